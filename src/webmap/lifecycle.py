@@ -1,0 +1,83 @@
+"""Who starts what: constructors record, :func:`webmap.start` does the I/O.
+
+A :class:`Service` (a bridge, for one) adds itself to :data:`lifecycle` when it is
+made. Nothing happens until the model's event loop runs; from then on a service that
+is added starts at once.
+"""
+
+import asyncio
+import logging
+import threading
+import weakref
+from collections.abc import Callable
+from typing import Any, Protocol
+
+log = logging.getLogger("webmap")
+
+
+class Service(Protocol):
+    """Something with I/O of its own on the model's event loop."""
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin; called in the loop's thread."""
+
+    async def stop(self) -> None:
+        """End, and leave nothing behind."""
+
+
+class Lifecycle:
+    """The services of one process and the event loop that they run on."""
+
+    def __init__(self) -> None:
+        self.loop: asyncio.AbstractEventLoop | None = None
+        self._thread: int | None = None
+        self._services: weakref.WeakSet[Any] = weakref.WeakSet()
+
+    @property
+    def running(self) -> bool:
+        """Whether the model's event loop runs now."""
+        return self.loop is not None
+
+    def add(self, service: Service) -> None:
+        """Let ``service`` start with the process, or now if that has started."""
+        self._services.add(service)
+        if self.loop is not None:
+            self.call(service.start, self.loop)
+
+    def discard(self, service: Service) -> None:
+        """Forget ``service``; it does not start any more."""
+        self._services.discard(service)
+
+    def call(self, fn: Callable[..., object], /, *args: Any) -> None:
+        """Call ``fn`` in the model's thread: now if this is it, else soon.
+
+        Raises:
+            RuntimeError: If the model's event loop does not run.
+
+        """
+        if self.loop is None:
+            raise RuntimeError("WebMap has not been started: call webmap.start()")
+        if threading.get_ident() == self._thread:
+            fn(*args)
+        else:
+            self.loop.call_soon_threadsafe(fn, *args)
+
+    def begin(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Start every service on ``loop``, from the loop's own thread."""
+        self.loop, self._thread = loop, threading.get_ident()
+        for service in list(self._services):
+            service.start(loop)
+
+    async def end(self) -> None:
+        """Stop every service, also when one of them raises."""
+        services, self.loop = list(self._services), None
+        results = await asyncio.gather(
+            *(service.stop() for service in services), return_exceptions=True
+        )
+        for service, result in zip(services, results, strict=True):
+            if isinstance(result, Exception):
+                log.error("%r did not stop cleanly", service, exc_info=result)
+
+
+lifecycle = Lifecycle()
+"""The one life cycle of this process."""
