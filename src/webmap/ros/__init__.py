@@ -1,1 +1,1 @@
-"""."""
+"""The link to ROS: rosbridge v2 as a client, messages, and names."""

@@ -1,0 +1,136 @@
+"""Names of topics, types and bridges, and when two of them mean the same."""
+
+import re
+from typing import NamedTuple
+from urllib.parse import urlsplit, urlunsplit
+
+from webmap.errors import ConfigError
+
+_TOPIC = re.compile(r"/(?:[A-Za-z_~][A-Za-z0-9_]*)(?:/[A-Za-z0-9_]+)*\Z")
+_TYPE = re.compile(
+    r"(?P<package>[A-Za-z][A-Za-z0-9_]*)"
+    r"(?:/(?P<kind>msg|srv|action))?"
+    r"/(?P<name>[A-Za-z][A-Za-z0-9_]*)\Z"
+)
+_DEFAULT_PORT = {"ws": 80, "wss": 443}
+_MAX_NAME = 255
+
+
+class TypeName(NamedTuple):
+    """A type's name without its dialect."""
+
+    package: str
+    name: str
+
+    def __str__(self) -> str:
+        """The name as ROS 1 writes it."""
+        return f"{self.package}/{self.name}"
+
+
+def normalise_topic(topic: str) -> str:
+    """Return the resolved name of ``topic``: absolute, single slashes, none last.
+
+    A relative name is taken from the root, as rosbridge itself does unless it runs
+    in a namespace.
+
+    Raises:
+        ConfigError: If the text cannot be the name of a topic or a service.
+
+    """
+    if not isinstance(topic, str):
+        raise ConfigError(f"a topic is a text such as '/odom', got {topic!r}")
+    name = "/" + "/".join(part for part in topic.strip().split("/") if part)
+    if len(name) > _MAX_NAME or not _TOPIC.match(name):
+        raise ConfigError(
+            f"{topic!r} is not the name of a topic: expected letters, digits and "
+            f"underscores between slashes, such as '/robot_0/odom'"
+        )
+    return name
+
+
+def is_topic(topic: str) -> bool:
+    """Return whether :func:`normalise_topic` would take ``topic``."""
+    try:
+        normalise_topic(topic)
+    except ConfigError:
+        return False
+    return True
+
+
+def split_type(type: str) -> TypeName:
+    """Return package and name of a type in either dialect.
+
+    ``nav_msgs/Odometry`` (ROS 1) and ``nav_msgs/msg/Odometry`` (ROS 2) give the
+    same value.
+
+    Raises:
+        ConfigError: If the text is not the name of a type.
+
+    """
+    match = _TYPE.match(type.strip()) if isinstance(type, str) else None
+    if match is None:
+        raise ConfigError(
+            f"{type!r} is not the name of a type: expected one such as "
+            f"'nav_msgs/Odometry' or 'nav_msgs/msg/Odometry'"
+        )
+    return TypeName(match["package"], match["name"])
+
+
+def same_type(one: str, other: str) -> bool:
+    """Return whether two names mean one type, whatever their dialects.
+
+    A text that is not the name of a type is the same as nothing.
+    """
+    try:
+        return split_type(one) == split_type(other)
+    except ConfigError:
+        return False
+
+
+def is_type(type: str, *names: str) -> bool:
+    """Return whether ``type`` is one of ``names``, whatever the dialects."""
+    return any(same_type(type, name) for name in names)
+
+
+def ros2_type(type: str) -> str:
+    """Return the name of a message type as ROS 2 writes it, with ``/msg/``.
+
+    Raises:
+        ConfigError: If the text is not the name of a type.
+
+    """
+    package, name = split_type(type)
+    return f"{package}/msg/{name}"
+
+
+def normalise_url(url: str) -> str:
+    """Return the one spelling of a bridge's address.
+
+    Scheme and host are in lower case, the scheme's own port and the slash at the
+    end are left out, so that two spellings of one bridge compare equal.
+
+    Raises:
+        ConfigError: If the text is not a WebSocket address.
+
+    """
+    hint = "expected one such as 'ws://localhost:9090' or 'wss://robot.example/ros'"
+    if not isinstance(url, str) or any(c.isspace() or c < " " for c in url.strip()):
+        raise ConfigError(f"{url!r} is not the address of a rosbridge: {hint}")
+    try:
+        parts = urlsplit(url.strip())
+        host, port = parts.hostname, parts.port
+    except ValueError as error:
+        raise ConfigError(
+            f"{url!r} is not the address of a rosbridge ({error}): {hint}"
+        ) from None
+    if parts.scheme not in _DEFAULT_PORT or not host or port == 0:
+        raise ConfigError(f"{url!r} is not the address of a rosbridge: {hint}")
+    if parts.username is not None or parts.fragment:
+        raise ConfigError(
+            f"the address of a rosbridge holds no user name and no fragment: {hint}"
+        )
+    place = f"[{host}]" if ":" in host else host
+    if port is not None and port != _DEFAULT_PORT[parts.scheme]:
+        place = f"{place}:{port}"
+    path = parts.path.rstrip("/")
+    return urlunsplit((parts.scheme, place, path, parts.query, ""))
