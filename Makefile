@@ -1,0 +1,121 @@
+# `make demo` shows WebMap, `make test` proves it, `make help` lists the rest.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.DEFAULT_GOAL := help
+
+# Every path is relative to this file, so that the checkout may lie anywhere.
+BIN := .venv/bin
+PY := $(BIN)/python
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+# Stamps lie in the folders that they vouch for and go with them.
+MADE := .venv/.made
+INSTALLED := .venv/.installed
+DEV := .venv/.installed-dev
+NODE := node_modules/.installed
+
+JOBS ?= 2
+ARGS ?=
+
+## help: list what there is
+.PHONY: help
+help:
+	@sed -n 's/^## /  make /p' Makefile
+
+## demo: install WebMap here and show two simulated robots (ARGS="--robots 5")
+.PHONY: demo
+demo: $(INSTALLED)
+	@exec $(BIN)/webmap demo $(ARGS)
+
+## test: everything: lint, types, contracts, unit, property, browser and peer tests, docs
+.PHONY: test
+test: check test-web test-python docs
+
+## check: lint, types, import contracts, generated files
+.PHONY: check
+check: lint types contracts
+
+## lint: ruff, codespell, eslint
+.PHONY: lint
+lint: $(DEV) $(NODE)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/codespell
+	node_modules/.bin/eslint .
+
+## types: mypy --strict on the Python, tsc on the JavaScript
+.PHONY: types
+types: $(DEV) $(NODE)
+	$(BIN)/mypy
+	$(BIN)/mypy benchmarks tools
+	node_modules/.bin/tsc
+
+## contracts: which room may import which, and whether generated files are up to date
+.PHONY: contracts
+contracts: $(DEV)
+	$(BIN)/lint-imports
+	$(PY) tools/make_opcodes.py --check
+
+## test-fast: the tests that need neither a browser nor a peer nor a quiet machine
+.PHONY: test-fast
+test-fast: $(DEV)
+	$(BIN)/pytest -q -n $(JOBS) -m "not browser and not peer and not serial and not slow"
+
+## test-web: the JavaScript that touches no DOM, in Node
+.PHONY: test-web
+test-web: $(NODE)
+	node --test $$(find tests/web -name '*.test.js' | sort)
+
+## test-python: pytest; what measures time runs alone at the end
+.PHONY: test-python
+test-python: $(DEV) $(NODE)
+	$(BIN)/pytest -q -n $(JOBS) -m "not serial"
+	$(BIN)/pytest -q -m serial
+
+## docs: the documentation, in docs/_build/html
+.PHONY: docs
+docs: $(DEV)
+	$(BIN)/sphinx-build -n -W --keep-going -q -b html docs docs/_build/html
+
+## bench: measure against roslibpy and the old ways of drawing; see benchmarks/README.md
+.PHONY: bench
+bench: $(DEV) $(NODE)
+	$(PY) -m benchmarks $(ARGS)
+
+## format: let ruff put the Python in order
+.PHONY: format
+format: $(DEV)
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+## clean: remove what was built here, environments too
+.PHONY: clean
+clean:
+	rm -rf .venv node_modules docs/_build build dist \
+	  .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+
+$(MADE): tools/make_venv.sh
+	tools/make_venv.sh .venv
+	touch $@
+
+$(INSTALLED): pyproject.toml $(MADE)
+	$(PY) -m pip install --quiet --editable .
+	touch $@
+
+# Dependency groups came to pip with 25.1.
+$(DEV): pyproject.toml $(INSTALLED)
+	$(PY) -m pip install --quiet --upgrade "pip>=25.1"
+	$(PY) -m pip install --quiet --group dev --group docs
+	touch $@
+
+# Looked for every time: it costs nothing, and a missing browser is then said at once.
+.PHONY: system
+system:
+	@tools/need_browser_and_node.sh
+
+$(NODE): package.json package-lock.json | system
+	npm ci --no-audit --no-fund --loglevel=error
+	touch $@
