@@ -1,0 +1,316 @@
+"""The elements of the scene: SVG and HTML, in Python."""
+
+from collections.abc import Iterator
+from typing import Any, Self
+
+from webmap.errors import SceneError
+from webmap.scene.allowed import (
+    attribute_name,
+    check_event,
+    check_property,
+    check_tag,
+    check_value,
+)
+from webmap.scene.classes import Classes, split_classes
+from webmap.scene.events import Event, Handler, Listener, Report, Spawn
+from webmap.scene.live import Live
+from webmap.scene.node import Node, Text
+from webmap.scene.values import format_value
+from webmap.scope import Removal, current_scope, keep
+
+Child = Node | str
+"""What an element takes as a child; a string becomes a text."""
+
+# A hand may have changed these on a page since, so that they are always sent.
+_CHANGED_BY_HANDS = frozenset({"value", "checked", "open", "selected"})
+
+
+class Element(Live):
+    """One element; every change of it reaches the pages that show it.
+
+    Keywords are attributes: ``class_`` is ``class`` and ``stroke_width`` is
+    ``stroke-width``. Tags and attributes outside the allow-list raise.
+    """
+
+    __slots__ = (
+        "_attributes",
+        "_children",
+        "_classes",
+        "_listeners",
+        "_styles",
+        "namespace",
+        "tag",
+    )
+
+    def __init__(
+        self,
+        tag: str,
+        /,
+        *children: Child,
+        text: str | None = None,
+        namespace: str = "svg",
+        **attributes: Any,
+    ) -> None:
+        super().__init__()
+        check_tag(namespace, tag)
+        self._prepare(tag, namespace)
+        self.set(**attributes)
+        if text is not None:
+            self.append(text)
+        self.append(*children)
+
+    def _prepare(self, tag: str, namespace: str) -> None:
+        self.tag = tag
+        self.namespace = namespace
+        self._attributes: dict[str, str] = {}
+        self._children: list[Node] = []
+        self._classes: dict[str, None] = {}
+        self._listeners: dict[str, list[Listener]] = {}
+        self._styles: dict[str, str] = {}
+
+    def __repr__(self) -> str:
+        name = f" class={str(self.classes)!r}" if self._classes else ""
+        return f"<{self.tag} {self.id}{name}>"
+
+    # Attributes ---------------------------------------------------------------
+
+    def get(self, name: str) -> str | None:
+        """Return the text of an attribute, or None if it is not set."""
+        name = attribute_name(self.namespace, name)
+        if name == "class":
+            return str(self.classes) or None
+        if name == "transform":
+            return self._transform if isinstance(self._transform, str) else None
+        return self._attributes.get(name)
+
+    def set(
+        self, name: str | None = None, value: Any = None, /, **attributes: Any
+    ) -> Self:
+        """Set attributes, by keyword or one by name; None and False unset them.
+
+        Raises:
+            SceneError: If an attribute or its value is not allowed.
+
+        """
+        if name is not None:
+            self._set(attribute_name(self.namespace, name), value)
+        for key, item in attributes.items():
+            self._set(attribute_name(self.namespace, key), item)
+        return self
+
+    def unset(self, *names: str) -> Self:
+        """Unset attributes; those that are not set stay so."""
+        for name in names:
+            self._set(attribute_name(self.namespace, name), None)
+        return self
+
+    def _set(self, name: str, value: Any) -> None:
+        text = format_value(name, value)
+        if text is not None:
+            check_value(self.tag, name, text)
+        if name == "class":
+            self.classes._replace(split_classes(text) if text else {})
+        elif name == "transform":
+            self._transform = text
+            self._touch("transform")
+        elif text != self._attributes.get(name) or name in _CHANGED_BY_HANDS:
+            self._store(self._attributes, name, text)
+
+    def set_style(self, name: str, value: str | float | None) -> Self:
+        """Set a custom style property such as ``"--dot-size"``; None unsets it.
+
+        Raises:
+            SceneError: If ``name`` is not that of a custom property, or the value
+                refers to something outside the document.
+
+        """
+        check_property(name)
+        text = format_value(name, value)
+        if text is not None:
+            check_value(self.tag, name, text)
+        if text != self._styles.get(name):
+            self._store(self._styles, name, text)
+        return self
+
+    def _store(self, place: dict[str, str], name: str, text: str | None) -> None:
+        if text is None:
+            place.pop(name, None)
+        else:
+            place[name] = text
+        self._touch(name)
+
+    @property
+    def classes(self) -> Classes:
+        """The classes that Python gave to the element."""
+        return Classes(self)
+
+    # Tree ---------------------------------------------------------------------
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The elements and texts in this one, in order."""
+        return tuple(self._children)
+
+    def walk(self) -> Iterator[Node]:
+        """Yield this element and everything in it, parents first."""
+        yield self
+        for child in self._children:
+            yield from child.walk()
+
+    @property
+    def text(self) -> str:
+        """All text in the element; setting it replaces what was in the element."""
+        return "".join(node.data for node in self.walk() if isinstance(node, Text))
+
+    @text.setter
+    def text(self, text: str) -> None:
+        children = self._children
+        if len(children) == 1 and isinstance(children[0], Text):
+            children[0].data = text
+        else:
+            self.clear()
+            self.append(text)
+
+    def append(self, *children: Child) -> Self:
+        """Put children at the end; one that has another parent leaves it.
+
+        Raises:
+            SceneError: If a child cannot be put there.
+
+        """
+        for child in children:
+            self.insert(len(self._children), child)
+        return self
+
+    def prepend(self, *children: Child) -> Self:
+        """Put children at the beginning, in their order."""
+        for index, child in enumerate(children):
+            self.insert(index, child)
+        return self
+
+    def insert(self, index: int, child: Child) -> Self:
+        """Put ``child`` before the child that is at ``index`` now.
+
+        Raises:
+            SceneError: If ``child`` is the root of a fragment, which is mounted and
+                not appended, or has this element in it.
+
+        """
+        node = self._check_child(child)
+        if node.parent is not None:
+            if node.parent is self and self._children.index(node) < index:
+                index -= 1
+            node.parent._take_out(node)
+        self._children.insert(index, node)
+        node.parent = self
+        if self.fragment is not None:
+            self.fragment.put_in(node)
+        return self
+
+    def _check_child(self, child: Child) -> Node:
+        node = Text(child) if isinstance(child, str) else child
+        if not isinstance(node, Node):
+            raise SceneError(f"a child must be an element or text, got {child!r}")
+        if node.parent is None and node.fragment is not None:
+            raise SceneError(
+                f"{node!r} is the root of a fragment: mount the fragment instead"
+            )
+        above: Element | None = self
+        while above is not None:
+            if above is node:
+                raise SceneError(f"{node!r} cannot be put into itself")
+            above = above.parent
+        return node
+
+    def clear(self) -> Self:
+        """Remove everything in the element."""
+        for child in reversed(self._children[:]):
+            child.remove()
+        return self
+
+    def _take_out(self, node: Node) -> None:
+        self._children.remove(node)
+        if self.fragment is not None:
+            self.fragment.take_out(node)
+        node.parent = None
+
+    def _release(self) -> None:
+        for listeners in self._listeners.values():
+            for listener in listeners:
+                listener.forget()
+        self._listeners = {}
+        for child in self._children:
+            child._release()
+
+    # Events -------------------------------------------------------------------
+
+    def on(
+        self,
+        event: str,
+        handler: Handler,
+        *,
+        prevent: bool = False,
+        stop: bool = False,
+    ) -> Removal:
+        """Call ``handler`` with every such event, of every viewer.
+
+        The handler joins the current scope and is called within it; it goes with
+        the element, too.
+
+        Args:
+            event: The browser's name of the event, such as ``"click"``.
+            handler: A function, or a coroutine function, that takes an
+                :class:`Event`.
+            prevent: Whether the browser leaves out what it would do by itself.
+            stop: Whether elements further out do not hear of it.
+
+        Returns:
+            What takes the handler away again.
+
+        Raises:
+            SceneError: If the event is not one that a scene knows.
+
+        """
+        check_event(event)
+        listener = Listener(handler, current_scope(), prevent=prevent, stop=stop)
+        self._listeners.setdefault(event, []).append(listener)
+        self._touch("events")
+        listener.removal = Removal(lambda: self._off(event, listener))
+        return keep(listener.removal)
+
+    def _off(self, event: str, listener: Listener) -> None:
+        listener.forget()
+        listeners = self._listeners.get(event, [])
+        if listener in listeners:
+            listeners.remove(listener)
+            if not listeners:
+                del self._listeners[event]
+            self._touch("events")
+
+    def handlers(self, event: str) -> tuple[Handler, ...]:
+        """Return the handlers of an event, in the order in which they were added."""
+        return tuple(item.handler for item in self._listeners.get(event, ()))
+
+    def dispatch(
+        self, event: Event, report: Report, spawn: Spawn | None = None
+    ) -> None:
+        """Call every handler of ``event.kind``, each in the scope it was added in.
+
+        Args:
+            event: What happened.
+            report: Called with each exception that a handler lets out; the other
+                handlers are called all the same.
+            spawn: Called with what a coroutine function returned, in the context
+                in which it is to run.
+
+        """
+        for listener in tuple(self._listeners.get(event.kind, ())):
+            listener.call(event, report, spawn)
+
+    @property
+    def listening(self) -> dict[str, tuple[bool, bool]]:
+        """The events that are listened to: whether prevented, whether stopped."""
+        return {
+            kind: (any(i.prevent for i in items), any(i.stop for i in items))
+            for kind, items in self._listeners.items()
+        }

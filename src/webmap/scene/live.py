@@ -1,0 +1,153 @@
+"""Values that change many times a second: poses, dots and ages."""
+
+import math
+import time
+from typing import NamedTuple
+
+from webmap.errors import SceneError
+from webmap.geometry import Affine
+from webmap.scene.node import Node
+
+isfinite = math.isfinite
+
+
+class Dots(NamedTuple):
+    """Points to draw as small squares."""
+
+    points: bytes
+    """Pairs of 16-bit integers, little-endian: x and y."""
+
+    unit: float
+    """Metres in one unit of ``points``."""
+
+
+class Age(NamedTuple):
+    """When the data of an element was measured, by this process's clock."""
+
+    measured: float
+    """Seconds of :func:`time.monotonic`; -inf if there was never any data."""
+
+    limit: float
+    """Seconds after which the data counts as old."""
+
+    shown: bool
+    """Whether the age is the element's text."""
+
+
+class Live(Node):
+    """A node whose place, dots and age can be set at every tick, cheaply."""
+
+    __slots__ = ("_age", "_dots", "_transform")
+
+    namespace = "svg"
+
+    def __init__(self) -> None:
+        super().__init__()
+        # The newest of: an attribute's text, a pose (x, y, yaw), a matrix.
+        self._transform: str | tuple[float, float, float] | Affine | None = None
+        self._dots: Dots | None = None
+        self._age: Age | None = None
+
+    def set_pose(self, x: float, y: float, yaw: float) -> None:
+        """Place the element in its parent, newest wins.
+
+        Args:
+            x: Metres.
+            y: Metres.
+            yaw: Radians, counter-clockwise.
+
+        Raises:
+            SceneError: If a number is not finite.
+
+        """
+        if not isfinite(x + y + yaw):
+            raise SceneError(f"a pose must be finite, got {x}, {y}, {yaw}")
+        pose = (x, y, yaw)
+        if pose != self._transform:
+            self._place(pose)
+
+    def set_matrix(self, matrix: Affine) -> None:
+        """Place the element in its parent by any affine map, newest wins.
+
+        Raises:
+            SceneError: If a component is not finite.
+
+        """
+        if not all(map(isfinite, matrix.values)):
+            raise SceneError(f"a matrix must be finite, got {matrix}")
+        if matrix != self._transform:
+            self._place(matrix)
+
+    def _place(self, transform: tuple[float, float, float] | Affine) -> None:
+        if self.namespace != "svg":
+            raise SceneError(f"{self!r} is not SVG, so it has no pose")
+        self._transform = transform
+        self._touch("transform")
+
+    def set_dots(self, points: bytes | bytearray | memoryview, unit: float) -> None:
+        """Draw the element, a ``path``, as a small square at each point.
+
+        The squares are as wide as the CSS custom property ``--dot-size`` says, in
+        metres.
+
+        Args:
+            points: Pairs of 16-bit integers, little-endian: x and y of each point.
+            unit: Metres in one unit of ``points``.
+
+        Raises:
+            SceneError: If the element is no path, if there is half a point, or if
+                ``unit`` is not a finite number above 0.
+
+        """
+        if self.tag != "path":
+            raise SceneError(f"{self!r} is not a path, so it cannot be drawn as dots")
+        data = bytes(points)
+        if len(data) % 4:
+            raise SceneError(f"points are 4 bytes each, got {len(data)} bytes in all")
+        if not (isfinite(unit) and unit > 0):
+            raise SceneError(f"unit must be a number of metres above 0, got {unit}")
+        dots = Dots(data, unit)
+        if dots != self._dots:
+            self._dots = dots
+            self._touch("dots")
+
+    def set_age(
+        self,
+        seconds_old: float,
+        *,
+        limit: float | None = None,
+        age_text: bool | None = None,
+    ) -> None:
+        """Say how old the data is that the element shows.
+
+        From then on every page counts the age by itself, keeps it in ``data-age``
+        and gives the element the class ``stale`` beyond the limit, also while this
+        process is out of reach.
+
+        Args:
+            seconds_old: Seconds since the data was measured; infinity if there was
+                none yet.
+            limit: Seconds after which the data counts as old; at first 1.
+            age_text: Whether the page shows the age as the element's text; at first
+                not.
+
+        Raises:
+            SceneError: If ``seconds_old`` or ``limit`` is NaN or below 0.
+
+        """
+        if not seconds_old >= 0:
+            raise SceneError(f"an age must be at least 0 s, got {seconds_old}")
+        if limit is not None and not (limit >= 0 and isfinite(limit)):
+            raise SceneError(f"the limit of an age must be at least 0 s, got {limit}")
+        old = self._age
+        if old is None:
+            old = Age(0.0, 1.0, False)
+            self._touch("age-limit")
+        if limit is None:
+            limit = old.limit
+        if age_text is None:
+            age_text = old.shown
+        if limit != old.limit or age_text != old.shown:
+            self._touch("age-limit")
+        self._age = Age(time.monotonic() - seconds_old, limit, age_text)
+        self._touch("age")

@@ -1,0 +1,63 @@
+"""Makers of SVG elements: ``svg.circle(r=0.2, fill="red")``.
+
+There is one for each SVG tag that a scene may hold. Children come first, then
+``text`` and attributes by keyword.
+"""
+
+from typing import Any
+
+from webmap.scene.element import Child, Element
+
+namespace = "http://www.w3.org/2000/svg"
+"""The XML namespace of SVG."""
+
+xlink_namespace = "http://www.w3.org/1999/xlink"
+"""The XML namespace of XLink, for documents that still use it."""
+
+
+class Maker:
+    """Makes SVG elements with one tag."""
+
+    def __init__(self, tag: str) -> None:
+        self.tag = tag
+
+    def __call__(
+        self, *children: Child, text: str | None = None, **attributes: Any
+    ) -> Element:
+        """Return a new element.
+
+        Raises:
+            SceneError: If an attribute is not allowed.
+
+        """
+        return Element(self.tag, *children, text=text, **attributes)
+
+    def __repr__(self) -> str:
+        return f"<maker of SVG {self.tag}>"
+
+
+circle = Maker("circle")
+clip_path = Maker("clipPath")
+defs = Maker("defs")
+desc = Maker("desc")
+ellipse = Maker("ellipse")
+g = Maker("g")
+image = Maker("image")
+line = Maker("line")
+linear_gradient = Maker("linearGradient")
+marker = Maker("marker")
+mask = Maker("mask")
+path = Maker("path")
+pattern = Maker("pattern")
+polygon = Maker("polygon")
+polyline = Maker("polyline")
+radial_gradient = Maker("radialGradient")
+rect = Maker("rect")
+stop = Maker("stop")
+svg = Maker("svg")
+symbol = Maker("symbol")
+text = Maker("text")
+text_path = Maker("textPath")
+title = Maker("title")
+tspan = Maker("tspan")
+use = Maker("use")

@@ -1,0 +1,63 @@
+import pytest
+
+from webmap.errors import SceneError
+from webmap.scene import Changed, Document, Fragment, html, svg
+
+
+def test_the_same_id_gives_the_same_element():
+    document = Document()
+    Fragment(document)
+    log = document.bind("log")
+    assert document.bind("log") is log
+    assert log.html_id == "log"
+    assert document.bind("other") is not log
+
+
+def test_setting_text_drops_what_the_page_had():
+    document = Document()
+    fragment = Fragment(document)
+    label = document.bind("label")
+    since = fragment.revision
+    label.text = "Bob"
+    assert Changed(label, "emptied") in fragment.changes_since(since)
+    assert label.text == "Bob"
+
+
+def test_lines_can_be_put_on_top():
+    log = Document().bind("log")
+    log.prepend("first line").prepend("second line")
+    assert log.text == "second linefirst line"
+
+
+def test_a_bound_element_has_classes_attributes_and_events():
+    element = Document().bind("x")
+    element.classes.add("on")
+    element.set(title="hello", aria_live="polite")
+    element.on("click", print)
+    assert element.get("title") == "hello"
+    with pytest.raises(SceneError):
+        element.set("onclick", "x")
+    with pytest.raises(SceneError, match="not SVG"):
+        element.set_pose(0, 0, 0)
+
+
+@pytest.mark.parametrize("html_id", ["", "two words", None])
+def test_an_id_is_a_word(html_id):
+    with pytest.raises(SceneError, match="word"):
+        Document().bind(html_id)
+
+
+def test_the_document_holds_bound_elements_only():
+    document = Document()
+    with pytest.raises(SceneError, match=r"page\.element"):
+        document.append(html.p())
+    with pytest.raises(SceneError, match=r"page\.element"):
+        document.append("text")
+    with pytest.raises(SceneError, match="no attributes"):
+        document.set(title="x")
+
+
+def test_a_map_is_put_into_a_bound_element():
+    container = Document().bind("container")
+    container.append(svg.svg())
+    assert container.children[0].tag == "svg"

@@ -1,0 +1,207 @@
+import gc
+import math
+import weakref
+
+import pytest
+
+from webmap.errors import SceneError
+from webmap.geometry import Affine
+from webmap.scene import Event, Fragment, Text, html, svg
+from webmap.scope import Scope, current_scope
+
+
+def test_keywords_are_attributes():
+    circle = svg.circle(r=0.2, class_="a b", stroke_width=2, viewBox=None)
+    assert circle.get("r") == "0.2"
+    assert circle.get("stroke-width") == circle.get("stroke_width") == "2"
+    assert list(circle.classes) == ["a", "b"]
+    assert circle.get("class") == "a b"
+    assert circle.get("viewBox") is None
+
+
+def test_odd_names_are_set_one_by_one():
+    g = svg.g().set("data-name", "Bob").set("aria-label", "Robot Bob")
+    assert g.get("data-name") == "Bob"
+    assert g.get("aria_label") == "Robot Bob"
+    assert g.unset("data-name").get("data-name") is None
+
+
+def test_classes_come_and_go():
+    g = svg.g(class_="robot")
+    g.classes.add("fast", "red")
+    g.classes.remove("fast", "never-there")
+    assert "red" in g.classes
+    assert g.classes.toggle("red") is False
+    assert g.classes.toggle("red", on=True) is True
+    assert str(g.classes) == "robot red"
+    with pytest.raises(SceneError, match="word"):
+        g.classes.add("")
+
+
+def test_text_replaces_what_was_there():
+    p = html.p("Hello ", html.strong("you"))
+    assert p.text == "Hello you"
+    p.text = "<b>bye</b>"
+    assert p.text == "<b>bye</b>"
+    assert [type(node) for node in p.children] == [Text]
+
+
+def test_a_new_text_reuses_the_node():
+    p = html.p(text="1")
+    node = p.children[0]
+    p.text = "2"
+    assert p.children == (node,)
+
+
+def test_children_are_kept_in_order():
+    a, b, c = svg.g(), svg.g(), svg.g()
+    parent = svg.g(b)
+    parent.append(c).insert(0, a)
+    assert parent.children == (a, b, c)
+    parent.insert(3, a)
+    assert parent.children == (b, c, a)
+    parent.prepend(c, a)
+    assert parent.children == (c, a, b)
+    assert c.parent is parent
+
+
+def test_a_child_leaves_its_old_parent():
+    child = svg.g()
+    old, new = svg.g(child), svg.g()
+    new.append(child)
+    assert old.children == ()
+    assert child.parent is new
+
+
+def test_an_element_cannot_be_in_itself():
+    inner = svg.g()
+    outer = svg.g(inner)
+    with pytest.raises(SceneError, match="itself"):
+        inner.append(outer)
+    with pytest.raises(SceneError, match="itself"):
+        inner.append(inner)
+
+
+def test_the_root_of_a_fragment_is_mounted_and_not_appended():
+    root = svg.g()
+    Fragment(root)
+    with pytest.raises(SceneError, match="mount"):
+        svg.g().append(root)
+    with pytest.raises(SceneError, match="already"):
+        Fragment(root)
+
+
+def test_what_is_no_element_is_no_child():
+    with pytest.raises(SceneError, match="element or text"):
+        svg.g().append(5)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_a_pose_is_finite(number):
+    g = svg.g()
+    for pose in ((number, 0, 0), (0, number, 0), (0, 0, number)):
+        with pytest.raises(SceneError, match="finite"):
+            g.set_pose(*pose)
+    with pytest.raises(SceneError, match="finite"):
+        g.set_matrix(Affine(a=number))
+
+
+def test_html_has_no_pose():
+    with pytest.raises(SceneError, match="not SVG"):
+        html.p().set_pose(1, 2, 3)
+
+
+def test_dots_are_whole_points_of_a_path():
+    svg.path().set_dots(b"\0\0\0\0", 0.001)
+    with pytest.raises(SceneError, match="not a path"):
+        svg.circle().set_dots(b"", 0.001)
+    with pytest.raises(SceneError, match="4 bytes"):
+        svg.path().set_dots(b"123", 0.001)
+    with pytest.raises(SceneError, match="unit"):
+        svg.path().set_dots(b"", 0)
+
+
+@pytest.mark.parametrize("age", [-1, math.nan])
+def test_an_age_is_not_negative(age):
+    with pytest.raises(SceneError, match="age"):
+        svg.g().set_age(age)
+    with pytest.raises(SceneError, match="limit"):
+        svg.g().set_age(0, limit=age)
+
+
+def test_an_event_reaches_every_handler_although_one_raises():
+    heard, errors = [], []
+    button = html.button("Go")
+
+    def broken(event):
+        raise RuntimeError("no")
+
+    button.on("click", broken)
+    button.on("click", heard.append)
+    event = Event(kind="click", element=button)
+    button.dispatch(event, errors.append)
+    assert heard == [event]
+    assert [str(error) for error in errors] == ["no"]
+    assert button.handlers("click") == (broken, heard.append)
+
+
+def test_a_handler_runs_in_the_scope_it_was_added_in():
+    scope, seen = Scope("page"), []
+    button = html.button()
+    with scope.active():
+        button.on("click", lambda event: seen.append(current_scope()))
+    button.on("click", lambda event: seen.append(current_scope()))
+    with Scope("other").active():
+        button.dispatch(Event(kind="click"), pytest.fail)
+    assert seen == [scope, None]
+
+
+def test_what_a_coroutine_function_returns_is_handed_on():
+    async def handler(event):
+        return event.kind
+
+    spawned = []
+    button = html.button()
+    button.on("click", handler)
+    button.dispatch(Event(kind="click"), pytest.fail, spawned.append)
+    with pytest.raises(StopIteration, match="click"):
+        spawned[0].send(None)
+
+
+def test_a_scope_ends_its_handlers():
+    scope = Scope()
+    button = html.button()
+    with scope.active():
+        button.on("click", print, stop=True)
+    assert button.listening == {"click": (False, True)}
+    scope.close()
+    assert button.listening == {}
+
+
+def test_a_removed_element_leaves_nothing_in_its_scope():
+    scope = Scope()
+    parent = html.ul()
+    Fragment(parent)
+    with scope.active():
+        for _ in range(1000):
+            item = html.li(html.button("x"))
+            item.children[0].on("click", print)
+            parent.append(item)
+            item.remove()
+        removal = html.button().on("click", print)
+        removal.remove()
+    assert len(scope) == 0
+    assert parent.fragment is not None
+    assert len(parent.fragment) == 1
+    left = weakref.ref(item)
+    del item
+    gc.collect()
+    assert left() is None
+
+
+def test_removing_twice_does_nothing():
+    child = svg.g()
+    parent = svg.g(child)
+    child.remove()
+    child.remove()
+    assert parent.children == ()

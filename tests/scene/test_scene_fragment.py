@@ -1,0 +1,219 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.scene import Added, Changed, Fragment, Removed, Text, html, svg
+
+
+def test_nothing_changed_since_now():
+    fragment = Fragment(svg.g())
+    assert fragment.changes_since(fragment.revision) == []
+
+
+def test_the_newest_value_wins():
+    root = svg.g()
+    fragment = Fragment(root)
+    for x in range(100):
+        root.set_pose(x, 0, 0)
+        root.set(fill="red" if x % 2 else "blue")
+    changes = fragment.changes_since(0)
+    assert sorted(changes, key=lambda c: c.slot) == [
+        Changed(root, "fill"),
+        Changed(root, "transform"),
+    ]
+
+
+def test_an_equal_value_is_no_change():
+    root = svg.path(fill="red", class_="dot")
+    fragment = Fragment(root)
+    root.set_pose(1, 2, 3)
+    root.set_dots(b"1234", 1)
+    before = fragment.revision
+    root.set_pose(1, 2, 3)
+    root.set_dots(b"1234", 1)
+    root.set(fill="red", class_="dot")
+    root.classes.add("dot")
+    assert fragment.revision == before
+
+
+def test_a_tick_of_a_checkbox_is_sent_again_since_a_hand_may_have_changed_it():
+    box = html.input(type="checkbox", checked=True)
+    fragment = Fragment(box)
+    box.set(checked=True)
+    assert fragment.changes_since(0) == [Changed(box, "checked")]
+
+
+def test_a_new_element_comes_whole():
+    root = svg.g(svg.rect())
+    fragment = Fragment(root)
+    since = fragment.revision
+    child = svg.g(svg.circle())
+    root.append(child)
+    child.children[0].set(r=2)
+    child.append(svg.line())
+    assert fragment.changes_since(since) == [Added(child, root.children[0])]
+
+
+def test_new_siblings_come_from_left_to_right():
+    old = svg.g()
+    root = svg.g(old)
+    fragment = Fragment(root)
+    a, b, c = svg.g(), svg.g(), svg.g()
+    root.append(c).insert(0, b).insert(0, a)
+    assert fragment.changes_since(0) == [Added(a, None), Added(b, a), Added(c, old)]
+
+
+def test_what_nobody_was_told_of_needs_no_removal():
+    root = svg.g()
+    fragment = Fragment(root)
+    for _ in range(10_000):
+        child = svg.g()
+        root.append(child)
+        child.set_pose(1, 2, 3)
+        child.remove()
+    assert fragment.changes_since(0) == []
+    assert not fragment._removed
+    assert not fragment._touched
+    assert not fragment._added
+
+
+def test_the_log_is_bounded_and_says_when_it_forgot():
+    root = svg.g()
+    fragment = Fragment(root)
+    start = fragment.revision
+    for _ in range(Fragment.REMOVALS_KEPT + 1):
+        child = svg.g()
+        root.append(child)
+        fragment.mark_told()
+        child.remove()
+    assert len(fragment._removed) == Fragment.REMOVALS_KEPT
+    assert fragment.changes_since(start) is None
+    assert fragment.changes_since(fragment.revision) == []
+
+
+def test_a_moved_element_goes_and_comes():
+    child = svg.g()
+    left, right = svg.g(child), svg.g()
+    fragment = Fragment(svg.g(left, right))
+    fragment.mark_told()
+    right.append(child)
+    assert fragment.changes_since(0) == [Removed(child.id), Added(child, None)]
+
+
+def test_nodes_are_found_by_id_while_they_are_in():
+    child = svg.g("text")
+    root = svg.g(child)
+    fragment = Fragment(root)
+    assert fragment.find(child.children[0].id) is child.children[0]
+    child.remove()
+    assert fragment.find(child.id) is None
+    assert child.fragment is None
+    assert len(fragment) == 1
+
+
+def test_listening_is_a_change():
+    root = svg.g()
+    fragment = Fragment(root)
+    removal = root.on("click", print)
+    assert fragment.changes_since(0) == [Changed(root, "events")]
+    since = fragment.revision
+    removal.remove()
+    assert fragment.changes_since(since) == [Changed(root, "events")]
+
+
+def test_a_closed_fragment_has_no_listeners():
+    child = svg.g()
+    fragment = Fragment(svg.g(child))
+    child.on("click", print)
+    fragment.close()
+    assert child.handlers("click") == ()
+
+
+class Mirror:
+    """Does what a viewer does with changes, without any encoding."""
+
+    def __init__(self, fragment):
+        self.fragment = fragment
+        self.revision = fragment.revision
+        fragment.mark_told()
+        self.children = {}
+        self.data = {}
+        self.create(fragment.root)
+
+    def create(self, node):
+        assert node.id not in self.data
+        self.data[node.id] = node.data if isinstance(node, Text) else node.get("fill")
+        self.children[node.id] = []
+        for child in getattr(node, "children", ()):
+            self.create(child)
+            self.children[node.id].append(child.id)
+
+    def forget(self, node_id):
+        for child in self.children.pop(node_id):
+            self.forget(child)
+        del self.data[node_id]
+
+    def follow(self):
+        for change in self.fragment.changes_since(self.revision):
+            match change:
+                case Removed(node_id):
+                    if node_id in self.data:
+                        for siblings in self.children.values():
+                            if node_id in siblings:
+                                siblings.remove(node_id)
+                        self.forget(node_id)
+                case Added(node, after):
+                    self.create(node)
+                    siblings = self.children[node.parent.id]
+                    siblings.insert(
+                        siblings.index(after.id) + 1 if after else 0, node.id
+                    )
+                case Changed(node, "fill"):
+                    self.data[node.id] = node.get("fill")
+                case Changed(node, "text"):
+                    self.data[node.id] = node.data
+        self.revision = self.fragment.revision
+
+    def check(self):
+        fresh = Mirror(self.fragment)
+        assert (self.children, self.data) == (fresh.children, fresh.data)
+
+
+steps = st.lists(
+    st.tuples(
+        st.sampled_from(
+            ["add", "move", "remove", "fill", "text", "follow 0", "follow 1"]
+        ),
+        st.integers(0, 30),
+        st.integers(0, 30),
+        st.integers(0, 30),
+    ),
+    max_size=60,
+)
+
+
+@given(steps)
+def test_viewers_that_look_now_and_then_see_the_same_tree(steps):
+    fragment = Fragment(svg.g())
+    mirrors = [Mirror(fragment), Mirror(fragment)]
+    for step, a, b, c in steps:
+        groups = [n for n in fragment.root.walk() if not isinstance(n, Text)]
+        one, other = groups[a % len(groups)], groups[b % len(groups)]
+        place = c % (len(one.children) + 1)
+        match step:
+            case "add":
+                one.insert(place, svg.g(svg.g("x")))
+            case "move":
+                if one not in list(other.walk()):
+                    one.insert(place, other)
+            case "remove":
+                if one is not fragment.root:
+                    one.remove()
+            case "fill":
+                one.set(fill=str(b))
+            case "text":
+                one.text = str(b)
+            case follow:
+                mirrors[int(follow[-1])].follow()
+    for mirror in mirrors:
+        mirror.follow()
+        mirror.check()
