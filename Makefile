@@ -62,7 +62,7 @@ contracts: $(DEV)
 ## test-fast: the tests that need neither a browser nor a peer nor a quiet machine
 .PHONY: test-fast
 test-fast: $(DEV)
-	$(BIN)/pytest -q -n $(JOBS) -m "not browser and not peer and not serial and not slow"
+	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not browser and not peer and not serial and not slow"
 
 ## test-web: the JavaScript that touches no DOM, in Node
 .PHONY: test-web
@@ -72,7 +72,7 @@ test-web: $(NODE)
 ## test-python: pytest; what measures time runs alone at the end
 .PHONY: test-python
 test-python: $(DEV) $(NODE)
-	$(BIN)/pytest -q -n $(JOBS) -m "not serial"
+	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not serial"
 	$(BIN)/pytest -q -m serial
 
 ## docs: the documentation, in docs/_build/html

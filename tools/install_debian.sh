@@ -15,4 +15,4 @@ fi
 printf 'webmap: installing %s\n' "$*" >&2
 export DEBIAN_FRONTEND=noninteractive
 apt-get update -qq
-apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "$@" >/dev/null

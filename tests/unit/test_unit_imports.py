@@ -1,0 +1,41 @@
+"""What is loaded when, because it decides how soon things start and what can fail."""
+
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"PIL", "cbor2", "click", "numpy", "starlette", "uvicorn", "yaml"}
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Return the top-level modules that a fresh interpreter has after it."""
+    return {name.partition(".")[0] for name in modules_after(statement)}
+
+
+def modules_after(statement: str) -> list[str]:
+    program = f"{statement}; import sys; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+def test_the_heavy_packages_would_be_seen() -> None:
+    assert {"numpy", "starlette"} <= loaded_by("import numpy, starlette")
+
+
+def test_importing_webmap_loads_no_heavy_package() -> None:
+    assert not loaded_by("import webmap") & (HEAVY | {"websockets", "msgspec"})
+
+
+@pytest.mark.parametrize("module", ["webmap.gate.__main__", "webmap.gate.client"])
+def test_the_gate_loads_no_heavy_package(module: str) -> None:
+    assert not loaded_by(f"import {module}") & HEAVY
+
+
+def test_the_gate_process_loads_nothing_of_the_display() -> None:
+    loaded = modules_after("import webmap.gate.__main__")
+    rooms = {".".join(name.split(".")[:2]) for name in loaded}
+    display = {"cli", "console", "core", "modules", "scene", "server", "sim", "wire"}
+    assert not rooms & {f"webmap.{room}" for room in display}

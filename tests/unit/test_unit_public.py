@@ -1,0 +1,36 @@
+"""The public names, and the version that is said in several places."""
+
+import re
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import webmap
+
+ROOT = Path(__file__).parents[2]
+PAGES = (ROOT / "docs" / "reference").glob("*.md")
+REFERENCE = "\n".join(page.read_text("utf-8") for page in PAGES)
+
+
+@pytest.mark.parametrize("name", webmap.__all__)
+def test_every_public_name_can_be_had(name: str) -> None:
+    assert getattr(webmap, name) is not None
+
+
+@pytest.mark.parametrize("name", webmap.__all__)
+def test_every_public_name_stands_in_the_reference(name: str) -> None:
+    assert f"webmap.{name}" in REFERENCE
+
+
+def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = webmap.no_such_name
+
+
+def test_every_place_says_the_same_version() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    newest = re.search(r"^## (\S+?),", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
+    assert newest is not None
+    assert {webmap.__version__, version("webmap"), newest[1]} == {project["version"]}
