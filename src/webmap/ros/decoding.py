@@ -1,0 +1,104 @@
+"""From bytes to a value of the type that was asked for: strictly, then leniently.
+
+Nearly every frame takes the first road, one strict pass by msgspec. What real bridges
+write beside the standard takes the second: the bare tokens ``NaN`` and ``Infinity``,
+and ``null`` in the place of a number.
+"""
+
+import json
+import math
+from array import array
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from webmap.errors import ProtocolError
+from webmap.ros.arrays import dec_hook
+
+MAX_DEPTH = 32
+"""How deeply a plain message may be nested; ROS messages are far flatter."""
+
+_FAILURES = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+@lru_cache(maxsize=256)
+def _decoder(type: Any) -> "msgspec.json.Decoder[Any]":
+    return msgspec.json.Decoder(type, dec_hook=dec_hook)
+
+
+def decode_json(text: bytes, type: Any) -> Any:
+    """Return the JSON in ``text`` as a value of ``type``.
+
+    Raises:
+        ProtocolError: If it is not JSON, not even leniently, or of another shape.
+
+    """
+    try:
+        return _decoder(type).decode(text)
+    except msgspec.ValidationError as error:
+        reason: Exception = error
+    except _FAILURES as error:
+        # Only these tokens can make good text of what is bad JSON.
+        if b"NaN" not in text and b"Infinity" not in text:
+            raise ProtocolError(f"not JSON: {error}") from None
+        reason = error
+    try:
+        value = json.loads(text.decode())
+    except (ValueError, RecursionError):
+        raise ProtocolError(f"not JSON: {reason}") from None
+    return convert(value, type)
+
+
+def convert(value: Any, type: Any) -> Any:
+    """Return a decoded value as one of ``type``.
+
+    A ``null`` where a number is wanted becomes NaN and a typed array where a list
+    is wanted becomes a list.
+
+    Raises:
+        ProtocolError: If the value has another shape.
+
+    """
+    try:
+        return msgspec.convert(value, type, dec_hook=dec_hook)
+    except (msgspec.ValidationError, RecursionError) as error:
+        reason = error
+    try:
+        plain = _plain(value, MAX_DEPTH)
+        return msgspec.convert(plain, type, dec_hook=dec_hook)
+    except (msgspec.ValidationError, RecursionError):
+        raise ProtocolError(str(reason)) from None
+
+
+def check_depth(value: Any, allowed: int = MAX_DEPTH) -> None:
+    """Let a plain value pass if it is nested no deeper than ``allowed``.
+
+    Raises:
+        ProtocolError: If it is.
+
+    """
+    if isinstance(value, dict):
+        value = value.values()
+    elif not isinstance(value, list):
+        return
+    if allowed == 0:
+        raise ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
+    for item in value:
+        if isinstance(item, (dict, list)):
+            check_depth(item, allowed - 1)
+
+
+def _plain(value: Any, allowed: int) -> Any:
+    """Return ``value`` with NaN for null and lists for typed arrays."""
+    if allowed == 0:
+        raise ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
+    if value is None:
+        return math.nan
+    if isinstance(value, array):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _plain(item, allowed - 1) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item, allowed - 1) for item in value]
+    return value

@@ -1,0 +1,320 @@
+"""Typed views of ROS messages: the fields that WebMap needs, in either dialect.
+
+A view names a few fields of a message; a decoder skips the rest. Fields that tell one
+type from another have no defaults, so a message of another type is an error and never
+a robot at the origin. A number that was ``null`` is NaN.
+"""
+
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from webmap.errors import ProtocolError
+from webmap.geometry import Pose, Quaternion, Twist, Vector3
+from webmap.ros.arrays import Floats, Int8s
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class Time(msgspec.Struct, frozen=True, gc=False):
+    """A moment of the robot's clock, with the names of ROS 1 and of ROS 2."""
+
+    secs: int = 0
+    nsecs: int = 0
+    sec: int = 0
+    nanosec: int = 0
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the epoch of that clock; 0 if nobody set it."""
+        return (self.secs or self.sec) + 1e-9 * (self.nsecs or self.nanosec)
+
+
+class Header(msgspec.Struct, frozen=True):
+    """When a message was measured, and in which frame its numbers are."""
+
+    stamp: Time = Time()
+    frame_id: str = ""
+
+
+class PointMsg(msgspec.Struct, frozen=True, gc=False):
+    """``geometry_msgs/Point`` and ``geometry_msgs/Vector3``."""
+
+    x: float
+    y: float
+    z: float = 0.0
+
+    @property
+    def vector(self) -> Vector3:
+        """The same numbers as a value of :mod:`webmap.geometry`."""
+        return Vector3(self.x, self.y, self.z)
+
+
+class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
+    """``geometry_msgs/Quaternion``; its norm may be anything."""
+
+    x: float
+    y: float
+    z: float
+    w: float
+
+    @property
+    def quaternion(self) -> Quaternion:
+        """The same numbers as a value of :mod:`webmap.geometry`."""
+        return Quaternion(self.x, self.y, self.z, self.w)
+
+
+class PoseMsg(msgspec.Struct, frozen=True):
+    """``geometry_msgs/Pose``."""
+
+    position: PointMsg
+    orientation: QuaternionMsg
+
+    @property
+    def planar(self) -> Pose:
+        """Place and heading in the plane."""
+        return Pose(self.position.x, self.position.y, self.orientation.quaternion.yaw)
+
+    @property
+    def place(self) -> "PoseMsg":
+        """The pose itself; every view of a pose has one of this name."""
+        return self
+
+    @property
+    def frame_id(self) -> str:
+        """Empty: this type does not say in which frame it is."""
+        return ""
+
+    @property
+    def stamp(self) -> float:
+        """0: this type does not say when it was measured."""
+        return 0.0
+
+
+class _Stamped(msgspec.Struct, frozen=True, kw_only=True):
+    header: Header = Header()
+
+    @property
+    def frame_id(self) -> str:
+        """The frame that the numbers are in."""
+        return self.header.frame_id
+
+    @property
+    def stamp(self) -> float:
+        """When it was measured, in seconds of the robot's clock; 0 if not said."""
+        return self.header.stamp.seconds
+
+
+class PoseStampedMsg(_Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/PoseStamped``."""
+
+    pose: PoseMsg
+
+    @property
+    def place(self) -> PoseMsg:
+        """Place and orientation in :attr:`frame_id`."""
+        return self.pose
+
+
+class PoseWithCovarianceMsg(msgspec.Struct, frozen=True):
+    """``geometry_msgs/PoseWithCovariance`` without the covariance."""
+
+    pose: PoseMsg
+
+
+class PoseWithCovarianceStampedMsg(_Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/PoseWithCovarianceStamped``."""
+
+    pose: PoseWithCovarianceMsg
+
+    @property
+    def place(self) -> PoseMsg:
+        """Place and orientation in :attr:`frame_id`."""
+        return self.pose.pose
+
+
+class Pose2DMsg(msgspec.Struct, frozen=True, gc=False):
+    """``geometry_msgs/Pose2D``."""
+
+    x: float
+    y: float
+    theta: float
+    """Radians, counter-clockwise."""
+
+    @property
+    def place(self) -> PoseMsg:
+        """The same pose in space."""
+        turned = Quaternion.from_yaw(self.theta)
+        return PoseMsg(
+            PointMsg(self.x, self.y),
+            QuaternionMsg(turned.x, turned.y, turned.z, turned.w),
+        )
+
+    @property
+    def frame_id(self) -> str:
+        """Empty: this type does not say in which frame it is."""
+        return ""
+
+    @property
+    def stamp(self) -> float:
+        """0: this type does not say when it was measured."""
+        return 0.0
+
+
+class TwistMsg(msgspec.Struct, frozen=True):
+    """``geometry_msgs/Twist``."""
+
+    linear: PointMsg
+    angular: PointMsg
+
+    @property
+    def twist(self) -> Twist:
+        """What of it moves a base in the plane."""
+        angular = self.angular
+        return Twist(self.linear.x, self.linear.y, angular.z)
+
+
+class TwistStampedMsg(_Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/TwistStamped``."""
+
+    twist: TwistMsg
+
+
+class TwistWithCovarianceMsg(msgspec.Struct, frozen=True):
+    """``geometry_msgs/TwistWithCovariance`` without the covariance."""
+
+    twist: TwistMsg
+
+
+class OdometryMsg(_Stamped, frozen=True, kw_only=True):
+    """``nav_msgs/Odometry``."""
+
+    pose: PoseWithCovarianceMsg
+    twist: TwistWithCovarianceMsg
+    child_frame_id: str = ""
+
+    @property
+    def place(self) -> PoseMsg:
+        """Place and orientation in :attr:`frame_id`."""
+        return self.pose.pose
+
+    @property
+    def velocity(self) -> Twist:
+        """How the base moves, in its own frame."""
+        return self.twist.twist.twist
+
+
+class LaserScanMsg(_Stamped, frozen=True, kw_only=True):
+    """``sensor_msgs/LaserScan``."""
+
+    angle_min: float
+    """Bearing of the first ray, in radians, counter-clockwise from x."""
+
+    angle_increment: float
+    """Angle between neighbouring rays, in radians; negative if it sweeps clockwise."""
+
+    range_min: float
+    """Shortest range the sensor can measure, in metres."""
+
+    range_max: float
+    """Longest range the sensor can measure, in metres."""
+
+    range_values: Floats = msgspec.field(name="ranges")
+    """The ranges as they came; :attr:`ranges` is what to count with."""
+
+    @property
+    def ranges(self) -> "NDArray[np.float32]":
+        """Measured ranges, in metres, of shape (N,), read-only.
+
+        NaN and infinities are kept where the link can carry them (CBOR); in JSON
+        bridges write ``null`` for all three, which is NaN here.
+        """
+        return self.range_values.array()
+
+
+class BatteryStateMsg(_Stamped, frozen=True, kw_only=True):
+    """``sensor_msgs/BatteryState``."""
+
+    percentage: float
+    """Charge from 0 to 1; NaN if the battery does not measure it."""
+
+    voltage: float
+    """Volts."""
+
+    power_supply_status: int = 0
+    """1 charging, 2 discharging, 3 not charging, 4 full, 0 unknown."""
+
+
+class MapMetaDataMsg(msgspec.Struct, frozen=True):
+    """``nav_msgs/MapMetaData``."""
+
+    resolution: float
+    """Metres a cell."""
+
+    width: int
+    """Cells along x."""
+
+    height: int
+    """Cells along y."""
+
+    origin: PoseMsg
+    """Pose of the corner of cell (0, 0)."""
+
+
+class OccupancyGridMsg(_Stamped, frozen=True, kw_only=True):
+    """``nav_msgs/OccupancyGrid``."""
+
+    info: MapMetaDataMsg
+    data: Int8s
+
+    @property
+    def cells(self) -> "NDArray[np.int8]":
+        """The cells, of shape (height, width), read-only; -1 is unknown.
+
+        Raises:
+            ProtocolError: If there are more or fewer than the size says.
+
+        """
+        info = self.info
+        if info.width < 0 or info.height < 0:
+            raise ProtocolError(f"a grid of {info.width} x {info.height} cells")
+        if info.width * info.height != len(self.data):
+            raise ProtocolError(
+                f"a grid of {info.width} x {info.height} cells came with "
+                f"{len(self.data)} of them"
+            )
+        return self.data.array().reshape(info.height, info.width)
+
+
+class PathMsg(_Stamped, frozen=True, kw_only=True):
+    """``nav_msgs/Path``."""
+
+    poses: list[PoseStampedMsg]
+
+
+class TransformMsg(msgspec.Struct, frozen=True):
+    """``geometry_msgs/Transform``."""
+
+    translation: PointMsg
+    rotation: QuaternionMsg
+
+    @property
+    def planar(self) -> Pose:
+        """The transform in the plane."""
+        place = self.translation
+        return Pose(place.x, place.y, self.rotation.quaternion.yaw)
+
+
+class TransformStampedMsg(_Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/TransformStamped``."""
+
+    child_frame_id: str
+    transform: TransformMsg
+
+
+class TFMessage(msgspec.Struct, frozen=True):
+    """``tf2_msgs/TFMessage``."""
+
+    transforms: list[TransformStampedMsg]

@@ -1,0 +1,98 @@
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.errors import ConfigError
+from webmap.ros import names
+
+
+@pytest.mark.parametrize(
+    ("given_name", "resolved"),
+    [
+        ("/odom", "/odom"),
+        ("odom", "/odom"),
+        ("/robot_0//odom/", "/robot_0/odom"),
+        (" /tf ", "/tf"),
+        ("/_hidden/0", "/_hidden/0"),
+    ],
+)
+def test_topics_have_one_spelling(given_name, resolved):
+    assert names.normalise_topic(given_name) == resolved
+
+
+@pytest.mark.parametrize(
+    "bad", ["", "/", "/a b", "/a\nb", "/ä", "/a-b", "a" * 300, None]
+)
+def test_what_is_no_topic_is_refused(bad):
+    assert not names.is_topic(bad)
+    with pytest.raises(ConfigError):
+        names.normalise_topic(bad)
+
+
+def test_types_of_both_dialects_are_the_same():
+    assert names.same_type("nav_msgs/Odometry", "nav_msgs/msg/Odometry")
+    assert not names.same_type("nav_msgs/Odometry", "nav_msgs/Path")
+    assert not names.same_type("", "")
+    assert names.is_type("geometry_msgs/msg/Twist", "a/B", "geometry_msgs/Twist")
+    assert str(names.split_type("nav_msgs/msg/Odometry")) == "nav_msgs/Odometry"
+    assert names.ros2_type("nav_msgs/Odometry") == "nav_msgs/msg/Odometry"
+
+
+@pytest.mark.parametrize(
+    "bad", ["", "Odometry", "a/b/C", "a/msg/", "a//B", "1/B", None]
+)
+def test_what_is_no_type_is_refused(bad):
+    with pytest.raises(ConfigError, match="nav_msgs/Odometry"):
+        names.split_type(bad)
+
+
+@pytest.mark.parametrize(
+    ("url", "normal"),
+    [
+        ("ws://localhost:9090", "ws://localhost:9090"),
+        ("WS://LocalHost:9090/", "ws://localhost:9090"),
+        ("ws://robot:80/", "ws://robot"),
+        ("wss://robot:443/ros/", "wss://robot/ros"),
+        ("ws://[::1]:9090", "ws://[::1]:9090"),
+        ("ws://robot/ros?x=1", "ws://robot/ros?x=1"),
+    ],
+)
+def test_addresses_have_one_spelling(url, normal):
+    assert names.normalise_url(url) == normal
+    assert names.normalise_url(normal) == normal
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        "",
+        "localhost:9090",
+        "http://localhost:9090",
+        "ws://",
+        "ws://:9090",
+        "ws://a:99999",
+        "ws://a:0",
+        "ws://a:b",
+        "ws://user:secret@a",
+        "ws://a/#x",
+        "ws://a b",
+        "ws://[::1",
+        None,
+        9090,
+    ],
+)
+def test_what_is_no_address_is_refused(bad):
+    with pytest.raises(
+        ConfigError, match=r"expected one such as|no user name"
+    ) as caught:
+        names.normalise_url(bad)
+    assert "secret" not in str(caught.value)
+
+
+@given(st.text())
+def test_any_text_is_a_name_or_refused(text):
+    for function in (names.normalise_topic, names.split_type, names.normalise_url):
+        with contextlib.suppress(ConfigError):
+            function(text)

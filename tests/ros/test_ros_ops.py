@@ -1,0 +1,67 @@
+import json
+import math
+
+import pytest
+
+from webmap.ros import ops
+
+
+def said(frame):
+    return json.loads(frame)
+
+
+def test_a_subscription_always_has_an_identifier():
+    assert said(
+        ops.subscribe("/scan", id="WebMap-1", type="sensor_msgs/LaserScan")
+    ) == {
+        "op": "subscribe",
+        "id": "WebMap-1",
+        "topic": "/scan",
+        "type": "sensor_msgs/LaserScan",
+        "throttle_rate": 0,
+        "queue_length": 1,
+    }
+
+
+def test_unsubscribing_names_the_subscription():
+    assert said(ops.unsubscribe("/scan", id="WebMap-1")) == {
+        "op": "unsubscribe",
+        "id": "WebMap-1",
+        "topic": "/scan",
+    }
+
+
+def test_advertising_keeps_nothing_for_late_listeners():
+    frame = said(ops.advertise("/cmd_vel", "geometry_msgs/Twist", id="WebMap-2"))
+    assert frame["queue_size"] == 1
+    assert frame["latch"] is False
+
+
+def test_a_call_without_arguments_sends_an_empty_mapping():
+    assert said(ops.call_service("/rosapi/topics", id="WebMap-3"))["args"] == {}
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_none_never_leave(number):
+    with pytest.raises(ValueError, match=r"JSON|nan|inf"):
+        ops.publish("/cmd_vel", {"linear": {"x": number}})
+    with pytest.raises(ValueError, match=r"JSON|nan|inf"):
+        ops.call_service("/set", {"value": [number]}, id="WebMap-4")
+
+
+def test_what_json_does_not_know_is_refused():
+    with pytest.raises(TypeError):
+        ops.publish("/a", {"x": object()})
+    loop = []
+    loop.append(loop)
+    with pytest.raises(ValueError, match=r"[Cc]ircular"):
+        ops.publish("/a", {"x": loop})
+
+
+def test_text_of_any_language_is_kept():
+    assert said(ops.publish("/a", {"data": "löwe 獅"}))["msg"] == {"data": "löwe 獅"}
+
+
+def test_a_lone_surrogate_is_refused():
+    with pytest.raises(ValueError, match="surrogates"):
+        ops.publish("/a", {"data": "\ud800"})
