@@ -1,0 +1,142 @@
+"""The HTML of pages: the user's own, with what WebMap needs put in, or one made.
+
+The user's file is changed in two places only: the base style sheet goes first into
+the head, so that the user's own rules win, and the script goes last.
+"""
+
+from dataclasses import dataclass, field
+from html import escape
+from html.parser import HTMLParser
+from urllib.parse import quote
+
+_MADE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<link rel="icon" href="{base}icon.svg" type="image/svg+xml">
+<link rel="stylesheet" href="{base}webmap.css">
+<link rel="stylesheet" href="{base}made_page.css">
+<script type="module" src="{base}page.js"></script>
+</head>
+<body>
+<div id="webmap_container"></div>
+<noscript>WebMap needs JavaScript.</noscript>
+</body>
+</html>
+"""
+
+# Other types are data, which no policy blocks.
+_SCRIPTS = {"", "module", "importmap", "text/javascript", "application/javascript"}
+_LOADS = {"script": "src", "img": "src", "link": "href", "iframe": "src"}
+
+
+def base_of(root_path: str) -> str:
+    """Return the URL below which WebMap's own files are, ending in a slash."""
+    return quote(root_path.rstrip("/")) + "/_webmap/"
+
+
+def make_page(title: str, base: str) -> str:
+    """Return a page with one container that fills the window."""
+    return _MADE.format(title=escape(title), base=escape(base))
+
+
+@dataclass(frozen=True, slots=True)
+class OwnPage:
+    """A user's HTML with what WebMap needs in it."""
+
+    text: str
+    blocked: list[str] = field(default_factory=list)
+    """What the Content-Security-Policy will block, in sentences, with line numbers."""
+
+
+def prepare_page(text: str, base: str) -> OwnPage:
+    """Put the base style sheet and the page's script into a user's HTML.
+
+    Args:
+        text: The user's HTML, whole.
+        base: Where WebMap's own files are, as :func:`base_of` gives it.
+
+    """
+    seen = _Reader(text)
+    first, last = "", ""
+    if not seen.has("webmap.css"):
+        first = f'<link rel="stylesheet" href="{escape(base)}webmap.css">'
+    if not seen.has("page.js"):
+        last = f'<script type="module" src="{escape(base)}page.js"></script>'
+    if not seen.icon:
+        last += f'<link rel="icon" href="{escape(base)}icon.svg" type="image/svg+xml">'
+    start, end = seen.head()
+    text = text[:start] + first + text[start:end] + last + text[end:]
+    return OwnPage(text, seen.blocked)
+
+
+class _Reader(HTMLParser):
+    """Finds the head of a page, what it loads, and what will be blocked."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.blocked: list[str] = []
+        self.icon = False
+        self._loaded: list[str] = []
+        self._head_start: int | None = None
+        self._head_end: int | None = None
+        self._content: int | None = None
+        self._lines = [0]
+        for line in text.split("\n"):
+            self._lines.append(self._lines[-1] + len(line) + 1)
+        self._length = len(text)
+        self.feed(text)
+        self.close()
+
+    def head(self) -> tuple[int, int]:
+        """Return where the head starts and ends; without one, where it would be."""
+        content = self._length if self._content is None else self._content
+        start = content if self._head_start is None else self._head_start
+        end = start if self._head_end is None else max(start, self._head_end)
+        return start, end
+
+    def has(self, name: str) -> bool:
+        """Tell whether the page loads one of WebMap's own files by itself."""
+        return any(url.endswith(f"_webmap/{name}") for url in self._loaded)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._look_at(tag, {name: value or "" for name, value in attrs})
+        if tag == "head" and self._head_start is None:
+            self._head_start = self._here() + len(self.get_starttag_text() or "")
+        elif tag == "body" and self._head_start is not None and self._head_end is None:
+            self._head_end = self._here()
+        if tag not in {"html", "head"} and self._content is None:
+            self._content = self._here()
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "head" and self._head_end is None:
+            self._head_end = self._here()
+
+    def _here(self) -> int:
+        line, column = self.getpos()
+        return self._lines[line - 1] + column
+
+    def _look_at(self, tag: str, attributes: dict[str, str]) -> None:
+        url = attributes.get(_LOADS.get(tag, ""), "")
+        self._loaded.append(url)
+        if tag == "link" and "icon" in attributes.get("rel", "").lower().split():
+            self.icon = True
+        if tag == "style" or "style" in attributes:
+            self._block("an inline style", "a .css file")
+        kind = attributes.get("type", "").lower()
+        if tag == "script" and "src" not in attributes and kind in _SCRIPTS:
+            self._block("an inline script", "a .js file")
+        if any(name.startswith("on") for name in attributes):
+            self._block("a handler in an attribute", "a .js file")
+        if tag == "base":
+            self._block("a <base> element", "relative URLs")
+        if url.lower().startswith(("http:", "https:", "//", "data:")):
+            self._block(f"{url[:80]!r}", "a file of the page's folder")
+
+    def _block(self, what: str, instead: str) -> None:
+        self.blocked.append(
+            f"line {self.getpos()[0]}: {what} is blocked by the Content-Security-"
+            f"Policy; use {instead} instead"
+        )

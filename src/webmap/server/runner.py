@@ -1,0 +1,119 @@
+"""What runs the web application: uvicorn, set up for small messages and quick ends."""
+
+import asyncio
+import logging
+import socket
+from collections.abc import Callable
+from types import FrameType
+from typing import Protocol
+
+import uvicorn
+from starlette.types import Receive, Scope, Send
+
+from webmap.errors import WebMapError
+from webmap.server.listening import check_exposure, listen, url_of
+from webmap.server.settings import Settings
+
+log = logging.getLogger("webmap.server")
+
+PING_EVERY_S = 2.0
+PONG_WITHIN_S = 4.0
+_MAX_MESSAGE = 64 * 1024
+_MAX_REQUESTS_AT_ONCE = 512
+
+
+class Application(Protocol):
+    """An ASGI application with settings; :class:`webmap.server.app.WebApp`."""
+
+    @property
+    def settings(self) -> Settings:
+        """Who may use it."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request, one socket, or the life of the application."""
+
+
+def announce(url: str) -> None:
+    """Print the one line that says where the page is, at once."""
+    print(f"WebMap is ready at {url}", flush=True)
+
+
+def serve(
+    app: Application,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    insecure_lan: bool = False,
+    listener: socket.socket | None = None,
+    on_ready: Callable[[str], object] = announce,
+) -> None:
+    """Serve the application in this thread until SIGINT or SIGTERM.
+
+    Args:
+        app: The web application.
+        host: What to listen on.
+        port: The port; 0 lets the kernel choose.
+        insecure_lan: The explicit word without which only this machine is served.
+        listener: A socket of :func:`webmap.server.listening.listen` that was opened
+            before, so that nothing starts if the port is in use; closed here.
+        on_ready: Called once with the URL when the page can be opened.
+
+    Raises:
+        ConfigError: If it cannot listen there.
+        WebMapError: If the application's own start failed; the log says why.
+
+    """
+    check_exposure(host, insecure_lan=insecure_lan)
+    listener = listener or listen(host, port)
+    url = url_of(listener, host)
+    if not app.settings.authenticate:
+        url += f"?token={app.settings.token}"
+    server = _Server(_config(app), lambda: on_ready(url))
+    try:
+        server.run(sockets=[listener])
+    except SystemExit as error:
+        raise WebMapError("the web application did not start") from error
+    finally:
+        listener.close()
+
+
+def _config(app: Application) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        interface="asgi3",
+        ws="websockets-sansio",
+        ws_max_size=_MAX_MESSAGE,
+        ws_ping_interval=PING_EVERY_S,
+        ws_ping_timeout=PONG_WITHIN_S,
+        # Compression costs 27 to 90 times the send, for a tenth of the bytes.
+        ws_per_message_deflate=False,
+        # Whoever can connect could otherwise say which address it comes from.
+        proxy_headers=False,
+        server_header=False,
+        # At INFO uvicorn writes the URL of each socket, with its query.
+        access_log=False,
+        log_config=None,
+        log_level=logging.WARNING,
+        limit_concurrency=_MAX_REQUESTS_AT_ONCE,
+        timeout_graceful_shutdown=1,
+    )
+
+
+class _Server(uvicorn.Server):
+    """A server that says when it is ready, and takes a signal as a wish to end."""
+
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], object]) -> None:
+        super().__init__(config)
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            self._on_ready()
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        # uvicorn's own remembers the signal and raises it again at the end, and the
+        # process would not exit with 0.
+        del sig, frame
+        self.force_exit = self.should_exit
+        self.should_exit = True
