@@ -1,0 +1,55 @@
+"""What a frame from a robot costs: ``webmap.Bridge`` against roslibpy.
+
+Both listen in a process of their own to the same player in another. roslibpy hands
+out dicts and lists; WebMap hands out typed messages and numpy arrays, so it does more
+for what it costs.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+
+from benchmarks.frames import ODOM, SCAN
+from benchmarks.harness import Comparison, Contender, Figures, compare
+
+COUNTS = {ODOM: 10_000, SCAN: 2_000}
+
+
+def listening(client: str, topic: str, count: int) -> Callable[[], Figures]:
+    """Return a run of one client that hears ``count`` frames."""
+
+    def run() -> Figures:
+        module = [sys.executable, "-m"]
+        player = subprocess.Popen(
+            [*module, "benchmarks.player", str(count)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        with player:
+            try:
+                assert player.stdout is not None
+                port = player.stdout.readline().strip()
+                command = [*module, "benchmarks.listener", client, port, topic]
+                heard = subprocess.run(
+                    [*command, str(count)], capture_output=True, text=True, check=True
+                )
+            finally:
+                player.terminate()
+        figures: Figures = json.loads(heard.stdout)
+        return figures
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare the clients on odometry and on scans."""
+    comparisons = []
+    for topic, title, clients in (
+        (ODOM, "Odometry of 1.9 kB", ["webmap", "roslibpy"]),
+        (SCAN, "LaserScan of 720 ranges", ["webmap", "roslibpy", "webmap-cbor"]),
+    ):
+        count = COUNTS[topic] // (10 if quick else 1)
+        contenders = [Contender(c, listening(c, topic, count)) for c in clients]
+        comparisons.append(compare(title, contenders, rounds))
+    return comparisons

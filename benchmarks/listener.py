@@ -1,0 +1,114 @@
+"""One client that listens to the player and says what each frame cost it.
+
+Run as ``python -m benchmarks.listener CLIENT PORT TOPIC COUNT``; prints JSON. The cost
+is the processor time of this whole process, all threads, from the first frame of the
+measured part to the last, by the number of frames between.
+"""
+
+import asyncio
+import json
+import sys
+import threading
+import time
+from typing import Any
+
+from benchmarks.frames import ODOM, TYPES
+
+WARM = 200
+"""Frames that are not counted."""
+
+
+class Meter:
+    """Counts frames and knows when all have come."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.seen = 0
+        self.done = threading.Event()
+        self._cpu = self._wall = 0.0
+
+    def frame(self) -> None:
+        """Note that one message reached the user's code."""
+        self.seen += 1
+        if self.seen == WARM:
+            self._cpu, self._wall = time.process_time(), time.perf_counter()
+        elif self.seen == self.count:
+            self._cpu = time.process_time() - self._cpu
+            self._wall = time.perf_counter() - self._wall
+            self.done.set()
+
+    def figures(self) -> dict[str, float]:
+        """Return what was measured."""
+        frames = self.count - WARM
+        return {
+            "cpu a frame (us)": self._cpu / frames * 1e6,
+            "frames a second": frames / self._wall,
+        }
+
+
+def listen_with_roslibpy(port: int, topic: str, meter: Meter) -> None:
+    """Take the messages as roslibpy gives them: dicts, not even turned to arrays."""
+    import roslibpy
+
+    def on_message(message: dict[str, Any]) -> None:
+        _ = message["pose"]["pose"]["position"]["x"] if topic == ODOM else None
+        _ = message["ranges"] if topic != ODOM else None
+        meter.frame()
+
+    ros = roslibpy.Ros("127.0.0.1", port)
+    ros.run()
+    roslibpy.Topic(ros, topic, TYPES[topic]).subscribe(on_message)
+    meter.done.wait(120)
+    ros.terminate()
+
+
+def listen_with_webmap(port: int, topic: str, meter: Meter, cbor: bool) -> None:
+    """Take the messages as WebMap's own modules do: typed, the ranges an array."""
+    asyncio.run(_listen_with_webmap(port, topic, meter, cbor))
+
+
+async def _listen_with_webmap(port: int, topic: str, meter: Meter, cbor: bool) -> None:
+    from webmap import Bridge
+    from webmap.ros.messages import LaserScanMsg, OdometryMsg
+
+    done = asyncio.Event()
+
+    def on_odometry(message: Any) -> None:
+        _ = message.pose.pose.position.x
+        count()
+
+    def on_scan(message: Any) -> None:
+        _ = message.ranges
+        count()
+
+    def count() -> None:
+        meter.frame()
+        if meter.done.is_set():
+            done.set()
+
+    bridge = Bridge(f"ws://127.0.0.1:{port}")
+    bridge.subscribe(
+        topic,
+        on_odometry if topic == ODOM else on_scan,
+        TYPES[topic],
+        decode=OdometryMsg if topic == ODOM else LaserScanMsg,
+        compression="cbor" if cbor else None,
+    )
+    bridge.start(asyncio.get_running_loop())
+    async with asyncio.timeout(120):
+        await done.wait()
+    await bridge.stop()
+
+
+def main(client: str, port: int, topic: str, count: int) -> None:
+    """Listen with one client and print the figures."""
+    meter = Meter(count)
+    if client == "roslibpy":
+        listen_with_roslibpy(port, topic, meter)
+    else:
+        listen_with_webmap(port, topic, meter, cbor=client == "webmap-cbor")
+    print(json.dumps(meter.figures()), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), sys.argv[3], int(sys.argv[4]))

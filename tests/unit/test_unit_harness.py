@@ -1,0 +1,43 @@
+"""The benchmarks' harness: who runs when, and what is compared with what."""
+
+import pytest
+
+from benchmarks.harness import Comparison, Contender, compare
+
+
+def contender(name: str, calls: list[str], figures: list[float]) -> Contender:
+    left = iter(figures)
+
+    def run() -> dict[str, float]:
+        calls.append(name)
+        return {"cpu (us)": next(left)}
+
+    return Contender(name, run)
+
+
+def compared() -> tuple[Comparison, list[str]]:
+    calls: list[str] = []
+    a = contender("a", calls, [1.0, 2.0, 100.0])
+    b = contender("b", calls, [3.0, 6.0, 300.0])
+    return compare("a title", [a, b], rounds=3), calls
+
+
+def test_contenders_run_in_turn_and_every_other_round_backwards() -> None:
+    assert compared()[1] == ["a", "b", "b", "a", "a", "b"]
+
+
+def test_a_ratio_is_taken_within_a_round_so_that_a_slow_round_does_not_count() -> None:
+    assert compared()[0].ratios("b", "cpu (us)") == [3.0, 3.0, 3.0]
+
+
+def test_the_median_is_over_the_rounds() -> None:
+    assert compared()[0].median("a", "cpu (us)") == 2.0
+
+
+def test_the_table_shows_medians_and_ratios() -> None:
+    assert "| cpu (us) | 2 | 6 (3.00 x, 3.00 to 3.00) |" in compared()[0].table()
+
+
+def test_no_rounds_are_refused() -> None:
+    with pytest.raises(ValueError, match="got 0 rounds"):
+        compare("a title", [], rounds=0)
