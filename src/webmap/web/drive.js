@@ -1,0 +1,348 @@
+import { attentive, watchAttention } from "./motion/attention.js";
+import { Hands } from "./motion/hands.js";
+import { Line } from "./motion/line.js";
+import { Loop } from "./motion/loop.js";
+import { Pilot, TAKE_PATIENCE } from "./motion/pilot.js";
+
+/** @typedef {import('./motion/axes.js').Axes} Axes */
+/** @typedef {import('./motion/pilot.js').Command} Command */
+/** @typedef {import('./motion/report.js').RobotReport} RobotReport */
+/** @typedef {'connecting' | 'open' | 'late' | 'lost'} LinkState */
+
+/**
+ * The kinds of news, and what each tells.
+ *
+ * `robot`: the gate's newest word on a robot. `gone`: the gate knows a robot no more.
+ * `state`: the link's state changed. `refused`: the gate refused something. `stop`:
+ * STOP was sent for a robot or "*". `read`: inputs that must be asked for their state
+ * (gamepads) are asked now. `drop`: inputs must forget what is held. `step`: a 20 Hz
+ * step is over.
+ *
+ * @typedef {object} News
+ * @property {RobotReport} robot
+ * @property {string} gone
+ * @property {LinkState} state
+ * @property {{robot: string | null, what: string, why: string}} refused
+ * @property {string} stop
+ * @property {null} read
+ * @property {null} drop
+ * @property {null} step
+ */
+
+/** Commands carry the state of the hands this often, in ms. */
+const PERIOD = 50;
+
+/**
+ * This page's line to the gate: who drives what, the operator's hands, goals, STOP.
+ *
+ * One per page, however many maps it shows. It sends the *state* of the inputs at
+ * 20 Hz while it holds a lease, from a timer of the page itself: a worker's timer would
+ * go on when the page is hidden or hangs. No method moves a robot by itself but
+ * {@link Drive#goal}; see `motion/pilot.js` for when the hands do.
+ */
+export class Drive {
+  /**
+   * @param {string | URL} baseUrl The address under which the server has `drive`.
+   * @param {{releaseAfter?: number}} [options] `releaseAfter`: a lease that is not
+   *     used for so long is given back, in ms.
+   */
+  constructor(baseUrl, options = {}) {
+    const now = performance.now();
+    this._hands = new Hands(now);
+    this._loop = new Loop();
+    this._pilot = new Pilot(this._hands, this._loop, now, options);
+    this._line = new Line(socketUrl(baseUrl), {
+      open: () => this._loop.open(performance.now()),
+      receive: (message) => this._receive(message),
+      lost: () => this._lost(),
+    });
+    /**
+     * This connection's name at the gate; null while there is none.
+     * @type {string | null}
+     */
+    this.connection = null;
+    /** @type {LinkState} */
+    this._state = "connecting";
+    /** @type {Map<keyof News, Set<Function>>} */
+    this._listeners = new Map();
+    /**
+     * STOPs that were asked for without a connection.
+     * @type {Set<string>}
+     */
+    this._unsent = new Set();
+    this._unwatch = watchAttention(
+      (left) => this._doubt(left),
+      () => this._renew(),
+    );
+    this._timer = setInterval(() => this._tick(), PERIOD);
+    this._line.mind(now);
+  }
+
+  /** The state of the link: may commands arrive, and do they? */
+  get state() {
+    return this._state;
+  }
+
+  /**
+   * The newest word of the gate on each robot.
+   * @returns {ReadonlyMap<string, RobotReport>}
+   */
+  get robots() {
+    return this._pilot.robots;
+  }
+
+  /** What the operator should know of the chosen robot and of the hands. */
+  get status() {
+    return { link: this._state, ...this._pilot.status };
+  }
+
+  /**
+   * Listen.
+   *
+   * @template {keyof News} K
+   * @param {K} kind
+   * @param {(news: News[K]) => void} fn
+   * @returns {() => void} Stops listening.
+   */
+  on(kind, fn) {
+    const listeners = this._listeners.get(kind) ?? new Set();
+    this._listeners.set(kind, listeners.add(fn));
+    return () => {
+      listeners.delete(fn);
+    };
+  }
+
+  /**
+   * Say what an input asks for. One input owns the motion at a time.
+   *
+   * @param {string} source
+   * @param {Partial<Axes> | null} axes Null when the input is gone.
+   */
+  setInput(source, axes) {
+    const was = this._hands.pressed;
+    this._hands.set(source, axes, performance.now());
+    // A release must not wait for the next step, nor should a press.
+    if (was !== this._hands.pressed) this._step();
+  }
+
+  /** Forget what is held and go neutral at once: for inputs that are in doubt. */
+  doubt() {
+    this._doubt(false);
+  }
+
+  /**
+   * Choose the robot that a press drives. The one driven before is let go of.
+   *
+   * @param {string | null} robot
+   */
+  choose(robot) {
+    this._send(this._pilot.choose(robot, performance.now()));
+  }
+
+  /**
+   * Ask for the lease of a robot. Whatever is pressed now does not move it.
+   *
+   * @param {string} robot
+   */
+  take(robot) {
+    this._send(this._pilot.take(robot, performance.now()));
+  }
+
+  /**
+   * Give the lease of a robot back, neutral first.
+   *
+   * @param {string} robot
+   */
+  release(robot) {
+    this._send(this._pilot.release(robot, performance.now()));
+  }
+
+  /**
+   * Send a robot to a place, and take its lease for that when it is free.
+   *
+   * @param {string} robot
+   * @param {{x: number, y: number, yaw: number}} pose Metres and radians in the
+   *     robot's goal frame.
+   * @returns {Promise<void>} Done when the gate has accepted the goal.
+   * @throws {Error} When the gate refuses it or does not answer.
+   */
+  async goal(robot, { x, y, yaw }) {
+    if (![x, y, yaw].every(Number.isFinite)) {
+      throw new Error(`A goal needs finite numbers, got ${x}, ${y}, ${yaw}.`);
+    }
+    if (this._pilot.epoch(robot) === null) {
+      this._send([{ op: "take", robot }]);
+      await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
+    }
+    const goal = this._pilot.goal(robot, { x, y, yaw }, performance.now());
+    this._send([goal]);
+    await this._until(robot, "goal", () => this._loop.acknowledged(goal.seq));
+  }
+
+  /**
+   * Take back the goal of a robot.
+   *
+   * @param {string} robot
+   */
+  cancel(robot) {
+    this._send([{ op: "cancel", robot }]);
+  }
+
+  /**
+   * Stop a robot, or all: "*". Needs no lease, and is heard whoever drives.
+   *
+   * Without a connection it is the first thing said on the next one: a stop that comes
+   * late is still a stop.
+   *
+   * @param {string} robot
+   * @returns {boolean} Whether it has left this page.
+   */
+  stop(robot) {
+    const left = this._line.open;
+    if (left) this._line.send({ op: "stop", robot });
+    else this._unsent.add(robot);
+    this._pilot.doubt(performance.now());
+    this._step();
+    this._tell("stop", robot);
+    return left;
+  }
+
+  /** End for good: neutral, leases back, connection closed. */
+  close() {
+    this._doubt(true);
+    clearInterval(this._timer);
+    this._unwatch();
+    this._line.abandon();
+  }
+
+  /** @param {boolean} left Whether the page is hidden or going away. */
+  _doubt(left) {
+    const now = performance.now();
+    this._pilot.doubt(now, { drop: true });
+    this._step();
+    if (left) this._send(this._pilot.letGo(now));
+    this._tell("drop", null);
+  }
+
+  _tick() {
+    this._tell("read", null);
+    this._step();
+    const now = performance.now();
+    if (this._line.open) this._judge(this._loop.state(now));
+    this._line.mind(now);
+    this._tell("step", null);
+  }
+
+  _step() {
+    const held = this._hands.pressed;
+    this._send(this._pilot.step(performance.now(), attentive()));
+    if (held && !this._hands.pressed) this._tell("drop", null);
+  }
+
+  /** @param {'open' | 'late' | 'lost'} state */
+  _judge(state) {
+    if (state === "lost") this._line.lose();
+    else if (this.connection !== null) this._setState(state);
+  }
+
+  /** The page was frozen or stored away; its connection may be dead or not ours. */
+  _renew() {
+    this._pilot.doubt(performance.now(), { drop: true });
+    this._tell("drop", null);
+    this._line.renew();
+  }
+
+  _lost() {
+    this.connection = null;
+    this._pilot.doubt(performance.now());
+    this._pilot.disconnect();
+    this._setState("lost");
+    for (const report of this.robots.values()) this._tell("robot", report);
+  }
+
+  /** @param {any} message */
+  _receive(message) {
+    const now = performance.now();
+    if (message.op === "tick") {
+      this._loop.receive(message.tick, message.ack, now);
+    } else if (message.op === "hello") {
+      this.connection = message.connection;
+      this._line.trust();
+      for (const robot of this._unsent) this._line.send({ op: "stop", robot });
+      this._unsent.clear();
+      this._setState("open");
+    } else if (message.op === "robot") {
+      this._pilot.report(message, now);
+      this._tell("robot", message);
+    } else if (message.op === "gone") {
+      this._pilot.gone(message.robot, now);
+      this._tell("gone", message.robot);
+    } else if (message.op === "refused") {
+      this._pilot.refuse(message.robot, message.what, message.why, now);
+      this._tell("refused", message);
+    }
+  }
+
+  /** @param {Command[]} messages */
+  _send(messages) {
+    for (const message of messages) this._line.send(message);
+  }
+
+  /**
+   * @param {string} robot
+   * @param {string} what
+   * @param {() => boolean} reached
+   * @returns {Promise<void>}
+   */
+  _until(robot, what, reached) {
+    return new Promise((resolve, reject) => {
+      const since = performance.now();
+      /** @param {string | null} problem */
+      const end = (problem) => {
+        for (const off of offs) off();
+        if (problem === null) resolve();
+        else reject(new Error(problem));
+      };
+      const offs = [
+        this.on("refused", (refusal) => {
+          if (refusal.robot === robot && refusal.what === what) end(refusal.why);
+        }),
+        this.on("step", () => {
+          if (reached()) end(null);
+          else if (performance.now() - since > TAKE_PATIENCE)
+            end("The gate is silent.");
+        }),
+      ];
+    });
+  }
+
+  /** @param {LinkState} state */
+  _setState(state) {
+    if (state === this._state) return;
+    this._state = state;
+    this._tell("state", state);
+  }
+
+  /**
+   * @template {keyof News} K
+   * @param {K} kind
+   * @param {News[K]} news
+   */
+  _tell(kind, news) {
+    for (const fn of this._listeners.get(kind) ?? []) {
+      try {
+        fn(news);
+      } catch (error) {
+        // A broken display must never keep a neutral or a STOP from leaving.
+        reportError(error);
+      }
+    }
+  }
+}
+
+/** @param {string | URL} baseUrl */
+function socketUrl(baseUrl) {
+  const url = new URL("drive", baseUrl);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  return url;
+}

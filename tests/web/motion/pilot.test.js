@@ -1,0 +1,307 @@
+import assert from "node:assert/strict";
+import { beforeEach, describe, test } from "node:test";
+
+import { Hands } from "../../../src/webmap/web/motion/hands.js";
+import { Loop } from "../../../src/webmap/web/motion/loop.js";
+import { Pilot, TAKE_PATIENCE } from "../../../src/webmap/web/motion/pilot.js";
+
+const FORWARD = { x: 1, y: 0, turn: 0 };
+
+/** A gate of one page, as far as the page can tell, and a page stepped at 20 Hz. */
+class Bench {
+  constructor(options = {}) {
+    this.now = 0;
+    this.attentive = true;
+    this.ticking = true;
+    this.acking = true;
+    this.arming = true;
+    this.tick = 1000;
+    this.ack = -1;
+    this.epoch = 7;
+    /** @type {any[]} */
+    this.sent = [];
+    this.loop = new Loop();
+    this.hands = new Hands(-1000);
+    this.pilot = new Pilot(this.hands, this.loop, 0, options);
+    this.loop.open(0);
+    this.loop.receive(this.tick, -1, 0);
+    this.say("r1");
+    this.say("r2");
+    this.pilot.choose("r1", 0);
+  }
+
+  say(robot, fields = {}) {
+    const report = {
+      robot, name: robot, state: "free", holder: null, mine: false, epoch: null,
+      armed: false, v: 1, w: 1, why: [], link: "up", sent: [0, 0, 0], echoed: null,
+      measured: null, armable: true, reason: null, ...fields,
+    };
+    this.pilot.report(/** @type {any} */ (report), this.now);
+  }
+
+  grant(robot, epoch = ++this.epoch) {
+    const holder = { connection: "c1", name: "me" };
+    this.say(robot, { holder, mine: true, epoch, state: "held", armed: this.arming });
+    return epoch;
+  }
+
+  keep(messages) {
+    this.sent.push(...messages);
+    for (const message of messages) {
+      if (this.acking && message.seq !== undefined) this.ack = message.seq;
+    }
+    return messages;
+  }
+
+  press(axes = FORWARD) {
+    this.hands.set("keys", axes, this.now);
+    return this.step(0);
+  }
+
+  letGo() {
+    this.hands.set("keys", null, this.now);
+    return this.step(0);
+  }
+
+  step(dt = 50) {
+    this.now += dt;
+    if (this.ticking && dt > 0) this.loop.receive(++this.tick, this.ack, this.now);
+    return this.keep(this.pilot.step(this.now, this.attentive));
+  }
+
+  run(ms) {
+    const before = this.sent.length;
+    for (let t = 0; t < ms; t += 50) this.step();
+    return this.sent.slice(before);
+  }
+
+  /** Drive r1 forward until it moves. */
+  drive() {
+    this.press();
+    const epoch = this.grant("r1");
+    this.run(600);
+    assert.equal(this.sent.at(-1).x, 1, "the bench drives");
+    return epoch;
+  }
+}
+
+const moves = (messages) =>
+  messages.filter((m) => m.op === "drive" && (m.x !== 0 || m.y !== 0 || m.turn !== 0));
+
+/** @type {Bench} */
+let bench;
+beforeEach(() => { bench = new Bench(); });
+
+describe("the first press", () => {
+  test("takes a free robot and nothing more", () => {
+    assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
+    assert.deepEqual(bench.run(200), []);
+  });
+
+  test("takes effect after neutral that the gate has seen for 200 ms", () => {
+    bench.press();
+    const epoch = bench.grant("r1");
+    const messages = bench.run(600);
+    const first = messages.findIndex((m) => m.x === 1);
+    assert.ok(first >= 5, `${first} neutral commands came first`);
+    assert.ok(messages.slice(0, first).every((m) => m.x === 0 && m.epoch === epoch));
+    assert.ok(messages.slice(first).every((m) => m.x === 1));
+  });
+
+  test("waits for the gate to say that it is armed", () => {
+    bench.arming = false;
+    bench.press();
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(600)), []);
+  });
+
+  test("waits for the acknowledgement of neutral, however long the way", () => {
+    bench.acking = false;
+    bench.press();
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(250)), []);
+    bench.ack = bench.sent.at(-1).seq;
+    assert.deepEqual(moves(bench.run(200)), []);
+  });
+
+  test("does nothing on a robot that somebody else drives", () => {
+    bench.say("r1", { holder: { connection: "c2", name: "Ann" }, epoch: 9, state: "held" });
+    assert.deepEqual(bench.press(), []);
+    bench.say("r1");
+    assert.deepEqual(bench.run(500), [], "nor when that one lets go");
+  });
+
+  test("does nothing on a robot that cannot be driven", () => {
+    bench.say("r1", { armable: false, reason: "link down" });
+    assert.deepEqual(bench.press(), []);
+  });
+
+  test("reaches over a program, and then asks for a new press", () => {
+    bench.say("r1", { holder: { connection: "program", name: "program" }, epoch: 9, state: "held" });
+    assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(600)), []);
+    bench.letGo();
+    bench.run(250);
+    assert.equal(moves(bench.press()).length, 1);
+  });
+
+  test("is given up when the gate does not answer", () => {
+    bench.press();
+    bench.run(TAKE_PATIENCE + 100);
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(600)), []);
+  });
+
+  test("is given up when the gate refuses", () => {
+    bench.press();
+    bench.pilot.refuse("r1", "take", "Ann drives it", bench.now);
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(600)), []);
+    assert.equal(bench.pilot.status.refusal, "Ann drives it");
+  });
+});
+
+describe("while driving", () => {
+  test("the state goes out at every step with the newest tick and a growing number", () => {
+    bench.drive();
+    const messages = bench.run(200);
+    assert.equal(messages.length, 4);
+    messages.reduce((last, m) => (assert.equal(m.seq, last.seq + 1), m));
+    assert.equal(messages.at(-1).tick, bench.tick);
+  });
+
+  test("a release is neutral at once, and a press moves again at once", () => {
+    bench.drive();
+    assert.equal(bench.letGo().at(-1).x, 0);
+    assert.equal(bench.press().at(-1).x, 1);
+  });
+
+  for (const [what, happen] of [
+    ["the page loses attention", () => { bench.attentive = false; bench.step(); bench.attentive = true; }],
+    ["the page slept", () => { bench.step(400); }],
+    ["the clock jumps ahead", () => { bench.step(3_600_000); }],
+    ["the gate disarms", () => { bench.say("r1", { mine: true, epoch: bench.epoch, armed: false, state: "stopping", holder: { connection: "c1", name: "me" } }); bench.grant("r1", bench.epoch); }],
+    ["the gate refuses a command", () => { bench.pilot.refuse("r1", "drive", "too old", bench.now); }],
+    ["acknowledgements stay away", () => { bench.acking = false; bench.run(400); bench.acking = true; }],
+    ["ticks stay away", () => { bench.ticking = false; bench.run(350); bench.ticking = true; }],
+    ["the lease is lost and comes again", () => { bench.say("r1"); bench.grant("r1"); }],
+  ]) {
+    test(`nothing resumes when ${what}`, () => {
+      bench.drive();
+      happen();
+      bench.run(100);
+      // A key that is held and says so again is still not a new press.
+      bench.hands.set("keys", FORWARD, bench.now);
+      assert.deepEqual(moves(bench.run(1500)), []);
+    });
+  }
+
+  test("after a doubt, a release and a new press drive again", () => {
+    bench.drive();
+    bench.pilot.doubt(bench.now);
+    bench.run(300);
+    bench.letGo();
+    bench.run(300);
+    assert.equal(moves(bench.press()).length, 1);
+  });
+
+  test("after a doubt, a new press waits for neutral that the gate has seen", () => {
+    bench.drive();
+    bench.letGo();
+    bench.run(300);
+    bench.pilot.doubt(bench.now);
+    bench.acking = false;
+    bench.run(200);
+    assert.deepEqual(moves(bench.press()), []);
+  });
+
+  test("the stream stays neutral while the loop is late", () => {
+    bench.drive();
+    bench.acking = false;
+    assert.ok(moves(bench.run(1000)).length <= 7);
+    assert.equal(bench.sent.at(-1).op, "drive", "and goes on, to be found alive again");
+  });
+});
+
+describe("another choice", () => {
+  test("lets go of the driven robot, neutral first", () => {
+    bench.drive();
+    const messages = bench.pilot.choose("r2", bench.now);
+    assert.deepEqual(messages.map((m) => [m.op, m.robot, m.x]), [["drive", "r1", 0], ["release", "r1", undefined]]);
+  });
+
+  test("is not driven by what is held", () => {
+    bench.drive();
+    bench.keep(bench.pilot.choose("r2", bench.now));
+    assert.deepEqual(bench.run(1000), []);
+    bench.letGo();
+    bench.run(250);
+    assert.deepEqual(bench.press(), [{ op: "take", robot: "r2" }]);
+  });
+
+  test("gives back a lease that is on its way", () => {
+    bench.press();
+    assert.deepEqual(bench.pilot.choose("r2", bench.now), [{ op: "release", robot: "r1" }]);
+    bench.grant("r1");
+    assert.deepEqual(bench.run(500), []);
+  });
+
+  test("of nothing leaves nothing to drive", () => {
+    bench.drive();
+    bench.keep(bench.pilot.choose(null, bench.now));
+    bench.letGo();
+    bench.run(500);
+    assert.deepEqual(bench.press(), []);
+  });
+});
+
+describe("leases", () => {
+  test("are given back after a while without motion", () => {
+    bench = new Bench({ releaseAfter: 5000 });
+    bench.drive();
+    bench.letGo();
+    const messages = bench.run(5100);
+    assert.equal(messages.filter((m) => m.op === "release").length, 1);
+    assert.equal(bench.pilot.driven, null);
+  });
+
+  test("are not given back while something is held", () => {
+    bench = new Bench({ releaseAfter: 5000 });
+    bench.drive();
+    assert.ok(bench.run(10_000).every((m) => m.op === "drive"));
+  });
+
+  test("that were given back are not believed in by a late report", () => {
+    const epoch = bench.drive();
+    bench.letGo();
+    bench.keep(bench.pilot.release("r1", bench.now));
+    bench.grant("r1", epoch);
+    bench.run(250);
+    assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
+  });
+
+  test("asked for by name do not move by what is held", () => {
+    bench.press({ x: 0, y: 0, turn: 0 });
+    bench.keep(bench.pilot.take("r1", bench.now));
+    bench.hands.set("keys", FORWARD, bench.now);
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(600)), []);
+  });
+
+  test("for a goal are kept quietly and given back later", () => {
+    bench = new Bench({ releaseAfter: 5000 });
+    const epoch = bench.grant("r1");
+    const goal = bench.pilot.goal("r1", { x: 1, y: 2, yaw: 0 }, bench.now);
+    assert.deepEqual([goal.op, goal.epoch], ["goal", epoch]);
+    assert.deepEqual(bench.run(4900), []);
+    assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);
+  });
+
+  test("end with the connection", () => {
+    bench.drive();
+    bench.pilot.disconnect();
+    assert.deepEqual(bench.run(200), []);
+    assert.equal(bench.pilot.epoch("r1"), null);
+  });
+});
