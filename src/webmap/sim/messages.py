@@ -1,0 +1,202 @@
+"""What the simulated robots say, as ROS messages in one dialect."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from webmap.geometry import Pose, Quaternion
+from webmap.sim.maps import FloorPlan
+from webmap.sim.planner import Point
+from webmap.sim.robot import Robot
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.scanner import ScannerOptions
+
+Message = dict[str, Any]
+
+_COVARIANCE = [0.0] * 36
+for _i, _variance in enumerate((0.001, 0.001, 1e6, 1e6, 1e6, 0.01)):
+    _COVARIANCE[7 * _i] = _variance
+_FULL, _EMPTY = 25.2, 21.0
+_DISCHARGING, _LITHIUM_ION, _GOOD = 2, 2, 1
+
+
+class Messages:
+    """Builds messages; headers are numbered by topic where the dialect does.
+
+    Args:
+        dialect: Of the graph.
+        nan: Whether covariances carry a NaN, as some drivers' do.
+
+    """
+
+    def __init__(self, dialect: Dialect, *, nan: bool = False) -> None:
+        self.dialect = dialect
+        self._covariance = _COVARIANCE.copy()
+        if nan:
+            self._covariance[1] = math.nan
+
+    def odometry(self, topic: str, stamp: float, robot: Robot) -> Message:
+        """Return ``nav_msgs/Odometry``."""
+        name = robot.name
+        return {
+            "header": self.dialect.header(topic, stamp, f"{name}/odom"),
+            "child_frame_id": f"{name}/base_link",
+            "pose": {"pose": pose(robot.odometry), "covariance": self._covariance},
+            "twist": {
+                "twist": {
+                    "linear": _vector(robot.twist.vx),
+                    "angular": _vector(z=robot.twist.wz),
+                },
+                "covariance": self._covariance,
+            },
+        }
+
+    def scan(
+        self,
+        topic: str,
+        stamp: float,
+        robot: Robot,
+        options: ScannerOptions,
+        ranges: NDArray[np.float32],
+    ) -> Message:
+        """Return ``sensor_msgs/LaserScan``."""
+        increment = math.tau / options.beams
+        return {
+            "header": self.dialect.header(topic, stamp, f"{robot.name}/base_laser"),
+            "angle_min": _float32(-math.pi),
+            "angle_max": _float32(-math.pi + (options.beams - 1) * increment),
+            "angle_increment": _float32(increment),
+            "time_increment": 0.0,
+            "scan_time": _float32(0.1),
+            "range_min": _float32(options.range_min),
+            "range_max": _float32(options.range_max),
+            "ranges": ranges,
+            "intensities": np.empty(0, np.float32),
+        }
+
+    def battery(self, topic: str, stamp: float, robot: Robot) -> Message:
+        """Return ``sensor_msgs/BatteryState``; NaN is what nobody measures."""
+        nothing = np.empty(0, np.float32)
+        return {
+            "header": self.dialect.header(topic, stamp, f"{robot.name}/base_link"),
+            "voltage": _float32(_EMPTY + (_FULL - _EMPTY) * robot.charge),
+            "temperature": math.nan,
+            "current": _float32(-0.8 - 2.5 * abs(robot.twist.vx)),
+            "charge": math.nan,
+            "capacity": math.nan,
+            "design_capacity": math.nan,
+            "percentage": _float32(robot.charge),
+            "power_supply_status": _DISCHARGING,
+            "power_supply_health": _GOOD,
+            "power_supply_technology": _LITHIUM_ION,
+            "present": True,
+            "cell_voltage": nothing,
+            "cell_temperature": nothing,
+            "location": "",
+            "serial_number": "",
+        }
+
+    def path(self, topic: str, stamp: float, points: list[Point]) -> Message:
+        """Return ``nav_msgs/Path`` in the map's frame, headed from point to point."""
+        header = self.dialect.header(topic, stamp, "map")
+        poses = []
+        for i, (x, y) in enumerate(points):
+            before, after = points[max(i - 1, 0)], points[min(i + 1, len(points) - 1)]
+            yaw = math.atan2(after[1] - before[1], after[0] - before[0])
+            poses.append({"header": header, "pose": pose(Pose(x, y, yaw))})
+        return {"header": header, "poses": poses}
+
+    def pose_stamped(self, stamp: float, at: Pose) -> Message:
+        """Return ``geometry_msgs/PoseStamped`` in the map's frame."""
+        return {"header": self.dialect.header("", stamp, "map"), "pose": pose(at)}
+
+    def transforms(self, topic: str, stamp: float, robots: list[Robot]) -> Message:
+        """Return ``tf2_msgs/TFMessage`` with each robot's map to odom to base."""
+        found = []
+        for robot in robots:
+            odom, base = f"{robot.name}/odom", f"{robot.name}/base_link"
+            map_from_odom = robot.pose @ robot.odometry.inverse
+            found.append(self._transform(topic, stamp, "map", odom, map_from_odom))
+            found.append(self._transform(topic, stamp, odom, base, robot.odometry))
+        return {"transforms": found}
+
+    def static_transforms(
+        self, topic: str, stamp: float, robots: list[Robot]
+    ) -> Message:
+        """Return where the scanners sit: above the middle of the base."""
+        return {
+            "transforms": [
+                self._transform(
+                    topic,
+                    stamp,
+                    f"{robot.name}/base_link",
+                    f"{robot.name}/base_laser",
+                    Pose(),
+                    z=0.2,
+                )
+                for robot in robots
+            ]
+        }
+
+    def grid(self, topic: str, stamp: float, plan: FloorPlan) -> Message:
+        """Return ``nav_msgs/OccupancyGrid``."""
+        rows, columns = plan.occupancy.shape
+        return {
+            "header": self.dialect.header(topic, stamp, "map"),
+            "info": {
+                "map_load_time": self.dialect.time(stamp),
+                "resolution": _float32(plan.resolution),
+                "width": columns,
+                "height": rows,
+                "origin": pose(Pose(plan.x, plan.y)),
+            },
+            "data": plan.occupancy.ravel(),
+        }
+
+    def _transform(
+        self,
+        topic: str,
+        stamp: float,
+        parent: str,
+        child: str,
+        at: Pose,
+        z: float = 0.0,
+    ) -> Message:
+        header = self.dialect.header(f"{topic}:{child}", stamp, parent)
+        return {
+            "header": header,
+            "child_frame_id": child,
+            "transform": {
+                "translation": _vector(at.x, at.y, z),
+                "rotation": _quaternion(at.yaw),
+            },
+        }
+
+
+def pose(at: Pose) -> Message:
+    """Return ``geometry_msgs/Pose``."""
+    return {"position": _vector(at.x, at.y), "orientation": _quaternion(at.yaw)}
+
+
+def read_pose(message: Message) -> Pose | None:
+    """Return a ``geometry_msgs/Pose`` in the plane; None unless it is finite."""
+    position, turn = message["position"], message["orientation"]
+    rotation = Quaternion(turn["x"], turn["y"], turn["z"], turn["w"])
+    at = Pose(position["x"], position["y"], rotation.yaw)
+    return at if all(map(math.isfinite, (at.x, at.y, at.yaw))) else None
+
+
+def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
+    return {"x": x, "y": y, "z": z}
+
+
+def _quaternion(yaw: float) -> Message:
+    turn = Quaternion.from_yaw(yaw)
+    return {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w}
+
+
+def _float32(value: float) -> float:
+    """Return the nearest value that the message's field can hold."""
+    return float(np.float32(value))

@@ -1,0 +1,192 @@
+"""A robot's own driver: plans a path to a goal, follows it, and may be stopped."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from enum import Enum
+
+from webmap.geometry import Pose, Twist, normalize_angle
+from webmap.sim.planner import Planner, Point
+from webmap.sim.robot import Robot
+
+_LOOK_AHEAD = 0.5
+_ARRIVED = 0.12
+_TURNED = 0.08
+_CRUISE = 0.7
+_PATIENCE = 2.5
+_MOST_PLANS = 6
+_KEEP_OFF = 0.15
+
+Discs = Sequence[tuple[float, float, float]]
+
+
+class GoalState(Enum):
+    """How a goal goes."""
+
+    ACTIVE = "active"
+    SUCCEEDED = "succeeded"
+    CANCELED = "canceled"
+    ABORTED = "aborted"
+
+
+class Goal:
+    """A pose to drive to, in the map's frame, and who hears of its end."""
+
+    def __init__(
+        self, pose: Pose, on_end: Callable[["Goal"], None] | None = None
+    ) -> None:
+        self.pose = pose
+        self.state = GoalState.ACTIVE
+        self.text = ""
+        """Why it ended."""
+        self._on_end = on_end
+
+    def end(self, state: GoalState, text: str) -> None:
+        """Close the goal, once."""
+        if self.state is GoalState.ACTIVE:
+            self.state, self.text = state, text
+            if self._on_end:
+                self._on_end(self)
+
+
+class Navigator:
+    """Drives one robot to one goal at a time."""
+
+    def __init__(self, robot: Robot, planner: Planner) -> None:
+        self.robot = robot
+        self.planner = planner
+        self.goal: Goal | None = None
+        self.path: list[Point] = []
+        """What it follows, in the map's frame; empty without a path."""
+        self.path_changes = 0
+        """Grows with every new path, and when one ends."""
+        self._search: Iterator[list[Point] | None] | None = None
+        self._plans = 0
+        self._next = 0
+        self._stuck_for = 0.0
+
+    def send(self, goal: Goal) -> None:
+        """Drive to a goal, instead of what it drove to before."""
+        self.cancel("another goal came")
+        self.goal = goal
+        self._plans = 0
+        self._search = None
+        self._stuck_for = 0.0
+        self.robot.release()
+
+    def cancel(self, reason: str) -> None:
+        """End the goal, if there is one, and stop."""
+        self._end(GoalState.CANCELED, reason)
+
+    @property
+    def distance_left(self) -> float:
+        """Metres along the path to the goal; 0 without a path."""
+        if not self.path:
+            return 0.0
+        points = [(self.robot.pose.x, self.robot.pose.y), *self.path[self._next :]]
+        return sum(math.dist(a, b) for a, b in itertools.pairwise(points))
+
+    def step(self, dt: float, discs: Discs) -> None:
+        """Go on with the goal.
+
+        Args:
+            dt: Seconds since the last step.
+            discs: The other robots, as x, y and radius.
+
+        """
+        if self.goal is None:
+            return
+        if not self.path:
+            self._plan(discs)
+            return
+        self._watch_progress(dt)
+        if self.goal is not None and self.path:
+            self._follow(discs)
+
+    def _plan(self, discs: Discs) -> None:
+        goal = self.goal
+        assert goal is not None
+        pose = self.robot.pose
+        if self._search is None:
+            if self._plans >= _MOST_PLANS:
+                self._end(GoalState.ABORTED, "no way through")
+                return
+            self._plans += 1
+            radius = self.robot.options.radius
+            # Who is close cannot be planned around, only waited for.
+            others = [
+                (x, y, r + radius + _KEEP_OFF)
+                for x, y, r in discs
+                if math.dist((x, y), (pose.x, pose.y)) > r + radius + 2 * _KEEP_OFF
+            ]
+            self._search = self.planner.search(
+                (pose.x, pose.y), (goal.pose.x, goal.pose.y), others
+            )
+        found = next(self._search)
+        if found is None:
+            return
+        self._search = None
+        if found:
+            self._set_path(found)
+        else:
+            self._end(GoalState.ABORTED, "no path to the goal")
+
+    def _set_path(self, path: list[Point]) -> None:
+        self.path = path
+        self.path_changes += 1
+        self._next = 1
+        self._stuck_for = 0.0
+
+    def _watch_progress(self, dt: float) -> None:
+        moving = abs(self.robot.twist.vx) > 0.03 or abs(self.robot.twist.wz) > 0.1
+        self._stuck_for = 0.0 if moving else self._stuck_for + dt
+        if self._stuck_for > _PATIENCE:
+            self._set_path([])
+
+    def _follow(self, discs: Discs) -> None:
+        assert self.goal is not None
+        pose, last = self.robot.pose, self.path[-1]
+        if math.dist((pose.x, pose.y), last) < _ARRIVED:
+            self._turn_to(self.goal.pose.yaw)
+            return
+        ahead = self._look_ahead(pose)
+        bearing = math.atan2(ahead[1] - pose.y, ahead[0] - pose.x)
+        error = normalize_angle(bearing - pose.yaw)
+        speed = min(_CRUISE, 0.15 + 0.9 * self.distance_left) * max(math.cos(error), 0)
+        if abs(error) > 0.9 or self._must_wait(discs):
+            speed = 0.0
+        self.robot.autonomous = Twist(vx=speed, wz=max(-1.5, min(1.5, 2.2 * error)))
+
+    def _look_ahead(self, pose: Pose) -> Point:
+        here = (pose.x, pose.y)
+        while (
+            self._next < len(self.path) - 1
+            and math.dist(here, self.path[self._next]) < _LOOK_AHEAD
+        ):
+            self._next += 1
+        return self.path[self._next]
+
+    def _must_wait(self, discs: Discs) -> bool:
+        """Whether another robot is right in front."""
+        pose, radius = self.robot.pose, self.robot.options.radius
+        for x, y, r in discs:
+            seen = pose.inverse @ Pose(x, y)
+            if 0 < seen.x < r + radius + 0.45 and abs(seen.y) < r + radius + 0.05:
+                return True
+        return False
+
+    def _turn_to(self, yaw: float) -> None:
+        error = normalize_angle(yaw - self.robot.pose.yaw)
+        if abs(error) < _TURNED:
+            self._end(GoalState.SUCCEEDED, "arrived")
+        else:
+            self.robot.autonomous = Twist(wz=max(-1.2, min(1.2, 2.5 * error)))
+
+    def _end(self, state: GoalState, text: str) -> None:
+        goal, self.goal = self.goal, None
+        self._search = None
+        self.robot.autonomous = None
+        if self.path:
+            self._set_path([])
+        if goal:
+            goal.end(state, text)

@@ -1,0 +1,201 @@
+"""The ROS node of the simulated robots: the world on one side, topics on the other."""
+
+import logging
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from webmap.geometry import Pose, Twist
+from webmap.sim.actionlib import ActionlibServer
+from webmap.sim.messages import Messages, read_pose
+from webmap.sim.nav2 import NavigateToPose
+from webmap.sim.navigator import Goal
+from webmap.sim.rosbridge.encode import Publication
+from webmap.sim.rosbridge.graph import Graph, Respond
+from webmap.sim.rosbridge.quirks import Quirks
+from webmap.sim.world import World
+
+log = logging.getLogger(__name__)
+
+NODE = "/robots"
+STEP = 0.025
+"""Seconds of one step of the world."""
+
+_ODOMETRY_EVERY = 2
+_SCAN_EVERY = 4
+_STATUS_EVERY = 8
+_SLOW_EVERY = 40
+
+
+class RobotsNode:
+    """Publishes what robots do, and makes them do what they are told.
+
+    Args:
+        world: The robots.
+        graph: Where their topics are.
+        twist: ``Twist`` or ``TwistStamped``, what ``cmd_vel`` takes.
+        quirks: Of the server, for the services that may hang.
+
+    """
+
+    def __init__(self, world: World, graph: Graph, twist: str, quirks: Quirks) -> None:
+        self.world = world
+        self.graph = graph
+        self.messages = Messages(graph.schema.dialect, nan=world.options.scanner.nan)
+        self._twist = twist
+        self._quirks = quirks
+        self._steps = 0
+        self.on_step: list[Callable[[], None]] = []
+        """Called five times a second: the actions say how their goals go."""
+        self._paths_seen = [0 for _ in world.robots]
+
+    def start(self) -> None:
+        """Advertise, subscribe and serve everything."""
+        self._publish_fixed()
+        self._advertise("/tf", "tf2_msgs/TFMessage")
+        for index, robot in enumerate(self.world.robots):
+            self._start_robot(index, f"/{robot.name}")
+
+    def _start_robot(self, index: int, prefix: str) -> None:
+        self._advertise(f"{prefix}/odom", "nav_msgs/Odometry")
+        self._advertise(f"{prefix}/base_scan", "sensor_msgs/LaserScan")
+        self._advertise(f"{prefix}/battery_state", "sensor_msgs/BatteryState")
+        self._advertise(f"{prefix}/plan", "nav_msgs/Path")
+        self._subscribe(
+            f"{prefix}/cmd_vel",
+            f"geometry_msgs/{self._twist}",
+            partial(self._on_twist, index),
+        )
+        goals = ["move_base_simple/goal"]
+        if self.graph.schema.dialect.is_ros2:
+            goals.append("goal_pose")
+            NavigateToPose(self, index, prefix).start()
+        else:
+            ActionlibServer(self, index, prefix).start()
+        for name in goals:
+            self._subscribe(
+                f"{prefix}/{name}",
+                "geometry_msgs/PoseStamped",
+                partial(self._on_simple_goal, index),
+            )
+        self.graph.serve(
+            self,
+            f"{prefix}/stop",
+            "std_srvs/Trigger",
+            partial(self._on_stop, index),
+            node=NODE,
+        )
+
+    def step(self) -> None:
+        """Let the world go on by one step, and publish what is due."""
+        self.world.step(STEP)
+        self._steps += 1
+        if self._steps % _ODOMETRY_EVERY == 0:
+            self._publish_poses()
+        if self._steps % _SCAN_EVERY == 0:
+            self._publish_scans()
+        if self._steps % _STATUS_EVERY == 0:
+            for report in self.on_step:
+                report()
+        slow = self._steps % _SLOW_EVERY == 0
+        if slow:
+            self._publish_batteries()
+        self._publish_paths(all_of_them=slow)
+
+    def target(self, pose_stamped: dict[str, Any], index: int) -> Pose | None:
+        """Return a goal in the map's frame; None if it is in no frame we know."""
+        at = read_pose(pose_stamped["pose"])
+        frame = pose_stamped["header"]["frame_id"].strip("/")
+        robot = self.world.robots[index]
+        if at is None or frame in ("", "map"):
+            return at
+        if frame in ("odom", f"{robot.name}/odom"):
+            return robot.pose @ robot.odometry.inverse @ at
+        log.warning("%s: a goal in an unknown frame %r", robot.name, frame)
+        return None
+
+    # From the graph.
+
+    def _on_twist(self, index: int, publication: Publication) -> None:
+        message = publication.message
+        if self._twist == "TwistStamped":
+            message = message["twist"]
+        twist = Twist(vx=message["linear"]["x"], wz=message["angular"]["z"])
+        if not self.world.command(index, twist):
+            log.warning("robot_%d: refused %s", index, twist)
+
+    def _on_simple_goal(self, index: int, publication: Publication) -> None:
+        at = self.target(publication.message, index)
+        if at is not None:
+            self.world.send_goal(index, Goal(at))
+
+    def _on_stop(self, index: int, _: dict[str, Any], respond: Respond) -> None:
+        if self._quirks.hanging_stop:
+            return
+        self.world.stop(index)
+        respond({"success": True, "message": "stopped"})
+
+    # To the graph.
+
+    def _publish_fixed(self) -> None:
+        now = self.graph.clock()
+        self._advertise("/map", "nav_msgs/OccupancyGrid", latch=True)
+        self.publish("/map", self.messages.grid("/map", now, self.world.plan))
+        self._advertise("/tf_static", "tf2_msgs/TFMessage", latch=True)
+        transforms = self.messages.static_transforms(
+            "/tf_static", now, self.world.robots
+        )
+        self.publish("/tf_static", transforms)
+
+    def _publish_poses(self) -> None:
+        now = self.graph.clock()
+        for robot in self.world.robots:
+            topic = f"/{robot.name}/odom"
+            if self.graph.is_wanted(topic):
+                self.publish(topic, self.messages.odometry(topic, now, robot))
+        if self.graph.is_wanted("/tf"):
+            self.publish("/tf", self.messages.transforms("/tf", now, self.world.robots))
+
+    def _publish_scans(self) -> None:
+        robots = self.world.robots
+        wanted = [
+            i
+            for i, robot in enumerate(robots)
+            if self.graph.is_wanted(f"/{robot.name}/base_scan")
+        ]
+        if not wanted:
+            return
+        now = self.graph.clock()
+        options = self.world.options.scanner
+        for i, ranges in zip(wanted, self.world.sweep(wanted), strict=True):
+            topic = f"/{robots[i].name}/base_scan"
+            self.publish(
+                topic, self.messages.scan(topic, now, robots[i], options, ranges)
+            )
+
+    def _publish_batteries(self) -> None:
+        now = self.graph.clock()
+        for robot in self.world.robots:
+            topic = f"/{robot.name}/battery_state"
+            if self.graph.is_wanted(topic):
+                self.publish(topic, self.messages.battery(topic, now, robot))
+
+    def _publish_paths(self, *, all_of_them: bool) -> None:
+        for i, navigator in enumerate(self.world.navigators):
+            is_new = navigator.path_changes != self._paths_seen[i]
+            self._paths_seen[i] = navigator.path_changes
+            topic = f"/{navigator.robot.name}/plan"
+            repeats = all_of_them and navigator.path
+            if (is_new or repeats) and self.graph.is_wanted(topic):
+                now = self.graph.clock()
+                self.publish(topic, self.messages.path(topic, now, navigator.path))
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        """Publish on a topic of this node."""
+        self.graph.publish(self, topic, message)
+
+    def _advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
+        self.graph.advertise(self, topic, type_name, node=NODE, latch=latch)
+
+    def _subscribe(self, topic: str, type_name: str, callback: Any) -> None:
+        self.graph.subscribe(self, topic, callback, type_name, node=NODE)

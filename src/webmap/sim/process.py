@@ -1,0 +1,165 @@
+"""The simulator as a process: the world's clock and the server in one loop."""
+
+import asyncio
+import contextlib
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+log = logging.getLogger(__name__)
+
+_MOST_ROBOTS = 1000
+
+
+async def run_simulator(
+    *,
+    robots: int = 2,
+    port: int = 0,
+    seed: int = 1,
+    map: Path | str | None = None,
+    dialect: Literal["ros1", "ros2"] = "ros1",
+    twist: Literal["Twist", "TwistStamped"] = "Twist",
+    robot_timeout: float | None = 0.25,
+    drift: float = 0.0,
+    nan: bool = False,
+    quirks: str = "real",
+    wander: bool = False,
+    host: str = "127.0.0.1",
+    refuse_nan: bool = True,
+    on_ready: Callable[[str], None] | None = None,
+    stop: asyncio.Event | None = None,
+) -> None:
+    """Run a simulator until SIGINT, SIGTERM, or ``stop`` is set.
+
+    Args:
+        robots: How many, called ``robot_0`` and so on.
+        port: To listen on; 0 lets the kernel choose.
+        seed: Of everything random: the same seed gives the same places.
+        map: A map_server YAML file; None for the floor that comes with the package.
+        dialect: Whose type names and times the server speaks.
+        twist: What the robots take on ``cmd_vel``.
+        robot_timeout: Seconds without a command until a base stops by itself; None
+            for a bad one that never does.
+        drift: How wrong odometry grows, in metres a metre.
+        nan: Whether scans and covariances hold some NaN.
+        quirks: ``real``, ``polite``, or one of them with changes; see
+            :func:`webmap.sim.rosbridge.quirks.parse_quirks`.
+        wander: Whether robots that nobody commands drive to random places.
+        host: The address to listen on.
+        refuse_nan: Whether the bases ignore a twist with NaN or infinity.
+        on_ready: Called with the URL once clients can connect.
+        stop: Ends the run when it is set.
+
+    Raises:
+        ConfigError: If the map or an option makes no sense.
+        OSError: If the port is in use or the address is not this machine's.
+
+    """
+    # Heavy, and needed by nobody who only imports the name.
+    from webmap.sim.maps import FLOOR, load_map
+    from webmap.sim.node import RobotsNode
+    from webmap.sim.robot import BaseOptions
+    from webmap.sim.rosbridge.dialect import Dialect
+    from webmap.sim.rosbridge.encode import Encoder
+    from webmap.sim.rosbridge.graph import Graph
+    from webmap.sim.rosbridge.quirks import parse_quirks
+    from webmap.sim.rosbridge.rosapi import Rosapi
+    from webmap.sim.rosbridge.schema import Schema
+    from webmap.sim.rosbridge.server import RosbridgeServer
+    from webmap.sim.scanner import ScannerOptions
+    from webmap.sim.world import World, WorldOptions
+
+    _check(robots, dialect, twist, robot_timeout)
+    behaviour = parse_quirks(quirks, dialect)
+    options = WorldOptions(
+        robots=robots,
+        seed=seed,
+        base=BaseOptions(timeout=robot_timeout, drift=drift, refuse_nan=refuse_nan),
+        scanner=ScannerOptions(nan=nan),
+        wander=wander,
+    )
+    world = World(load_map(map or FLOOR), options)
+    schema = Schema(Dialect(dialect))
+    graph = Graph(schema)
+    Rosapi(graph, behaviour).start()
+    node = RobotsNode(world, graph, twist, behaviour)
+    node.start()
+    server = RosbridgeServer(graph, Encoder(schema, behaviour))
+    stop = stop or asyncio.Event()
+    with _signals_set(stop):
+        url = await server.start(host, port)
+        try:
+            if on_ready:
+                on_ready(url)
+            await _turn_the_clock(node, stop)
+        finally:
+            await server.stop()
+
+
+def _check(robots: int, dialect: str, twist: str, robot_timeout: float | None) -> None:
+    if not 1 <= robots <= _MOST_ROBOTS:
+        raise ConfigError(f"robots must be from 1 to {_MOST_ROBOTS}, got {robots}")
+    if dialect not in ("ros1", "ros2"):
+        raise ConfigError(f"dialect must be 'ros1' or 'ros2', got {dialect!r}")
+    if twist not in ("Twist", "TwistStamped"):
+        raise ConfigError(f"twist must be 'Twist' or 'TwistStamped', got {twist!r}")
+    if robot_timeout is not None and not robot_timeout > 0:
+        raise ConfigError(f"robot_timeout must be above 0, got {robot_timeout}")
+
+
+async def _turn_the_clock(node: "RobotsNode", stop: asyncio.Event) -> None:
+    from webmap.sim.node import STEP
+
+    loop = asyncio.get_running_loop()
+    due = loop.time()
+    while not stop.is_set():
+        node.step()
+        due += STEP
+        late = loop.time() - due
+        if late > 1:
+            log.warning("the simulator is %.1f s behind: that time is left out", late)
+            due = loop.time()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(max(due - loop.time(), 0)):
+                await stop.wait()
+
+
+@contextlib.contextmanager
+def _signals_set(stop: asyncio.Event) -> Iterator[None]:
+    """Let SIGINT and SIGTERM end the run, where this thread may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    loop = asyncio.get_running_loop()
+    signals = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in signals}
+    for number in signals:
+        signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def end_with_stdin(stop: asyncio.Event) -> None:
+    """Set ``stop`` when standard input ends: whoever started this process is gone."""
+    loop = asyncio.get_running_loop()
+
+    def watch() -> None:
+        with contextlib.suppress(OSError, ValueError):
+            while sys.stdin.buffer.read(4096):
+                pass
+        with contextlib.suppress(RuntimeError):
+            loop.call_soon_threadsafe(stop.set)
+
+    threading.Thread(target=watch, name="stdin", daemon=True).start()

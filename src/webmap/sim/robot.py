@@ -1,0 +1,165 @@
+"""A differential-drive base: how it moves, and when it stops by itself."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+
+from webmap.geometry import Pose, Twist, normalize_angle
+
+_HOLD = 0.5
+_STILL = Twist()
+_DRAIN_IDLE = 1 / 14_400
+_DRAIN_MOVING = 1 / 7_200
+_LOWEST_CHARGE = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class BaseOptions:
+    """What a base can do."""
+
+    radius: float = 0.25
+    """Of its round footprint, in metres."""
+
+    v_max: float = 1.2
+    """Metres per second, forward and backward."""
+
+    w_max: float = 2.5
+    """Radians per second."""
+
+    acceleration: float = 2.0
+    """Metres per second squared, speeding up and slowing down."""
+
+    turn_acceleration: float = 8.0
+    """Radians per second squared."""
+
+    timeout: float | None = 0.25
+    """Seconds without a command until it stops by itself; None for a bad robot."""
+
+    refuse_nan: bool = True
+    """Whether a twist with NaN or infinity is ignored, as a good driver does."""
+
+    drift: float = 0.0
+    """How wrong the odometry grows: metres (and half as many radians) a metre."""
+
+
+class Robot:
+    """One simulated robot, moved in steps."""
+
+    def __init__(
+        self, name: str, pose: Pose, options: BaseOptions, seed: int = 0
+    ) -> None:
+        self.name = name
+        self.options = options
+        self.pose = pose
+        """True pose in the map's frame."""
+        self.odometry = pose
+        """Where its odometry thinks it is."""
+        self.twist = _STILL
+        """True velocity."""
+        self.charge = 0.94 - 0.07 * (seed % 7)
+        """Of the battery, 0 to 1."""
+        self.autonomous: Twist | None = None
+        """What its own planner wants, if it drives itself."""
+        self.bumped = False
+        """Whether something stopped it in the last step."""
+        self.travelled = 0.0
+        """Metres on the wheels since the start."""
+        self._command: Twist | None = None
+        self._commanded_at = 0.0
+        self._random = Random(seed)  # noqa: S311 - a simulation's noise
+
+    def command(self, twist: Twist, now: float) -> bool:
+        """Take a velocity command; return False if it was refused.
+
+        Args:
+            twist: What the base shall do.
+            now: Seconds on the world's clock.
+
+        """
+        if not twist.is_finite and self.options.refuse_nan:
+            return False
+        self._command = twist
+        self._commanded_at = now
+        return True
+
+    def release(self) -> None:
+        """Forget the client's command, so that the planner may drive."""
+        self._command = None
+
+    def stop(self) -> None:
+        """Command zero, until somebody commands anew."""
+        self._command = None
+        self.autonomous = None
+
+    def step(
+        self, dt: float, now: float, is_blocked: Callable[[float, float], bool]
+    ) -> None:
+        """Move on by ``dt`` seconds.
+
+        Args:
+            dt: The length of the step, in seconds.
+            now: The world's clock at its end.
+            is_blocked: Whether the base cannot stand at a place of the map.
+
+        """
+        wanted = self._wanted(now)
+        limits = self.options
+        before = self.twist
+        vx = _towards(before.vx, wanted.vx, limits.v_max, limits.acceleration * dt)
+        wz = _towards(before.wz, wanted.wz, limits.w_max, limits.turn_acceleration * dt)
+        # The mean of a ramp: a command of 1 m/s for 1 s makes 1 m, ramps included.
+        ahead = (before.vx + vx) / 2 * dt
+        turn = (before.wz + wz) / 2 * dt
+        target = self.pose @ _arc(ahead, turn)
+        self.bumped = bool(ahead) and is_blocked(target.x, target.y)
+        if self.bumped:
+            ahead, vx = 0.0, 0.0
+            target = self.pose @ Pose(yaw=turn)
+        self.pose = target
+        self.twist = Twist(vx=vx, wz=wz)
+        self._measure(ahead, turn)
+        self._drain(dt)
+
+    def _wanted(self, now: float) -> Twist:
+        if self._command is not None:
+            if now - self._commanded_at <= self._holds_for(self._command):
+                return self._command
+            self._command = None
+        return self.autonomous or _STILL
+
+    def _holds_for(self, command: Twist) -> float:
+        if self.options.timeout is not None:
+            return self.options.timeout
+        return _HOLD if command.is_zero else math.inf
+
+    def _measure(self, ahead: float, turn: float) -> None:
+        drift = self.options.drift
+        if not drift:
+            self.odometry = self.pose
+            return
+        way = abs(ahead)
+        ahead += way * drift * self._random.gauss(0.5, 1)
+        turn += way * drift / 2 * self._random.gauss(0.5, 1)
+        self.odometry = self.odometry @ _arc(ahead, turn)
+
+    def _drain(self, dt: float) -> None:
+        moved = abs(self.twist.vx) * dt
+        self.travelled += moved
+        used = dt * _DRAIN_IDLE + moved * _DRAIN_MOVING
+        self.charge = max(self.charge - used, _LOWEST_CHARGE)
+
+
+def _towards(now: float, wanted: float, limit: float, change: float) -> float:
+    wanted = max(-limit, min(limit, wanted))
+    return max(now - change, min(now + change, wanted))
+
+
+def _arc(ahead: float, turn: float) -> Pose:
+    """Return where a base gets that goes ``ahead`` metres while it turns."""
+    if abs(turn) < 1e-9:
+        return Pose(ahead, 0.0, turn)
+    radius = ahead / turn
+    return Pose(
+        radius * math.sin(turn), radius * (1 - math.cos(turn)), normalize_angle(turn)
+    )

@@ -1,0 +1,1 @@
+"""A rosbridge v2.1 server over a small ROS graph that lives in this process."""

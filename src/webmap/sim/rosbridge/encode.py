@@ -1,0 +1,169 @@
+"""One published message in the forms that subscribers ask for."""
+
+import base64
+import io
+import math
+from typing import Any
+
+import cbor2
+import msgspec
+import numpy as np
+
+from webmap.sim.rosbridge.quirks import Quirks
+from webmap.sim.rosbridge.raw import serialize
+from webmap.sim.rosbridge.schema import Schema
+
+# RFC 8746: typed arrays, little-endian.
+_ARRAY_TAGS = {
+    "u2": 69,
+    "u4": 70,
+    "u8": 71,
+    "i1": 72,
+    "i2": 77,
+    "i4": 78,
+    "i8": 79,
+    "f4": 85,
+    "f8": 86,
+}
+_NAN = msgspec.Raw(b"NaN")
+_ONE_FRAGMENT = 1
+
+
+class Publication:
+    """A message on a topic; each form is made once, however many want it."""
+
+    __slots__ = ("_forms", "message", "stamp", "topic", "type")
+
+    def __init__(
+        self, topic: str, type_name: str, message: dict[str, Any], stamp: float
+    ) -> None:
+        self.topic = topic
+        self.type = type_name
+        self.message = message
+        self.stamp = stamp
+        self._forms: dict[str, str | bytes | None] = {}
+
+    def form(self, compression: str, encoder: "Encoder") -> str | bytes | None:
+        """Return the frame, or None if this server cannot send that form."""
+        if compression not in self._forms:
+            self._forms[compression] = encoder.publication(self, compression)
+        return self._forms[compression]
+
+
+class Encoder:
+    """Makes frames in one dialect, with one server's quirks."""
+
+    def __init__(self, schema: Schema, quirks: Quirks) -> None:
+        self.schema = schema
+        self.quirks = quirks
+
+    def json(self, operation: dict[str, Any]) -> str:
+        """Return an operation as JSON; NaN and infinity become ``null``."""
+        text = msgspec.json.encode(operation, enc_hook=_plain).decode()
+        return text.replace("/", "\\/") if self.quirks.escaped_slashes else text
+
+    def publication(
+        self, publication: Publication, compression: str
+    ) -> str | bytes | None:
+        """Return a publication's frame in a form, or None if it is never sent."""
+        operation = {
+            "op": "publish",
+            "topic": publication.topic,
+            "msg": publication.message,
+        }
+        if compression == "cbor":
+            return self._cbor(operation, publication)
+        if compression == "cbor-raw":
+            return self._cbor_raw(publication)
+        if self.quirks.bare_nan and self.has_fixed_array(publication.type):
+            operation["msg"] = _bare_nan(publication.message)
+        text = self.json(operation)
+        if compression != "png":
+            return text
+        return None if self.quirks.no_png else self.png(text)
+
+    def _cbor(
+        self, operation: dict[str, Any], publication: Publication
+    ) -> bytes | None:
+        if self.quirks.no_fixed_array_cbor and self.has_fixed_array(publication.type):
+            return None
+        return cbor2.dumps(operation, default=_tag_array)
+
+    def _cbor_raw(self, publication: Publication) -> bytes:
+        seconds, rest = divmod(round(publication.stamp * 1e9), 1_000_000_000)
+        octets = serialize(self.schema, publication.type, publication.message)
+        return cbor2.dumps(
+            {
+                "op": "publish",
+                "topic": publication.topic,
+                # Both dialects say secs and nsecs here.
+                "msg": {"secs": seconds, "nsecs": rest, "bytes": octets},
+            }
+        )
+
+    def has_fixed_array(self, type_name: str) -> bool:
+        """Whether a type has, at any depth, a fixed array that is not of bytes."""
+        return any(
+            (field.length is not None and field.length > 0 and field.type != "uint8")
+            or ("/" in field.type and self.has_fixed_array(field.type))
+            for field in self.schema.fields(type_name)
+        )
+
+    def png(self, text: str) -> str:
+        """Return an operation's JSON packed into the pixels of a PNG."""
+        from PIL import Image
+
+        octets = text.encode()
+        width = max(math.isqrt(len(octets) // 3), 1)
+        height = math.ceil(len(octets) / 3 / width)
+        padded = octets.ljust(width * height * 3, b"\n")
+        out = io.BytesIO()
+        Image.frombytes("RGB", (width, height), padded).save(out, "png")
+        return self.json(
+            {"op": "png", "data": base64.b64encode(out.getvalue()).decode()}
+        )
+
+    def fragments(self, text: str, size: int, identifier: Any = None) -> list[str]:
+        """Return a frame in pieces of ``size`` characters, or whole if it fits."""
+        if len(text) <= size:
+            return [text]
+        pieces = [text[start : start + size] for start in range(0, len(text), size)]
+        float_total = self.quirks.float_fragments
+        total = len(text) / size + _ONE_FRAGMENT if float_total else len(pieces)
+        return [
+            self.json(
+                {
+                    "op": "fragment",
+                    "id": 0 if identifier is None else identifier,
+                    "data": piece,
+                    "num": number,
+                    "total": total,
+                }
+            )
+            for number, piece in enumerate(pieces)
+        ]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a message cannot hold a {type(value)}")
+
+
+def _tag_array(encoder: cbor2.CBOREncoder, value: Any) -> None:
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"a message cannot hold a {type(value)}")
+    tag = _ARRAY_TAGS.get(value.dtype.str[1:])
+    if tag is None:
+        raise TypeError(f"no typed array for {value.dtype}")
+    little = value.astype(value.dtype.newbyteorder("<"), copy=False)
+    encoder.encode(cbor2.CBORTag(tag, little.tobytes()))
+
+
+def _bare_nan(value: Any) -> Any:
+    """Return a message whose fixed arrays carry the token that JSON does not have."""
+    if isinstance(value, dict):
+        return {name: _bare_nan(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_NAN if item != item else _bare_nan(item) for item in value]
+    return value

@@ -1,0 +1,102 @@
+"""What real rosbridge servers do that their protocol text does not say."""
+
+from dataclasses import dataclass, fields, replace
+
+from webmap.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True)
+class Quirks:
+    """Departures from the protocol text; without any the server is polite."""
+
+    silent: bool = False
+    """A bad request is answered with silence, never with ``op: status``."""
+
+    bare_nan: bool = False
+    """NaN in a fixed array (a covariance) is written as the token ``NaN``."""
+
+    no_fixed_array_cbor: bool = False
+    """A message with a fixed array (Odometry) is never sent as CBOR."""
+
+    no_png: bool = False
+    """A subscription with compression png is never served."""
+
+    no_cbor_fragments: bool = False
+    """CBOR with a fragment size is never sent."""
+
+    float_fragments: bool = False
+    """The total of fragments is a float, and publications share the id 0."""
+
+    escaped_slashes: bool = False
+    r"""JSON has ``\/`` for every slash, as the ujson library writes it."""
+
+    lenient_numbers: bool = False
+    """NaN, Infinity and 1e999 from a client reach the robot."""
+
+    blocking_services: bool = False
+    """A service call blocks its socket's other messages until it is answered."""
+
+    blocking_goals: bool = False
+    """An action goal blocks its socket's other messages until it ends."""
+
+    hanging_param_names: bool = False
+    """``/rosapi/get_param_names`` never answers, nor does rosapi after it."""
+
+    deadly_message_details: bool = False
+    """``/rosapi/message_details`` never answers, and rosapi is gone after it."""
+
+    hanging_stop: bool = False
+    """``/robot_N/stop`` never answers. No server does this by nature: it is a fault."""
+
+
+POLITE = Quirks()
+REAL = {
+    "ros1": Quirks(
+        silent=True,
+        no_fixed_array_cbor=True,
+        no_cbor_fragments=True,
+        float_fragments=True,
+        escaped_slashes=True,
+        lenient_numbers=True,
+    ),
+    "ros2": Quirks(
+        silent=True,
+        bare_nan=True,
+        no_fixed_array_cbor=True,
+        no_png=True,
+        no_cbor_fragments=True,
+        float_fragments=True,
+        escaped_slashes=True,
+        lenient_numbers=True,
+        blocking_services=True,
+        blocking_goals=True,
+        hanging_param_names=True,
+        deadly_message_details=True,
+    ),
+}
+"""What rosbridge 0.11.17 (ROS 1) and 2.1.0 (ROS 2) were seen to do."""
+
+
+def parse_quirks(text: str, dialect: str) -> Quirks:
+    """Return the quirks that ``text`` names.
+
+    Args:
+        text: ``real`` or ``polite``, then any number of ``,NAME`` to add a quirk or
+            ``,-NAME`` to take one away: ``polite,bare_nan`` or ``real,-silent``.
+        dialect: ``ros1`` or ``ros2``; says what ``real`` is.
+
+    Raises:
+        ConfigError: If the text names something else.
+
+    """
+    base, *changes = (part.strip() for part in text.split(","))
+    if base not in ("real", "polite"):
+        raise ConfigError(f"quirks must begin with 'real' or 'polite', got {text!r}")
+    known = [field.name for field in fields(Quirks)]
+    quirks = REAL[dialect] if base == "real" else POLITE
+    for change in changes:
+        name = change.removeprefix("-")
+        if name not in known:
+            raise ConfigError(f"no quirk is called {name!r}; there are {known}")
+        quirks = replace(quirks, **{name: not change.startswith("-")})
+    return quirks

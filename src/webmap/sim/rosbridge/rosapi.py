@@ -1,0 +1,188 @@
+"""The rosapi node: the services with which clients discover a ROS graph."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from webmap.sim.rosbridge.definitions import MESSAGES
+from webmap.sim.rosbridge.details import definition_text, type_definitions
+from webmap.sim.rosbridge.dialect import canonical, resolve
+from webmap.sim.rosbridge.graph import Graph, Respond, ServiceFailed
+from webmap.sim.rosbridge.quirks import Quirks
+from webmap.sim.rosbridge.schema import UnknownType
+
+NODE = "/rosapi"
+
+Args = dict[str, Any]
+
+
+@dataclass(slots=True)
+class Rosapi:
+    """Answers discovery, until a quirk hangs it."""
+
+    graph: Graph
+    quirks: Quirks
+    hung: bool = False
+
+    def start(self) -> None:
+        """Put the services into the graph."""
+        services: dict[str, tuple[str, Callable[[Args], Any]]] = {
+            "topics": ("Topics", self._topics),
+            "topics_for_type": ("TopicsForType", self._topics_for_type),
+            "topics_and_raw_types": ("TopicsAndRawTypes", self._raw_types),
+            "topic_type": ("TopicType", self._topic_type),
+            "services": ("Services", self._services),
+            "services_for_type": ("ServicesForType", self._services_for_type),
+            "service_type": ("ServiceType", self._service_type),
+            "service_providers": ("ServiceProviders", self._service_providers),
+            "service_request_details": ("ServiceRequestDetails", self._request_details),
+            "service_response_details": (
+                "ServiceResponseDetails",
+                self._response_details,
+            ),
+            "publishers": ("Publishers", self._publishers),
+            "subscribers": ("Subscribers", self._subscribers),
+            "nodes": ("Nodes", self._nodes),
+            "node_details": ("NodeDetails", self._node_details),
+            "message_details": ("MessageDetails", self._message_details),
+            "action_servers": ("GetActionServers", self._action_servers),
+            "get_time": ("GetTime", self._get_time),
+            "get_param": ("GetParam", self._get_param),
+            "get_param_names": ("GetParamNames", self._get_param_names),
+        }
+        if self.graph.schema.dialect.is_ros2:
+            services["get_ros_version"] = ("GetROSVersion", self._get_ros_version)
+        for name, (type_name, answer) in services.items():
+            self._serve(name, type_name, answer)
+
+    def _serve(self, name: str, type_name: str, answer: Callable[[Args], Any]) -> None:
+        hangs = self.quirks.hanging_param_names and name == "get_param_names"
+        kills = self.quirks.deadly_message_details and name == "message_details"
+
+        def handle(request: Args, respond: Respond) -> None:
+            if kills:
+                self._die()
+            if hangs:
+                self.hung = True
+            if not (kills or self.hung):
+                respond(answer(request))
+
+        self.graph.serve(
+            self, f"{NODE}/{name}", f"rosapi/{type_name}", handle, node=NODE
+        )
+
+    def _die(self) -> None:
+        for name in [s.name for s in self.graph.services.values() if s.owner is self]:
+            self.graph.unserve(self, name)
+
+    def _spell(self, type_name: str) -> str:
+        return self.graph.schema.dialect.spell(type_name)
+
+    def _topics(self, _: Args) -> Any:
+        topics = self.graph.topics.values()
+        return {
+            "topics": [topic.name for topic in topics],
+            "types": [self._spell(topic.type) for topic in topics],
+        }
+
+    def _raw_types(self, _: Args) -> Any:
+        texts = [
+            definition_text(self.graph.schema, topic.type)
+            for topic in self.graph.topics.values()
+        ]
+        return {**self._topics({}), "typedefs_full_text": texts}
+
+    def _topics_for_type(self, request: Args) -> Any:
+        wanted = canonical(request["type"])
+        return {
+            "topics": [t.name for t in self.graph.topics.values() if t.type == wanted]
+        }
+
+    def _topic_type(self, request: Args) -> Any:
+        topic = self.graph.topics.get(resolve(request["topic"]))
+        return {"type": self._spell(topic.type) if topic else ""}
+
+    def _services(self, _: Args) -> Any:
+        return {"services": list(self.graph.services)}
+
+    def _services_for_type(self, request: Args) -> Any:
+        wanted = canonical(request["type"])
+        services = self.graph.services.values()
+        return {"services": [s.name for s in services if s.type == wanted]}
+
+    def _service_type(self, request: Args) -> Any:
+        service = self.graph.services.get(resolve(request["service"]))
+        spell = self.graph.schema.dialect.spell
+        return {"type": spell(service.type, "srv") if service else ""}
+
+    def _service_providers(self, request: Args) -> Any:
+        service = self.graph.services.get(resolve(request["service"]))
+        return {"providers": [service.node] if service else []}
+
+    def _publishers(self, request: Args) -> Any:
+        topic = self.graph.topics.get(resolve(request["topic"]))
+        return {"publishers": sorted(set(topic.publishers.values())) if topic else []}
+
+    def _subscribers(self, request: Args) -> Any:
+        topic = self.graph.topics.get(resolve(request["topic"]))
+        nodes = {node for node, _ in topic.subscribers.values()} if topic else set()
+        return {"subscribers": sorted(nodes)}
+
+    def _nodes(self, _: Args) -> Any:
+        nodes = {service.node for service in self.graph.services.values()}
+        for topic in self.graph.topics.values():
+            nodes.update(topic.publishers.values())
+            nodes.update(node for node, _ in topic.subscribers.values())
+        return {"nodes": sorted(nodes)}
+
+    def _node_details(self, request: Args) -> Any:
+        node = resolve(request["node"])
+        topics = self.graph.topics.values()
+        services = self.graph.services.values()
+        return {
+            "subscribing": sorted(
+                t.name for t in topics if node in (n for n, _ in t.subscribers.values())
+            ),
+            "publishing": sorted(
+                t.name for t in topics if node in t.publishers.values()
+            ),
+            "services": sorted(s.name for s in services if s.node == node),
+        }
+
+    def _message_details(self, request: Args) -> Any:
+        return self._details(request["type"], request["type"])
+
+    def _request_details(self, request: Args) -> Any:
+        return self._details(request["type"], f"{canonical(request['type'])}Request")
+
+    def _response_details(self, request: Args) -> Any:
+        return self._details(request["type"], f"{canonical(request['type'])}Response")
+
+    def _details(self, asked: str, type_name: str) -> Any:
+        try:
+            return {"typedefs": type_definitions(self.graph.schema, type_name)}
+        except UnknownType:
+            raise ServiceFailed(
+                f"Unable to load {asked}; known are {', '.join(sorted(MESSAGES))}"
+            ) from None
+
+    def _action_servers(self, _: Args) -> Any:
+        names = set(self.graph.actions)
+        suffix = "/goal"
+        for topic in self.graph.topics.values():
+            if topic.type.endswith("ActionGoal") and topic.subscribers:
+                names.add(topic.name.removesuffix(suffix))
+        return {"action_servers": sorted(names)}
+
+    def _get_time(self, _: Args) -> Any:
+        return {"time": self.graph.schema.dialect.time(self.graph.clock())}
+
+    def _get_param(self, request: Args) -> Any:
+        # There are no parameters; as rosapi, the default comes back as it was sent.
+        return {"value": request["default"]}
+
+    def _get_param_names(self, _: Args) -> Any:
+        return {"names": []}
+
+    def _get_ros_version(self, _: Args) -> Any:
+        return {"version": 2, "distro": "kilted"}

@@ -1,0 +1,167 @@
+"""A planar laser scanner, by exact ray casting on the grid."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from webmap.geometry import Pose
+from webmap.sim.obstacles import Obstacles
+
+_NUDGE = 1e-6
+_NAN_SHARE = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class ScannerOptions:
+    """What a scanner measures."""
+
+    beams: int = 360
+    """Rays of one sweep, over the full circle from -pi, counter-clockwise."""
+
+    range_min: float = 0.1
+    """The shortest range, in metres; nearer things give -inf (REP 117)."""
+
+    range_max: float = 8.0
+    """The longest range, in metres; where nothing is nearer, the range is inf."""
+
+    nan: bool = False
+    """Whether a few rays of each sweep fail, with NaN."""
+
+
+class Scanner:
+    """Measures ranges for many poses at once."""
+
+    def __init__(
+        self, obstacles: Obstacles, options: ScannerOptions, seed: int = 0
+    ) -> None:
+        self.obstacles = obstacles
+        self.options = options
+        self._random = np.random.default_rng(seed)
+        self._bearings = -math.pi + np.arange(options.beams) * self.angle_increment
+
+    @property
+    def angle_increment(self) -> float:
+        """The angle between neighbouring rays, in radians."""
+        return math.tau / self.options.beams
+
+    def sweep(
+        self,
+        poses: Sequence[Pose],
+        discs: Sequence[Sequence[tuple[float, float, float]]] = (),
+    ) -> NDArray[np.float32]:
+        """Return the ranges seen from each pose.
+
+        Args:
+            poses: Of the scanners, in the map's frame.
+            discs: For each pose, the round things in sight as x, y and radius in
+                metres.
+
+        Returns:
+            Ranges in metres, of shape (poses, beams).
+
+        """
+        yaws = np.array([pose.yaw for pose in poses])[:, np.newaxis]
+        angles = yaws + self._bearings
+        along_x, along_y = np.cos(angles), np.sin(angles)
+        xs = np.repeat([pose.x for pose in poses], self.options.beams)
+        ys = np.repeat([pose.y for pose in poses], self.options.beams)
+        ranges = cast_rays(
+            self.obstacles,
+            xs,
+            ys,
+            along_x.ravel(),
+            along_y.ravel(),
+            self.options.range_max,
+        ).reshape(angles.shape)
+        for i, round_things in enumerate(discs):
+            for x, y, radius in round_things:
+                _shade(ranges[i], along_x[i], along_y[i], poses[i], x, y, radius)
+        return self._as_measured(ranges)
+
+    def _as_measured(self, ranges: NDArray[np.float64]) -> NDArray[np.float32]:
+        ranges[ranges > self.options.range_max] = np.inf
+        ranges[ranges < self.options.range_min] = -np.inf
+        if self.options.nan:
+            ranges[self._random.random(ranges.shape) < _NAN_SHARE] = np.nan
+        return ranges.astype(np.float32)
+
+
+def cast_rays(
+    obstacles: Obstacles,
+    xs: NDArray[np.float64],
+    ys: NDArray[np.float64],
+    along_x: NDArray[np.float64],
+    along_y: NDArray[np.float64],
+    farthest: float,
+) -> NDArray[np.float64]:
+    """Return how far each ray goes until it meets a solid cell's edge.
+
+    A ray leaps over the largest empty square around its cell, so that it passes every
+    cell it must and no more; the result is exact to the edges of the cells.
+
+    Args:
+        obstacles: The grid.
+        xs: Where the rays begin, in metres.
+        ys: The same, along y.
+        along_x: Their directions, of length 1.
+        along_y: The same, along y.
+        farthest: Where to give up, in metres.
+
+    Returns:
+        Distances in metres; inf where nothing was met.
+
+    """
+    plan, steps = obstacles.plan, obstacles.steps
+    rows, columns = steps.shape
+    limit = farthest / plan.resolution
+    x0 = (xs - plan.x) / plan.resolution
+    y0 = (ys - plan.y) / plan.resolution
+    result = np.full(xs.shape, np.inf)
+    left = np.arange(len(xs))
+    gone = np.zeros(len(xs))
+    with np.errstate(divide="ignore"):
+        per_x, per_y = 1 / along_x, 1 / along_y
+    right, up = along_x > 0, along_y > 0
+    while len(left):
+        column = np.floor(x0 + gone * along_x).astype(np.intp)
+        row = np.floor(y0 + gone * along_y).astype(np.intp)
+        inside = ((column >= 0) & (column < columns) & (row >= 0) & (row < rows)) & (
+            gone <= limit
+        )
+        clear = np.zeros(len(left), np.int16)
+        clear[inside] = steps[row[inside], column[inside]]
+        hit = inside & (clear == 0)
+        # The last nudge went past the edge: take it back.
+        result[left[hit]] = np.maximum(gone[hit] - _NUDGE, 0)
+        on = inside & ~hit
+        left, gone, clear = left[on], gone[on], clear[on]
+        column, row, x0, y0 = column[on], row[on], x0[on], y0[on]
+        along_x, along_y, right, up = along_x[on], along_y[on], right[on], up[on]
+        per_x, per_y = per_x[on], per_y[on]
+        edge_x = np.where(right, column + clear, column - clear + 1)
+        edge_y = np.where(up, row + clear, row - clear + 1)
+        to_x = np.where(np.isinf(per_x), np.inf, (edge_x - x0) * per_x)
+        to_y = np.where(np.isinf(per_y), np.inf, (edge_y - y0) * per_y)
+        gone = np.maximum(np.minimum(to_x, to_y), gone) + _NUDGE
+    return np.asarray(result * plan.resolution)
+
+
+def _shade(
+    ranges: NDArray[np.float64],
+    along_x: NDArray[np.float64],
+    along_y: NDArray[np.float64],
+    pose: Pose,
+    x: float,
+    y: float,
+    radius: float,
+) -> None:
+    """Shorten the ranges that meet a disc first."""
+    to_x, to_y = x - pose.x, y - pose.y
+    ahead = to_x * along_x + to_y * along_y
+    aside = to_x * along_y - to_y * along_x
+    meets = (ahead > 0) & (np.abs(aside) < radius)
+    near = ahead[meets] - np.sqrt(radius * radius - aside[meets] ** 2)
+    ranges[meets] = np.minimum(ranges[meets], np.maximum(near, 0))
