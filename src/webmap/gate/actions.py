@@ -1,0 +1,120 @@
+"""What the decisions ask of the shell."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from webmap.gate.events import Key
+from webmap.gate.messages import FromGate, RobotSpec
+from webmap.geometry import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Attach:
+    """Hold the sockets of this robot open; sent again, it replaces the earlier one."""
+
+    key: Key
+    spec: RobotSpec
+
+
+@dataclass(frozen=True, slots=True)
+class Detach:
+    """The robot's sockets are no longer needed."""
+
+    key: Key
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """Listen to the machine's echo and odometry, or no longer."""
+
+    key: Key
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class WriteTwist:
+    """Write a velocity now or drop it; answered by ``Wrote``.
+
+    Zero is written whenever the link is open. Anything else is written only if
+    nothing is waiting to be sent before it.
+    """
+
+    key: Key
+    twist: Twist
+    epoch: int | None
+    by: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class SendGoal:
+    """Write a goal now or drop it; answered by ``WroteGoal``."""
+
+    key: Key
+    robot: str
+    id: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoals:
+    """Cancel every goal of the robot, by every way that it has."""
+
+    key: Key
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class CutLink:
+    """Throw the control socket away with all that it has not sent, and reconnect."""
+
+    url: str
+
+
+@dataclass(frozen=True, slots=True)
+class Lock:
+    """Try to have the machine for this gate alone; answered by ``LockState``."""
+
+    key: Key
+
+
+@dataclass(frozen=True, slots=True)
+class Unlock:
+    """Let other gates have the machine."""
+
+    key: Key
+
+
+@dataclass(frozen=True, slots=True)
+class MarkDriven:
+    """Keep on disk whether the machine is being driven (S13)."""
+
+    key: Key
+    driven: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """Tell the display."""
+
+    message: FromGate
+
+
+Action = (
+    Attach
+    | Detach
+    | Watch
+    | WriteTwist
+    | SendGoal
+    | CancelGoals
+    | CutLink
+    | Lock
+    | Unlock
+    | MarkDriven
+    | Say
+)
+
+Emit = Callable[[Action], None]

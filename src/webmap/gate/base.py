@@ -1,0 +1,322 @@
+"""One machine: who may move it, and when it must stop.
+
+::
+
+            take                 neutral 200 ms, then a command
+    free ─────────▶ held ───────────────────────────────────────▶ driving
+     ▲               ▲                                               │
+     │ (no lease)    │ (lease)                                       │ release, doubt,
+     └───────────────┴────────────── stopping ◀──────────────────────┘ lease ends, STOP
+          silence after 500 ms       zeros at 20 Hz
+
+Doubt (a link that does not answer, a display that is silent, odometry that does not
+come) stops the machine and disarms its driver, whose hands must then be seen to be off.
+"""
+
+from typing import Literal
+
+from webmap.gate.actions import Detach, Emit, Say, Watch
+from webmap.gate.deadman import DeadMan
+from webmap.gate.events import Key, LockState, Wrote
+from webmap.gate.goals import Goals
+from webmap.gate.health import Health, Pulse
+from webmap.gate.lease import Lease
+from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
+from webmap.gate.messages import Refused, RobotSpec, SentTwist
+from webmap.gate.motion import Bounds, Motion
+from webmap.gate.refusal import Refusal
+from webmap.geometry import Twist
+
+BLIND_LIMIT = 1.0
+"""The oldest odometry with which a machine is driven, in seconds (S16)."""
+
+State = Literal["free", "held", "driving", "stopping", "stopped"]
+
+
+class Base:
+    """The machine behind one velocity topic of one bridge.
+
+    Args:
+        key: The bridge and the topic.
+        control: The link that velocity goes to.
+        pulse: Whether the display is there.
+        emit: Takes the actions.
+
+    """
+
+    def __init__(self, key: Key, control: Health, pulse: Pulse, emit: Emit) -> None:
+        self.key = key
+        self.control = control
+        self.specs: dict[str, RobotSpec] = {}
+        """The robots that this machine goes by; the newest is the last."""
+        self.goals: dict[str, Goals] = {}
+        self.lease: Lease | None = None
+        self.deadman = DeadMan()
+        self.motion = Motion(key, control, self._bounds, emit)
+        self.echoed: Twist | None = None
+        self.measured: Twist | None = None
+        self._pulse = pulse
+        self._emit = emit
+        self._lock = LockState(key, held=False, why="not locked yet")
+        self._page_cap: Cap | None = None
+        self._watched = False
+        self._seen_at: float | None = None
+        self._leaving: set[str] = set()
+
+    @property
+    def spec(self) -> RobotSpec:
+        """The newest of the robots that share this machine."""
+        return next(reversed(self.specs.values()))
+
+    @property
+    def state(self) -> State:
+        """What the machine does, as far as the gate has a hand in it."""
+        if self.motion.driving:
+            return "driving"
+        if self.motion.stopping:
+            return "stopping"
+        return "free" if self.lease is None else "held"
+
+    @property
+    def speed(self) -> Speed:
+        """The speeds in force now."""
+        caps = [cap for spec in self.specs.values() for cap in caps_of(spec)]
+        if self._page_cap is not None:
+            caps.append(self._page_cap)
+        return speed_in_force(caps)
+
+    def _bounds(self) -> Bounds:
+        a_max = min((s.a_max for s in self.specs.values() if s.a_max), default=None)
+        holonomic = all(spec.holonomic for spec in self.specs.values())
+        return Bounds(self.speed, a_max, holonomic)
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing is written now and nothing will be by itself."""
+        return self.motion.silent
+
+    @property
+    def active(self) -> bool:
+        """Whether time alone may make a difference."""
+        return self.lease is not None or not self.silent or self.motion.owes_zero
+
+    # The robots that it is.
+
+    def declare(self, spec: RobotSpec, tasks: Health, now: float) -> None:
+        """Take in a robot, or what changed of it; a change ends the lease."""
+        self.end_lease("the robot was declared anew", now)
+        self._leaving.discard(spec.id)
+        self.specs.pop(spec.id, None)
+        self.specs[spec.id] = spec
+        goals = self.goals.get(spec.id)
+        if goals is None:
+            self.goals[spec.id] = Goals(self.key, spec, tasks, self._emit)
+        else:
+            goals.spec, goals.link = spec, tasks
+
+    def forget(self, robot: str, now: float) -> None:
+        """Drop a robot; the last one stays until its machine has stopped."""
+        self._leaving.add(robot)
+        if len(self.specs) == len(self._leaving):
+            self.end_lease("the robot was removed", now)
+        self._drop_leaving()
+
+    def _drop_leaving(self) -> None:
+        for robot in list(self._leaving):
+            if len(self.specs) == 1 and not self.silent:
+                return
+            self._leaving.discard(robot)
+            del self.specs[robot]
+            del self.goals[robot]
+            self._emit(Detach(self.key, robot))
+
+    # Whether it may move.
+
+    def unarmable(self, now: float) -> str | None:
+        """Return why nobody can take the machine now, in words."""
+        if not self._lock.held:
+            return self._lock.why
+        if doubt := self._pulse.doubt(now):
+            return doubt
+        if self.spec.twist_topic is not None:
+            return None if self.control.up else f"no link to {self.key.url}"
+        goals = self.goals[self.spec.id]
+        if not goals.can_send:
+            return "it has neither a velocity topic nor a goal topic"
+        return None if goals.link.up else "no link to where its goals go"
+
+    def doubt(self, now: float) -> str | None:
+        """Return why the machine must not be driven now, in words."""
+        if reason := self.unarmable(now):
+            return reason
+        if self.spec.twist_topic is None:
+            return "it has no velocity topic"
+        if not self.control.fresh(now):
+            return f"{self.key.url} does not answer"
+        if all(spec.odometry_topic is None for spec in self.specs.values()):
+            return None
+        if self._seen_at is None:
+            return "no odometry yet"
+        if now - self._seen_at > BLIND_LIMIT:
+            return f"no odometry for {BLIND_LIMIT:g} s"
+        return None
+
+    # Leases.
+
+    def give(self, lease: Lease, cap: Cap) -> None:
+        """Let somebody have the machine; nothing moves by that."""
+        self.lease = lease
+        self.deadman = DeadMan(needs_neutral=not lease.program)
+        self._page_cap = cap
+        self._update_watch()
+
+    def set_cap(self, cap: Cap) -> None:
+        """Change what the page of the lease's holder asks for at most."""
+        self._page_cap = cap
+
+    def end_lease(self, why: str | None, now: float) -> None:
+        """Take the machine out of its driver's hands; it stops if it is driven.
+
+        Args:
+            why: What the driver is told, if it is not the driver's own doing.
+            now: The time.
+
+        """
+        lease = self.lease
+        if lease is None:
+            return
+        self.motion.halt(now)
+        self.lease, self._page_cap = None, None
+        self.deadman = DeadMan()
+        self._update_watch()
+        if why is not None:
+            for robot in self.specs:
+                self._emit(Say(Refused(lease.connection, robot, "lease", why)))
+
+    def lost(self, connection: str, now: float) -> None:
+        """A page is gone: what it drove stops."""
+        if self.lease is not None and self.lease.connection == connection:
+            self.end_lease(None, now)
+        for goals in self.goals.values():
+            goals.lost(connection)
+
+    # Motion.
+
+    def drive(self, wanted: Twist, neutral: bool, now: float) -> str | None:
+        """Take in an accepted command of the lease's holder.
+
+        Args:
+            wanted: The velocity asked for, not yet limited.
+            neutral: Whether every input is released.
+            now: The time.
+
+        Returns:
+            Why nothing moves although something should, in words, or ``None``.
+
+        """
+        lease = self.lease
+        assert lease is not None
+        if reason := self.doubt(now):
+            self._fault(reason, now)
+            return None if neutral else reason
+        self.deadman.accept(neutral, now)
+        if neutral or not self.deadman.armed:
+            self.motion.halt(now)
+            return None if neutral else "release every input first"
+        if not self.motion.driving:
+            for goals in self.goals.values():
+                goals.make_way()
+        self.motion.drive(wanted, lease, now)
+        return None
+
+    def goal(
+        self, robot: str, pose: tuple[float, float, float], by: str, now: float
+    ) -> None:
+        """Send the machine somewhere by itself; that ends driving.
+
+        Raises:
+            Refusal: If it cannot be sent now.
+
+        """
+        if reason := self.unarmable(now):
+            raise Refusal(reason)
+        self._lapse(now)
+        self.goals[robot].send(*pose, by)
+
+    def stop(self, why: str, now: float) -> None:
+        """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
+        self.end_lease(why, now)
+        if self.spec.twist_topic is not None:
+            self.motion.zero(now)
+        for goals in self.goals.values():
+            goals.stop()
+        self._update_watch()
+
+    def step(self, now: float) -> None:
+        """Let time have its say."""
+        if self.lease is not None:
+            if reason := self.doubt(now):
+                self._fault(reason, now)
+            elif self.deadman.expired(now):
+                self._lapse(now)
+        self.motion.step(now)
+        self._update_watch()
+        self._drop_leaving()
+
+    def _lapse(self, now: float) -> None:
+        self.deadman.disarm()
+        self.motion.halt(now)
+
+    def _fault(self, reason: str, now: float) -> None:
+        """Stop and disarm, because something may not be as it should."""
+        self._lapse(now)
+        # A program is not seen to let go of anything, so it has to take it again.
+        if self.lease is not None and self.lease.program:
+            self.end_lease(reason, now)
+
+    # What is heard of it.
+
+    def wrote(self, write: Wrote, now: float) -> None:
+        """Note what became of a velocity."""
+        if not write.done:
+            return
+        self.motion.wrote(write, now)
+        twist = write.twist
+        for robot in self.specs:
+            sent = SentTwist(robot, twist.vx, twist.vy, twist.wz, write.by)
+            self._emit(Say(sent))
+
+    def saw(self, measured: Twist | None, now: float) -> None:
+        """Note that odometry came."""
+        if self._watched:
+            self.measured, self._seen_at = measured, now
+
+    def saw_echo(self, twist: Twist) -> None:
+        """Note what the robot's ROS says on the velocity topic."""
+        if self._watched:
+            self.echoed = twist
+
+    def locked(self, lock: LockState, now: float) -> None:
+        """Note whether this gate alone has the machine."""
+        self._lock = lock
+        if lock.driven:
+            self.motion.owe_from_before()
+            self.link_up(now)
+
+    def link_up(self, now: float) -> None:
+        """A zero that may not have arrived goes first."""
+        if self.control.up:
+            self.motion.pay(now)
+
+    def link_down(self, now: float) -> None:
+        """The control link is gone."""
+        if self.lease is not None:
+            self._fault(f"no link to {self.key.url}", now)
+
+    def _update_watch(self) -> None:
+        on = self.lease is not None or not self.silent
+        if on != self._watched:
+            self._watched = on
+            self._emit(Watch(self.key, on))
+        if not on:
+            self.measured = self.echoed = self._seen_at = None

@@ -1,0 +1,244 @@
+"""What a page may say on ``/drive``, read strictly. No I/O, no state.
+
+One JSON object in one text frame of at most 1024 bytes, with exactly these fields::
+
+    {"op": "take", "robot": "r1"}
+    {"op": "release", "robot": "r1"}
+    {"op": "drive", "robot": "r1", "epoch": 3, "seq": 17, "tick": 812,
+     "x": 1.0, "y": 0.0, "turn": 0.0}
+    {"op": "goal", "robot": "r1", "epoch": 3, "seq": 18, "tick": 813,
+     "x": 1.0, "y": 2.0, "yaw": 0.5}
+    {"op": "cancel", "robot": "r1"}
+    {"op": "stop", "robot": "r1"}        or "*" for all
+
+``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
+when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
+left and ``turn`` counter-clockwise, as parts of the speed in force, each in
+``[-1, 1]``; what lies beyond is clamped. ``epoch`` is the lease's, ``tick`` the newest
+one that came, and ``seq`` grows with every ``drive`` and ``goal`` of the connection.
+``goal`` is a pose in the robot's goal frame, in metres and radians.
+
+Whatever is not one of these is refused whole. What the gate says back stands in
+:mod:`webmap.gate.reports`.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from webmap.gate.refusal import Refusal
+
+MAX_BYTES = 1024
+"""The longest command, in bytes of UTF-8."""
+
+MAX_INTEGER = 2**53 - 1
+"""The largest whole number that JavaScript keeps exactly."""
+
+MAX_COORDINATE = 1e6
+"""The farthest goal, in metres from the frame's origin along an axis."""
+
+MAX_NAME = 64
+"""The longest name of a robot, in characters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Take:
+    """The page asks for the lease of a robot."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """The page gives the lease back."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """How the page's inputs stand now."""
+
+    robot: str
+    epoch: int
+    seq: int
+    tick: int
+    x: float
+    y: float
+    turn: float
+    clamped: bool = False
+    """Whether an axis lay beyond ``[-1, 1]``."""
+
+    @property
+    def neutral(self) -> bool:
+        """Whether every input is released."""
+        return self.x == 0 and self.y == 0 and self.turn == 0
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where the page sends a robot: metres and radians in its goal frame."""
+
+    robot: str
+    epoch: int
+    seq: int
+    tick: int
+    x: float
+    y: float
+    yaw: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """The robot should give up its goals."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """The robot, or every robot (``None``), should stop at once."""
+
+    robot: str | None
+
+
+Command = Take | Release | Drive | Goal | Cancel | Stop
+
+
+def parse(data: bytes) -> Command:
+    """Return the command that ``data`` says.
+
+    Raises:
+        Refusal: If it says none; nothing else is raised, whatever the bytes.
+
+    """
+    fields = _object(data)
+    op = fields.pop("op", None)
+    read = _READERS.get(op) if isinstance(op, str) else None
+    if read is None:
+        _refuse(f"'op' is {_short(op)}, expected one of {', '.join(_READERS)}")
+    reader = _Fields(fields)
+    command = read(reader)
+    if fields:
+        _refuse(f"{_short(next(iter(fields)))} is not a field of {op!r}")
+    return command
+
+
+def _object(data: bytes) -> dict[str, Any]:
+    if len(data) > MAX_BYTES:
+        _refuse(f"a command has at most {MAX_BYTES} bytes")
+    try:
+        value = json.loads(
+            data.decode(), object_pairs_hook=_pairs, parse_constant=_no_constant
+        )
+    except Refusal:
+        raise
+    except (ValueError, RecursionError):
+        _refuse(f"not JSON: {_short(data)}")
+    if not isinstance(value, dict):
+        _refuse(f"a command is a JSON object, got {_short(value)}")
+    return value
+
+
+def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) != len(pairs):
+        _refuse("a field stands there twice")
+    return fields
+
+
+def _no_constant(name: str) -> NoReturn:
+    _refuse(f"{name} is not a number that anything can be driven by")
+
+
+class _Fields:
+    """Takes fields out of a command one by one, each of its own type."""
+
+    def __init__(self, fields: dict[str, Any]) -> None:
+        self._fields = fields
+
+    def _take(self, name: str) -> Any:
+        try:
+            return self._fields.pop(name)
+        except KeyError:
+            _refuse(f"{name!r} is missing")
+
+    def robot(self) -> str:
+        value = self._take("robot")
+        if not (isinstance(value, str) and value and len(value) <= MAX_NAME):
+            _refuse(f"'robot' is {_short(value)}, expected a robot's name")
+        if not value.isprintable():
+            _refuse(f"'robot' is {_short(value)}, which is not plain text")
+        return value
+
+    def whole(self, name: str) -> int:
+        value = self._take(name)
+        # A bool is an int to Python, but not to whoever wrote it.
+        if type(value) is not int or not 0 <= value <= MAX_INTEGER:
+            _refuse(f"{name!r} is {_short(value)}, expected a whole number from 0 on")
+        return value
+
+    def number(self, name: str) -> float:
+        value = self._take(name)
+        if type(value) not in (int, float):
+            _refuse(f"{name!r} is {_short(value)}, expected a number")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            _refuse(f"{name!r} is too large for a number")
+        return number
+
+    def coordinate(self, name: str) -> float:
+        value = self.number(name)
+        if abs(value) > MAX_COORDINATE:
+            _refuse(f"{name!r} is {value:g} m, farther than any goal")
+        return value
+
+
+def _drive(fields: _Fields) -> Drive:
+    robot = fields.robot()
+    epoch, seq, tick = (fields.whole(name) for name in ("epoch", "seq", "tick"))
+    asked = [fields.number(name) for name in ("x", "y", "turn")]
+    x, y, turn = (min(1.0, max(-1.0, axis)) for axis in asked)
+    return Drive(robot, epoch, seq, tick, x, y, turn, clamped=asked != [x, y, turn])
+
+
+def _goal(fields: _Fields) -> Goal:
+    robot = fields.robot()
+    epoch, seq, tick = (fields.whole(name) for name in ("epoch", "seq", "tick"))
+    x, y = fields.coordinate("x"), fields.coordinate("y")
+    return Goal(
+        robot, epoch, seq, tick, x, y, math.remainder(fields.number("yaw"), math.tau)
+    )
+
+
+def _stop(fields: _Fields) -> Stop:
+    robot = fields.robot()
+    return Stop(None if robot == "*" else robot)
+
+
+_READERS: dict[str, Callable[[_Fields], Command]] = {
+    "take": lambda fields: Take(fields.robot()),
+    "release": lambda fields: Release(fields.robot()),
+    "drive": _drive,
+    "goal": _goal,
+    "cancel": lambda fields: Cancel(fields.robot()),
+    "stop": _stop,
+}
+
+
+def _short(value: object) -> str:
+    """Return ``value`` as it may stand in a log: ASCII, and not much of it."""
+    try:
+        text = ascii(value)
+    except (ValueError, RecursionError):  # an int of very many digits, for one
+        return "something too large to show"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _refuse(why: str) -> NoReturn:
+    raise Refusal(why, garbage=True)

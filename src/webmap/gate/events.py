@@ -1,0 +1,119 @@
+"""What the shell tells the decisions, besides what comes over the pipe."""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from webmap.geometry import Twist
+
+Lane = Literal["control", "witness", "tasks"]
+
+
+class Key(NamedTuple):
+    """What makes a machine one machine: its bridge and its velocity topic."""
+
+    url: str
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
+class LinkUp:
+    """A socket to a bridge is open."""
+
+    url: str
+    lane: Lane
+
+
+@dataclass(frozen=True, slots=True)
+class LinkDown:
+    """A socket to a bridge is gone."""
+
+    url: str
+    lane: Lane
+
+
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """The bridge answered on the control socket: a pong, or an echo of our own."""
+
+    url: str
+
+
+@dataclass(frozen=True, slots=True)
+class Wrote:
+    """What became of a velocity that was to be written."""
+
+    key: Key
+    twist: Twist
+    epoch: int | None
+    by: str | None
+    done: bool
+    """Whether it went out; if not, it was dropped and will not go out later."""
+
+
+@dataclass(frozen=True, slots=True)
+class WroteGoal:
+    """What became of a goal that was to be written."""
+
+    robot: str
+    id: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+    done: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GoalEnded:
+    """The action reported the result of a goal, whatever it is."""
+
+    robot: str
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Echoed:
+    """A velocity came back on the topic that the gate writes to."""
+
+    key: Key
+    twist: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Odometry came; ``twist`` is ``None`` if it says nothing of velocity."""
+
+    key: Key
+    twist: Twist | None
+
+
+@dataclass(frozen=True, slots=True)
+class LockState:
+    """Whether this gate alone on this computer has the machine."""
+
+    key: Key
+    held: bool
+    driven: bool = False
+    """Whether an earlier gate died while it drove the machine (S13)."""
+    why: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Shutdown:
+    """The process is to end: stop what is driven, then be silent."""
+
+    why: str
+
+
+Event = (
+    LinkUp
+    | LinkDown
+    | Alive
+    | Wrote
+    | WroteGoal
+    | GoalEnded
+    | Echoed
+    | Measured
+    | LockState
+    | Shutdown
+)

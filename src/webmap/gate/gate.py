@@ -1,0 +1,308 @@
+"""The gate's decisions: events in, actions out. No I/O and no clock of its own.
+
+The shell calls :meth:`Gate.handle` for whatever happens and :meth:`Gate.step` every
+10 ms, and does what they return, in that order. What came of a write it tells with a
+further event before it does anything else.
+"""
+
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+from webmap.gate import events, messages
+from webmap.gate.actions import Action, Say
+from webmap.gate.base import Base
+from webmap.gate.commands import (
+    Cancel,
+    Command,
+    Drive,
+    Goal,
+    Release,
+    Stop,
+    Take,
+    parse,
+)
+from webmap.gate.connection import Connection
+from webmap.gate.fleet import Fleet
+from webmap.gate.health import Pulse
+from webmap.gate.lease import Epochs, Lease, check_lease, check_role, check_take
+from webmap.gate.messages import PROGRAM
+from webmap.gate.people import People
+from webmap.gate.refusal import Refusal
+from webmap.gate.ticks import Ticks
+from webmap.geometry import Twist
+
+log = logging.getLogger("webmap.gate")
+
+
+class Gate:
+    """Decides over every machine of one display.
+
+    Args:
+        ticks: The ticks to issue.
+        epochs: The epochs to give to leases.
+
+    """
+
+    def __init__(
+        self, ticks: Ticks | None = None, epochs: Epochs | None = None
+    ) -> None:
+        self._ticks = ticks or Ticks()
+        self._epochs = epochs or Epochs()
+        self._out: list[Action] = []
+        self._pulse = Pulse()
+        self._people = People(self._out.append)
+        self._fleet = Fleet(self._pulse, self._out.append, self._people.refuse)
+        self._display_there = False
+        self._handlers: dict[type, Callable[[Any, float], None]] = {
+            **self._fleet.handlers,
+            messages.Connect: self._connect,
+            messages.Disconnect: self._disconnect,
+            messages.FromBrowser: self._from_browser,
+            messages.Speeds: self._speeds,
+            messages.Heartbeat: self._beat,
+            messages.Stop: self._program_stop,
+            messages.ProgramTake: self._program_take,
+            messages.ProgramRelease: self._program_release,
+            messages.ProgramTwist: self._program_twist,
+            messages.ProgramMove: self._program_move,
+            messages.ProgramCancel: self._program_cancel,
+            events.Shutdown: self._shut_down,
+        }
+
+    def handle(self, event: messages.ToGate | events.Event, now: float) -> list[Action]:
+        """Take in one event and return what is to be done, in order."""
+        self._handlers[type(event)](event, now)
+        return self._actions(now)
+
+    def step(self, now: float) -> list[Action]:
+        """Let time pass and return what is to be done, in order."""
+        if self._display_there and self._pulse.doubt(now):
+            self._display_there = False
+            self._goals_lost()
+        self._fleet.step(now)
+        tick = self._ticks.issue(now)
+        if tick is not None:
+            self._out.append(Say(messages.Tick(tick, self._people.acks)))
+        return self._actions(now)
+
+    @property
+    def busy(self) -> bool:
+        """Whether time may make a difference to some machine."""
+        return self._fleet.busy
+
+    @property
+    def silent(self) -> bool:
+        """Whether no machine is driven or being stopped."""
+        return self._fleet.silent
+
+    def _actions(self, now: float) -> list[Action]:
+        self._fleet.report(now)
+        actions = self._out.copy()
+        self._out.clear()
+        return actions
+
+    # The display and its pages.
+
+    def _beat(self, message: messages.Heartbeat, now: float) -> None:
+        self._display_there = True
+        self._pulse.beat(now)
+
+    def _shut_down(self, event: events.Shutdown, now: float) -> None:
+        self._pulse.ended = event.why
+        for base in self._fleet:
+            base.end_lease(event.why, now)
+        self._goals_lost()
+
+    def _goals_lost(self) -> None:
+        """Nobody is left who could look after a goal."""
+        for base in self._fleet:
+            for goals in base.goals.values():
+                goals.lost()
+
+    def _connect(self, message: messages.Connect, now: float) -> None:
+        if message.connection != PROGRAM:
+            self._disconnect(messages.Disconnect(message.connection), now)
+            self._people.add(message)
+
+    def _disconnect(self, message: messages.Disconnect, now: float) -> None:
+        if message.connection == PROGRAM or not self._people.remove(message.connection):
+            return
+        for base in self._fleet:
+            base.lost(message.connection, now)
+
+    def _speeds(self, message: messages.Speeds, now: float) -> None:
+        connection = self._people.find(message.connection)
+        if connection is None:
+            return
+        connection.set_speeds(message.v, message.w)
+        for base in self._fleet:
+            if base.lease is not None and base.lease.connection == connection.id:
+                base.set_cap(connection.cap)
+
+    def _from_browser(self, message: messages.FromBrowser, now: float) -> None:
+        connection = self._people.find(message.connection)
+        if connection is None or connection.program:
+            return
+        try:
+            command = parse(message.text)
+        except Refusal as refusal:
+            self._people.refuse(connection.id, None, "command", refusal.why, now)
+            if connection.garbage.too_often(now):
+                self._people.close(connection, "too many messages that make no sense")
+        else:
+            what = type(command).__name__.lower()
+            self._attempt(
+                connection,
+                command.robot,
+                what,
+                lambda: self._obey(connection, command, now),
+                now,
+            )
+        if connection.messages.too_often(now):
+            self._people.close(connection, "too many messages")
+
+    def _attempt(
+        self,
+        connection: Connection,
+        robot: str | None,
+        what: str,
+        act: Callable[[], object],
+        now: float,
+    ) -> None:
+        try:
+            act()
+        except Refusal as refusal:
+            self._people.refuse(connection.id, robot, what, refusal.why, now)
+
+    # Commands.
+
+    def _obey(self, connection: Connection, command: Command, now: float) -> None:
+        match command:
+            case Stop(robot):
+                # Before any check: a stop is always allowed.
+                self._stop(robot, connection, now)
+            case Drive():
+                self._drive(connection, command, now)
+            case Goal(robot):
+                base = self._licensed(connection, command, now)
+                pose = (command.x, command.y, command.yaw)
+                base.goal(robot, pose, connection.id, now)
+            case Take(robot):
+                self._take(connection, robot, now)
+            case Release(robot):
+                self._release(connection, robot, now)
+            case Cancel(robot):
+                check_role(connection.role)
+                self._fleet.find(robot).goals[robot].cancel()
+
+    def _stop(self, robot: str | None, by: Connection, now: float) -> None:
+        for base in self._fleet if robot is None else [self._fleet.find(robot)]:
+            base.stop(f"STOP by {by.name or by.id}", now)
+
+    def _take(self, connection: Connection, robot: str, now: float) -> int:
+        base = self._fleet.find(robot)
+        if base.lease is not None and base.lease.connection == connection.id:
+            return base.lease.epoch
+        check_take(base.lease, connection.role, connection.program)
+        if reason := base.unarmable(now):
+            raise Refusal(reason)
+        base.end_lease(f"{connection.name or connection.id} took it", now)
+        epoch = self._epochs.next()
+        lease = Lease(connection.id, connection.name, epoch, connection.program)
+        base.give(lease, connection.cap)
+        return epoch
+
+    def _release(self, connection: Connection, robot: str, now: float) -> None:
+        base = self._fleet.find(robot)
+        if base.lease is not None and base.lease.connection == connection.id:
+            base.end_lease(None, now)
+
+    def _checked(
+        self, connection: Connection, robot: str, epoch: int, tick: int, now: float
+    ) -> Base:
+        """Return the machine if this connection may move it by this command."""
+        base = self._fleet.find(robot)
+        check_lease(base.lease, connection.id, epoch)
+        self._ticks.check(tick, now)
+        return base
+
+    def _licensed(
+        self, connection: Connection, command: Drive | Goal, now: float
+    ) -> Base:
+        base = self._checked(
+            connection, command.robot, command.epoch, command.tick, now
+        )
+        if command.seq <= connection.acked:
+            raise Refusal(f"seq {command.seq} came after {connection.acked}")
+        connection.acked = command.seq
+        return base
+
+    def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
+        base = self._licensed(connection, drive, now)
+        if drive.clamped and not connection.flagged:
+            connection.flagged = True
+            log.warning("connection %s asks for more than full speed", connection.id)
+        speed = base.speed
+        wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
+        if reason := base.drive(wanted, drive.neutral, now):
+            raise Refusal(reason)
+
+    # The program's road.
+
+    def _program_stop(self, message: messages.Stop, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._attempt(
+            program, robot, "stop", lambda: self._stop(robot, program, now), now
+        )
+
+    def _program_take(self, message: messages.ProgramTake, now: float) -> None:
+        robot, epoch, why = message.robot, None, None
+        try:
+            epoch = self._take(self._people.program, robot, now)
+        except Refusal as refusal:
+            why = refusal.why
+        self._out.append(Say(messages.TakeReply(message.request, robot, epoch, why)))
+
+    def _program_release(self, message: messages.ProgramRelease, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._attempt(
+            program, robot, "release", lambda: self._release(program, robot, now), now
+        )
+
+    def _program_twist(self, message: messages.ProgramTwist, now: float) -> None:
+        program, robot = self._people.program, message.robot
+
+        def drive() -> None:
+            base = self._checked(program, robot, message.epoch, message.tick, now)
+            twist = Twist(*_finite(message.velocity))
+            if reason := base.drive(twist, twist.is_zero, now):
+                raise Refusal(reason)
+
+        self._attempt(program, robot, "drive", drive, now)
+
+    def _program_move(self, message: messages.ProgramMove, now: float) -> None:
+        program, robot = self._people.program, message.robot
+
+        def move() -> None:
+            base = self._checked(program, robot, message.epoch, message.tick, now)
+            base.goal(robot, _finite(message.pose), program.id, now)
+
+        self._attempt(program, robot, "goal", move, now)
+
+    def _program_cancel(self, message: messages.ProgramCancel, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._attempt(
+            program,
+            robot,
+            "cancel",
+            lambda: self._fleet.find(robot).goals[robot].cancel(),
+            now,
+        )
+
+
+def _finite(numbers: messages.Velocity) -> messages.Velocity:
+    if not all(map(math.isfinite, numbers)):
+        raise Refusal(f"expected finite numbers, got {numbers}")
+    return numbers

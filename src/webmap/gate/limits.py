@@ -1,0 +1,114 @@
+"""How fast a machine may go now, and why not faster.
+
+Every reason to be slow is a :class:`Cap`; the least of them is in force. A further
+reason (latency, scan assist) is one more cap in the list.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from webmap.gate.messages import RobotSpec
+from webmap.geometry import Twist
+
+SLOW_V = 0.3
+"""Metres per second for a machine of which too little is known (S9)."""
+
+SLOW_W = 0.6
+"""Radians per second for a machine of which too little is known (S9)."""
+
+STOPS_WITHIN = 0.5
+"""A base that stops by itself within this time, in seconds, may go faster (S12)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cap:
+    """One upper bound: metres and radians per second, and its reason in words."""
+
+    v: float
+    w: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """The speeds in force and the reasons that bind them."""
+
+    v: float
+    w: float
+    why: tuple[str, ...]
+
+
+def caps_of(spec: RobotSpec) -> list[Cap]:
+    """Return what the robot itself does not allow to exceed."""
+    caps = []
+    if spec.stops_within is None:
+        caps.append(Cap(SLOW_V, SLOW_W, "unverified stop"))
+    elif spec.stops_within > STOPS_WITHIN:
+        why = f"stops by itself only after {spec.stops_within:g} s"
+        caps.append(Cap(SLOW_V, SLOW_W, why))
+    v = math.inf if spec.v_max is None else spec.v_max
+    w = math.inf if spec.w_max is None else spec.w_max
+    caps.append(Cap(v, w, "limit of the robot"))
+    return caps
+
+
+def speed_in_force(caps: Iterable[Cap]) -> Speed:
+    """Return the least of ``caps``; slow where none of them says anything."""
+    caps = list(caps)
+    v = min((cap.v for cap in caps), default=math.inf)
+    w = min((cap.w for cap in caps), default=math.inf)
+    why = dict.fromkeys(
+        cap.why
+        for cap in caps
+        if (cap.v == v and v < math.inf) or (cap.w == w and w < math.inf)
+    )
+    if math.inf in (v, w):
+        v, w = min(v, SLOW_V), min(w, SLOW_W)
+        why["no limit was stated"] = None
+    return Speed(v, w, tuple(why))
+
+
+def fit(wanted: Twist, speed: Speed, *, holonomic: bool) -> Twist:
+    """Return ``wanted`` within ``speed``, in the same direction.
+
+    Args:
+        wanted: A velocity of finite numbers.
+        speed: The speeds in force.
+        holonomic: Whether the base can move sideways; if not, ``vy`` is exactly 0.
+
+    """
+    vx, vy = wanted.vx, wanted.vy if holonomic else 0.0
+    length = math.hypot(vx, vy)
+    if length > speed.v:
+        # A velocity along one axis is clamped exactly, without rounding.
+        vx = math.copysign(speed.v, vx) if vy == 0 else vx * (speed.v / length)
+        vy *= speed.v / length
+    wz = min(speed.w, max(-speed.w, wanted.wz))
+    return Twist(vx + 0.0, vy + 0.0, wz + 0.0)  # no negative zeros on the wire
+
+
+def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
+    """Return ``wanted`` or, if that speeds up too much, what is allowed of it.
+
+    Slowing down is never held back; turning round counts as speeding up from
+    standstill. The turning rate is not ramped.
+
+    Args:
+        last: What was written last.
+        wanted: What is wanted now.
+        a_max: Greatest growth of the speed along an axis, in m/s².
+        elapsed: Seconds since ``last`` was written.
+
+    """
+    step = a_max * elapsed
+    return Twist(
+        _towards(last.vx, wanted.vx, step),
+        _towards(last.vy, wanted.vy, step),
+        wanted.wz,
+    )
+
+
+def _towards(last: float, wanted: float, step: float) -> float:
+    base = abs(last) if last * wanted > 0 else 0.0
+    return math.copysign(min(abs(wanted), base + step), wanted)

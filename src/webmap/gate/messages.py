@@ -1,0 +1,293 @@
+"""What the display and the gate say to each other over the pipe.
+
+Speeds are metres and radians per second in the robot's own frame (x forward, y left,
+turn counter-clockwise); times are seconds. A robot is named by a short opaque text
+that the display makes up; a connection (one page's socket) likewise.
+"""
+
+from typing import Literal
+
+import msgspec
+
+PROGRAM = "program"
+"""The connection of the display's own Python code."""
+
+Role = Literal["viewer", "operator", "admin"]
+Velocity = tuple[float, float, float]
+"""Forward, left and counter-clockwise."""
+
+
+class RobotSpec(
+    msgspec.Struct, frozen=True, kw_only=True, tag="declare", omit_defaults=True
+):
+    """What the gate must know of a robot. Sent again, it replaces the earlier one.
+
+    As long as the robot is the same (bridge and velocity topic) a lease on it ends
+    when anything else here changes.
+    """
+
+    id: str
+    name: str
+    """A label for people; need not be unique."""
+    bridge_url: str
+    """The rosbridge that velocity goes to."""
+    twist_topic: str | None = None
+    twist_type: str = "geometry_msgs/Twist"
+    """Twist or TwistStamped, in either dialect; the stamp sent is zero."""
+    holonomic: bool = False
+    """Whether the base can move sideways."""
+    stops_within: float | None = None
+    """Seconds after the last command until the base stops by itself, if known."""
+    v_max: float | None = None
+    w_max: float | None = None
+    a_max: float | None = None
+    """Greatest growth of the speed, in m/s²; slowing down is never held back."""
+    odometry_topic: str | None = None
+    odometry_type: str | None = None
+    odometry_url: str | None = None
+    """The bridge of the odometry, if it is another."""
+    goal_topic: str | None = None
+    goal_url: str | None = None
+    """The bridge of goals and cancel, if it is another."""
+    goal_type: str = "geometry_msgs/PoseStamped"
+    goal_frame: str = "map"
+    cancel_topic: str | None = None
+    """Where an empty ``actionlib_msgs/GoalID`` cancels every goal."""
+    action: str | None = None
+    """A ``NavigateToPose`` action: goals go to it if there is no ``goal_topic``,
+    and its cancel service is called in any case."""
+    action_type: str = "nav2_msgs/action/NavigateToPose"
+    on_operator_loss: Literal["continue", "cancel"] = "continue"
+    """What becomes of a goal when the page (or program) that gave it is lost."""
+
+
+class Forget(msgspec.Struct, frozen=True, tag="forget"):
+    """The robot is no longer wanted: stop it if it is driven, then drop it."""
+
+    robot: str
+
+
+class Connect(msgspec.Struct, frozen=True, tag="connect"):
+    """A page opened its socket; the gate answers with :class:`Hello`."""
+
+    connection: str
+    name: str
+    role: Role
+
+
+class Disconnect(msgspec.Struct, frozen=True, tag="disconnect"):
+    """The page's socket is gone: what it drove stops."""
+
+    connection: str
+
+
+class FromBrowser(msgspec.Struct, frozen=True, tag="browser"):
+    """A page's own words, not looked at by the display."""
+
+    connection: str
+    text: bytes
+
+
+class Speeds(msgspec.Struct, frozen=True, tag="speeds"):
+    """The greatest speeds that a page's ``Teleop`` asks for."""
+
+    connection: str
+    v: float
+    w: float
+
+
+class Heartbeat(msgspec.Struct, frozen=True, tag="beat"):
+    """The display lives; sent every 50 ms."""
+
+
+class Stop(msgspec.Struct, frozen=True, tag="stop"):
+    """STOP from Python, for one robot or (``None``) for all."""
+
+    robot: str | None = None
+
+
+class ProgramTake(msgspec.Struct, frozen=True, tag="program-take"):
+    """Python asks for the lease; answered by :class:`TakeReply`."""
+
+    request: int
+    robot: str
+
+
+class ProgramRelease(msgspec.Struct, frozen=True, tag="program-release"):
+    """Python gives the lease back."""
+
+    robot: str
+
+
+class ProgramTwist(msgspec.Struct, frozen=True, tag="program-twist"):
+    """One velocity from Python; it holds until the dead-man and is never repeated."""
+
+    robot: str
+    epoch: int
+    tick: int
+    velocity: Velocity
+
+
+class ProgramMove(msgspec.Struct, frozen=True, tag="program-move"):
+    """One goal from Python: metres and radians in the robot's ``goal_frame``."""
+
+    robot: str
+    epoch: int
+    tick: int
+    pose: tuple[float, float, float]
+
+
+class ProgramCancel(msgspec.Struct, frozen=True, tag="program-cancel"):
+    """Python cancels the robot's goals; needs no lease."""
+
+    robot: str
+
+
+ToGate = (
+    RobotSpec
+    | Forget
+    | Connect
+    | Disconnect
+    | FromBrowser
+    | Speeds
+    | Heartbeat
+    | Stop
+    | ProgramTake
+    | ProgramRelease
+    | ProgramTwist
+    | ProgramMove
+    | ProgramCancel
+)
+
+
+class Ready(msgspec.Struct, frozen=True, tag="ready"):
+    """The gate's process runs and listens."""
+
+    pid: int
+
+
+class Hello(msgspec.Struct, frozen=True, tag="hello"):
+    """The gate knows the connection now."""
+
+    connection: str
+
+
+class Tick(msgspec.Struct, frozen=True, tag="tick"):
+    """The number that commands must echo, at 20 Hz."""
+
+    tick: int
+    acks: dict[str, int]
+    """The newest accepted ``seq`` of each connection, -1 at first."""
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """Who holds the lease of a robot."""
+
+    connection: str
+    name: str
+
+
+class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
+    """Everything a page shows about a robot's motion."""
+
+    robot: str
+    name: str
+    state: Literal["free", "held", "driving", "stopping", "stopped"]
+    """``stopping``: zeros are being sent; ``stopped`` is for a STOP that latches."""
+    holder: Holder | None
+    epoch: int | None
+    """The epoch of the lease, which commands must name; ``None`` without a lease."""
+    armed: bool
+    """Whether a command to move would be taken now."""
+    v: float
+    w: float
+    """The speeds in force."""
+    why: tuple[str, ...]
+    """What holds the speeds down, in words."""
+    link: Literal["up", "down"]
+    sent: Velocity
+    echoed: Velocity | None
+    """What the robot's ROS last said back on the velocity topic."""
+    measured: Velocity | None
+    """What odometry says, if it is fresh."""
+    armable: bool
+    reason: str | None
+    """Why the robot cannot be taken or moved now, in words."""
+
+
+class RobotGone(msgspec.Struct, frozen=True, tag="gone"):
+    """The robot was forgotten."""
+
+    robot: str
+
+
+class Refused(msgspec.Struct, frozen=True, tag="refused"):
+    """A command was not taken."""
+
+    connection: str
+    robot: str | None
+    what: str
+    why: str
+
+
+class CloseConnection(msgspec.Struct, frozen=True, tag="close"):
+    """The display should close this page's socket: it talks nonsense."""
+
+    connection: str
+    why: str
+
+
+class TakeReply(msgspec.Struct, frozen=True, tag="take-reply"):
+    """The answer to :class:`ProgramTake`."""
+
+    request: int
+    robot: str
+    epoch: int | None
+    why: str | None
+
+
+class SentTwist(msgspec.Struct, frozen=True, tag="sent-twist"):
+    """A velocity was written to the robot's bridge."""
+
+    robot: str
+    vx: float
+    vy: float
+    wz: float
+    by: str | None
+    """The connection that gave it; ``None`` for a zero that the gate sent itself."""
+
+
+class SentGoal(msgspec.Struct, frozen=True, tag="sent-goal"):
+    """A goal was written to the robot's bridge."""
+
+    robot: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+
+
+class GateUp(msgspec.Struct, frozen=True, tag="up"):
+    """The gate's process runs (made by the client)."""
+
+
+class GateDown(msgspec.Struct, frozen=True, tag="down"):
+    """The gate's process is gone: every lease and tick with it (by the client)."""
+
+    why: str
+
+
+FromGate = (
+    Ready
+    | Hello
+    | Tick
+    | RobotReport
+    | RobotGone
+    | Refused
+    | CloseConnection
+    | TakeReply
+    | SentTwist
+    | SentGoal
+)
+
+Report = RobotReport | RobotGone | Refused | SentTwist | SentGoal | GateUp | GateDown

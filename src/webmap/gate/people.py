@@ -1,0 +1,68 @@
+"""Everybody who may say something: the pages' connections and the program. No I/O."""
+
+import logging
+from collections.abc import Iterator
+
+from webmap.gate.actions import Emit, Say
+from webmap.gate.connection import Connection
+from webmap.gate.messages import (
+    PROGRAM,
+    CloseConnection,
+    Connect,
+    Hello,
+    Refused,
+)
+
+log = logging.getLogger("webmap.gate")
+
+
+class People:
+    """The connections that there are, and what they are told.
+
+    Args:
+        emit: Takes the actions.
+
+    """
+
+    def __init__(self, emit: Emit) -> None:
+        self.program = Connection(PROGRAM, PROGRAM, "operator")
+        self._emit = emit
+        self._all = {PROGRAM: self.program}
+
+    def __iter__(self) -> Iterator[Connection]:
+        return iter(list(self._all.values()))
+
+    @property
+    def acks(self) -> dict[str, int]:
+        """The newest accepted ``seq`` of each connection."""
+        return {connection.id: connection.acked for connection in self._all.values()}
+
+    def find(self, id: str) -> Connection | None:
+        """Return the connection of that name, if there is one."""
+        return self._all.get(id)
+
+    def add(self, message: Connect) -> None:
+        """Take in a page."""
+        self._all[message.connection] = Connection(
+            message.connection, message.name, message.role
+        )
+        self._emit(Say(Hello(message.connection)))
+
+    def remove(self, id: str) -> bool:
+        """Forget a page; return whether there was one."""
+        return self._all.pop(id, None) is not None
+
+    def refuse(
+        self, id: str, robot: str | None, what: str, why: str, now: float
+    ) -> None:
+        """Tell somebody that a command was not taken; not twice in a second."""
+        connection = self._all.get(id)
+        if connection is not None and connection.news(robot, what, why, now):
+            self._emit(Say(Refused(id, robot, what, why)))
+
+    def close(self, connection: Connection, why: str) -> None:
+        """Ask the display to close the page's socket."""
+        if not connection.closing:
+            connection.closing = True
+            log.warning("connection %s is to be closed: %s", connection.id, why)
+            self._emit(Say(CloseConnection(connection.id, why)))

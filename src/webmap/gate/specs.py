@@ -1,0 +1,76 @@
+"""Robots as the gate takes them: names in one spelling, numbers that make sense."""
+
+import math
+
+import msgspec
+
+from webmap.errors import ConfigError
+from webmap.gate.events import Key
+from webmap.gate.messages import RobotSpec
+from webmap.ros.names import is_type, normalise_topic, normalise_url, split_type
+
+
+def checked(spec: RobotSpec) -> RobotSpec:
+    """Return ``spec`` with its addresses and topics resolved.
+
+    Raises:
+        ConfigError: If something in it cannot be meant.
+
+    """
+    if not spec.id or len(spec.id) > 64 or not spec.id.isprintable() or spec.id == "*":
+        raise ConfigError(f"a robot's id is a short plain text, got {spec.id!r}")
+    for limit in ("v_max", "w_max", "stops_within"):
+        _check_number(spec, limit, least=0.0)
+    _check_number(spec, "a_max", least=1e-3)
+    if spec.twist_topic and not is_type(
+        spec.twist_type, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
+    ):
+        raise ConfigError(
+            f"robot {spec.name!r}: velocity is sent as geometry_msgs/Twist or "
+            f"TwistStamped, got {spec.twist_type!r}"
+        )
+    if spec.goal_topic and not is_type(spec.goal_type, "geometry_msgs/PoseStamped"):
+        raise ConfigError(
+            f"robot {spec.name!r}: goals are sent as geometry_msgs/PoseStamped, "
+            f"got {spec.goal_type!r}"
+        )
+    if spec.odometry_type:
+        split_type(spec.odometry_type)
+    url = normalise_url(spec.bridge_url)
+    return msgspec.structs.replace(
+        spec,
+        bridge_url=url,
+        odometry_url=normalise_url(spec.odometry_url) if spec.odometry_url else url,
+        goal_url=normalise_url(spec.goal_url) if spec.goal_url else url,
+        twist_topic=_topic(spec.twist_topic),
+        odometry_topic=_topic(spec.odometry_topic),
+        goal_topic=_topic(spec.goal_topic),
+        cancel_topic=_topic(spec.cancel_topic),
+        action=_topic(spec.action),
+    )
+
+
+def key_of(spec: RobotSpec) -> Key:
+    """Return what the machine of a checked ``spec`` is known by.
+
+    One that takes goals only is known by where they go.
+    """
+    if spec.twist_topic is not None:
+        return Key(spec.bridge_url, spec.twist_topic)
+    goal = spec.goal_topic or spec.action or f"robot {spec.id}"
+    return Key(spec.goal_url or spec.bridge_url, f"goal {goal}")
+
+
+def _check_number(spec: RobotSpec, field: str, least: float) -> None:
+    value = getattr(spec, field)
+    if value is None:
+        return
+    if not (math.isfinite(value) and value >= least):
+        raise ConfigError(
+            f"robot {spec.name!r}: {field} is {value}, expected a number from "
+            f"{least:g} on"
+        )
+
+
+def _topic(topic: str | None) -> str | None:
+    return normalise_topic(topic) if topic else None
