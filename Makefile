@@ -56,7 +56,7 @@ types: $(DEV) $(NODE)
 ## contracts: which room may import which, and whether generated files are up to date
 .PHONY: contracts
 contracts: $(DEV)
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-logo
 	$(PY) tools/make_opcodes.py --check
 
 ## test-fast: the tests that need neither a browser nor a peer nor a quiet machine

@@ -1,0 +1,109 @@
+"""Main-thread time in Chromium: WebMap's page against a circle for each dot.
+
+Two hundred robots with scans of 360 points at 10 Hz and poses at 20 Hz. Both draw at
+most 20 frames a second, each in one animation frame; a page that cannot keep up draws
+fewer. WebMap's side includes the socket, the decoding and the acknowledgement; the
+other is spared all that.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+from benchmarks.display import display
+from benchmarks.harness import Comparison, Contender, Figures, compare
+
+ROBOTS = 200
+BEAMS = 360
+CIRCLES = Path(__file__).parent / "circles.js"
+
+# A page acknowledges each frame that it has drawn; that is how they are counted.
+COUNT_FRAMES = """
+globalThis.framesDrawn = 0;
+const send = WebSocket.prototype.send;
+WebSocket.prototype.send = function (data) {
+  if (typeof data === "string" && data.includes('"seen"')) globalThis.framesDrawn++;
+  return send.call(this, data);
+};
+"""
+
+FIGURES = {
+    "main thread a frame (ms)": "TaskDuration",
+    "script a frame (ms)": "ScriptDuration",
+    "style a frame (ms)": "RecalcStyleDuration",
+    "layout a frame (ms)": "LayoutDuration",
+}
+
+
+@contextmanager
+def browser_page() -> Iterator[Page]:
+    """Open a page in a Chromium of its own."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"),
+            args=["--no-sandbox", "--disable-gpu"],
+        )
+        try:
+            yield browser.new_page(viewport={"width": 1200, "height": 900})
+        finally:
+            browser.close()
+
+
+def measure(page: Page, seconds: float) -> Figures:
+    """Return the figures for each frame drawn while the page runs on."""
+    page.wait_for_function("globalThis.framesDrawn > 5", timeout=60_000)
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def now() -> dict[str, float]:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        frames = page.evaluate("globalThis.framesDrawn")
+        return {m["name"]: m["value"] for m in metrics} | {"frames": frames}
+
+    before = now()
+    page.wait_for_timeout(seconds * 1000)
+    after = now()
+    frames = after["frames"] - before["frames"]
+    figures = {
+        figure: (after[metric] - before[metric]) * 1000 / frames
+        for figure, metric in FIGURES.items()
+    }
+    elapsed = after["Timestamp"] - before["Timestamp"]
+    return figures | {"frames a second": frames / elapsed}
+
+
+def webmap_page(robots: int, seconds: float) -> Callable[[], Figures]:
+    """Return a run of WebMap's own page."""
+
+    def run() -> Figures:
+        with display(robots, BEAMS) as shown, browser_page() as page:
+            page.add_init_script(COUNT_FRAMES)
+            page.goto(shown.url)
+            return measure(page, seconds)
+
+    return run
+
+
+def circle_page(robots: int, seconds: float) -> Callable[[], Figures]:
+    """Return a run of a page with a circle for each dot."""
+
+    def run() -> Figures:
+        with browser_page() as page:
+            page.add_script_tag(path=CIRCLES)
+            page.evaluate(f"circles({robots}, {BEAMS})")
+            return measure(page, seconds)
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare the two ways of drawing."""
+    robots, seconds = (20, 2.0) if quick else (ROBOTS, 10.0)
+    contenders = [
+        Contender("WebMap", webmap_page(robots, seconds)),
+        Contender("circles", circle_page(robots, seconds)),
+    ]
+    return [compare(f"{robots} robots with scans of {BEAMS}", contenders, rounds)]

@@ -1,0 +1,88 @@
+"""A program for ``webmap run``: robots that move and scan, with no ROS behind them.
+
+What they do was computed before, so that what is measured is the scene, the wire and
+the sockets. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` say how many there are of each.
+"""
+
+import math
+import os
+import threading
+import time
+
+import numpy as np
+
+import webmap
+
+ROBOTS = int(os.environ.get("FLEET_ROBOTS", "200"))
+BEAMS = int(os.environ.get("FLEET_BEAMS", "360"))
+
+TICK = 0.05
+"""Seconds between two poses of a robot; its scans come half as often."""
+
+STEPS = 40
+"""After how many ticks everything repeats."""
+
+
+class Mover:
+    """One robot on its circle."""
+
+    def __init__(self, number: int) -> None:
+        model = webmap.svg.circle(r=0.3, fill="steelblue")
+        self.robot = webmap.Robot(f"robot {number}", model)
+        self.dots = webmap.svg.path(class_="dot", fill="crimson")
+        self.robot.svg.append(webmap.svg.g(self.dots, class_="laserscan"))
+        side = math.ceil(math.sqrt(ROBOTS))
+        self.x, self.y = number % side * 4.0, number // side * 4.0
+        self.phase = number * 0.7
+        chance = np.random.default_rng(number)
+        bearings = np.linspace(-math.pi, math.pi, BEAMS, endpoint=False)
+        self.scans = []
+        for _ in range(STEPS // 2):
+            ranges = chance.uniform(0.5, 1.9, BEAMS)
+            hits = np.stack((ranges * np.cos(bearings), ranges * np.sin(bearings)), 1)
+            self.scans.append((hits * 1000).astype("<i2").tobytes())
+
+    def step(self, number: int) -> None:
+        """Show the state of one tick."""
+        turn = self.phase + number % STEPS * math.tau / STEPS
+        x, y = self.x + math.cos(turn), self.y + math.sin(turn)
+        self.robot.svg.set_pose(x, y, turn + math.pi / 2)
+        if number % 2 == 0:
+            self.dots.set_dots(self.scans[number % STEPS // 2], 0.001)
+
+
+fleet = [Mover(number) for number in range(ROBOTS)]
+
+
+def step(number: int) -> None:
+    """Move everything, in the model's thread."""
+    for mover in fleet:
+        mover.step(number)
+
+
+def drive() -> None:
+    """Ask for a step at each tick, from a thread that only keeps time."""
+    due = time.monotonic()
+    number = 0
+    while True:
+        due += TICK
+        time.sleep(max(0.0, due - time.monotonic()))
+        number += 1
+        try:
+            webmap.call(step, number)
+        except RuntimeError:
+            continue  # not started yet
+
+
+@webmap.page("/")
+def main(page: webmap.Page) -> None:
+    """Show all robots in the window."""
+    side = math.ceil(math.sqrt(ROBOTS))
+    map = webmap.Map(page.element("webmap_container"), 1200, 900)
+    map.scale(900 / (side * 4.0 + 2.0), 0, 900)
+    for mover in fleet:
+        map.add_robot(mover.robot)
+
+
+threading.Thread(target=drive, daemon=True).start()
+webmap.run()

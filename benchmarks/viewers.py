@@ -1,0 +1,53 @@
+"""What viewers cost the display process: one against twenty.
+
+Fifty robots with scans of 360 points at 10 Hz and poses at 20 Hz. The viewers are in
+a process of their own and draw nothing.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+
+from benchmarks.display import display
+from benchmarks.harness import Comparison, Contender, Figures, compare
+
+ROBOTS = 50
+BEAMS = 360
+
+
+def watched_by(viewers: int, seconds: float) -> Callable[[], Figures]:
+    """Return a run with so many viewers."""
+
+    def run() -> Figures:
+        with display(ROBOTS, BEAMS) as shown:
+            command = [sys.executable, "-m", "benchmarks.watchers", shown.url]
+            with subprocess.Popen(
+                [*command, str(viewers), str(seconds)],
+                stdout=subprocess.PIPE,
+                text=True,
+            ) as watching:
+                assert watching.stdout is not None
+                if watching.stdout.readline().strip() != "ready":
+                    raise RuntimeError("the viewers saw no frame")
+                before = shown.cpu()
+                received = json.loads(watching.stdout.readline())
+                used = shown.cpu() - before
+        return {
+            "cpu of the display (ms a second)": used / seconds * 1000,
+            "frames a viewer (a second)": received["frames"],
+            "bytes a viewer (kB a second)": received["bytes"] / 1000,
+        }
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare one viewer with twenty."""
+    seconds = 2.0 if quick else 10.0
+    contenders = [
+        Contender(f"{viewers} viewers", watched_by(viewers, seconds))
+        for viewers in (1, 20)
+    ]
+    title = f"{ROBOTS} robots with scans of {BEAMS} points"
+    return [compare(title, contenders, rounds)]

@@ -1,0 +1,85 @@
+"""Viewers that draw nothing: they take frames and acknowledge them, like a page.
+
+Run as ``python -m benchmarks.watchers URL COUNT SECONDS``. Prints ``ready`` when all
+have got a frame, then JSON with what they received in the seconds after that.
+"""
+
+import asyncio
+import json
+import struct
+import sys
+from urllib.parse import urlsplit
+
+import httpx
+from websockets.asyncio.client import ClientConnection, connect
+
+HEAD = struct.Struct("<HBI")
+"""Version, flags and number of a frame."""
+
+
+class Watcher:
+    """One viewer's socket."""
+
+    def __init__(self, link: ClientConnection) -> None:
+        self.link = link
+        self.bytes = 0
+        self.frames = 0
+        self.first = asyncio.Event()
+
+    async def watch(self, name: str) -> None:
+        """Say hello, then acknowledge frame after frame."""
+        container = {"webmap_container": [1200, 900]}
+        hello = {"op": "hello", "page": name, "url": "/", "width": 1200, "height": 900}
+        await self.link.send(json.dumps(hello | {"containers": container}))
+        async for frame in self.link:
+            if isinstance(frame, bytes):
+                self.bytes += len(frame)
+                self.frames += 1
+                number = HEAD.unpack_from(frame)[2]
+                await self.link.send(json.dumps({"op": "seen", "frame": number}))
+                self.first.set()
+
+
+async def open_link(url: str, name: str) -> ClientConnection:
+    """Open ``/scene`` as a browser of its own would, with a cookie for the token."""
+    async with httpx.AsyncClient(follow_redirects=True) as client:
+        (await client.get(url)).raise_for_status()
+        cookies = "; ".join(f"{k}={v}" for k, v in client.cookies.items())
+    place = urlsplit(url)
+    return await connect(
+        f"ws://{place.netloc}/_webmap/scene?page=/&id={name}",
+        origin=f"http://{place.netloc}",  # type: ignore[arg-type]  # a NewType of str
+        additional_headers={"Cookie": cookies},
+        compression=None,
+        max_size=None,
+    )
+
+
+async def main(url: str, count: int, seconds: float) -> None:
+    """Watch with ``count`` viewers and say what they received."""
+    watchers = []
+    tasks = []
+    for number in range(count):
+        name = f"watcher{number:04d}"
+        watcher = Watcher(await open_link(url, name))
+        watchers.append(watcher)
+        tasks.append(asyncio.create_task(watcher.watch(name)))
+    async with asyncio.timeout(30):
+        for watcher in watchers:
+            await watcher.first.wait()
+    await asyncio.sleep(1.0)
+    for watcher in watchers:
+        watcher.bytes = watcher.frames = 0
+    print("ready", flush=True)
+    await asyncio.sleep(seconds)
+    received = {
+        "bytes": sum(watcher.bytes for watcher in watchers) / count / seconds,
+        "frames": sum(watcher.frames for watcher in watchers) / count / seconds,
+    }
+    print(json.dumps(received), flush=True)
+    for task in tasks:
+        task.cancel()
+
+
+if __name__ == "__main__":
+    asyncio.run(main(sys.argv[1], int(sys.argv[2]), float(sys.argv[3])))
