@@ -1,5 +1,6 @@
 """The elements of the scene: SVG and HTML, in Python."""
 
+import math
 from collections.abc import Iterator
 from typing import Any, Self
 
@@ -13,7 +14,7 @@ from webmap.scene.allowed import (
 )
 from webmap.scene.classes import Classes, split_classes
 from webmap.scene.events import Event, Handler, Listener, Report, Spawn
-from webmap.scene.live import Live
+from webmap.scene.live import Live, MapPlace
 from webmap.scene.node import Node, Text
 from webmap.scene.values import format_value
 from webmap.scope import Removal, current_scope, keep
@@ -73,6 +74,12 @@ class Element(Live):
         return f"<{self.tag} {self.id}{name}>"
 
     # Attributes ---------------------------------------------------------------
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """The texts of all attributes that are set, as a copy."""
+        names = ("class", "transform", *self._attributes)
+        return {name: text for name in names if (text := self.get(name)) is not None}
 
     def get(self, name: str) -> str | None:
         """Return the text of an attribute, or None if it is not set."""
@@ -138,6 +145,27 @@ class Element(Live):
         else:
             place[name] = text
         self._touch(name)
+
+    def set_map(self, world: "Element", width: float = 0, height: float = 0) -> Self:
+        """Make the element, an ``<svg>``, a map whose view each page moves by itself.
+
+        Args:
+            world: The group in it whose matrix is the view; leave its place alone.
+            width: Pixels, or 0 to be as wide as what the map is in.
+            height: Pixels, or 0 to be as high as what the map is in.
+
+        Raises:
+            SceneError: If this is no ``<svg>``, ``world`` is not in it, or a size is
+                not a finite number of at least 0.
+
+        """
+        if self.tag != "svg" or world not in self.walk():
+            raise SceneError(f"a map is an svg with its world in it, not {self!r}")
+        if not (0 <= width < math.inf and 0 <= height < math.inf):
+            raise SceneError(f"a map has a size in pixels, got {width} x {height}")
+        self._map = MapPlace(world.id, width, height)
+        self._touch("map")
+        return self
 
     @property
     def classes(self) -> Classes:

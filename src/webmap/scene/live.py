@@ -34,10 +34,23 @@ class Age(NamedTuple):
     """Whether the age is the element's text."""
 
 
+class MapPlace(NamedTuple):
+    """What makes an ``<svg>`` a map."""
+
+    world_id: int
+    """The group in it whose matrix is the view."""
+
+    width: float
+    """Pixels, or 0 to be as wide as what it is in."""
+
+    height: float
+    """Pixels, or 0 to be as high as what it is in."""
+
+
 class Live(Node):
     """A node whose place, dots and age can be set at every tick, cheaply."""
 
-    __slots__ = ("_age", "_dots", "_transform")
+    __slots__ = ("_age", "_dots", "_map", "_transform")
 
     namespace = "svg"
 
@@ -47,6 +60,7 @@ class Live(Node):
         self._transform: str | tuple[float, float, float] | Affine | None = None
         self._dots: Dots | None = None
         self._age: Age | None = None
+        self._map: MapPlace | None = None
 
     def set_pose(self, x: float, y: float, yaw: float) -> None:
         """Place the element in its parent, newest wins.

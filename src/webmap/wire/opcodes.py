@@ -1,0 +1,98 @@
+"""The one table of what is on the wire between the display and a page.
+
+``tools/make_opcodes.py`` writes the same table for the browser. Everything is
+little-endian. In the layouts below, ``v`` is a variable-length integer of seven bits
+a byte, lowest first, ``s`` is text in UTF-8 after its length as ``v``, and ``u8``,
+``u16``, ``u32``, ``i16``, ``f32`` and ``f64`` are what they say.
+
+A frame is a header and then records until its end. The header is ``u16 version``,
+``u8 flags``, ``u32 frame`` and ``f64 now``: the version of this table, :data:`RESET`
+or 0, the number that the page acknowledges, and the display's monotonic clock in
+seconds.
+"""
+
+import zlib
+from enum import IntEnum
+
+from webmap.scene.allowed import (
+    ATTRIBUTES,
+    BOOLEAN_ATTRIBUTES,
+    EVENTS,
+    HTML_TAGS,
+    SVG_TAGS,
+)
+
+RESET = 1
+"""Flag of a frame that tells everything: the page drops what it had."""
+
+PREVENT, STOP = 1, 2
+"""Flags of an event that is listened to."""
+
+LAST, FIRST, AFTER = 0, 1, 2
+"""Where a child goes: at the end, at the beginning, or after id (place - AFTER)."""
+
+VIEW_OPERATIONS = ("translate", "scale", "rotate", "set", "fit", "follow")
+"""What a program may do to the view of a map."""
+
+TAGS = SVG_TAGS + HTML_TAGS
+"""The tags by their numbers: first those of SVG, then those of HTML."""
+
+
+class Op(IntEnum):
+    """The first byte of a record; the comment is what comes after it."""
+
+    # About the page.
+    DELTA = 1  # v fragment: the element records that follow go to all its mounts
+    SNAPSHOT = 2  # v mount: the element records that follow build this one mount
+    MOUNT = 3  # v mount, v fragment, v within, v under, f64 order
+    UNMOUNT = 4  # v mount
+    MOUNT_CLASS = 5  # v mount, u8 on, s class
+    LISTEN = 6  # v mount, v element, u8 event, u8 flags
+    UNLISTEN = 7  # v mount, v element, u8 event
+    # v svg, v session, v operations in it, u8 known, if known: 6 f64, v followed id
+    VIEW_STATE = 8
+    VIEW = 9  # v svg, v number, u8 operation, u8 count, count f64
+    ATTACH = 10  # v svg, v instance, s module, s stylesheet, s options (JSON)
+    DETACH = 11  # v instance
+    MESSAGE = 12  # v instance, s message (JSON)
+    ERROR = 13  # s text
+
+    # About elements; a place is LAST, FIRST or AFTER and the id of a sibling.
+    CREATE = 32  # v id, v parent (0: the root), v place, u8 tag
+    TEXT = 33  # v id, v parent, v place, s text
+    DOCUMENT = 34  # v id
+    BIND = 35  # v id, s id in the page
+    REMOVE = 36  # v id
+    ATTRIBUTE = 37  # v id, u8 name, s value
+    UNSET = 38  # v id, u8 name
+    NAMED_ATTRIBUTE = 39  # v id, s name, s value: data-* and aria-*
+    NAMED_UNSET = 40  # v id, s name
+    CLASSES = 41  # v id, s classes
+    STYLE = 42  # v id, s custom property, s value (empty: unset)
+    POSE = 43  # v id, f32 x, f32 y, f32 yaw
+    FAR_POSE = 44  # v id, f64 x, f64 y, f32 yaw
+    MATRIX = 45  # v id, 6 f64
+    DOTS = 46  # v id, f32 unit, v count, count times (i16 x, i16 y)
+    AGE = 47  # v id, v milliseconds of the display's clock (0: never)
+    AGE_LIMIT = 48  # v id, f32 seconds, u8 whether the age is the text
+    DATA = 49  # v id of a text, s text
+    EVENTS = 50  # v id, u8 count, count times (u8 event, u8 flags)
+    EMPTY = 51  # v id: drop what the page had in a bound element
+    MAP = 52  # v id of svg, v id of world, f32 width, f32 height (0: its container's)
+
+
+TABLES = {
+    "OP": {op.name: op.value for op in Op},
+    "FLAG": {"RESET": RESET, "PREVENT": PREVENT, "STOP": STOP},
+    "PLACE": {"LAST": LAST, "FIRST": FIRST, "AFTER": AFTER},
+    "VIEW_OPERATIONS": list(VIEW_OPERATIONS),
+    "SVG_TAGS": list(SVG_TAGS),
+    "HTML_TAGS": list(HTML_TAGS),
+    "ATTRIBUTES": list(ATTRIBUTES),
+    "BOOLEAN_ATTRIBUTES": sorted(BOOLEAN_ATTRIBUTES),
+    "EVENTS": list(EVENTS),
+}
+"""All of it, as the browser gets it."""
+
+VERSION = zlib.crc32(repr(TABLES).encode()) & 0xFFFF
+"""Changes with the table, so that a page of another version notices."""
