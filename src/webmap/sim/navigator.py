@@ -9,13 +9,17 @@ from webmap.geometry import Pose, Twist, normalize_angle
 from webmap.sim.planner import Planner, Point
 from webmap.sim.robot import Robot
 
-_LOOK_AHEAD = 0.5
+_CORNER = 0.15
 _ARRIVED = 0.12
 _TURNED = 0.08
 _CRUISE = 0.7
 _PATIENCE = 2.5
 _MOST_PLANS = 6
 _KEEP_OFF = 0.15
+_TURN_FIRST = 0.5
+_TURN_RATE = 1.8
+_GAP = 0.04
+_BRAKING = 0.4
 
 Discs = Sequence[tuple[float, float, float]]
 
@@ -146,32 +150,40 @@ class Navigator:
     def _follow(self, discs: Discs) -> None:
         assert self.goal is not None
         pose, last = self.robot.pose, self.path[-1]
-        if math.dist((pose.x, pose.y), last) < _ARRIVED:
+        here = (pose.x, pose.y)
+        if math.dist(here, last) < _ARRIVED:
             self._turn_to(self.goal.pose.yaw)
             return
-        ahead = self._look_ahead(pose)
-        bearing = math.atan2(ahead[1] - pose.y, ahead[0] - pose.x)
+        self._pass_corners(here)
+        corner = self.path[self._next]
+        bearing = math.atan2(corner[1] - pose.y, corner[0] - pose.x)
         error = normalize_angle(bearing - pose.yaw)
-        speed = min(_CRUISE, 0.15 + 0.9 * self.distance_left) * max(math.cos(error), 0)
-        if abs(error) > 0.9 or self._must_wait(discs):
+        # Slow enough at the corner to turn there, not beyond it.
+        speed = min(_CRUISE, 0.2 + 1.2 * math.dist(here, corner))
+        if abs(error) > _TURN_FIRST or self._must_wait(here, corner, discs):
             speed = 0.0
-        self.robot.autonomous = Twist(vx=speed, wz=max(-1.5, min(1.5, 2.2 * error)))
+        turn = max(-_TURN_RATE, min(_TURN_RATE, 3.0 * error))
+        self.robot.autonomous = Twist(vx=speed * max(math.cos(error), 0), wz=turn)
 
-    def _look_ahead(self, pose: Pose) -> Point:
-        here = (pose.x, pose.y)
+    def _pass_corners(self, here: Point) -> None:
         while (
             self._next < len(self.path) - 1
-            and math.dist(here, self.path[self._next]) < _LOOK_AHEAD
+            and math.dist(here, self.path[self._next]) < _CORNER
         ):
             self._next += 1
-        return self.path[self._next]
 
-    def _must_wait(self, discs: Discs) -> bool:
-        """Whether another robot is right in front."""
-        pose, radius = self.robot.pose, self.robot.options.radius
-        for x, y, r in discs:
-            seen = pose.inverse @ Pose(x, y)
-            if 0 < seen.x < r + radius + 0.45 and abs(seen.y) < r + radius + 0.05:
+    def _must_wait(self, here: Point, corner: Point, discs: Discs) -> bool:
+        """Whether another robot stands on the next metre of the way."""
+        way = math.dist(here, corner)
+        x, y = corner[0] - here[0], corner[1] - here[1]
+        for disc_x, disc_y, radius in discs:
+            to_x, to_y = disc_x - here[0], disc_y - here[1]
+            along = (to_x * x + to_y * y) / way if way else 0.0
+            if not 0 < along < way + radius:
+                continue
+            aside = abs(to_x * y - to_y * x) / way
+            near = radius + self.robot.options.radius + _GAP
+            if aside < near and along < near + _BRAKING:
                 return True
         return False
 

@@ -48,16 +48,21 @@ class Planner:
 
     def reachable(self, x: float, y: float) -> NDArray[np.bool_]:
         """Return the cells of the search that a base at a place can get to."""
-        seen = np.zeros_like(self.blocked)
-        cell = self.cell(x, y)
-        if not self._holds(cell) or self.blocked[cell]:
-            return seen
-        seen[cell] = True
-        while True:
-            grown = dilate(seen, 1) & ~self.blocked
-            if grown.sum() == seen.sum():
-                return seen
-            seen = grown
+        rows, columns = self.blocked.shape
+        width = columns + 2
+        waiting = np.pad(~self.blocked, 1).ravel().tolist()
+        seen = np.zeros(len(waiting), np.bool_)
+        row, column = self.cell(x, y)
+        if self._holds((row, column)) and not self.blocked[row, column]:
+            found = [(row + 1) * width + column + 1]
+            waiting[found[0]] = False
+            for here in found:
+                for there in (here + 1, here - 1, here + width, here - width):
+                    if waiting[there]:
+                        waiting[there] = False
+                        found.append(there)
+            seen[found] = True
+        return seen.reshape(rows + 2, width)[1:-1, 1:-1]
 
     def center(self, row: int, column: int) -> Point:
         """Return the middle of a cell of the search, in metres."""

@@ -161,8 +161,8 @@ class World:
 
     def _open_heading(self, x: float, y: float) -> float:
         """Return the heading with the longest free way."""
-        yaws = np.arange(16) * math.tau / 16 - math.pi
-        ones = np.ones(16)
+        yaws = np.arange(8) * math.tau / 8 - math.pi
+        ones = np.ones(8)
         ways = cast_rays(
             self.obstacles, x * ones, y * ones, np.cos(yaws), np.sin(yaws), 12.0
         )

@@ -128,7 +128,7 @@ class Graph:
         type_name: str | None = None,
         *,
         node: str = BRIDGE_NODE,
-    ) -> Topic:
+    ) -> None:
         """Let ``owner`` hear a topic, what is latched included.
 
         Raises:
@@ -137,12 +137,12 @@ class Graph:
         """
         topic = self._topic(name, type_name)
         topic.subscribers[owner] = (node, deliver)
-        self.repeat_latched(topic, deliver)
-        return topic
+        self.repeat_latched(topic.name, deliver)
 
-    def repeat_latched(self, topic: Topic, deliver: Deliver) -> None:
+    def repeat_latched(self, name: str, deliver: Deliver) -> None:
         """Deliver what a topic has latched."""
-        for publication in topic.latched.values():
+        topic = self.topics.get(name)
+        for publication in tuple(topic.latched.values()) if topic else ():
             if publication:
                 deliver(publication)
 
@@ -217,8 +217,6 @@ class Graph:
 
     def _request(self, type_name: str, args: Any) -> dict[str, Any]:
         request = f"{type_name}Request"
-        if isinstance(args, Mapping) and not args:
-            args = {}
         try:
             self.schema.fields(request)
         except UnknownType:

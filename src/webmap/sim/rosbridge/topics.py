@@ -1,0 +1,153 @@
+"""What a client does with topics: advertise, publish, subscribe."""
+
+from functools import partial
+
+from webmap.sim.rosbridge.dialect import resolve
+from webmap.sim.rosbridge.encode import Publication
+from webmap.sim.rosbridge.graph import GraphError
+from webmap.sim.rosbridge.operation import (
+    Client,
+    Handlers,
+    Operation,
+    text,
+    whole_number,
+)
+from webmap.sim.rosbridge.outbox import DEFAULT_DEPTH
+from webmap.sim.rosbridge.subscription import Request, Subscription
+
+_COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+
+
+class Topics:
+    """One client's publishers and subscriptions."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._graph = client.graph
+        self._advertised: set[str] = set()
+        self._subscriptions: dict[str, Subscription] = {}
+
+    @property
+    def handlers(self) -> Handlers:
+        """What serves each operation."""
+        return {
+            "advertise": self._advertise,
+            "unadvertise": self._unadvertise,
+            "publish": self._publish,
+            "subscribe": self._subscribe,
+            "unsubscribe": self._unsubscribe,
+        }
+
+    def poll(self) -> float | None:
+        """Release what throttling held back; return seconds to the next, if any."""
+        now = self._client.now()
+        for subscription in self._subscriptions.values():
+            subscription.poll(now)
+        dues = [s.next_due for s in self._subscriptions.values()]
+        soonest = min((due for due in dues if due is not None), default=None)
+        return None if soonest is None else max(soonest - now, 0.0)
+
+    def frames(self, publication: Publication) -> list[str | bytes]:
+        """Return a publication as this client asked for it; empty if it cannot be."""
+        subscription = self._subscriptions.get(publication.topic)
+        if subscription is None:
+            return []
+        request, encoder = subscription.merged, self._client.encoder
+        size = request.fragment_size
+        is_binary = request.compression in ("cbor", "cbor-raw")
+        if is_binary and size and encoder.quirks.no_cbor_fragments:
+            return []
+        frame = publication.form(request.compression, encoder)
+        if frame is None:
+            return []
+        if size is None or isinstance(frame, bytes):
+            return [frame]
+        return list(encoder.fragments(frame, size))
+
+    def close(self) -> None:
+        """Take the publishers and subscriptions out of the graph."""
+        for topic in self._subscriptions:
+            self._graph.unsubscribe(self, topic)
+        for topic in self._advertised:
+            self._graph.unadvertise(self, topic)
+        self._subscriptions.clear()
+        self._advertised.clear()
+
+    def _advertise(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        latch = bool(operation.get("latch", False))
+        self._graph.advertise(self, topic, text(operation, "type"), latch=latch)
+        self._advertised.add(topic)
+
+    def _unadvertise(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        if topic not in self._advertised:
+            raise GraphError(f"{topic} is not advertised")
+        self._advertised.discard(topic)
+        self._graph.unadvertise(self, topic)
+
+    def _publish(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        known = self._graph.topics.get(topic)
+        if known is None:
+            raise GraphError(f"Cannot infer the type of {topic}: nobody has it")
+        message = self._graph.conform(
+            known.type,
+            operation.get("msg", {}),
+            finite=not self._client.encoder.quirks.lenient_numbers,
+        )
+        if topic not in self._advertised:
+            self._graph.advertise(self, topic, known.type)
+            self._advertised.add(topic)
+        self._graph.publish(self, topic, message)
+
+    def _subscribe(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        request, identifier = _request(operation), operation.get("id")
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            subscription = Subscription(self._enqueue)
+            subscription.ask(identifier, request)
+            self._subscriptions[topic] = subscription
+            try:
+                deliver = partial(self._deliver, subscription)
+                type_name = operation.get("type") or None
+                self._graph.subscribe(self, topic, deliver, type_name)
+            except GraphError:
+                del self._subscriptions[topic]
+                raise
+        elif subscription.ask(identifier, request):
+            # Each new id gets what is latched once more, as in rosbridge.
+            self._graph.repeat_latched(topic, partial(self._enqueue, depth=0))
+
+    def _unsubscribe(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            raise GraphError(f"{topic} is not subscribed")
+        if subscription.drop(operation.get("id")):
+            del self._subscriptions[topic]
+            self._client.outbox.forget(topic)
+            self._graph.unsubscribe(self, topic)
+
+    def _deliver(self, subscription: Subscription, publication: Publication) -> None:
+        subscription.offer(publication, self._client.now())
+        if subscription.next_due is not None:
+            self._client.wake()
+
+    def _enqueue(self, publication: Publication, depth: int) -> None:
+        self._client.outbox.publication(publication, depth or DEFAULT_DEPTH)
+        self._client.wake()
+
+
+def _request(operation: Operation) -> Request:
+    compression = operation.get("compression") or "none"
+    if compression not in _COMPRESSIONS:
+        raise GraphError(f"compression must be of {_COMPRESSIONS}, got {compression!r}")
+    size = operation.get("fragment_size")
+    return Request(
+        whole_number(operation, "throttle_rate") / 1000,
+        whole_number(operation, "queue_length"),
+        None if size is None else max(whole_number(operation, "fragment_size"), 1),
+        compression,
+    )
