@@ -43,15 +43,16 @@ const PERIOD = 50;
 export class Drive {
   /**
    * @param {string | URL} baseUrl The address under which the server has `drive`.
-   * @param {{releaseAfter?: number}} [options] `releaseAfter`: a lease that is not
-   *     used for so long is given back, in ms.
+   * @param {{id?: string, releaseAfter?: number}} [options] `id`: the page's own, by
+   *     which the server knows its `scene` and `drive` as one. `releaseAfter`: a lease
+   *     that is not used for so long is given back, in ms.
    */
   constructor(baseUrl, options = {}) {
     const now = performance.now();
     this._hands = new Hands(now);
     this._loop = new Loop();
     this._pilot = new Pilot(this._hands, this._loop, now, options);
-    this._line = new Line(socketUrl(baseUrl), {
+    this._line = new Line(socketUrl(baseUrl, options.id), {
       open: () => this._loop.open(performance.now()),
       receive: (message) => this._receive(message),
       lost: () => this._lost(),
@@ -309,8 +310,9 @@ export class Drive {
         }),
         this.on("step", () => {
           if (reached()) end(null);
-          else if (performance.now() - since > TAKE_PATIENCE)
+          else if (performance.now() - since > TAKE_PATIENCE) {
             end("The gate is silent.");
+          }
         }),
       ];
     });
@@ -340,9 +342,13 @@ export class Drive {
   }
 }
 
-/** @param {string | URL} baseUrl */
-function socketUrl(baseUrl) {
+/**
+ * @param {string | URL} baseUrl
+ * @param {string | undefined} id
+ */
+function socketUrl(baseUrl, id) {
   const url = new URL("drive", baseUrl);
+  if (id !== undefined) url.searchParams.set("id", id);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url;
 }

@@ -32,9 +32,23 @@ class Bench {
 
   say(robot, fields = {}) {
     const report = {
-      robot, name: robot, state: "free", holder: null, mine: false, epoch: null,
-      armed: false, v: 1, w: 1, why: [], link: "up", sent: [0, 0, 0], echoed: null,
-      measured: null, armable: true, reason: null, ...fields,
+      robot,
+      name: robot,
+      state: "free",
+      holder: null,
+      mine: false,
+      epoch: null,
+      armed: false,
+      v: 1,
+      w: 1,
+      why: [],
+      link: "up",
+      sent: [0, 0, 0],
+      echoed: null,
+      measured: null,
+      armable: true,
+      reason: null,
+      ...fields,
     };
     this.pilot.report(/** @type {any} */ (report), this.now);
   }
@@ -90,7 +104,9 @@ const moves = (messages) =>
 
 /** @type {Bench} */
 let bench;
-beforeEach(() => { bench = new Bench(); });
+beforeEach(() => {
+  bench = new Bench();
+});
 
 describe("the first press", () => {
   test("takes a free robot and nothing more", () => {
@@ -125,7 +141,11 @@ describe("the first press", () => {
   });
 
   test("does nothing on a robot that somebody else drives", () => {
-    bench.say("r1", { holder: { connection: "c2", name: "Ann" }, epoch: 9, state: "held" });
+    bench.say("r1", {
+      holder: { connection: "c2", name: "Ann" },
+      epoch: 9,
+      state: "held",
+    });
     assert.deepEqual(bench.press(), []);
     bench.say("r1");
     assert.deepEqual(bench.run(500), [], "nor when that one lets go");
@@ -137,7 +157,11 @@ describe("the first press", () => {
   });
 
   test("reaches over a program, and then asks for a new press", () => {
-    bench.say("r1", { holder: { connection: "program", name: "program" }, epoch: 9, state: "held" });
+    bench.say("r1", {
+      holder: { connection: "program", name: "program" },
+      epoch: 9,
+      state: "held",
+    });
     assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
     bench.grant("r1");
     assert.deepEqual(moves(bench.run(600)), []);
@@ -178,14 +202,68 @@ describe("while driving", () => {
   });
 
   for (const [what, happen] of [
-    ["the page loses attention", () => { bench.attentive = false; bench.step(); bench.attentive = true; }],
-    ["the page slept", () => { bench.step(400); }],
-    ["the clock jumps ahead", () => { bench.step(3_600_000); }],
-    ["the gate disarms", () => { bench.say("r1", { mine: true, epoch: bench.epoch, armed: false, state: "stopping", holder: { connection: "c1", name: "me" } }); bench.grant("r1", bench.epoch); }],
-    ["the gate refuses a command", () => { bench.pilot.refuse("r1", "drive", "too old", bench.now); }],
-    ["acknowledgements stay away", () => { bench.acking = false; bench.run(400); bench.acking = true; }],
-    ["ticks stay away", () => { bench.ticking = false; bench.run(350); bench.ticking = true; }],
-    ["the lease is lost and comes again", () => { bench.say("r1"); bench.grant("r1"); }],
+    [
+      "the page loses attention",
+      () => {
+        bench.attentive = false;
+        bench.step();
+        bench.attentive = true;
+      },
+    ],
+    [
+      "the page slept",
+      () => {
+        bench.step(400);
+      },
+    ],
+    [
+      "the clock jumps ahead",
+      () => {
+        bench.step(3_600_000);
+      },
+    ],
+    [
+      "the gate disarms",
+      () => {
+        bench.say("r1", {
+          mine: true,
+          epoch: bench.epoch,
+          armed: false,
+          state: "stopping",
+          holder: { connection: "c1", name: "me" },
+        });
+        bench.grant("r1", bench.epoch);
+      },
+    ],
+    [
+      "the gate refuses a command",
+      () => {
+        bench.pilot.refuse("r1", "drive", "too old", bench.now);
+      },
+    ],
+    [
+      "acknowledgements stay away",
+      () => {
+        bench.acking = false;
+        bench.run(400);
+        bench.acking = true;
+      },
+    ],
+    [
+      "ticks stay away",
+      () => {
+        bench.ticking = false;
+        bench.run(350);
+        bench.ticking = true;
+      },
+    ],
+    [
+      "the lease is lost and comes again",
+      () => {
+        bench.say("r1");
+        bench.grant("r1");
+      },
+    ],
   ]) {
     test(`nothing resumes when ${what}`, () => {
       bench.drive();
@@ -228,7 +306,13 @@ describe("another choice", () => {
   test("lets go of the driven robot, neutral first", () => {
     bench.drive();
     const messages = bench.pilot.choose("r2", bench.now);
-    assert.deepEqual(messages.map((m) => [m.op, m.robot, m.x]), [["drive", "r1", 0], ["release", "r1", undefined]]);
+    assert.deepEqual(
+      messages.map((m) => [m.op, m.robot, m.x]),
+      [
+        ["drive", "r1", 0],
+        ["release", "r1", undefined],
+      ],
+    );
   });
 
   test("is not driven by what is held", () => {
@@ -242,7 +326,9 @@ describe("another choice", () => {
 
   test("gives back a lease that is on its way", () => {
     bench.press();
-    assert.deepEqual(bench.pilot.choose("r2", bench.now), [{ op: "release", robot: "r1" }]);
+    assert.deepEqual(bench.pilot.choose("r2", bench.now), [
+      { op: "release", robot: "r1" },
+    ]);
     bench.grant("r1");
     assert.deepEqual(bench.run(500), []);
   });

@@ -32,7 +32,8 @@ export function attentive() {
   return (
     document.visibilityState === "visible" &&
     document.hasFocus() &&
-    !takesKeys(document.activeElement)
+    !takesKeys(document.activeElement) &&
+    document.querySelector(":modal") === null
   );
 }
 

@@ -23,8 +23,9 @@ export function clean(asked) {
   const x = asked?.x ?? 0;
   const y = asked?.y ?? 0;
   const turn = asked?.turn ?? 0;
-  if (!(Number.isFinite(x) && Number.isFinite(y) && Number.isFinite(turn)))
+  if (!(Number.isFinite(x) && Number.isFinite(y) && Number.isFinite(turn))) {
     return NEUTRAL;
+  }
   if (x === 0 && y === 0 && turn === 0) return NEUTRAL;
   return Object.freeze({ x: unit(x), y: unit(y), turn: unit(turn) });
 }

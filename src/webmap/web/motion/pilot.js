@@ -165,8 +165,9 @@ export class Pilot {
    * @returns {Command[]}
    */
   release(robot, now) {
-    if (robot === this._lease?.robot || robot === this._asked?.robot)
+    if (robot === this._lease?.robot || robot === this._asked?.robot) {
       return this.letGo(now);
+    }
     const epoch = this.epoch(robot);
     this._parked.delete(robot);
     if (epoch === null) return [];
@@ -225,8 +226,9 @@ export class Pilot {
     this._parked.clear();
     this._given.clear();
     this._seq = 0;
-    for (const [id, report] of this.robots)
+    for (const [id, report] of this.robots) {
       this.robots.set(id, { ...report, mine: false });
+    }
   }
 
   /**

@@ -1,0 +1,155 @@
+import { Keys } from "./keys.js";
+
+/** @typedef {import('../drive.js').Drive} Drive */
+
+/**
+ * A map that robots can be driven from.
+ *
+ * @typedef {object} Seat
+ * @property {object} map
+ * @property {() => string | null} robot The robot that is selected there.
+ * @property {boolean} holonomic Whether its keys move a base sideways, too.
+ * @property {(active: boolean) => void} onActive Called when the page's hands start or
+ *     stop to belong to this map.
+ */
+
+/** @type {WeakMap<Drive, Desk>} */
+const desks = new WeakMap();
+
+/**
+ * Return the desk of a page, made when it is first asked for.
+ *
+ * @param {Drive} drive
+ */
+export function deskOf(drive) {
+  const desk = desks.get(drive) ?? new Desk(drive);
+  desks.set(drive, desk);
+  return desk;
+}
+
+/**
+ * Where the operator sits: one keyboard for all the maps of a page.
+ *
+ * Keys drive the robot that is selected on the map that was touched last, so that two
+ * maps on a page never both drive.
+ */
+export class Desk {
+  /** @param {Drive} drive */
+  constructor(drive) {
+    this._drive = drive;
+    /** @type {Seat[]} */
+    this._seats = [];
+    /** @type {Seat | null} */
+    this.active = null;
+    /** @type {Set<() => boolean>} */
+    this._escapes = new Set();
+    this._uses = 0;
+    /** @type {Keys | null} */
+    this._keys = null;
+  }
+
+  /**
+   * Use the STOP keys, whether or not anything can be driven from here.
+   *
+   * @returns {() => void} Ends the use.
+   */
+  open() {
+    this._uses += 1;
+    this._keys ??= new Keys(this._drive, {
+      wanted: () => this.active?.robot() != null,
+      holonomic: () => this.active?.holonomic ?? false,
+      stop: (all, event) => this._stop(all, event),
+    });
+    let ended = false;
+    return () => {
+      if (ended) return;
+      ended = true;
+      this._uses -= 1;
+      if (this._uses > 0) return;
+      this._keys?.destroy();
+      this._keys = null;
+    };
+  }
+
+  /**
+   * Drive from a map. The first one is active until another is touched.
+   *
+   * @param {Seat} seat
+   * @returns {() => void} Leaves.
+   */
+  sit(seat) {
+    const close = this.open();
+    this._seats.push(seat);
+    if (this.active === null) this.activate(seat);
+    return () => {
+      close();
+      this._seats = this._seats.filter((other) => other !== seat);
+      if (this.active === seat) this.activate(this._seats[0] ?? null);
+    };
+  }
+
+  /**
+   * Make a map the one that is driven from.
+   *
+   * @param {Seat | null} seat
+   */
+  activate(seat) {
+    if (seat === this.active) return;
+    this.active?.onActive(false);
+    this.active = seat;
+    this.choose();
+    seat?.onActive(true);
+  }
+
+  /** Look again which robot is selected on the active map. */
+  choose() {
+    this._drive.choose(this.active?.robot() ?? null);
+  }
+
+  /**
+   * Let Escape end something smaller first: a tool, a menu. Not while a robot is driven.
+   *
+   * @param {() => boolean} leave Returns whether there was something to end.
+   * @returns {() => void} Gives the key back.
+   */
+  claimEscape(leave) {
+    this._escapes.add(leave);
+    return () => {
+      this._escapes.delete(leave);
+    };
+  }
+
+  /**
+   * @param {boolean} all
+   * @param {KeyboardEvent} event
+   */
+  _stop(all, event) {
+    const { driven, choice } = this._drive.status;
+    if (all) {
+      this._drive.stop("*");
+      return true;
+    }
+    if (driven === null && keepsKey(event)) return false;
+    if (driven === null && event.code === "Escape") {
+      for (const leave of this._escapes) if (leave()) return true;
+    }
+    const robot = driven ?? choice;
+    if (robot === null) return false;
+    this._drive.stop(robot);
+    return true;
+  }
+}
+
+/**
+ * @param {KeyboardEvent} event
+ * @returns {boolean} Whether the key has a meaning of its own where it was pressed, and
+ *     nothing else (Enter, a click) would do the same.
+ */
+function keepsKey(event) {
+  const target = event.target;
+  if (!(target instanceof Element)) return false;
+  if (event.code === "Escape") {
+    return target.closest("dialog, [popover], input, textarea") !== null;
+  }
+  return target.matches("input[type=checkbox], input[type=radio], select, summary");
+}

@@ -1,0 +1,67 @@
+/**
+ * Make an HTML element.
+ *
+ * @template {keyof HTMLElementTagNameMap} K
+ * @param {K} tag
+ * @param {string} className
+ * @param {Record<string, string>} [attributes]
+ * @param {...(Node | string)} children Strings are text, never markup.
+ * @returns {HTMLElementTagNameMap[K]}
+ */
+export function html(tag, className, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  element.className = className;
+  for (const [name, value] of Object.entries(attributes)) {
+    element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+/**
+ * Make an SVG element.
+ *
+ * @template {keyof SVGElementTagNameMap} K
+ * @param {K} tag
+ * @param {Record<string, string>} attributes
+ * @param {...Node} children
+ * @returns {SVGElementTagNameMap[K]}
+ */
+export function svg(tag, attributes, ...children) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+/**
+ * Make a button.
+ *
+ * @param {string} className
+ * @param {string} label
+ * @param {() => void} act
+ * @returns {HTMLButtonElement}
+ */
+export function button(className, label, act) {
+  const element = html(
+    "button",
+    `webmap-button ${className}`,
+    { type: "button" },
+    label,
+  );
+  element.addEventListener("click", act);
+  return element;
+}
+
+/**
+ * Change an element's text, and nothing when it is the same: a screen reader reads a
+ * live region again for every change.
+ *
+ * @param {Element} element
+ * @param {string} text
+ */
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,150 @@
+import { heldByAnother } from "./report.js";
+
+/** @typedef {import('./pilot.js').Pilot} Pilot */
+/** @typedef {import('./report.js').RobotReport} RobotReport */
+
+/**
+ * How it stands with driving a robot from this page, to be shown as words, a shape and
+ * a colour: the state names all three.
+ *
+ * @typedef {'none' | 'connecting' | 'lost' | 'late' | 'fixed' | 'held' | 'free' |
+ *     'taking' | 'ready' | 'hands-off' | 'driving' | 'stopping' | 'stopped'} State
+ */
+
+/** @typedef {{state: State, title: string, detail: string}} Description */
+
+/** @typedef {import('../drive.js').Drive['status']} Status */
+
+/**
+ * Say how it stands.
+ *
+ * @param {Status} status
+ * @param {string | null} robot The robot that is selected where this is shown.
+ * @param {RobotReport | null} report The gate's word on it.
+ * @param {boolean} active Whether the page's keys belong to that map.
+ * @returns {Description}
+ */
+export function describe(status, robot, report, active) {
+  const link = ofLink(status);
+  if (link) return link;
+  if (robot === null) {
+    return say("none", "No robot selected", "Click on one to drive it.");
+  }
+  if (report === null) return say("fixed", "Not drivable", "It has no velocity topic.");
+  if (report.state === "stopped") return say("stopped", "Stopped", report.reason ?? "");
+  if (heldByAnother(report)) return ofOther(report);
+  if (!active) {
+    return say("free", "Not driven here", "Click on this map to drive from it.");
+  }
+  if (status.driven === robot) return ofMine(status, report);
+  return ofFree(status, report);
+}
+
+/**
+ * Say how fast the robot may go, and why not faster.
+ *
+ * @param {RobotReport} report
+ */
+export function capOf(report) {
+  const turn = `${digits(report.w)} rad/s`;
+  const why = report.why.length > 0 ? `: ${report.why.join(", ")}` : "";
+  return `Up to ${digits(report.v)} m/s, ${turn}${why}`;
+}
+
+/**
+ * Say how fast the robot moves, as odometry has it.
+ *
+ * @param {RobotReport} report
+ */
+export function speedOf({ measured }) {
+  if (!measured) return "No speed known";
+  const [x, y, turn] = measured;
+  return `${Math.hypot(x, y).toFixed(2)} m/s, ${turn.toFixed(2)} rad/s`;
+}
+
+/** @param {Status} status */
+function ofLink({ link }) {
+  if (link === "connecting") return say("connecting", "Connecting", "");
+  if (link === "lost") {
+    return say(
+      "lost",
+      "Connection lost",
+      "Nothing can be driven from here. Trying again.",
+    );
+  }
+  if (link === "late") {
+    return say(
+      "late",
+      "Too slow",
+      "Commands take longer than 0.3 s, so none moves a robot.",
+    );
+  }
+  return null;
+}
+
+/** @param {RobotReport} report */
+function ofOther(report) {
+  const who = report.holder?.name || report.holder?.connection || "somebody else";
+  return say(
+    "held",
+    `Held by ${who}`,
+    report.state === "driving" ? "It is being driven." : "",
+  );
+}
+
+/**
+ * @param {Status} status
+ * @param {RobotReport} report
+ */
+function ofMine(status, report) {
+  if (report.state === "driving") return say("driving", "Driving", speedOf(report));
+  if (report.reason) return say("fixed", "Cannot move", sentence(report.reason));
+  if (status.pressed && status.dead) {
+    return say(
+      "hands-off",
+      "Let go, then press again",
+      "What is held now does nothing.",
+    );
+  }
+  if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
+  if (!status.settled) return say("taking", "Getting ready", "");
+  return say("ready", "Ready", "Hold W A S D or the arrows. Space stops.");
+}
+
+/**
+ * @param {Status} status
+ * @param {RobotReport} report
+ */
+function ofFree(status, report) {
+  if (status.taking) return say("taking", "Getting ready", "");
+  if (!report.armable) {
+    return say(
+      "fixed",
+      "Cannot be driven",
+      sentence(report.reason ?? "no reason given"),
+    );
+  }
+  if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
+  if (status.refusal) return say("free", "Free", sentence(status.refusal));
+  return say("free", "Free", "Hold W A S D or the arrows to drive.");
+}
+
+/**
+ * @param {State} state
+ * @param {string} title
+ * @param {string} detail
+ * @returns {Description}
+ */
+function say(state, title, detail) {
+  return { state, title, detail };
+}
+
+/** @param {string} text */
+function sentence(text) {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
+}
+
+/** @param {number} value */
+function digits(value) {
+  return Number.isFinite(value) ? value.toFixed(2) : "any";
+}
