@@ -95,7 +95,7 @@ async def run_simulator(
     node.start()
     server = RosbridgeServer(graph, Encoder(schema, behaviour))
     stop = stop or asyncio.Event()
-    with _signals_set(stop):
+    with signals_set(stop):
         url = await server.start(host, port)
         try:
             if on_ready:
@@ -134,7 +134,7 @@ async def _turn_the_clock(node: "RobotsNode", stop: asyncio.Event) -> None:
 
 
 @contextlib.contextmanager
-def _signals_set(stop: asyncio.Event) -> Iterator[None]:
+def signals_set(stop: asyncio.Event) -> Iterator[None]:
     """Let SIGINT and SIGTERM end the run, where this thread may say so."""
     if threading.current_thread() is not threading.main_thread():
         yield

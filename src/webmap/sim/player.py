@@ -1,0 +1,179 @@
+"""Plays frames that were captured from a real rosbridge, byte for byte.
+
+``python -m webmap.sim.player DIR`` serves a directory with ``publish_*.json`` (each one
+publication), ``*.bin`` (the same as CBOR) and ``service_response_*.json``. Clients get
+the frames of the topics that they subscribe, at a fixed rate, and answers to what
+rosapi was asked when the frames were taken; whatever else they send is met with
+silence, as by the servers that the frames come from.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import logging
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+
+from webmap.errors import ConfigError
+from webmap.sim.process import signals_set
+from webmap.sim.recording import Recording, load_recording
+
+log = logging.getLogger(__name__)
+
+_LATCHED = ("/map", "/tf_static")
+_ROSAPI = "/rosapi/"
+
+
+class Player:
+    """Answers one client from a recording, without its socket."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._wanted: dict[str, str] = {}
+        self._fresh: set[str] = set()
+
+    def receive(self, data: str | bytes) -> list[str]:
+        """Return the answers to a frame of the client."""
+        try:
+            operation = json.loads(data)
+        except ValueError:
+            return []
+        if not isinstance(operation, dict):
+            return []
+        name, topic = operation.get("op"), operation.get("topic")
+        if name == "subscribe" and isinstance(topic, str):
+            self._wanted[topic] = str(operation.get("compression") or "none")
+            self._fresh.add(topic)
+        elif name == "unsubscribe" and isinstance(topic, str):
+            self._wanted.pop(topic, None)
+        elif name == "call_service":
+            return [self._answer(operation)]
+        return []
+
+    def due(self) -> list[str | bytes]:
+        """Return the frames of this moment: latched ones only once a subscription."""
+        frames = []
+        for topic, compression in self._wanted.items():
+            if topic in _LATCHED and topic not in self._fresh:
+                continue
+            key = (topic, compression)
+            frame = self._recording.binaries.get(key, self._recording.texts.get(topic))
+            if frame is not None:
+                frames.append(frame)
+        self._fresh.clear()
+        return frames
+
+    def _answer(self, call: dict[str, Any]) -> str:
+        service = str(call.get("service", ""))
+        values = self._values("/" + service.lstrip("/"), call.get("args"))
+        found = values is not None
+        response = {
+            "op": "service_response",
+            "service": service,
+            "values": values if found else f"Service {service} does not exist",
+            "result": found,
+        }
+        if "id" in call:
+            response["id"] = call["id"]
+        return msgspec.json.encode(response).decode()
+
+    def _values(self, service: str, args: Any) -> Any:
+        types = self._recording.types
+        args = args if isinstance(args, dict) else {}
+        if service == f"{_ROSAPI}topic_type":
+            return {"type": types.get(args.get("topic", ""), "")}
+        if service == f"{_ROSAPI}topics_for_type":
+            wanted = args.get("type")
+            return {"topics": [name for name, kind in types.items() if kind == wanted]}
+        return self._recording.answers.get(service)
+
+
+async def play(
+    folder: Path,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    rate: float = 10.0,
+    on_ready: Callable[[str], None] | None = None,
+    stop: asyncio.Event | None = None,
+) -> None:
+    """Serve a recording until SIGINT, SIGTERM, or ``stop`` is set.
+
+    Args:
+        folder: Of the captured frames.
+        host: The address to listen on.
+        port: To listen on; 0 lets the kernel choose.
+        rate: Frames of each topic a second.
+        on_ready: Called with the URL once clients can connect.
+        stop: Ends the run when it is set.
+
+    Raises:
+        ConfigError: If the folder holds no frames.
+        OSError: If the port is in use.
+
+    """
+    recording = load_recording(folder)
+    stop = stop or asyncio.Event()
+
+    async def serve_client(connection: ServerConnection) -> None:
+        player = Player(recording)
+        sender = asyncio.create_task(_send_due(connection, player, 1 / rate))
+        try:
+            with contextlib.suppress(ConnectionClosed):
+                async for data in connection:
+                    for answer in player.receive(data):
+                        await connection.send(answer)
+        finally:
+            sender.cancel()
+
+    with signals_set(stop):
+        server = await serve(
+            serve_client, host, port, compression=None, ping_interval=None
+        )
+        async with server:
+            if on_ready:
+                on_ready(f"ws://{host}:{server.sockets[0].getsockname()[1]}")
+            await stop.wait()
+
+
+async def _send_due(
+    connection: ServerConnection, player: Player, period: float
+) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        while True:
+            for frame in player.due():
+                await connection.send(frame)
+            await asyncio.sleep(period)
+
+
+def main() -> int:
+    """Run the player and return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m webmap.sim.player")
+    parser.add_argument("folder", type=Path, help="of captured frames")
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, default=0)
+    parser.add_argument("--rate", type=float, default=10.0, help="frames a second")
+    options = vars(parser.parse_args())
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr)
+    logging.getLogger("websockets").setLevel(logging.WARNING)
+
+    def say_ready(url: str) -> None:
+        print(f"rosbridge is ready at {url}", flush=True)
+
+    try:
+        asyncio.run(play(**options, on_ready=say_ready))
+    except (ConfigError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
