@@ -1,0 +1,432 @@
+"""The link to one ROS system, shared by everything in the process that needs it."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from webmap.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.lifecycle import lifecycle
+from webmap.ros.callbacks import Callback, Callbacks
+from webmap.ros.calls import Calls
+from webmap.ros.connection import Lane, State
+from webmap.ros.events import CallService, Event, Malformed, Publish, Status
+from webmap.ros.graph import Graph
+from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
+from webmap.ros.ops import service_response
+from webmap.ros.protocol import Protocol
+from webmap.ros.publications import Publications
+from webmap.ros.subscriptions import Subscription, Topic, Wish, checked
+from webmap.scope import Removal, no_scope
+
+log = logging.getLogger("webmap.ros")
+
+SILENCE = 3.0
+"""How long a topic of a stated type may be silent before its type is asked, in s."""
+
+
+@dataclass(slots=True)
+class BridgeStats:
+    """What came on the data lane, since the bridge was made."""
+
+    frames: int = 0
+    bytes: int = 0
+    malformed: int = 0
+    links: int = 0
+    """How often the link was opened."""
+
+
+class Bridge:
+    """A link to one ROS system through a rosbridge v2 server.
+
+    Making one only records; the link is opened when WebMap starts and is opened again
+    whenever it is lost, with all subscriptions and advertisements. Its methods are
+    called in the model's thread.
+
+    Args:
+        url: Address of the rosbridge, such as ``ws://localhost:9090``.
+        name: What people call it; the address if not given.
+
+    Raises:
+        ConfigError: If ``url`` is not a WebSocket address.
+
+    """
+
+    def __init__(self, url: str, *, name: str | None = None) -> None:
+        self.url = normalise_url(url)
+        """The one spelling of the address."""
+        self.name = name or self.url
+        self.stats = BridgeStats()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._lane: Lane | None = None
+        self._topics: dict[str, Topic] = {}
+        self._publications = Publications()
+        self._calls = Calls(self.url)
+        self._graph = Graph(self.call_service)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
+        self._on_open = Callbacks(f"{self.name}: on_open", self._report)
+        self._on_close = Callbacks(f"{self.name}: on_close", self._report)
+        self._protocol = Protocol()
+        self._complained = False
+        """Whether this link, or the attempts to open it, were complained of."""
+        lifecycle.add(self)
+
+    def __repr__(self) -> str:
+        return f"<Bridge {self.url} {self.state}>"
+
+    @property
+    def state(self) -> State:
+        """``new``, ``connecting``, ``open``, or ``closed`` after :meth:`stop`."""
+        return self._lane.state if self._lane is not None else "new"
+
+    @property
+    def last_heard(self) -> float | None:
+        """When the last bytes came from the bridge, on the monotonic clock."""
+        return self._lane.last_heard if self._lane is not None else None
+
+    def on_open(self, fn: Callable[[], Any]) -> Removal:
+        """Call ``fn`` whenever the link opens; soon, if it is open already."""
+        callback, removal = self._on_open.add(fn)
+        if self.state == "open" and self._loop is not None:
+            self._loop.call_soon(callback)
+        return removal
+
+    def on_close(self, fn: Callable[[str], Any]) -> Removal:
+        """Call ``fn`` with the reason whenever an open link ends."""
+        return self._on_close.add(fn)[1]
+
+    def on_error(self, fn: Callable[[Exception], Any]) -> Removal:
+        """Call ``fn`` with each error that a person might want to know of."""
+        return self._on_error.add(fn)[1]
+
+    def subscribe(
+        self,
+        topic: str,
+        callback: Callable[[Any], Any],
+        type: str | None = None,
+        *,
+        throttle: int = 0,
+        decode: type[msgspec.Struct] | None = None,
+        compression: str | None = None,
+        queue_length: int = 1,
+    ) -> Subscription:
+        """Hear the messages of a topic; also of one that does not exist yet.
+
+        All listeners to a topic share what comes over the wire, each with a throttle
+        of its own, and a message is decoded once for each ``decode``.
+
+        Args:
+            topic: Name of the topic.
+            callback: Called with each message.
+            type: Message type, in either dialect. Without it the bridge can only
+                serve a topic that exists when it is asked.
+            throttle: Least time between two messages, in milliseconds.
+            decode: A type with the fields that are wanted; None for a plain dict.
+            compression: ``none``, ``png``, ``cbor`` or ``cbor-raw``; None lets
+                scans, grids and clouds come in CBOR and the rest in JSON.
+            queue_length: Messages that the bridge may hold back.
+
+        Returns:
+            What ends it. It ends with the current scope, too.
+
+        Raises:
+            ConfigError: If an argument makes no sense, or another listener said
+                that the topic has another type.
+
+        """
+        name = normalise_topic(topic)
+        checked(callback, throttle, queue_length, decode)
+        if type is not None:
+            split_type(type)
+        wish = Wish(type, throttle, queue_length, compression)
+        book = self._topics.get(name) or self._new_topic(name)
+        book.check(wish)
+        called = Callback(callback, f"{self.name}: {name}", self._report)
+        listener = Subscription(book, called, wish, decode)
+        if listener.removed:  # its scope has ended already
+            return listener
+        self._topics[name] = book
+        late = book.replay if book.listeners else None
+        book.add(listener)
+        if late is not None and self._loop is not None:
+            self._loop.call_soon(self._give, late, [listener])
+        elif self.state == "open":
+            self._watch_silence(book)
+        return listener
+
+    def publish(
+        self, topic: str, message: Mapping[str, Any], type: str | None = None
+    ) -> None:
+        """Publish a message now, or not at all; it is never kept for later.
+
+        Args:
+            topic: Name of the topic; it is advertised the first time.
+            message: The fields of the message.
+            type: Message type; needed the first time.
+
+        Raises:
+            MotionRefused: If the topic moves a robot: see :meth:`protect`.
+            BridgeClosed: If the link is not open.
+            BridgeError: If the type is not known or not the one of before.
+            ValueError: If a number in the message is NaN or infinite.
+            TypeError: If a value in the message is nothing that JSON knows.
+
+        """
+        name = normalise_topic(topic)
+        book = self._topics.get(name)
+        known = self._graph.known(name) or (book.message_type if book else None)
+        frames = self._publications.frames(name, message, type, known)
+        try:
+            for frame in frames:
+                self._lane_or_raise().send(frame)
+        except BridgeClosed:
+            if len(frames) > 1:
+                self._publications.forget(name)
+            raise
+
+    def unadvertise(self, topic: str) -> None:
+        """Publish no more on ``topic``; nothing happens if nobody did."""
+        for frame in self._publications.forget(topic):
+            self._send(frame)
+
+    def protect(self, topic: str) -> None:
+        """Refuse to publish on ``topic`` from now on: the gate writes it.
+
+        A topic that was declared as velocity, goal or cancel of a robot is one.
+        """
+        for frame in self._publications.protect(topic):
+            self._send(frame)
+
+    async def call_service(
+        self,
+        service: str,
+        args: Mapping[str, Any] | Sequence[Any] | None = None,
+        *,
+        type: str | None = None,
+        timeout: float = 5.0,  # noqa: ASYNC109 - how callers of services know it
+    ) -> Any:
+        """Call a ROS service; calls share no socket with data.
+
+        Args:
+            service: Name of the service.
+            args: The fields of the request.
+            type: Service type; some bridges need it.
+            timeout: Longest time for the answer, in seconds.
+
+        Returns:
+            The fields of the answer.
+
+        Raises:
+            ServiceError: If the service fails or does not answer in time.
+            BridgeClosed: If the link cannot be opened, or ends before the answer.
+            MotionRefused: If the service would send a robot somewhere.
+
+        """
+        self._publications.refuse_goal_service(service)
+        return await self._calls.call(normalise_topic(service), args, type, timeout)
+
+    async def topic_type(self, topic: str) -> str | None:
+        """Return the type of a topic as rosapi knows it, in the bridge's dialect.
+
+        None if nobody knows the topic, the bridge has no rosapi, or it does not
+        answer.
+        """
+        return await self._graph.topic_type(normalise_topic(topic))
+
+    async def topics(self) -> dict[str, str]:
+        """Return the type of every topic.
+
+        Raises:
+            ServiceError: If the bridge has no rosapi, or it does not answer.
+            BridgeClosed: If the link cannot be opened.
+
+        """
+        return await self._graph.topics()
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Open the link, and keep it open; called when WebMap starts."""
+        if self._lane is not None and self._lane.state != "closed":
+            return
+        self._loop = loop
+        self._lane = Lane(
+            self.url,
+            opened=self._opened,
+            received=self._received,
+            closed=self._link_lost,
+            failed=self._not_opened,
+        )
+        self._lane.start(loop)
+
+    async def stop(self) -> None:
+        """Close every link; listeners stay, for another :meth:`start`."""
+        for task in list(self._tasks):
+            task.cancel()
+        if self._lane is not None:
+            await self._lane.stop()
+        await self._calls.stop()
+
+    def _new_topic(self, name: str) -> Topic:
+        return Topic(
+            name,
+            send=self._send,
+            complain=self._message_failed,
+            emptied=self._topic_emptied,
+        )
+
+    def _topic_emptied(self, topic: Topic) -> None:
+        self._topics.pop(topic.name, None)
+
+    def _send(self, frame: bytes) -> None:
+        """Send what a new link will be told anyway; nothing happens while closed."""
+        if self._lane is not None and self._lane.state == "open":
+            try:
+                self._lane.send(frame)
+            except BridgeError as error:
+                self._report(error)
+
+    def _lane_or_raise(self) -> Lane:
+        if self._lane is None:
+            raise BridgeClosed(f"the link to {self.url} was never opened")
+        return self._lane
+
+    def _opened(self) -> None:
+        self.stats.links += 1
+        self._protocol = Protocol()
+        self._complained = False
+        self._graph.forget()
+        log.info("%s: the link is open", self.name)
+        for frame in self._publications.again():
+            self._send(frame)
+        for topic in list(self._topics.values()):
+            topic.again()
+            self._watch_silence(topic)
+        self._on_open.call()
+
+    def _link_lost(self, reason: str) -> None:
+        log.warning("%s: the link ended: %s", self.name, reason)
+        for topic in self._topics.values():
+            topic.link_lost()
+        self._on_close.call(reason)
+
+    def _not_opened(self, error: Exception) -> None:
+        # One line in the log for a bridge that is away, however long.
+        level = logging.DEBUG if self._complained else logging.WARNING
+        self._complained = True
+        log.log(level, "%s", error)
+        self._on_error.call(error)
+
+    def _report(self, error: Exception) -> None:
+        self._on_error.call(error)
+
+    def _received(self, frame: bytes) -> None:
+        event = self._protocol.receive(frame, time.monotonic())
+        self.stats.frames += 1
+        self.stats.bytes += len(frame)
+        if isinstance(event, Publish):
+            topic = self._topics.get(event.topic)
+            if topic is not None:
+                topic.received(event)
+                self._fan_out(topic, event)
+        elif event is not None:
+            self._other(event)
+
+    def _fan_out(self, topic: Topic, message: Publish) -> None:
+        now = time.monotonic()
+        due = []
+        for listener in topic.listeners:
+            if listener.throttle.offer(message, now) is not None:
+                due.append(listener)
+            else:
+                self._hold(listener)
+        if due:
+            self._give(message, due)
+
+    def _hold(self, listener: Subscription) -> None:
+        if self._loop is not None:
+            listener.hold(self._loop, lambda: self._release(listener))
+
+    def _release(self, listener: Subscription) -> None:
+        """Hand over the newest message that a listener's throttle held back."""
+        listener.forget_timer()
+        message = listener.throttle.take(time.monotonic())
+        if message is not None:
+            self._give(message, [listener])
+        else:
+            self._hold(listener)
+
+    def _give(self, message: Publish, listeners: list[Subscription]) -> None:
+        for listener in listeners:
+            listener.deliver(message)
+
+    def _other(self, event: Event) -> None:
+        if isinstance(event, Malformed):
+            self.stats.malformed += 1
+            self._complain_of_frame(event)
+        elif isinstance(event, Status) and event.level == "error":
+            error = BridgeError(f"{self.name} says: {event.msg}")
+            log.warning("%s", error)
+            self._report(error)
+        elif isinstance(event, CallService):
+            answer = "this client offers no services"
+            id = None if event.id is None else str(event.id)
+            self._send(service_response(event.service, answer, id=id, result=False))
+
+    def _complain_of_frame(self, event: Malformed) -> None:
+        """Report what is not rosbridge, once for each link; the rest is counted."""
+        if not self._complained:
+            self._complained = True
+            error = ProtocolError(
+                f"{self.name} sent {event.size} bytes that are not rosbridge: "
+                f"{event.reason}"
+            )
+            log.warning("%s", error)
+            self._report(error)
+
+    def _message_failed(
+        self, topic: Topic, expected: str, error: ProtocolError
+    ) -> None:
+        self.stats.malformed += 1
+        self._spawn(self._explain_failure(topic.name, expected, error))
+
+    async def _explain_failure(
+        self, topic: str, expected: str, error: ProtocolError
+    ) -> None:
+        got = await self.topic_type(topic)
+        said = f"the bridge says it is {got}" if got else "its type is not known"
+        full = ProtocolError(f"{topic}: expected {expected}, {said}: {error}")
+        log.warning("%s: %s", self.name, full)
+        self._report(full)
+
+    def _watch_silence(self, topic: Topic) -> None:
+        """Ask for the type of a topic that stays silent: bridges say nothing.
+
+        A subscription with a wrong type is met with silence by most of them.
+        """
+        if topic.message_type is not None and self._loop is not None:
+            self._loop.call_later(SILENCE, self._look_at_silence, topic)
+
+    def _look_at_silence(self, topic: Topic) -> None:
+        listening = self._topics.get(topic.name) is topic
+        if listening and self.state == "open" and topic.count == 0:
+            self._spawn(self._explain_silence(topic))
+
+    async def _explain_silence(self, topic: Topic) -> None:
+        got = await self.topic_type(topic.name)
+        wanted = topic.message_type
+        if got is None or wanted is None or topic.count or same_type(got, wanted):
+            return
+        topic.complain(ProtocolError("nothing will come"), None)
+
+    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
+        if self._loop is None or self.state == "closed":
+            work.close()
+            return
+        with no_scope():
+            task = self._loop.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)

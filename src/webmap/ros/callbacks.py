@@ -1,0 +1,90 @@
+"""The functions that others want to have called, each in the scope it was added in."""
+
+import asyncio
+import inspect
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from webmap.scope import Removal, current_scope, no_scope
+
+log = logging.getLogger("webmap.ros")
+
+
+class Callback:
+    """One function of somebody else's, which may raise.
+
+    Args:
+        fn: The function; where it is a coroutine function it runs as a task.
+        what: What it is called for, for the log.
+        report: Is told of what it raises.
+
+    """
+
+    __slots__ = ("_report", "_scope", "_tasks", "fn", "what")
+
+    def __init__(
+        self, fn: Callable[..., Any], what: str, report: Callable[[Exception], None]
+    ) -> None:
+        self.fn = fn
+        self.what = what
+        self._report = report
+        self._scope = current_scope()
+        self._tasks: set[asyncio.Future[Any]] = set()
+
+    def __call__(self, *args: Any) -> None:
+        """Call the function; what it raises is logged and reported, never raised."""
+        try:
+            with self._scope.active() if self._scope is not None else no_scope():
+                result = self.fn(*args)
+                if inspect.isawaitable(result):
+                    task = asyncio.ensure_future(result)
+                    self._tasks.add(task)
+                    task.add_done_callback(self._finished)
+        except Exception as error:
+            self._failed(error)
+
+    def _finished(self, task: "asyncio.Future[Any]") -> None:
+        self._tasks.discard(task)
+        error = None if task.cancelled() else task.exception()
+        if isinstance(error, Exception):
+            self._failed(error)
+
+    def _failed(self, error: Exception) -> None:
+        log.error("%s: a callback raised", self.what, exc_info=error)
+        self._report(error)
+
+
+class Callbacks:
+    """The functions to be called for one occasion, in the order they were added."""
+
+    def __init__(self, what: str, report: Callable[[Exception], None]) -> None:
+        self._what = what
+        self._report = report
+        self._each: dict[int, Callback] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return len(self._each)
+
+    def add(self, fn: Callable[..., Any]) -> tuple[Callback, Removal]:
+        """Add a function, which ends with the current scope or when removed."""
+        key, self._count = self._count, self._count + 1
+        callback = self._each[key] = Callback(fn, self._what, self._report)
+        scope = current_scope()
+
+        def undo() -> None:
+            self._each.pop(key, None)
+            if scope is not None:
+                scope.discard(removal)
+
+        removal = Removal(undo)
+        if scope is not None:
+            scope.add(removal)
+        return callback, removal
+
+    def call(self, *args: Any) -> None:
+        """Call every function; none of them can keep the others from being called."""
+        for key, callback in list(self._each.items()):
+            if key in self._each:
+                callback(*args)

@@ -1,0 +1,252 @@
+"""One lane to a rosbridge: a WebSocket that is kept open, or opened once."""
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from webmap.errors import BridgeClosed
+from webmap.ros.backoff import Backoff
+from webmap.ros.liveness import Liveness
+
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
+log = logging.getLogger("webmap.ros")
+
+State: TypeAlias = Literal["new", "connecting", "open", "closed"]
+
+CONNECT_TIMEOUT = 5.0
+MAX_FRAME = 64 << 20
+MAX_UNSENT = 4 << 20
+LOOK_PERIOD = 0.25
+
+
+class Lane:
+    """A link that hands over frames and takes frames, and knows nothing of them.
+
+    Frames that cannot be sent now are refused, and what was not sent when the link
+    ends is thrown away: nothing waits for a later link.
+
+    Args:
+        url: The bridge's address.
+        opened: Called when the link is open.
+        received: Called with each frame, text or binary, as bytes.
+        closed: Called with the reason when an open link has ended.
+        failed: Called with the error when the link could not be opened.
+        again: Whether to open it again whenever it ends or fails.
+
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        opened: Callable[[], None],
+        received: Callable[[bytes], None],
+        closed: Callable[[str], None],
+        failed: Callable[[Exception], None],
+        again: bool = True,
+    ) -> None:
+        self.url = url
+        self.state: State = "new"
+        self.last_heard: float | None = None
+        """When the last bytes came, answers to pings too, on the monotonic clock."""
+        self._opened = opened
+        self._received = received
+        self._closed = closed
+        self._failed = failed
+        self._again = again
+        self._task: asyncio.Task[None] | None = None
+        self._socket: ClientConnection | None = None
+        self._unsent: deque[bytes] = deque()
+        self._unsent_size = 0
+        self._wake = asyncio.Event()
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to connect; a second call while it runs does nothing."""
+        if self._task is None:
+            self.state = "connecting"
+            self._task = loop.create_task(self._run())
+
+    async def stop(self) -> None:
+        """Close the link and do not open it again."""
+        task, self._task = self._task, None
+        if task is None:
+            self.state = "closed"
+            return
+        task.cancel()
+        await asyncio.wait([task])
+
+    def send(self, frame: bytes) -> None:
+        """Send ``frame`` as text, now.
+
+        Raises:
+            BridgeClosed: If the link is not open, or does not take what is sent.
+
+        """
+        if self.state != "open":
+            raise BridgeClosed(f"the link to {self.url} is not open ({self.state})")
+        if self._unsent_size + len(frame) > MAX_UNSENT:
+            raise BridgeClosed(
+                f"the link to {self.url} is stuck: {self._unsent_size} bytes unsent"
+            )
+        self._unsent.append(frame)
+        self._unsent_size += len(frame)
+        self._wake.set()
+
+    def abort(self) -> None:
+        """Drop the link without a farewell; it is opened again if it should be."""
+        if self._socket is not None:
+            self._socket.transport.abort()
+
+    async def _run(self) -> None:
+        backoff = Backoff()
+        try:
+            while True:
+                self.state = "connecting"
+                lasted = await self._one_link()
+                if not self._again:
+                    break
+                await asyncio.sleep(backoff.next(lasted))
+        finally:
+            self.state = "closed"
+            self._task = None
+
+    async def _one_link(self) -> float:
+        """Connect, serve the link until it ends, and return how long it was open."""
+        try:
+            self._socket = socket = await _connect(self.url)
+        except Exception as error:  # name lookup, TCP, TLS, handshake: all the same
+            self._failed(_not_reached(self.url, error))
+            return 0.0
+        began = time.monotonic()
+        reason = "the link was closed here"
+        try:
+            reason = await self._serve(socket)
+        except asyncio.CancelledError:
+            await _say_farewell(socket)
+            raise
+        finally:
+            self._forget_link(socket)
+            self._closed(reason)
+        return time.monotonic() - began
+
+    async def _serve(self, socket: "ClientConnection") -> str:
+        """Carry frames both ways until the link ends; return why it did."""
+        from websockets.exceptions import ConnectionClosed
+
+        self.state, self.last_heard = "open", time.monotonic()
+        keeping = asyncio.create_task(self._keep_alive(socket))
+        writing = asyncio.create_task(self._write(socket))
+        try:
+            self._opened()
+            while True:
+                frame = await socket.recv(decode=False)
+                self.last_heard = time.monotonic()
+                self._hand_over(frame)
+        except ConnectionClosed as error:
+            if keeping.done() and not keeping.cancelled() and not keeping.exception():
+                return f"no answer to a ping for {Liveness.LIMIT:g} s"
+            return _why(error)
+        finally:
+            keeping.cancel()
+            writing.cancel()
+            await asyncio.wait([keeping, writing])
+
+    def _hand_over(self, frame: bytes) -> None:
+        try:
+            self._received(frame)
+        except Exception:
+            log.exception("%s: a frame of %d bytes was lost", self.url, len(frame))
+
+    def _forget_link(self, socket: "ClientConnection") -> None:
+        socket.transport.abort()
+        self._socket = None
+        self.state = "connecting" if self._again else "closed"
+        self._unsent.clear()
+        self._unsent_size = 0
+
+    async def _write(self, socket: "ClientConnection") -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                while self._unsent:
+                    frame = self._unsent.popleft()
+                    await socket.send(frame, text=True)
+                    self._unsent_size -= len(frame)
+        except ConnectionClosed:
+            pass  # the reader says so
+
+    async def _keep_alive(self, socket: "ClientConnection") -> None:
+        """Return when the link is dead, after having dropped it."""
+        liveness = Liveness(time.monotonic())
+        pinging: set[asyncio.Task[None]] = set()
+        try:
+            while not liveness.is_dead(time.monotonic()):
+                if liveness.wants_ping(time.monotonic()):
+                    liveness.pinged(time.monotonic())
+                    pinging = {asyncio.create_task(self._ping(socket, liveness))}
+                await asyncio.sleep(LOOK_PERIOD)
+            socket.transport.abort()
+        finally:
+            for task in pinging:
+                task.cancel()
+
+    async def _ping(self, socket: "ClientConnection", liveness: Liveness) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            # A link that takes no bytes holds up the ping itself: unanswered too.
+            await (await socket.ping())
+        except ConnectionClosed:
+            return
+        self.last_heard = time.monotonic()
+        liveness.ponged(self.last_heard)
+
+
+async def _connect(url: str) -> "ClientConnection":
+    from websockets.asyncio.client import connect
+
+    class ConnectHere(connect):
+        """Connect to the address that was given and to no other."""
+
+        def process_redirect(self, exc: Exception) -> Exception | str:
+            return exc
+
+    return await ConnectHere(
+        url,
+        compression=None,
+        max_size=MAX_FRAME,
+        open_timeout=CONNECT_TIMEOUT,
+        ping_interval=None,
+        close_timeout=0.5,
+        proxy=None,
+        user_agent_header=None,
+    )
+
+
+async def _say_farewell(socket: "ClientConnection") -> None:
+    with suppress(TimeoutError):
+        async with asyncio.timeout(0.5):
+            await socket.close()
+
+
+def _not_reached(url: str, error: Exception) -> BridgeClosed:
+    if isinstance(error, TimeoutError):
+        why = f"no answer within {CONNECT_TIMEOUT:g} s"
+    else:
+        why = str(error) or type(error).__name__
+    closed = BridgeClosed(f"cannot reach the rosbridge at {url}: {why}")
+    closed.__cause__ = error
+    return closed
+
+
+def _why(error: Exception) -> str:
+    return str(error) or "the link was lost"

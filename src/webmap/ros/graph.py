@@ -1,0 +1,68 @@
+"""What rosapi knows of the ROS graph: topics and their types."""
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import msgspec
+
+from webmap.errors import BridgeError, ProtocolError, ServiceError
+from webmap.ros.decoding import convert
+
+
+class Graph:
+    """Questions to a bridge's rosapi; what it knows is remembered for one link.
+
+    Neither ``get_param_names`` nor ``message_details`` is ever asked: on ROS 2 the
+    first hangs rosapi for good and the second kills it.
+
+    Args:
+        call: Calls a service and returns the fields of its answer.
+
+    """
+
+    def __init__(self, call: Callable[..., Awaitable[Any]]) -> None:
+        self._call = call
+        self._types: dict[str, str] = {}
+
+    def forget(self) -> None:
+        """Remember nothing: the robot may have been started anew."""
+        self._types.clear()
+
+    def known(self, topic: str) -> str | None:
+        """Return the type of ``topic`` if it was asked before."""
+        return self._types.get(topic)
+
+    async def topic_type(self, topic: str) -> str | None:
+        """Return the type of ``topic``, or None if nobody knows or answers."""
+        if topic in self._types:
+            return self._types[topic]
+        try:
+            answer = await self._call("/rosapi/topic_type", {"topic": topic})
+        except BridgeError:
+            return None
+        found = answer.get("type") if isinstance(answer, dict) else None
+        if not isinstance(found, str) or not found:
+            return None
+        self._types[topic] = found
+        return found
+
+    async def topics(self) -> dict[str, str]:
+        """Return the type of every topic.
+
+        Raises:
+            BridgeError: If rosapi does not answer, or answers something else.
+
+        """
+        answer = await self._call("/rosapi/topics")
+        try:
+            names = convert(answer, _Topics)
+            found = dict(zip(names.topics, names.types, strict=True))
+        except (ProtocolError, ValueError) as error:
+            raise ServiceError(f"/rosapi/topics made no sense: {error}") from None
+        self._types.update({name: type for name, type in found.items() if type})
+        return found
+
+
+class _Topics(msgspec.Struct):
+    topics: list[str]
+    types: list[str]

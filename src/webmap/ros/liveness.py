@@ -1,0 +1,46 @@
+"""Whether a link still lives, told by the answers to its pings."""
+
+
+class Liveness:
+    """Decide from the times of pings and pongs; all times in monotonic seconds.
+
+    Only one ping is under way at a time. A link that is silent is not dead: a robot
+    may have nothing to say. Dead is a link whose ping is not answered.
+    """
+
+    LIMIT = 3.0
+    """Longest wait for the answer to a ping, in seconds."""
+
+    PERIOD = 0.5
+    """Time from one answer to the next ping, in seconds."""
+
+    LATE = 0.75
+    """Time between two looks after which the looking itself was held up."""
+
+    def __init__(self, now: float) -> None:
+        self._pinged: float | None = None
+        self._ponged = now
+        self._looked = now
+
+    def wants_ping(self, now: float) -> bool:
+        """Return whether the next ping is due."""
+        return self._pinged is None and now - self._ponged >= self.PERIOD
+
+    def pinged(self, now: float) -> None:
+        """Note that a ping was sent."""
+        self._pinged = now
+
+    def ponged(self, now: float) -> None:
+        """Note that the ping was answered."""
+        self._pinged = None
+        self._ponged = now
+
+    def is_dead(self, now: float) -> bool:
+        """Return whether the last ping went unanswered for too long.
+
+        A look that comes late judges nothing: where this process stood still, the
+        answer may lie unread.
+        """
+        late = now - self._looked > self.LATE
+        self._looked = now
+        return not late and self._pinged is not None and now - self._pinged > self.LIMIT

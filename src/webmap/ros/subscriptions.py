@@ -1,0 +1,262 @@
+"""Who listens to which topic, and what the bridge is asked for on their behalf."""
+
+import time
+from asyncio import AbstractEventLoop, TimerHandle
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import msgspec
+
+from webmap.errors import ConfigError, ProtocolError
+from webmap.identifiers import generate_id
+from webmap.ros import ops
+from webmap.ros.callbacks import Callback
+from webmap.ros.events import Publish
+from webmap.ros.names import is_type, same_type, split_type
+from webmap.ros.throttle import Throttle
+from webmap.scope import Scope, current_scope
+
+_BULK = ("sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
+_LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
+_LATCHED_TOPICS = ("/tf_static", "/robot_description")
+
+
+class Wish(NamedTuple):
+    """What is asked of the bridge for one topic."""
+
+    type: str | None
+    throttle: int
+    queue_length: int
+    compression: str | None
+
+
+class Subscription:
+    """One listener to a topic; made by :meth:`webmap.Bridge.subscribe`.
+
+    It ends when :meth:`remove` is called, or with the scope that it was made in.
+    """
+
+    def __init__(
+        self,
+        topic: "Topic",
+        callback: Callback,
+        wish: Wish,
+        decode: type[msgspec.Struct] | None,
+    ) -> None:
+        self.topic = topic.name
+        """The resolved name of the topic."""
+        self.wish = wish
+        self.decode = decode
+        self.removed = False
+        self.throttle: Throttle[Publish] = Throttle(wish.throttle / 1000)
+        self._of = topic
+        self._callback = callback
+        self._timer: TimerHandle | None = None
+        self._scope: Scope | None = current_scope()
+        if self._scope is not None:
+            self._scope.add(self)
+
+    def remove(self) -> None:
+        """End this subscription and no other; the second call does nothing."""
+        if self.removed:
+            return
+        self.removed = True
+        self.hush()
+        if self._scope is not None:
+            self._scope.discard(self)
+        self._of.remove(self)
+
+    def deliver(self, message: Publish) -> None:
+        """Decode the message as the listener wants it and hand it over."""
+        if self.removed:
+            return
+        try:
+            value = message.decode(self.decode)
+        except ProtocolError as error:
+            self._of.complain(error, self.decode)
+            return
+        self._callback(value)
+
+    def hold(self, loop: AbstractEventLoop, release: Callable[[], None]) -> None:
+        """Come back for what the throttle holds."""
+        due = self.throttle.due
+        if due is not None and self._timer is None:
+            self._timer = loop.call_later(max(0.0, due - time.monotonic()), release)
+
+    def hush(self) -> None:
+        """Forget what the throttle holds."""
+        self.throttle.drop()
+        self.forget_timer()
+
+    def forget_timer(self) -> None:
+        """Note that the timer of :meth:`hold` has fired, or keep it from firing."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+class Topic:
+    """All listeners to one topic of one bridge, and their one wire subscription.
+
+    Args:
+        name: The resolved name.
+        send: Sends a frame if the link is open, else does nothing.
+        complain: Is told, once, of a message that does not decode.
+        emptied: Called when the last listener has gone.
+
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        send: Callable[[bytes], None],
+        complain: Callable[["Topic", str, ProtocolError], None],
+        emptied: Callable[["Topic"], None],
+    ) -> None:
+        self.name = name
+        self.listeners: dict[Subscription, None] = {}
+        self.count = 0
+        """Messages since the link was opened."""
+        self._send = send
+        self._complain = complain
+        self._emptied = emptied
+        self._complained = False
+        self._latest: Publish | None = None
+        self._asked: Wish | None = None
+        self._id = ""
+
+    @property
+    def message_type(self) -> str | None:
+        """The message type, if any listener said it."""
+        return next((s.wish.type for s in self.listeners if s.wish.type), None)
+
+    def check(self, wish: Wish) -> None:
+        """Let a further listener join if what it wants goes with the others.
+
+        Raises:
+            ConfigError: If it names another type, or another kind of raw bytes.
+
+        """
+        mine = self.message_type
+        if mine and wish.type and not same_type(mine, wish.type):
+            raise ConfigError(f"{self.name} is subscribed as {mine}, not {wish.type}")
+        raw = self._asked is not None and self._asked.compression == "cbor-raw"
+        if self.listeners and raw != (wish.compression == "cbor-raw"):
+            raise ConfigError(
+                f"{self.name}: raw and decoded messages cannot share a subscription"
+            )
+
+    def add(self, listener: Subscription) -> None:
+        """Let ``listener`` join, and ask the bridge for more if it wants more."""
+        self.listeners[listener] = None
+        self.update()
+
+    def remove(self, listener: Subscription) -> None:
+        """Let ``listener`` go, and ask the bridge for less if the others want less."""
+        self.listeners.pop(listener, None)
+        if self.listeners:
+            self.update()
+            return
+        if self._asked is not None:
+            self._send(ops.unsubscribe(self.name, id=self._id))
+        self._asked, self._latest = None, None
+        self._emptied(self)
+
+    def wish(self) -> Wish:
+        """Return what serves every listener."""
+        type = self.message_type
+        each = [listener.wish for listener in self.listeners]
+        chosen = next((w.compression for w in each if w.compression), None)
+        bulk = type is not None and is_type(type, *_BULK)
+        return Wish(
+            # The name as in ROS 1, which bridges of both kinds understand.
+            str(split_type(type)) if type else None,
+            min(w.throttle for w in each),
+            max(w.queue_length for w in each),
+            chosen or ("cbor" if bulk else None),
+        )
+
+    def update(self) -> None:
+        """Ask the bridge anew if what is wanted has changed.
+
+        The new subscription begins before the old one ends, so nothing is missed.
+        """
+        wish = self.wish()
+        if self._asked == wish:
+            return
+        old, had = self._id, self._asked is not None
+        self._ask(wish)
+        if had:
+            self._send(ops.unsubscribe(self.name, id=old))
+
+    def again(self) -> None:
+        """Ask the bridge on a new link, which knows nothing of the old one."""
+        self.count = 0
+        self._ask(self.wish())
+
+    def link_lost(self) -> None:
+        """Forget what the old link brought and was asked."""
+        self._asked, self._latest = None, None
+        for listener in self.listeners:
+            listener.hush()
+
+    def _ask(self, wish: Wish) -> None:
+        self._asked, self._id = wish, generate_id()
+        self._send(
+            ops.subscribe(
+                self.name,
+                id=self._id,
+                type=wish.type,
+                throttle_rate=wish.throttle,
+                queue_length=wish.queue_length,
+                compression=wish.compression,
+            )
+        )
+
+    def received(self, message: Publish) -> None:
+        """Note a message that came."""
+        self.count += 1
+        self._latest = message
+
+    @property
+    def replay(self) -> Publish | None:
+        """What a listener that joins late is given, since it will not come again.
+
+        A bridge sends a latched message once for each subscription of the wire.
+        """
+        latched = self.name in _LATCHED_TOPICS or self.count == 1
+        if not latched and self.message_type is not None:
+            latched = is_type(self.message_type, *_LATCHED_TYPES)
+        return self._latest if latched else None
+
+    def complain(
+        self, error: ProtocolError, decode: type[msgspec.Struct] | None
+    ) -> None:
+        """Report a message that does not decode, once for this topic."""
+        if not self._complained:
+            self._complained = True
+            expected = self.message_type or (decode.__name__ if decode else "a message")
+            self._complain(self, expected, error)
+
+
+def checked(
+    callback: object, throttle: object, queue_length: object, decode: object
+) -> None:
+    """Let the arguments of a subscription pass if they make sense.
+
+    Raises:
+        ConfigError: If they do not.
+
+    """
+    if not callable(callback):
+        raise ConfigError(f"a subscription needs a function, got {callback!r}")
+    for name, value in (("throttle", throttle), ("queue_length", queue_length)):
+        if not isinstance(value, int) or value < 0:
+            raise ConfigError(f"{name} is a whole number from 0 up, got {value!r}")
+    if decode is not None and not _is_struct(decode):
+        raise ConfigError(f"decode is a msgspec.Struct type, got {decode!r}")
+
+
+def _is_struct(decode: Any) -> bool:
+    return isinstance(decode, type) and issubclass(decode, msgspec.Struct)

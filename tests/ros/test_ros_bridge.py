@@ -1,0 +1,717 @@
+import asyncio
+import contextlib
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+from fake_rosbridge import FakeRosbridge, bridged, until
+
+from webmap.errors import (
+    BridgeClosed,
+    BridgeError,
+    ConfigError,
+    MotionRefused,
+    ProtocolError,
+    ServiceError,
+)
+from webmap.ros import backoff, liveness
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages import LaserScanMsg, OdometryMsg
+from webmap.scope import Scope
+
+CAPTURED = Path(__file__).parent / "captured"
+
+
+class Text(msgspec.Struct):
+    data: str
+
+
+def run(scenario):
+    asyncio.run(asyncio.wait_for(scenario(), 30))
+
+
+@pytest.fixture
+def fast(monkeypatch):
+    """Reconnect at once and call a link dead soon."""
+    monkeypatch.setattr(backoff, "FIRST", 0.02)
+    monkeypatch.setattr(liveness.Liveness, "LIMIT", 0.3)
+    monkeypatch.setattr(liveness.Liveness, "PERIOD", 0.05)
+
+
+def test_a_wrong_address_is_refused_at_once():
+    with pytest.raises(ConfigError, match="ws://localhost:9090"):
+        Bridge("localhost:9090")
+
+
+def test_before_the_start_everything_is_only_recorded():
+    bridge = Bridge("WS://LocalHost:9/")
+    bridge.subscribe("/a", print)
+    assert bridge.url == "ws://localhost:9"
+    assert bridge.state == "new"
+    assert bridge.last_heard is None
+    with pytest.raises(BridgeClosed):
+        bridge.publish("/b", {"data": "x"}, "std_msgs/String")
+
+
+def test_a_message_reaches_its_listener_as_a_plain_mapping():
+    async def scenario():
+        got = []
+        async with bridged() as (server, bridge):
+            bridge.subscribe("chatter", got.append)
+            (asked,) = await server.heard("subscribe", topic="/chatter")
+            assert asked["id"].startswith("WebMap-")
+            await server.publish("/chatter", {"data": "hello"})
+            await until(lambda: got)
+            assert got == [{"data": "hello"}]
+            assert bridge.stats.frames == 1
+            assert bridge.last_heard is not None
+
+    run(scenario)
+
+
+def test_the_typed_message_has_the_fields_that_were_asked_for():
+    async def scenario():
+        got = []
+        async with bridged() as (server, bridge):
+            bridge.subscribe(
+                "/robot_0/odom", got.append, "nav_msgs/Odometry", decode=OdometryMsg
+            )
+            (asked,) = await server.heard("subscribe")
+            assert asked["type"] == "nav_msgs/Odometry"
+            assert "compression" not in asked
+            for name in (
+                "ros1/publish_odom.ujson.json",
+                "ros2/publish_odom_nan_covariance.stdlib.json",
+            ):
+                await server.send((CAPTURED / name).read_text())
+            await until(lambda: len(got) == 2)
+            assert all(isinstance(each, OdometryMsg) for each in got)
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("type", ["sensor_msgs/LaserScan", "sensor_msgs/msg/LaserScan"])
+def test_scans_are_asked_for_in_cbor_under_the_name_every_bridge_knows(type):
+    async def scenario():
+        got = []
+        async with bridged() as (server, bridge):
+            bridge.subscribe(
+                "/robot_0/base_scan", got.append, type, decode=LaserScanMsg
+            )
+            (asked,) = await server.heard("subscribe")
+            assert asked["compression"] == "cbor"
+            assert asked["type"] == "sensor_msgs/LaserScan"
+            await server.send((CAPTURED / "ros2/cbor_scan_inf_nan.bin").read_bytes())
+            await until(lambda: got)
+            assert len(got[0].ranges) == 720
+            assert math.isnan(got[0].ranges[0])
+
+    run(scenario)
+
+
+def test_two_listeners_share_one_subscription_and_one_decode():
+    async def scenario():
+        one, two, plain = [], [], []
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/chatter", one.append, decode=Text)
+            bridge.subscribe("/chatter", two.append, decode=Text)
+            bridge.subscribe("/chatter", plain.append)
+            await server.publish("/chatter", {"data": "hello"})
+            await until(lambda: one and two and plain)
+            assert one[0] is two[0]
+            assert plain == [{"data": "hello"}]
+            assert len(server.ops("subscribe")) == 1
+
+    run(scenario)
+
+
+def test_ending_one_subscription_never_silences_another():
+    async def scenario():
+        one, two = [], []
+        async with bridged() as (server, bridge):
+            first = bridge.subscribe("/chatter", one.append)
+            second = bridge.subscribe("/chatter", two.append)
+            await server.heard("subscribe")
+            first.remove()
+            first.remove()
+            await server.publish("/chatter", {"data": "hello"})
+            await until(lambda: two)
+            assert one == []
+            assert server.ops("unsubscribe") == []
+            second.remove()
+            (ended,) = await server.heard("unsubscribe")
+            assert ended["id"] == server.ops("subscribe")[0]["id"]
+
+    run(scenario)
+
+
+def test_the_wire_has_the_lowest_throttle_of_its_listeners():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/chatter", print, throttle=500)
+            quick = bridge.subscribe("/chatter", print, throttle=100)
+            asked = await server.heard("subscribe", 2)
+            assert [each["throttle_rate"] for each in asked] == [500, 100]
+            (ended,) = await server.heard("unsubscribe")
+            assert ended["id"] == asked[0]["id"]
+            order = [m["op"] for m in server.said]
+            assert order == ["subscribe", "subscribe", "unsubscribe"]
+            quick.remove()
+            asked = await server.heard("subscribe", 3)
+            assert asked[2]["throttle_rate"] == 500
+
+    run(scenario)
+
+
+def test_each_listener_has_its_own_throttle_and_gets_the_newest_in_the_end():
+    async def scenario():
+        every, some = [], []
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/n", lambda m: every.append(m["data"]))
+            bridge.subscribe("/n", lambda m: some.append(m["data"]), throttle=200)
+            for number in range(10):
+                await server.publish("/n", {"data": number})
+            await until(lambda: len(every) == 10)
+            await until(lambda: some[-1] == 9)
+            assert some[0] == 0
+            assert len(some) < 5
+
+    run(scenario)
+
+
+def test_a_topic_that_nobody_wants_is_ignored():
+    async def scenario():
+        got = []
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/a", got.append)
+            await server.publish("/b", {"data": 1})
+            await server.publish("/a", {"data": 2})
+            await until(lambda: got)
+            assert got == [{"data": 2}]
+
+    run(scenario)
+
+
+def test_a_listener_that_joins_late_gets_the_message_that_comes_only_once():
+    async def scenario():
+        early, late = [], []
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/map", early.append, "nav_msgs/OccupancyGrid")
+            await server.heard("subscribe")
+            await server.publish("/map", {"data": [1]})
+            await until(lambda: early)
+            bridge.subscribe("/map", late.append, "nav_msgs/OccupancyGrid")
+            await until(lambda: late)
+            assert late == early
+            assert len(early) == 1
+
+    run(scenario)
+
+
+def test_a_callback_that_raises_is_reported_and_harms_nobody(caplog):
+    async def scenario():
+        errors, got = [], []
+
+        def bad(message):
+            raise ZeroDivisionError("mine")
+
+        async with bridged() as (server, bridge):
+            bridge.on_error(lambda error: 1 / 0)
+            bridge.on_error(errors.append)
+            bridge.subscribe("/a", bad)
+            bridge.subscribe("/a", got.append)
+            await server.publish("/a", {"data": 1})
+            await server.publish("/a", {"data": 2})
+            await until(lambda: len(got) == 2)
+            assert [str(error) for error in errors] == ["mine", "mine"]
+            assert bridge.state == "open"
+
+    run(scenario)
+    assert "a callback raised" in caplog.text
+
+
+def test_a_callback_may_be_a_coroutine_function():
+    async def scenario():
+        got, errors = [], []
+
+        async def callback(message):
+            await asyncio.sleep(0)
+            got.append(message)
+            raise ValueError("later")
+
+        async with bridged() as (server, bridge):
+            bridge.on_error(errors.append)
+            bridge.subscribe("/a", callback)
+            await server.publish("/a", {"data": 1})
+            await until(lambda: errors)
+            assert got == [{"data": 1}]
+
+    run(scenario)
+
+
+def test_what_a_callback_makes_belongs_to_the_scope_it_was_added_in():
+    async def scenario():
+        scope = Scope("page")
+        async with bridged() as (server, bridge):
+            with scope.active():
+                bridge.subscribe("/a", lambda _: bridge.subscribe("/b", print))
+            await server.publish("/a", {})
+            await server.heard("subscribe", topic="/b")
+            assert len(scope) == 2
+            scope.close()
+            await server.heard("unsubscribe", 2)
+            with scope.active():
+                assert bridge.subscribe("/c", print).removed
+            assert server.ops("subscribe", topic="/c") == []
+
+    run(scenario)
+
+
+def test_listeners_to_the_link_end_with_their_scope():
+    bridge = Bridge("ws://localhost:9")
+    scope = Scope()
+    with scope.active():
+        bridge.on_open(print)
+        bridge.on_close(print).remove()
+        bridge.on_error(print)
+    assert len(scope) == 2
+    scope.close()
+    assert len(bridge._on_open) == len(bridge._on_error) == 0
+
+
+def test_a_message_of_another_type_is_told_once_with_both_types():
+    async def scenario():
+        errors, got = [], []
+        async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
+            bridge.on_error(errors.append)
+            bridge.subscribe("/a", got.append, "std_msgs/String", decode=Text)
+            for value in (True, False, True):
+                await server.publish("/a", {"data": value})
+            await server.publish("/a", {"data": "good"})
+            await until(lambda: errors and got)
+            assert got == [Text("good")]
+            assert len(errors) == 1
+            assert isinstance(errors[0], ProtocolError)
+            for part in ("/a", "std_msgs/String", "std_msgs/Bool", "data"):
+                assert part in str(errors[0])
+
+    run(scenario)
+
+
+def test_silence_under_a_wrong_type_is_explained(monkeypatch):
+    monkeypatch.setattr("webmap.ros.bridge.SILENCE", 0.02)
+
+    async def scenario():
+        errors = []
+        async with bridged(topic_type={"type": "nav_msgs/msg/Path"}) as (_, bridge):
+            bridge.on_error(errors.append)
+            bridge.subscribe("/a", print, "nav_msgs/Odometry")
+            await until(lambda: errors)
+            assert "nav_msgs/msg/Path" in str(errors[0])
+            assert "nav_msgs/Odometry" in str(errors[0])
+
+    run(scenario)
+
+
+def test_two_types_for_one_topic_are_refused():
+    bridge = Bridge("ws://localhost:9")
+    bridge.subscribe("/a", print, "std_msgs/String")
+    bridge.subscribe("/a", print, "std_msgs/msg/String")
+    with pytest.raises(ConfigError, match="std_msgs/Bool"):
+        bridge.subscribe("/a", print, "std_msgs/Bool")
+    with pytest.raises(ConfigError, match="raw"):
+        bridge.subscribe("/a", print, compression="cbor-raw")
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"throttle": -1}, {"throttle": 0.5}, {"decode": dict}, {"type": "x"}]
+)
+def test_arguments_that_make_no_sense_are_refused(wrong):
+    bridge = Bridge("ws://localhost:9")
+    with pytest.raises(ConfigError):
+        bridge.subscribe("/a", print, **wrong)
+    with pytest.raises(ConfigError):
+        bridge.subscribe("/a", "no function")
+
+
+def test_garbage_is_reported_once_and_the_link_goes_on():
+    async def scenario():
+        errors, got = [], []
+        async with bridged() as (server, bridge):
+            bridge.on_error(errors.append)
+            bridge.subscribe("/a", got.append)
+            for garbage in ("{{{{", b"\xa1\xff", "[]", '{"op":"dance"}', ""):
+                await server.send(garbage)
+            await server.publish("/a", {"data": 1})
+            await until(lambda: got)
+            assert bridge.stats.malformed == 4
+            assert len(errors) == 1
+            assert "not rosbridge" in str(errors[0])
+
+    run(scenario)
+
+
+def test_a_status_of_the_bridge_is_reported():
+    async def scenario():
+        errors = []
+        async with bridged() as (server, bridge):
+            bridge.on_error(errors.append)
+            await server.send('{"op":"status","level":"info","msg":"fine"}')
+            await server.send('{"op":"status","level":"error","msg":"no such type"}')
+            await until(lambda: errors)
+            assert "no such type" in str(errors[0])
+
+    run(scenario)
+
+
+def test_publishing_advertises_first_and_once():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            bridge.publish("/a", {"data": "1"}, "std_msgs/msg/String")
+            bridge.publish("/a", {"data": "2"})
+            await server.heard("publish", 2)
+            assert [m["op"] for m in server.said] == ["advertise", "publish", "publish"]
+            assert server.said[0]["type"] == "std_msgs/String"
+            with pytest.raises(BridgeError, match="std_msgs/String"):
+                bridge.publish("/a", {"data": True}, "std_msgs/Bool")
+            with pytest.raises(BridgeError, match="say the message type"):
+                bridge.publish("/b", {})
+            with pytest.raises(ValueError, match=r"JSON|nan"):
+                bridge.publish("/a", {"data": math.nan})
+            bridge.unadvertise("/a")
+            await server.heard("unadvertise")
+
+    run(scenario)
+
+
+@pytest.mark.parametrize(
+    "type",
+    [
+        "geometry_msgs/Twist",
+        "geometry_msgs/msg/Twist",
+        "geometry_msgs/TwistStamped",
+        " geometry_msgs/msg/TwistStamped",
+    ],
+)
+def test_velocity_is_refused_whether_the_link_is_open_or_not(type):
+    async def scenario():
+        async with bridged() as (server, bridge):
+            with pytest.raises(MotionRefused, match="gate"):
+                bridge.publish("/anything", {}, type)
+            bridge.publish("/a", {"data": 1}, "std_msgs/Int8")
+            await server.heard("publish")
+            assert len(server.said) == 2
+
+    run(scenario)
+    with pytest.raises(MotionRefused):
+        Bridge("ws://localhost:9").publish("/anything", {}, type)
+
+
+def test_a_topic_whose_type_is_known_to_be_a_velocity_is_refused_under_any_name():
+    async def scenario():
+        async with bridged(topic_type={"type": "geometry_msgs/Twist"}) as (_, bridge):
+            assert await bridge.topic_type("/cmd_vel") == "geometry_msgs/Twist"
+            for type in (None, "std_msgs/String"):
+                with pytest.raises(MotionRefused):
+                    bridge.publish("cmd_vel", {}, type)
+
+    run(scenario)
+
+
+def test_a_protected_topic_is_refused_and_taken_back():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            bridge.publish("/goal", {}, "geometry_msgs/PoseStamped")
+            bridge.protect("goal")
+            with pytest.raises(MotionRefused):
+                bridge.publish("/goal/", {}, "geometry_msgs/PoseStamped")
+            with pytest.raises(MotionRefused):
+                await bridge.call_service("/nav/_action/send_goal")
+            await server.heard("unadvertise", topic="/goal")
+
+    run(scenario)
+
+
+def test_publishing_while_closed_raises_and_nothing_is_sent_later(fast):
+    async def scenario():
+        async with bridged() as (server, bridge):
+            await server.stop()
+            await until(lambda: bridge.state == "connecting")
+            with pytest.raises(BridgeClosed):
+                bridge.publish("/a", {"data": "old"}, "std_msgs/String")
+            await server.start()
+            await until(lambda: bridge.state == "open")
+            bridge.publish("/a", {"data": "new"}, "std_msgs/String")
+            (published,) = await server.heard("publish")
+            assert published["msg"] == {"data": "new"}
+
+    run(scenario)
+
+
+def test_after_a_lost_link_everything_is_asked_for_again(fast):
+    async def scenario():
+        opened, closed, got = [], [], []
+        async with bridged() as (server, bridge):
+            bridge.on_open(lambda: opened.append(bridge.state))
+            bridge.on_close(closed.append)
+            bridge.subscribe("/a", got.append)
+            bridge.publish("/b", {"data": "1"}, "std_msgs/String")
+            await server.heard("publish")
+            await until(lambda: opened)
+            server.drop()
+            await server.heard("subscribe", 2)
+            again = server.said[3:]
+            assert [m["op"] for m in again] == ["advertise", "subscribe"]
+            await server.publish("/a", {"data": 5})
+            await until(lambda: got)
+            assert opened == ["open", "open"]
+            assert len(closed) == 1
+            assert bridge.stats.links == 2
+        assert bridge.state == "closed"
+        assert len(closed) == 2
+
+    run(scenario)
+
+
+def test_a_bridge_that_is_not_there_is_reported_and_tried_again(fast):
+    async def scenario():
+        server = FakeRosbridge()
+        await server.start()
+        await server.stop()
+        bridge, errors = Bridge(server.url), []
+        bridge.on_error(errors.append)
+        bridge.start(asyncio.get_running_loop())
+        try:
+            await until(lambda: len(errors) >= 2)
+            assert all(isinstance(error, BridgeClosed) for error in errors)
+            assert server.url in str(errors[0])
+            await server.start()
+            await until(lambda: bridge.state == "open")
+        finally:
+            await bridge.stop()
+            await server.stop()
+
+    run(scenario)
+
+
+def test_a_link_that_does_not_answer_pings_is_dead(fast):
+    async def scenario():
+        reasons = []
+        async with bridged() as (server, bridge):
+            bridge.on_close(reasons.append)
+            silent = server.links[0]
+            silent.transport.pause_reading()
+            await until(lambda: reasons)
+            assert "ping" in reasons[0]
+            await until(lambda: bridge.state == "open")
+            silent.transport.abort()
+
+    run(scenario)
+
+
+def test_a_silent_robot_over_a_live_link_is_not_dead(fast):
+    async def scenario():
+        reasons = []
+        async with bridged() as (_, bridge):
+            bridge.on_close(reasons.append)
+            heard = bridge.last_heard
+            await until(lambda: bridge.last_heard > heard + 0.6)
+            assert reasons == []
+
+    run(scenario)
+
+
+def test_a_service_answers_on_a_socket_of_its_own():
+    async def scenario():
+        async with bridged(get_time={"time": {"sec": 5}}) as (server, bridge):
+            assert len(server.links) == 1
+            answer = await bridge.call_service("/rosapi/get_time")
+            assert answer == {"time": {"sec": 5}}
+            assert len(server.links) == 2
+            await bridge.call_service("/rosapi/get_time", {})
+            assert len(server.links) == 2
+            with pytest.raises(ServiceError, match="no such service"):
+                await bridge.call_service("/nobody")
+
+    run(scenario)
+
+
+def test_a_service_that_never_answers_holds_up_neither_data_nor_other_calls():
+    async def scenario():
+        got = []
+        async with bridged(get_time={"t": 1}) as (server, bridge):
+            server.answer["/hangs"] = None
+            bridge.subscribe("/a", got.append)
+            call = asyncio.create_task(bridge.call_service("/hangs", timeout=0.1))
+            await server.heard("call_service")
+            await server.publish("/a", {"data": 1})
+            await until(lambda: got)
+            with pytest.raises(
+                ServiceError, match=r"/hangs did not answer within 0\.1"
+            ):
+                await call
+            assert await bridge.call_service("/rosapi/get_time") == {"t": 1}
+            one, two = server.ops("call_service")
+            assert one["link"] is not two["link"]
+            await until(lambda: len(server.links) == 2)
+
+    run(scenario)
+
+
+def test_a_call_whose_link_ends_fails_at_once():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            server.answer["/hangs"] = None
+            call = asyncio.create_task(bridge.call_service("/hangs"))
+            (asked,) = await server.heard("call_service")
+            asked["link"].transport.abort()
+            with pytest.raises(BridgeClosed):
+                await call
+            server.answer["/hangs"] = {}
+            assert await bridge.call_service("/hangs") == {}
+
+    run(scenario)
+
+
+def test_a_call_to_a_bridge_that_is_not_there_fails():
+    async def scenario():
+        server = FakeRosbridge()
+        await server.start()
+        await server.stop()
+        with pytest.raises(BridgeClosed, match="cannot reach"):
+            await Bridge(server.url).call_service("/a")
+
+    run(scenario)
+
+
+def test_stopping_ends_calls_under_way():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            server.answer["/hangs"] = None
+            call = asyncio.create_task(bridge.call_service("/hangs"))
+            await server.heard("call_service")
+            await bridge.stop()
+            with pytest.raises(BridgeClosed):
+                await call
+            assert bridge.state == "closed"
+
+    run(scenario)
+
+
+def test_types_are_asked_of_rosapi_and_remembered_for_the_link(fast):
+    async def scenario():
+        async with bridged(topic_type={"type": "nav_msgs/Odometry"}) as (
+            server,
+            bridge,
+        ):
+            for _ in range(2):
+                assert await bridge.topic_type("odom") == "nav_msgs/Odometry"
+            assert len(server.ops("call_service")) == 1
+            server.drop()
+            await until(lambda: bridge.stats.links == 2)
+            assert await bridge.topic_type("odom") == "nav_msgs/Odometry"
+            assert len(server.ops("call_service")) == 2
+            server.answer["/rosapi/topic_type"] = {"type": ""}
+            assert await bridge.topic_type("/unknown") is None
+            del server.answer["/rosapi/topic_type"]
+            assert await bridge.topic_type("/unknown") is None
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("folder", ["ros1", "ros2", "rs"])
+def test_topics_are_told_from_captured_answers(folder):
+    (path,) = list(
+        (CAPTURED / folder).glob("service_response_rosapi_topics.[ur]*.json")
+    )
+    values = json.loads(path.read_text())["values"]
+
+    async def scenario():
+        async with bridged(topics=values) as (server, bridge):
+            topics = await bridge.topics()
+            assert "Odometry" in topics["/robot_0/odom"]
+            server.answer["/rosapi/topics"] = {"topics": ["/a"], "types": []}
+            with pytest.raises(ServiceError):
+                await bridge.topics()
+
+    run(scenario)
+
+
+def test_a_call_from_the_bridge_is_declined():
+    async def scenario():
+        async with bridged() as (server, _):
+            call = {"op": "call_service", "service": "/x", "id": "1", "args": {}}
+            await server.send(json.dumps(call))
+            (answer,) = await server.heard("service_response")
+            assert answer["result"] is False
+
+    run(scenario)
+
+
+def test_a_redirect_is_not_followed():
+    async def scenario():
+        hits = []
+
+        async def redirect(reader, writer):
+            hits.append(await reader.readuntil(b"\r\n\r\n"))
+            writer.write(
+                b"HTTP/1.1 302 Found\r\nLocation: ws://127.0.0.1:%d/elsewhere\r\n"
+                b"Content-Length: 0\r\n\r\n" % port
+            )
+            await writer.drain()
+            writer.close()
+
+        server = await asyncio.start_server(redirect, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        with pytest.raises(BridgeClosed, match="302"):
+            await Bridge(f"ws://127.0.0.1:{port}").call_service("/a")
+        assert len(hits) == 1
+        server.close()
+        await server.wait_closed()
+
+    run(scenario)
+
+
+def test_a_stopped_bridge_can_start_again():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/a", print)
+            await bridge.stop()
+            await bridge.stop()
+            bridge.start(asyncio.get_running_loop())
+            await until(lambda: bridge.state == "open")
+            await server.heard("subscribe", 2)
+
+    run(scenario)
+
+
+def test_a_thousand_listeners_leave_nothing_behind():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            tasks = len(asyncio.all_tasks())
+            for _ in range(1000):
+                with contextlib.ExitStack() as stack:
+                    scope = Scope()
+                    stack.callback(scope.close)
+                    with scope.active():
+                        bridge.on_open(print)
+                        bridge.subscribe("/a", print, throttle=100)
+            await server.heard("unsubscribe", 1000)
+            assert bridge._topics == {}
+            await until(lambda: len(asyncio.all_tasks()) <= tasks)
+
+    run(scenario)
+
+
+def test_importing_the_bridge_loads_no_heavy_library():
+    code = (
+        "import sys, webmap.ros.bridge, webmap.ros.messages, webmap.ros.views\n"
+        "heavy = {'numpy', 'websockets', 'cbor2', 'PIL', 'starlette', 'uvicorn'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
