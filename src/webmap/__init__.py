@@ -1,1 +1,102 @@
-"""WebMap."""
+"""WebMap: a web interface for safe teleoperation of many robots that run ROS.
+
+    import webmap
+
+    bridge = webmap.Bridge("ws://localhost:9090")
+    bob = webmap.Robot("Bob", webmap.svg.circle(r=0.2, fill="red"))
+    bob.set_odometry_topic(bridge, "/odom")
+
+    @webmap.page("/")
+    def main(page):
+        map = webmap.Map(page.element("webmap_container"))
+        map.add_robot(bob)
+
+    webmap.run()
+
+Names are loaded when they are first used, so that importing this costs little.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from webmap import geometry, modules
+    from webmap.core.extendable import Extendable
+    from webmap.core.layer import Layer
+    from webmap.core.map import Map
+    from webmap.core.page import Page
+    from webmap.core.registry import Namespace
+    from webmap.core.robot import Robot
+    from webmap.errors import WebMapError
+    from webmap.identifiers import generate_id
+    from webmap.ros.bridge import Bridge
+    from webmap.scene import html, svg
+    from webmap.scene.svg import namespace as svg_ns
+    from webmap.scene.svg import xlink_namespace as xlink_ns
+    from webmap.server.application import asgi_app, call, page, run, start, stop
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Bridge",
+    "Extendable",
+    "Layer",
+    "Map",
+    "Namespace",
+    "Page",
+    "Robot",
+    "WebMapError",
+    "asgi_app",
+    "call",
+    "generate_id",
+    "geometry",
+    "html",
+    "modules",
+    "page",
+    "run",
+    "start",
+    "stop",
+    "svg",
+    "svg_ns",
+    "xlink_ns",
+]
+
+_HOMES = {
+    "Bridge": "webmap.ros.bridge:Bridge",
+    "Extendable": "webmap.core.extendable:Extendable",
+    "Layer": "webmap.core.layer:Layer",
+    "Map": "webmap.core.map:Map",
+    "Namespace": "webmap.core.registry:Namespace",
+    "Page": "webmap.core.page:Page",
+    "Robot": "webmap.core.robot:Robot",
+    "WebMapError": "webmap.errors:WebMapError",
+    "asgi_app": "webmap.server.application:asgi_app",
+    "call": "webmap.server.application:call",
+    "generate_id": "webmap.identifiers:generate_id",
+    "geometry": "webmap.geometry",
+    "html": "webmap.scene.html",
+    "modules": "webmap.modules",
+    "page": "webmap.server.application:page",
+    "run": "webmap.server.application:run",
+    "start": "webmap.server.application:start",
+    "stop": "webmap.server.application:stop",
+    "svg": "webmap.scene.svg",
+    "svg_ns": "webmap.scene.svg:namespace",
+    "xlink_ns": "webmap.scene.svg:xlink_namespace",
+}
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module 'webmap' has no attribute {name!r}")
+    module, _, attribute = home.partition(":")
+    value: Any = importlib.import_module(module)
+    if attribute:
+        value = getattr(value, attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,1 +1,68 @@
-"""."""
+"""The command line: ``webmap demo``, ``sim``, ``view`` and ``run``."""
+
+import sys
+
+import click
+
+import webmap
+from webmap.errors import WebMapError
+
+COMMANDS = {
+    "demo": "webmap.cli.demo:demo",
+    "run": "webmap.cli.run:run",
+    "sim": "webmap.cli.sim:sim",
+    "view": "webmap.cli.view:view",
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are loaded when they are used."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Load a command."""
+        home = COMMANDS.get(cmd_name)
+        if home is None:
+            return None
+        module, _, name = home.partition(":")
+        __import__(module)
+        command: click.Command = getattr(sys.modules[module], name)
+        return command
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 88},
+)
+@click.version_option(webmap.__version__, "-V", "--version", prog_name="webmap")
+def cli() -> None:
+    r"""See and drive robots that run ROS, on a map in the browser.
+
+    \b
+    webmap demo                    two simulated robots, to try everything
+    webmap view ws://robot:9090    the robots behind a rosbridge
+    webmap run FILE.py             your own page, in Python
+    webmap sim                     the simulator and its rosbridge alone
+
+    Each command prints one line when it is ready, logs to standard error, and ends
+    on Ctrl+C.
+    """
+
+
+def main() -> None:
+    """Run the command line; what is wrong is said in one sentence, with exit code 2."""
+    try:
+        cli(standalone_mode=False)
+    except click.exceptions.Exit as done:
+        sys.exit(done.exit_code)
+    except click.Abort:
+        sys.exit(0)
+    except click.UsageError as error:
+        error.show()
+        sys.exit(2)
+    except (WebMapError, OSError) as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(2)

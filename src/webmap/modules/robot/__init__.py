@@ -1,1 +1,23 @@
-"""."""
+"""Modules of robots, by name: ``webmap.modules.robot.LaserScanner``.
+
+``register`` is a decorator that adds one's own; a package adds its modules by an
+entry point in the group ``webmap.modules.robot``.
+"""
+
+from typing import Any
+
+from webmap.core.registry import robot_modules as namespace
+from webmap.errors import ModuleNotFound
+
+register = namespace.register
+
+
+def __getattr__(name: str) -> Any:
+    try:
+        return namespace[name]
+    except ModuleNotFound as error:
+        raise AttributeError(str(error)) from error
+
+
+def __dir__() -> list[str]:
+    return [*namespace.names(), "namespace", "register"]

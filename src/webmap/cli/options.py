@@ -1,0 +1,61 @@
+"""Options that several commands have."""
+
+import logging
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+PORT = click.IntRange(0, 65535)
+
+
+def web_options(command: F) -> F:
+    """Add where the web interface listens, and what opens it."""
+    for option in (
+        click.option(
+            "--insecure-lan",
+            is_flag=True,
+            help="Allow a --host that other machines reach, without TLS.",
+        ),
+        click.option(
+            "--host",
+            default="127.0.0.1",
+            show_default=True,
+            help="Address that the web interface listens on.",
+        ),
+        click.option(
+            "--port",
+            "-p",
+            type=PORT,
+            default=8080,
+            show_default=True,
+            help="Port of the web interface; 0 lets the system choose.",
+        ),
+        click.option(
+            "--no-browser", is_flag=True, help="Do not open the page in a browser."
+        ),
+        verbose_option,
+    ):
+        command = option(command)
+    return command
+
+
+def _set_up_log(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    logging.basicConfig(
+        level=logging.DEBUG if value else logging.INFO,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    for noisy in ("websockets", "uvicorn", "asyncio", "PIL"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+verbose_option = click.option(
+    "--verbose",
+    "-v",
+    is_flag=True,
+    expose_value=False,
+    callback=_set_up_log,
+    help="Log more, to standard error.",
+)

@@ -1,0 +1,30 @@
+"""``webmap run FILE.py``: a page of one's own."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import click
+
+from webmap.cli.options import web_options
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@web_options
+def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) -> None:
+    """Serve the pages that FILE.py makes with @webmap.page.
+
+    The script may call webmap.run() itself; what is said here comes before what it
+    says there.
+    """
+    from webmap.server import application
+
+    application.command_line.update(
+        host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
+    )
+    sys.path.insert(0, str(file.resolve().parent))
+    sys.argv = [str(file)]
+    runpy.run_path(str(file), run_name="__main__")
+    if not application.has_run:
+        application.run()

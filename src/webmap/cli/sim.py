@@ -1,0 +1,129 @@
+"""``webmap sim``: the simulator and its rosbridge."""
+
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+import click
+
+from webmap.cli.options import PORT, verbose_option
+
+
+@click.command()
+@click.option(
+    "--robots",
+    "-n",
+    type=click.IntRange(1, 500),
+    default=2,
+    show_default=True,
+    help="How many robots.",
+)
+@click.option(
+    "--port",
+    "-p",
+    type=PORT,
+    default=9090,
+    show_default=True,
+    help="Port of the rosbridge; 0 lets the system choose.",
+)
+@click.option(
+    "--seed", type=int, default=1, show_default=True, help="Where they start."
+)
+@click.option(
+    "--map",
+    "map_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="The floor, in map_server's form (YAML); a building floor if not given.",
+)
+@click.option(
+    "--dialect",
+    type=click.Choice(["ros1", "ros2"]),
+    default="ros1",
+    show_default=True,
+    help="Names of types and stamps.",
+)
+@click.option(
+    "--twist",
+    type=click.Choice(["Twist", "TwistStamped"]),
+    default="Twist",
+    show_default=True,
+    help="The type of cmd_vel.",
+)
+@click.option(
+    "--robot-timeout",
+    type=click.FloatRange(0.0),
+    default=0.25,
+    show_default=True,
+    help="Seconds without cmd_vel after which a base stops by itself; 0: never.",
+)
+@click.option(
+    "--drift",
+    type=click.FloatRange(0.0),
+    default=0.0,
+    show_default=True,
+    help="How much odometry drifts, as a share of the way.",
+)
+@click.option("--nan", is_flag=True, help="Some rays of a scan are NaN.")
+@click.option("--wander", is_flag=True, help="Robots that nobody commands drive about.")
+@click.option(
+    "--flat",
+    is_flag=True,
+    help="Topics of the only robot without a prefix: /odom, /cmd_vel, /base_scan.",
+)
+@click.option(
+    "--polite",
+    is_flag=True,
+    help="A rosbridge that says what is wrong; real ones are silent.",
+)
+@click.option("--with-parent", is_flag=True, hidden=True)
+@verbose_option
+def sim(
+    robots: int,
+    port: int,
+    seed: int,
+    map_file: Path | None,
+    dialect: str,
+    twist: str,
+    robot_timeout: float,
+    drift: float,
+    nan: bool,
+    wander: bool,
+    flat: bool,
+    polite: bool,
+    with_parent: bool,
+) -> None:
+    """Simulate robots with laser scanners, behind a rosbridge.
+
+    Any client of rosbridge can use it: roslibpy, roslib, Foxglove, WebMap.
+    """
+    import asyncio
+
+    from webmap.sim import run_simulator
+
+    if with_parent:
+        threading.Thread(target=_end_with_parent, daemon=True).start()
+    asyncio.run(
+        run_simulator(
+            robots=robots,
+            port=port,
+            seed=seed,
+            map=map_file,
+            dialect=dialect,
+            twist=twist,
+            robot_timeout=robot_timeout or None,
+            drift=drift,
+            nan=nan,
+            wander=wander,
+            flat=flat,
+            quirks="polite" if polite else "real",
+            on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),
+        )
+    )
+
+
+def _end_with_parent() -> None:
+    """End when standard input does: the parent holds its other end while it lives."""
+    sys.stdin.buffer.read()
+    os.kill(os.getpid(), signal.SIGTERM)

@@ -1,0 +1,60 @@
+"""``webmap view URL``: the robots behind a rosbridge."""
+
+import click
+
+from webmap.cli.options import web_options
+
+
+@click.command()
+@click.argument("url", nargs=-1, required=True)
+@click.option(
+    "--robot",
+    "robots",
+    multiple=True,
+    metavar="NAME:ODOM:CMD_VEL:SCAN",
+    help="A robot and its topics; what it does not have stays empty. Several times "
+    "for several robots. With several URLs, URL's number and @ before the name say "
+    "behind which the robot is: 2@bob:/odom:/cmd_vel:",
+)
+@click.option(
+    "--stops-within",
+    type=click.FloatRange(0.0, min_open=True),
+    help="Seconds within which every base stops by itself when cmd_vel ceases. "
+    "Without it robots are driven at 0.3 m/s and 0.6 rad/s at the most.",
+)
+@click.option(
+    "--floor",
+    type=click.Path(exists=True, dir_okay=False),
+    help="A floor plan in map_server's form (YAML), to see the robots on.",
+)
+@web_options
+def view(
+    url: tuple[str, ...],
+    robots: tuple[str, ...],
+    stops_within: float | None,
+    floor: str | None,
+    host: str,
+    port: int,
+    no_browser: bool,
+    insecure_lan: bool,
+) -> None:
+    r"""See and drive the robots behind one rosbridge or several.
+
+    URL is a rosbridge's: ws://robot:9090
+
+    \b
+    webmap view ws://robot:9090 --robot Bob:/odom:/cmd_vel:/scan
+    """
+    from pathlib import Path
+
+    import webmap
+    from webmap import console
+
+    bridges = [webmap.Bridge(text) for text in url]
+    described = [
+        console.parse_robot(text, bridges, stops_within=stops_within) for text in robots
+    ]
+    console.open_console(bridges, described, floor=Path(floor) if floor else None)
+    webmap.run(
+        host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
+    )

@@ -1,0 +1,113 @@
+"""What maps and robots both are: owners of modules."""
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from webmap.core.registry import Namespace
+from webmap.scope import Scope, no_scope
+
+log = logging.getLogger("webmap.modules")
+
+
+class Extendable:
+    """An object that modules extend and that fires triggers on them.
+
+    Any object can be a module. A module is constructed by :meth:`add_module` with its
+    owner as the first argument; a method of it that is named like a trigger is called
+    when the trigger fires.
+    """
+
+    def __init__(self, namespace: Namespace) -> None:
+        self.namespace = namespace
+        self.modules: list[Any] = []
+        self._scopes: dict[int, Scope] = {}
+        self._made: dict[int, tuple[str, tuple[Any, ...], dict[str, Any]]] = {}
+
+    def add_module(
+        self, name: str | Callable[..., Any], /, *args: Any, **kwargs: Any
+    ) -> Any:
+        """Construct a module and add it.
+
+        Args:
+            name: The module's name in the owner's namespace, or what makes it.
+            *args: What the module's constructor gets after its owner.
+            **kwargs: Its arguments by name.
+
+        Returns:
+            The module, to keep for :meth:`remove_module`.
+
+        Raises:
+            ModuleNotFound: If there is no module of that name.
+
+        """
+        factory = self.namespace[name] if isinstance(name, str) else name
+        scope = Scope(f"{factory}")
+        try:
+            with scope.active():
+                module = factory(self, *args, **kwargs)
+        except BaseException:
+            scope.close()
+            raise
+        self.modules.append(module)
+        self._scopes[id(module)] = scope
+        if isinstance(name, str):
+            self._made[id(module)] = (name, args, kwargs)
+        return module
+
+    def module_arguments(self) -> list[tuple[str, tuple[Any, ...], dict[str, Any]]]:
+        """Return name and arguments of every module that was added by name."""
+        made = (self._made.get(id(module)) for module in self.modules)
+        return [arguments for arguments in made if arguments is not None]
+
+    def remove_module(self, module: Any) -> None:
+        """Remove a module: call its ``destroy()`` and release what it made.
+
+        Raises:
+            ValueError: If the module is not one of this owner's.
+
+        """
+        for index, known in enumerate(self.modules):
+            if known is module:
+                del self.modules[index]
+                break
+        else:
+            raise ValueError(f"{module!r} is not a module of {self!r}")
+        scope = self._scopes.pop(id(module))
+        self._made.pop(id(module), None)
+        try:
+            self._call(module, "destroy", ())
+        finally:
+            scope.close()
+
+    def remove_modules(self) -> None:
+        """Remove every module, in reverse order."""
+        while self.modules:
+            self.remove_module(self.modules[-1])
+
+    def notify_modules(self, trigger: str, /, *args: Any) -> None:
+        """Call the method ``trigger`` on every module that has it.
+
+        A module that raises is reported and does not keep the others from hearing.
+        """
+        for module in tuple(self.modules):
+            self._call(module, trigger, args)
+
+    def report_error(self, text: str) -> None:
+        """Show people that something of this owner's failed; the log has it."""
+
+    def _call(self, module: Any, name: str, args: tuple[Any, ...]) -> None:
+        method = getattr(module, name, None)
+        if method is None:
+            return
+        scope = self._scopes.get(id(module))
+        try:
+            if scope is None:
+                with no_scope():
+                    method(*args)
+            else:
+                scope.run(method, *args)
+        except Exception as error:
+            what = f"{type(module).__name__}.{name}"
+            log.exception("module %s of %r failed", what, self)
+            self.report_error(f"{what} failed: {type(error).__name__}: {error}")

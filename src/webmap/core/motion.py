@@ -1,0 +1,229 @@
+"""The road of one robot's commands to the gate, and the gate's word of it."""
+
+import itertools
+import logging
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from webmap.core.tasks import spawn
+from webmap.errors import ConfigError, MotionError
+from webmap.gate.messages import RobotSpec
+from webmap.geometry import Twist
+from webmap.lifecycle import lifecycle
+from webmap.ros.bridge import Bridge
+from webmap.ros.names import same_type
+from webmap.scope import Removable
+
+if TYPE_CHECKING:
+    from webmap.gate.client import GateClient
+
+log = logging.getLogger("webmap.robot")
+
+_numbers = itertools.count(1)
+
+TWIST_TYPES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+
+
+@dataclass(frozen=True, slots=True)
+class TwistTopic:
+    """Where velocity goes, and what is known of the base behind it."""
+
+    bridge: Bridge
+    topic: str
+    type: str | None
+    stops_within: float | None
+    v_max: float | None
+    w_max: float | None
+    a_max: float | None
+    holonomic: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTopic:
+    """Where goals go, and how one is called off."""
+
+    bridge: Bridge
+    topic: str
+    frame: str
+    cancel_topic: str | None
+    on_operator_loss: str
+
+
+class MotionRoad:
+    """What the gate is told about one robot, kept true as topics come and go.
+
+    Nothing here writes to a robot: everything is handed to the gate, which decides.
+    """
+
+    gate: "GateClient | None" = None
+    """The one gate of this process, once it is started."""
+
+    def __init__(self, name: str, complain: Any) -> None:
+        self.id = f"r{next(_numbers)}"
+        self._name = name
+        self._complain = complain
+        self._twist: TwistTopic | None = None
+        self._move: MoveTopic | None = None
+        self._odometry: tuple[Bridge, str, str] | None = None
+        self._opening: Removable | None = None
+        roads.add(self)
+
+    @property
+    def twist_topic(self) -> TwistTopic | None:
+        """Where velocity goes, if that is set."""
+        return self._twist
+
+    @property
+    def move_topic(self) -> MoveTopic | None:
+        """Where goals go, if that is set."""
+        return self._move
+
+    def set_twist(self, twist: TwistTopic | None) -> None:
+        """Set or clear where velocity goes.
+
+        Raises:
+            ConfigError: If the type is none that carries a velocity.
+
+        """
+        if twist is not None:
+            if twist.type is not None:
+                _check_twist_type(twist.topic, twist.type)
+            twist.bridge.protect(twist.topic)
+        if self._opening is not None:
+            self._opening.remove()
+            self._opening = None
+        self._twist = twist
+        if twist is not None and twist.type is None:
+            self._opening = twist.bridge.on_open(lambda: spawn(self._find_type()))
+        self.declare()
+
+    def set_move(self, move: MoveTopic | None) -> None:
+        """Set or clear where goals go."""
+        if move is not None:
+            move.bridge.protect(move.topic)
+            if move.cancel_topic:
+                move.bridge.protect(move.cancel_topic)
+        self._move = move
+        self.declare()
+
+    def set_odometry(self, bridge: Bridge, topic: str, type: str) -> None:
+        """Tell where the gate can see for itself how the robot moves."""
+        if self._odometry != (bridge, topic, type):
+            self._odometry = (bridge, topic, type)
+            self.declare()
+
+    def clear_odometry(self) -> None:
+        """Tell that there is no such topic any more."""
+        self._odometry = None
+        self.declare()
+
+    def declare(self) -> None:
+        """Tell the gate what it needs to know of this robot, as it is now."""
+        if self.gate is None:
+            return
+        spec = self.spec()
+        if spec is None:
+            self.gate.forget(self.id)
+        else:
+            self.gate.declare(spec)
+
+    def spec(self) -> RobotSpec | None:
+        """Return what the gate needs to know, or None if nothing moves the robot."""
+        twist, move = self._twist, self._move
+        link = twist or move
+        if link is None:
+            return None
+        odometry = self._odometry
+        return RobotSpec(
+            id=self.id,
+            name=self._name,
+            bridge_url=link.bridge.url,
+            twist_topic=twist.topic if twist else None,
+            twist_type=(twist.type if twist else None) or TWIST_TYPES[0],
+            stops_within=twist.stops_within if twist else None,
+            v_max=twist.v_max if twist else None,
+            w_max=twist.w_max if twist else None,
+            a_max=twist.a_max if twist else None,
+            holonomic=twist.holonomic if twist else False,
+            odometry_url=odometry[0].url if odometry else None,
+            odometry_topic=odometry[1] if odometry else None,
+            odometry_type=odometry[2] if odometry else None,
+            goal_url=move.bridge.url if move else None,
+            goal_topic=move.topic if move else None,
+            goal_frame=move.frame if move else "map",
+            cancel_topic=move.cancel_topic if move else None,
+            on_operator_loss="cancel"
+            if move and move.on_operator_loss == "cancel"
+            else "continue",
+        )
+
+    def close(self) -> None:
+        """Let the gate forget the robot; it stops if it was driven."""
+        self.set_twist(None)
+        self._move = self._odometry = None
+        self.declare()
+        roads.discard(self)
+
+    def take(self) -> "Future[int]":
+        """Ask for the lease on behalf of this program."""
+        return self._gate().take(self.id)
+
+    def release(self) -> None:
+        """Give the program's lease back; the robot is stopped."""
+        self._gate().release(self.id)
+
+    def twist(self, twist: Twist) -> None:
+        """Hand one velocity to the gate, as this program."""
+        self._gate().twist(self.id, twist)
+
+    def move(self, x: float, y: float, yaw: float) -> None:
+        """Hand one goal to the gate, as this program."""
+        self._gate().move(self.id, x, y, yaw)
+
+    def cancel(self) -> None:
+        """Have the gate call off the robot's goals."""
+        self._gate().cancel(self.id)
+
+    def stop(self) -> None:
+        """Have the gate stop the robot, whoever drives it."""
+        self._gate().stop_robot(self.id)
+
+    def _gate(self) -> "GateClient":
+        if self.gate is None or not lifecycle.running:
+            raise MotionError(
+                f"robot {self._name!r} cannot be moved before webmap.start()"
+            )
+        if self.spec() is None:
+            raise MotionError(
+                f"robot {self._name!r} has no twist topic and no move topic"
+            )
+        return self.gate
+
+    async def _find_type(self) -> None:
+        twist = self._twist
+        if twist is None:
+            return
+        found = await twist.bridge.topic_type(twist.topic)
+        if found is None or twist is not self._twist:
+            return
+        try:
+            _check_twist_type(twist.topic, found)
+        except ConfigError as error:
+            self._complain(str(error))
+            self.set_twist(None)
+            return
+        self._twist = replace(twist, type=found)
+        self.declare()
+
+
+def _check_twist_type(topic: str, type_name: str) -> None:
+    if not any(same_type(known, type_name) for known in TWIST_TYPES):
+        raise ConfigError(
+            f"topic {topic!r} has type {type_name}; velocity goes to "
+            f"{TWIST_TYPES[0]} or {TWIST_TYPES[1]}"
+        )
+
+
+roads: set[MotionRoad] = set()
+"""The roads of all robots there are; declared anew when the gate starts."""

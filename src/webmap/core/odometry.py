@@ -1,0 +1,158 @@
+"""How a robot hears where it is: one topic, its type found out when not said."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from webmap.core.tasks import spawn
+from webmap.errors import ConfigError, ProtocolError
+from webmap.geometry import Quaternion, Twist, Vector3
+from webmap.ros.bridge import Bridge
+from webmap.ros.decoding import convert
+from webmap.ros.messages import OdometryMsg
+from webmap.ros.views import (
+    ODOMETRY_VIEWS,
+    OdometryView,
+    odometry_view,
+    odometry_view_by_shape,
+)
+from webmap.scope import Removable
+
+_NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class PoseReading:
+    """What one message says of a robot's pose, and of its motion if it does."""
+
+    position: Vector3
+    orientation: Quaternion
+    twist: Twist | None = None
+
+    @classmethod
+    def of(cls, message: OdometryView) -> "PoseReading":
+        """Take the pose out of a decoded message."""
+        place = message.place
+        return cls(
+            place.position.vector,
+            place.orientation.quaternion,
+            message.velocity if isinstance(message, OdometryMsg) else None,
+        )
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether every number is finite and the orientation is one at all."""
+        p, q = self.position, self.orientation
+        numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+        return all(map(math.isfinite, numbers)) and q.norm > 1e-6
+
+
+class PoseListener(Protocol):
+    """Who is told the poses."""
+
+    def __call__(self, reading: PoseReading) -> None:
+        """Take the newest pose."""
+
+
+class OdometryFeed:
+    """A subscription to a topic with poses.
+
+    Args:
+        bridge: The link to the ROS system that has the topic.
+        topic: The topic.
+        throttle: The least time between two messages, in milliseconds.
+        type: The message type; asked of rosapi, or told from the first message's
+            shape, if not given.
+        listener: Called with each pose, in the model's thread.
+        complain: Called with a sentence for people when the topic cannot be used.
+
+    Raises:
+        ConfigError: If ``type`` is given and has no pose in it.
+
+    """
+
+    def __init__(
+        self,
+        bridge: Bridge,
+        topic: str,
+        throttle: int,
+        type: str | None,
+        listener: PoseListener,
+        complain: Callable[[str], None],
+    ) -> None:
+        self.bridge = bridge
+        self.topic = topic
+        self.throttle = throttle
+        self.type: str | None = None
+        self._listener = listener
+        self._complain = complain
+        self._complaint: str | None = None
+        self._opening: Removable | None = None
+        self._subscription: Removable | None = None
+        if type is None:
+            self._opening = bridge.on_open(self._on_open)
+            return
+        self._subscribe(odometry_view(type))
+
+    def remove(self) -> None:
+        """Unsubscribe; the second call does nothing."""
+        for thing in (self._opening, self._subscription):
+            if thing is not None:
+                thing.remove()
+        self._opening = self._subscription = None
+
+    def _on_open(self) -> None:
+        if self._subscription is None:
+            spawn(self._find_out())
+
+    async def _find_out(self) -> None:
+        found = await self.bridge.topic_type(self.topic)
+        if self._subscription is not None or self._opening is None:
+            return
+        if found is None:
+            self._subscription = self.bridge.subscribe(
+                self.topic, self._on_first, throttle=self.throttle
+            )
+            return
+        try:
+            self._subscribe(odometry_view(found))
+        except ConfigError as error:
+            self._say(f"topic {self.topic!r}: {error}")
+
+    def _on_first(self, message: Any) -> None:
+        try:
+            view = odometry_view_by_shape(message)
+            first = convert(message, view)
+        except ProtocolError as error:
+            self._say(f"topic {self.topic!r}: {error}; say type=... if one does")
+            return
+        untyped = self._subscription
+        self._subscribe(view)
+        if untyped is not None:
+            untyped.remove()
+        self._hear(first)
+
+    def _subscribe(self, view: type[OdometryView]) -> None:
+        self.type = next(
+            name for name, known in ODOMETRY_VIEWS.items() if known is view
+        )
+        self._subscription = self.bridge.subscribe(
+            self.topic, self._hear, self.type, throttle=self.throttle, decode=view
+        )
+
+    def _hear(self, message: OdometryView) -> None:
+        reading = PoseReading.of(message)
+        if reading.is_finite:
+            self._complaint = None
+            self._listener(reading)
+        else:
+            self._say(
+                f"topic {self.topic!r}: a pose with NaN, infinity or a quaternion of "
+                "zeros was ignored"
+            )
+
+    def _say(self, text: str) -> None:
+        if text != self._complaint:
+            self._complaint = text
+            self._complain(text)

@@ -1,0 +1,353 @@
+"""Pages: what a viewer opens, and what the rest of WebMap asks of one."""
+
+import inspect
+import logging
+import re
+import weakref
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from webmap.core.tasks import spawn
+from webmap.errors import ConfigError
+from webmap.scene.bound import BoundElement, Document
+from webmap.scene.element import Element
+from webmap.scene.events import Event, Handler, Listener
+from webmap.scene.fragment import Fragment
+from webmap.scope import Removal, Scope, current_scope, keep
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+log = logging.getLogger("webmap.page")
+
+PageFunction = Callable[["Page"], Any]
+
+
+class PageChannel(Protocol):
+    """What core asks of the socket to one page; :mod:`webmap.wire` provides it."""
+
+    def mount(
+        self,
+        fragment: Fragment,
+        *,
+        under: int,
+        order: float = 0,
+        within: int | None = None,
+    ) -> int:
+        """Show a fragment under an element; return the mount's number."""
+
+    def unmount(self, mount: int) -> None:
+        """Take a mounted fragment away."""
+
+    def set_class(self, mount: int, name: str, on: bool) -> None:
+        """Set a class on the fragment's root in this page only."""
+
+    def listen(
+        self, mount: int, element: int, event: str, *, prevent: bool, stop: bool
+    ) -> None:
+        """Hear of an event on an element, in this page only."""
+
+    def unlisten(self, mount: int, element: int, event: str) -> None:
+        """Hear of it no more."""
+
+    def view(self, map_element: int, operation: str, *args: float) -> None:
+        """Apply an operation to a map's view."""
+
+    def attach(
+        self,
+        map_element: int,
+        instance: int,
+        module_url: str,
+        options: dict[str, Any],
+        css_url: str | None = None,
+    ) -> None:
+        """Load the browser half of a module."""
+
+    def detach(self, instance: int) -> None:
+        """Take the browser half of a module away."""
+
+    def send(self, instance: int, message: dict[str, Any]) -> None:
+        """Send a message to the browser half of a module."""
+
+    def error(self, text: str) -> None:
+        """Show a notice."""
+
+
+class Publisher(Protocol):
+    """Where files get URLs by which a page can load them."""
+
+    def publish_file(self, path: Path) -> str:
+        """Let pages load an ES module or a style sheet; return its URL."""
+
+    def publish_image(self, image: Path) -> str:
+        """Let pages load an image; return the URL of this version of it."""
+
+    def withdraw_image(self, url: str) -> None:
+        """Undo one :meth:`publish_image`."""
+
+
+class Viewer(Protocol):
+    """One person's browser, signed in."""
+
+    @property
+    def id(self) -> str:
+        """Opaque, the same for as long as the browser stays signed in."""
+
+    @property
+    def name(self) -> str:
+        """What other people read when this viewer drives."""
+
+    @property
+    def role(self) -> str:
+        """``"viewer"``, ``"operator"`` or ``"admin"``."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageEntry:
+    """A URL, and the function that builds a page for each viewer that opens it."""
+
+    path: str
+    function: PageFunction
+    html: Path | None
+    folder: Path
+    title: str
+
+
+class Site:
+    """The pages of this process, by path."""
+
+    def __init__(self) -> None:
+        self.pages: dict[str, PageEntry] = {}
+
+    def page(
+        self, path: str, *, html: str | Path | None = None, title: str = "WebMap"
+    ) -> Callable[[PageFunction], PageFunction]:
+        """Build a page for each viewer that opens ``path``; a decorator.
+
+        Args:
+            path: Where the page is, from the application's root: ``"/"``, ``"/lab"``.
+            html: The HTML file to serve, from the script's folder; a page with one
+                container, ``webmap_container``, is made if not given. Files beside
+                it can be loaded by the page.
+            title: The title of a page that is made.
+
+        Raises:
+            ConfigError: If the path is not one, or the HTML file does not exist.
+
+        """
+        if not re.fullmatch(r"/[A-Za-z0-9._~/-]*", path) or path.startswith("/_webmap"):
+            raise ConfigError(
+                f"a page's path is '/' and letters, digits, '.', '_', '~', '-' or '/', "
+                f"and not below '/_webmap': got {path!r}"
+            )
+
+        def register(function: PageFunction) -> PageFunction:
+            source = inspect.getsourcefile(function)
+            folder = Path(source).resolve().parent if source else Path.cwd()
+            file = None
+            if html is not None:
+                file = (folder / html).resolve()
+                if not file.is_file():
+                    raise ConfigError(f"page {path!r}: there is no file {file}")
+                folder = file.parent
+            self.pages[path] = PageEntry(path, function, file, folder, title)
+            return function
+
+        return register
+
+
+site = Site()
+"""The pages of this process."""
+
+
+def _run(work: Awaitable[Any]) -> None:
+    async def wait() -> None:
+        await work
+
+    spawn(wait())
+
+
+class Page:
+    """One page that one viewer has open; made for each, and gone with it."""
+
+    def __init__(
+        self,
+        entry: PageEntry,
+        channel: PageChannel,
+        viewer: Viewer,
+        publisher: Publisher,
+        sizes: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self.entry = entry
+        self.channel = channel
+        self.viewer = viewer
+        self.maps: list[Map] = []
+        self.scope = Scope(f"page {entry.path}")
+        self.closed = False
+        self._publisher = publisher
+        self._sizes = dict(sizes)
+        self._document = Document()
+        self.fragment = Fragment(self._document)
+        self._mount = channel.mount(self.fragment, under=0)
+        _pages[self.fragment.id] = self
+        self.on_speeds: Callable[[float, float], None] | None = None
+        self._speeds: dict[int, tuple[float, float]] = {}
+        self._listening: dict[tuple[int, int, str], list[Listener]] = {}
+
+    def element(self, id: str) -> Element:
+        """Return the page's own element with this ``id``, to fill and to listen to.
+
+        Args:
+            id: The ``id`` in the page's HTML. If the page has none, the page says so.
+
+        """
+        return self._document.bind(id)
+
+    def size_of(self, container: Element) -> tuple[float, float]:
+        """Return the size in pixels that a container had when the page opened."""
+        if isinstance(container, BoundElement):
+            return self._sizes.get(container.html_id, (0.0, 0.0))
+        return (0.0, 0.0)
+
+    @property
+    def mount(self) -> int:
+        """The mount of the page's own elements."""
+        return self._mount
+
+    def on_close(self, fn: Callable[[], object]) -> Removal:
+        """Call ``fn`` when the page is closed for good."""
+        removal = Removal(fn)
+        self.scope.add(removal)
+        return removal
+
+    def image(self, href: str) -> str:
+        """Return the URL by which the page can load an image, until the page's end.
+
+        Args:
+            href: A file of the page's folder, or an absolute path.
+
+        Raises:
+            ConfigError: If the file does not exist, lies outside the folder or is no
+                image.
+
+        """
+        file = Path(href)
+        if not file.is_absolute():
+            file = self.entry.folder / file
+            if not file.resolve().is_relative_to(self.entry.folder):
+                raise ConfigError(f"{href!r} lies outside {self.entry.folder}")
+        url = self._publisher.publish_image(file)
+        self.scope.add(Removal(lambda: self._publisher.withdraw_image(url)))
+        return url
+
+    def notice(self, text: str) -> None:
+        """Show a sentence to the viewer until it is dismissed."""
+        self.channel.error(text)
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """What this page's hands may ask for at most, in m/s and rad/s.
+
+        The least of its modules that drive; zero if there is none.
+        """
+        if not self._speeds:
+            return (0.0, 0.0)
+        linear, angular = zip(*self._speeds.values(), strict=True)
+        return (min(linear), min(angular))
+
+    def set_speeds(self, module: object, speed: float, rotation_speed: float) -> None:
+        """Note that a module of this page drives, and how fast at the most."""
+        self._speeds[id(module)] = (speed, rotation_speed)
+        self._tell_speeds()
+
+    def clear_speeds(self, module: object) -> None:
+        """Note that a module drives no more."""
+        self._speeds.pop(id(module), None)
+        self._tell_speeds()
+
+    def _tell_speeds(self) -> None:
+        if self.on_speeds is not None:
+            self.on_speeds(*self.speeds)
+
+    def listen(
+        self,
+        mount: int,
+        element: Element,
+        event: str,
+        handler: Handler,
+        *,
+        prevent: bool = False,
+        stop: bool = False,
+    ) -> Removal:
+        """Call ``handler`` for an event of an element in this page only."""
+        key = (mount, element.id, event)
+        listeners = self._listening.setdefault(key, [])
+        if not listeners:
+            self.channel.listen(mount, element.id, event, prevent=prevent, stop=stop)
+        listener = Listener(handler, current_scope(), prevent=prevent, stop=stop)
+        listeners.append(listener)
+
+        def undo() -> None:
+            listeners.remove(listener)
+            if not listeners and self._listening.pop(key, None) is not None:
+                self.channel.unlisten(mount, element.id, event)
+
+        return keep(Removal(undo))
+
+    def forget_mount(self, mount: int) -> None:
+        """Let nobody hear of a mount that is taken away."""
+        for key in [key for key in self._listening if key[0] == mount]:
+            del self._listening[key]
+
+    def asset(self, file: str | Path) -> str:
+        """Return the URL of an ES module or a style sheet.
+
+        Args:
+            file: The name of one that comes with WebMap, as ``"modules/teleop.js"``,
+                or the path of a file.
+
+        """
+        return file if isinstance(file, str) else self._publisher.publish_file(file)
+
+    def dispatch(self, mount: int, element: Element, event: Event) -> None:
+        """Call who listens: the element's owner, then this viewer's own listeners."""
+        element.dispatch(event, self._failed, _run)
+        for listener in tuple(self._listening.get((mount, element.id, event.kind), ())):
+            listener.call(event, self._failed, _run)
+
+    def _failed(self, error: Exception) -> None:
+        log.error("a handler of %s failed", self.entry.path, exc_info=error)
+        self.notice(f"A handler failed: {type(error).__name__}: {error}")
+
+    def close(self) -> None:
+        """End the page: destroy its maps and release all that was made for it."""
+        if self.closed:
+            return
+        self.closed = True
+        for map in reversed(tuple(self.maps)):
+            map.destroy()
+        self.scope.close()
+        self._listening.clear()
+        self.channel.unmount(self._mount)
+
+
+_pages: "weakref.WeakValueDictionary[int, Page]" = weakref.WeakValueDictionary()
+
+
+def page_of(container: Element) -> Page:
+    """Return the page that an element belongs to.
+
+    Raises:
+        ConfigError: If it is on no page.
+
+    """
+    fragment = container.fragment
+    page = None if fragment is None else _pages.get(fragment.id)
+    if page is None:
+        raise ConfigError(
+            f"{container!r} is on no page: take the container of a map from "
+            "page.element(id), or append it to such an element first"
+        )
+    return page

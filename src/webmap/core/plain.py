@@ -1,0 +1,160 @@
+"""Robots as plain data: what JSON or TOML can hold, and back."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
+
+from webmap.core.plain_svg import element_from_dict, element_to_dict
+from webmap.errors import ConfigError
+from webmap.ros.bridge import Bridge
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+R = TypeVar("R", bound="Robot")
+
+
+class OdometryData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The arguments of ``set_odometry_topic``."""
+
+    bridge: str
+    topic: str
+    throttle: int = 100
+    type: str | None = None
+
+
+class TwistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The arguments of ``set_twist_topic``."""
+
+    bridge: str
+    topic: str
+    type: str | None = None
+    stops_within: float | None = None
+    v_max: float | None = None
+    w_max: float | None = None
+    a_max: float | None = None
+    holonomic: bool = False
+
+
+class MoveData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The arguments of ``set_move_topic``."""
+
+    bridge: str
+    topic: str
+    frame: str = "map"
+    cancel_topic: str | None = None
+    on_operator_loss: str = "continue"
+
+
+class ModuleData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The arguments of ``add_module``; a bridge among them is ``{"bridge": URL}``."""
+
+    name: str
+    args: list[Any] = []
+    options: dict[str, Any] = {}
+
+
+class RobotData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """A robot."""
+
+    name: str
+    base_link: str = "base_link"
+    classes: list[str] = []
+    model: dict[str, Any] | None = None
+    odometry: OdometryData | None = None
+    twist: TwistData | None = None
+    move: MoveData | None = None
+    modules: list[ModuleData] = []
+
+
+def robot_from_dict(
+    cls: type[R], data: Mapping[str, Any], bridges: Mapping[str, Bridge] | None
+) -> R:
+    """Make a robot from plain data; see :meth:`Robot.from_dict`."""
+    try:
+        plain = msgspec.convert(dict(data), RobotData)
+    except msgspec.ValidationError as error:
+        name = data.get("name", "?")
+        raise ConfigError(f"robot {name!r}: {error}") from error
+    links: dict[str, Bridge] = dict(bridges or {})
+
+    def link(name: str) -> Bridge:
+        if name not in links:
+            links[name] = Bridge(name)
+        return links[name]
+
+    model = None if plain.model is None else element_from_dict(plain.model)
+    robot = cls(plain.name, model, base_link=plain.base_link)
+    for name in plain.classes:
+        robot.svg.classes.add(name)
+    if plain.odometry is not None:
+        o = plain.odometry
+        robot.set_odometry_topic(link(o.bridge), o.topic, o.throttle, type=o.type)
+    if plain.twist is not None:
+        t = msgspec.structs.asdict(plain.twist)
+        robot.set_twist_topic(link(t.pop("bridge")), t.pop("topic"), **t)
+    if plain.move is not None:
+        m = msgspec.structs.asdict(plain.move)
+        robot.set_move_topic(link(m.pop("bridge")), m.pop("topic"), **m)
+    for module in plain.modules:
+        args = [_bridge_in(value, link) for value in module.args]
+        options = {key: _bridge_in(v, link) for key, v in module.options.items()}
+        robot.add_module(module.name, *args, **options)
+    return robot
+
+
+def robot_to_dict(robot: "Robot") -> dict[str, Any]:
+    """Return a robot as plain data; see :meth:`Robot.to_dict`."""
+    feed, twist, move = robot.feed, robot.motion.twist_topic, robot.motion.move_topic
+    known = {"robot", "unplaced", "selected", "stale"}
+    plain = RobotData(
+        name=robot.name,
+        base_link=robot.base_link,
+        classes=[name for name in robot.svg.classes if name not in known],
+        model=element_to_dict(robot.model),
+        odometry=None
+        if feed is None
+        else OdometryData(feed.bridge.url, feed.topic, feed.throttle, feed.type),
+        twist=None
+        if twist is None
+        else TwistData(
+            twist.bridge.url,
+            twist.topic,
+            twist.type,
+            twist.stops_within,
+            twist.v_max,
+            twist.w_max,
+            twist.a_max,
+            twist.holonomic,
+        ),
+        move=None
+        if move is None
+        else MoveData(
+            move.bridge.url,
+            move.topic,
+            move.frame,
+            move.cancel_topic,
+            move.on_operator_loss,
+        ),
+        modules=[
+            ModuleData(
+                name,
+                [_plain(value) for value in args],
+                {key: _plain(value) for key, value in options.items()},
+            )
+            for name, args, options in robot.module_arguments()
+        ],
+    )
+    result: dict[str, Any] = msgspec.to_builtins(plain)
+    return result
+
+
+def _bridge_in(value: Any, link: Any) -> Any:
+    if isinstance(value, Mapping) and set(value) == {"bridge"}:
+        return link(value["bridge"])
+    return value
+
+
+def _plain(value: Any) -> Any:
+    return {"bridge": value.url} if isinstance(value, Bridge) else value

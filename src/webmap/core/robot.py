@@ -1,0 +1,429 @@
+"""Robots: who they are, where they are and how they are moved."""
+
+import asyncio
+import logging
+import math
+import time
+import weakref
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+from webmap.core.extendable import Extendable
+from webmap.core.motion import MotionRoad, MoveTopic, TwistTopic
+from webmap.core.odometry import OdometryFeed, PoseReading
+from webmap.core.registry import Namespace, robot_modules
+from webmap.gate.messages import RobotReport
+from webmap.geometry import Quaternion, Twist, Vector3
+from webmap.ros.bridge import Bridge
+from webmap.scene import svg
+from webmap.scene.element import Element
+from webmap.scene.fragment import Fragment
+from webmap.scope import Removal, keep, no_scope
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+log = logging.getLogger("webmap.robot")
+
+POSE_LIMIT = 1.0
+"""Seconds after which a pose is drawn as old."""
+
+
+class Position(Protocol):
+    """Anything with ``x`` and ``y`` in metres."""
+
+    @property
+    def x(self) -> float:
+        """Metres along x."""
+
+    @property
+    def y(self) -> float:
+        """Metres along y."""
+
+
+class Orientation(Protocol):
+    """Anything with the components of a quaternion."""
+
+    @property
+    def x(self) -> float:
+        """The component along x."""
+
+    @property
+    def y(self) -> float:
+        """The component along y."""
+
+    @property
+    def z(self) -> float:
+        """The component along z."""
+
+    @property
+    def w(self) -> float:
+        """The real component."""
+
+
+robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary()
+"""All robots that were made and not destroyed, by their id."""
+
+
+class Robot(Extendable):
+    """One robot: its name, its pose, how it looks and how it is moved.
+
+    A robot may be shown on any number of maps, and used without any.
+
+    Args:
+        name: What people call it. A label: it need not be unique.
+        model: How it looks from above, in metres, x forward; a plain arrow if not
+            given. It becomes part of the robot's own group, :attr:`svg`.
+        base_link: The frame that the navigation stack calls the robot's own.
+        namespace: Where its modules are looked up.
+
+    """
+
+    def __init__(
+        self,
+        name: str,
+        model: Element | None = None,
+        *,
+        base_link: str = "base_link",
+        namespace: Namespace = robot_modules,
+    ) -> None:
+        super().__init__(namespace)
+        self.name = str(name)
+        self.base_link = base_link
+        self.model = default_model() if model is None else model
+        self.maps: list[Map] = []
+        self.selected = False
+        self.position = Vector3()
+        self.orientation = Quaternion()
+        self.measured_twist: Twist | None = None
+        self.valid = False
+        self.pose_stamp: float | None = None
+        self.error: str | None = None
+        self.report: RobotReport | None = None
+        self._destroyed = False
+        self._feed: OdometryFeed | None = None
+        self.motion = MotionRoad(self.name, self.report_error)
+        self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
+        self.svg.set("data-name", self.name)
+        self.svg.set("data-robot", self.motion.id)
+        self.fragment = Fragment(self.svg)
+        robots[self.id] = self
+        keep(Removal(self.destroy))
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name!r}>"
+
+    @property
+    def id(self) -> str:
+        """What the gate and the page call this robot; unique in the process."""
+        return self.motion.id
+
+    @property
+    def feed(self) -> OdometryFeed | None:
+        """Where the poses come from, if that is set."""
+        return self._feed
+
+    @property
+    def yaw(self) -> float:
+        """The heading, in radians in ``[-pi, pi]``, counter-clockwise from x."""
+        return self.orientation.yaw
+
+    @property
+    def angle(self) -> float:
+        """The heading, in degrees, counter-clockwise from x."""
+        return math.degrees(self.yaw)
+
+    @property
+    def pose_age(self) -> float | None:
+        """Seconds since the newest pose came in; None if there was none yet."""
+        return None if self.pose_stamp is None else time.monotonic() - self.pose_stamp
+
+    def destroy(self) -> None:
+        """Stop all communication, remove the modules, leave every map."""
+        if self._destroyed:
+            return
+        self._destroyed = True
+        for map in tuple(self.maps):
+            map.remove_robot(self)
+        self.remove_modules()
+        self.unsubscribe_odometry_topic()
+        self.motion.close()
+        robots.pop(self.id, None)
+
+    # Where it is.
+
+    def set_odometry_topic(
+        self,
+        bridge: Bridge,
+        topic: str,
+        throttle: int = 100,
+        *,
+        type: str | None = None,
+    ) -> None:
+        """Follow the poses on a topic, in place of the one before.
+
+        The topic may carry ``geometry_msgs`` Pose, PoseStamped,
+        PoseWithCovarianceStamped or Pose2D, or ``nav_msgs/Odometry``. If ``type`` is
+        not given, rosapi is asked, and where there is no rosapi the shape of the first
+        message tells. The bridge need not be open yet.
+
+        Args:
+            bridge: The link to the ROS system that has the topic.
+            topic: The topic.
+            throttle: The least time between two messages, in milliseconds.
+            type: The message type.
+
+        Raises:
+            ConfigError: If ``type`` has no pose.
+
+        """
+        self.unsubscribe_odometry_topic()
+        with no_scope():
+            self._feed = OdometryFeed(
+                bridge, topic, throttle, type, self._on_pose, self.report_error
+            )
+
+    def unsubscribe_odometry_topic(self) -> None:
+        """Stop following poses; does nothing if there is no topic."""
+        if self._feed is not None:
+            self._feed.remove()
+            self._feed = None
+            self.motion.clear_odometry()
+
+    # How it is moved.
+
+    def set_twist_topic(
+        self,
+        bridge: Bridge,
+        topic: str,
+        *,
+        type: str | None = None,
+        stops_within: float | None = None,
+        v_max: float | None = None,
+        w_max: float | None = None,
+        a_max: float | None = None,
+        holonomic: bool = False,
+    ) -> None:
+        """Say where velocity goes, and what the base behind it does and can.
+
+        Args:
+            bridge: The link to the robot's ROS system.
+            topic: The topic, of ``geometry_msgs`` Twist or TwistStamped.
+            type: The message type; asked of rosapi, or Twist, if not given.
+            stops_within: The time in seconds within which the base stops by itself
+                when velocity ceases. Without it nobody knows whether the robot stops
+                when WebMap cannot tell it to, and it is driven at no more than
+                0.3 m/s and 0.6 rad/s.
+            v_max: The highest speed, in metres per second.
+            w_max: The highest rate of turn, in radians per second.
+            a_max: The highest acceleration, in metres per second squared. Slowing
+                down is never delayed by it.
+            holonomic: Whether the base can move sideways.
+
+        Raises:
+            ConfigError: If ``type`` carries no velocity.
+
+        """
+        with no_scope():
+            self.motion.set_twist(
+                TwistTopic(
+                    bridge,
+                    topic,
+                    type,
+                    stops_within,
+                    v_max,
+                    w_max,
+                    a_max,
+                    holonomic,
+                )
+            )
+
+    def unadvertise_twist_topic(self) -> None:
+        """Give up the twist topic; does nothing if there is none."""
+        self.motion.set_twist(None)
+
+    def set_move_topic(
+        self,
+        bridge: Bridge,
+        topic: str,
+        *,
+        frame: str = "map",
+        cancel_topic: str | None = None,
+        on_operator_loss: str = "continue",
+    ) -> None:
+        """Say where goals go.
+
+        Args:
+            bridge: The link to the ROS system of the robot's navigation.
+            topic: A topic of ``geometry_msgs/PoseStamped``.
+            frame: The frame of the goals.
+            cancel_topic: actionlib's topic by which goals are called off.
+            on_operator_loss: ``"continue"`` if a goal goes on when its operator is
+                lost, ``"cancel"`` if it is called off.
+
+        """
+        with no_scope():
+            self.motion.set_move(
+                MoveTopic(bridge, topic, frame, cancel_topic, on_operator_loss)
+            )
+
+    def unadvertise_move_topic(self) -> None:
+        """Give up the move topic; does nothing if there is none."""
+        self.motion.set_move(None)
+
+    async def acquire_lease(self) -> int:
+        """Take the right to drive this robot, on behalf of this program.
+
+        Any operator takes it away by driving.
+
+        Returns:
+            The lease's epoch.
+
+        Raises:
+            NoLease: If somebody else drives.
+
+        """
+        return await asyncio.wrap_future(self.motion.take())
+
+    def release_lease(self) -> None:
+        """Give the right to drive back; the robot is stopped if it moves."""
+        self.motion.release()
+
+    def twist(
+        self,
+        x: float,
+        y: float = 0.0,
+        z: float = 0.0,
+        rx: float = 0.0,
+        ry: float = 0.0,
+        rz: float = 0.0,
+    ) -> None:
+        """Give one velocity, which holds until it is old: 0.2 s at the most.
+
+        It goes through the gate like every other, so the program needs the lease, and
+        the speed in force bounds it. Whoever wants the robot to go on calls again, at
+        20 Hz, say.
+
+        Args:
+            x: Metres per second forward.
+            y: Metres per second to the left.
+            z: Upward; the gate moves robots in the plane and leaves it out.
+            rx: About x; left out likewise.
+            ry: About y; left out likewise.
+            rz: Radians per second, counter-clockwise.
+
+        Raises:
+            NoLease: If the program does not hold the lease.
+
+        """
+        self.motion.twist(Twist(x, y, rz))
+
+    def move(self, position: Position, orientation: Orientation) -> None:
+        """Send the robot to a pose, by its own navigation.
+
+        Args:
+            position: Where the base link is to be, in metres in the goal frame.
+            orientation: Its orientation there.
+
+        Raises:
+            NoLease: If the program does not hold the lease.
+
+        """
+        o = orientation
+        self.motion.move(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+
+    def cancel(self) -> None:
+        """Call off the robot's goals."""
+        self.motion.cancel()
+
+    def stop(self) -> None:
+        """Stop the robot, whoever drives it, and call off its goals."""
+        self.motion.stop()
+
+    # Plain data.
+
+    @classmethod
+    def from_dict(
+        cls, data: Mapping[str, Any], bridges: Mapping[str, Bridge] | None = None
+    ) -> "Robot":
+        """Make a robot with its topics and modules from plain data.
+
+        Args:
+            data: As :meth:`to_dict` returns it, or a table of a TOML file.
+            bridges: Bridges by name or URL, to be shared; others are made.
+
+        Raises:
+            ConfigError: If a key or a value is not understood; it is named.
+
+        """
+        from webmap.core.plain import robot_from_dict
+
+        return robot_from_dict(cls, data, bridges)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the robot, its topics and its modules as plain data."""
+        from webmap.core.plain import robot_to_dict
+
+        return robot_to_dict(self)
+
+    # What others tell it.
+
+    def report_error(self, text: str) -> None:
+        """Log a failure, keep it in :attr:`error` and show it on every map."""
+        message = f"{self.name}: {text}"
+        log.warning("%s", message)
+        self.error = text
+        for map in self.maps:
+            map.report_error(message)
+
+    def on_map(self, map: "Map", shown: bool) -> None:
+        """Note that a map shows this robot, or does so no more."""
+        if shown:
+            self.maps.append(map)
+        else:
+            self.maps.remove(map)
+        self.update_selected()
+
+    def update_selected(self) -> None:
+        """Look whether any map has the robot selected and fire ``on_select``."""
+        selected = any(map.selected is self for map in self.maps)
+        if selected != self.selected:
+            self.selected = selected
+            self.notify_modules("on_select", selected)
+
+    def on_gate_report(self, report: RobotReport) -> None:
+        """Keep what the gate says of this robot and fire ``on_report``."""
+        self.report = report
+        self.notify_modules("on_report", report)
+
+    def on_written(self, kind: str, message: dict[str, Any]) -> None:
+        """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote."""
+        self.notify_modules(f"on_send_{kind}", message)
+
+    def _on_pose(self, reading: PoseReading) -> None:
+        self.pose_stamp = time.monotonic()
+        self.svg.set_age(0.0, limit=POSE_LIMIT)
+        if self._feed is not None and self._feed.type == "nav_msgs/Odometry":
+            self.motion.set_odometry(
+                self._feed.bridge, self._feed.topic, self._feed.type
+            )
+        changed = (
+            reading.position != self.position
+            or reading.orientation != self.orientation
+            or reading.twist != self.measured_twist
+            or not self.valid
+        )
+        if not changed:
+            return
+        self.position, self.orientation = reading.position, reading.orientation
+        self.measured_twist = reading.twist
+        self.svg.set_pose(self.position.x, self.position.y, self.yaw)
+        if not self.valid:
+            self.valid = True
+            self.svg.classes.remove("unplaced")
+        self.notify_modules("on_odometry_update")
+
+
+def default_model() -> Element:
+    """Return an arrowhead of 0.5 m that points along x."""
+    return svg.path(d="M0.25 0L-0.2 0.18L-0.1 0L-0.2 -0.18Z", class_="model")

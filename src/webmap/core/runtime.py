@@ -1,0 +1,198 @@
+"""The model's thread: one event loop with everything that a user touches.
+
+User code, callbacks and the robots' data live in this one thread, so nothing in it
+needs a lock. The web thread hands over what came from pages and takes finished bytes.
+"""
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+from webmap.core.motion import MotionRoad, roads
+from webmap.core.robot import robots
+from webmap.core.tasks import spawn
+from webmap.gate.messages import RobotReport, SentGoal, SentTwist
+from webmap.geometry import Quaternion
+from webmap.lifecycle import lifecycle
+from webmap.scope import Removal
+
+if TYPE_CHECKING:
+    from webmap.gate.client import GateClient
+
+log = logging.getLogger("webmap")
+
+TICK = 0.05
+"""Seconds between two frames for viewers: 20 Hz."""
+
+
+class Watcher(Protocol):
+    """Somebody who looks: a page, as a rule."""
+
+    def tick(self, now: float) -> None:
+        """Take what changed, at the loop's monotonic time ``now``."""
+
+
+class Runtime:
+    """The model's thread, its tick, and the gate."""
+
+    def __init__(self) -> None:
+        self.gate: GateClient | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+        self._watchers: dict[int, Watcher] = {}
+        self._on_stop: list[Callable[[], None]] = []
+        self._looked_at = asyncio.Event()
+        self._ending = asyncio.Event()
+
+    @property
+    def running(self) -> bool:
+        """Whether the model's thread runs."""
+        return self._thread is not None
+
+    def start(self) -> None:
+        """Start the model's thread and the gate; return when both are up.
+
+        The second call does nothing.
+        """
+        if self._thread is not None:
+            return
+        self._looked_at, self._ending = asyncio.Event(), asyncio.Event()
+        ready = threading.Event()
+        failure: list[BaseException] = []
+        self._thread = threading.Thread(
+            target=self._run, args=(ready, failure), name="webmap-model", daemon=True
+        )
+        self._thread.start()
+        ready.wait()
+        if failure:
+            self._thread.join()
+            self._thread = None
+            raise failure[0]
+
+    def stop(self) -> None:
+        """Stop driven robots, close every link and end the thread."""
+        thread, self._thread = self._thread, None
+        if thread is None or self._loop is None:
+            return
+        self._loop.call_soon_threadsafe(self._ending.set)
+        thread.join(10.0)
+
+    def call(self, fn: Callable[..., object], /, *args: Any) -> None:
+        """Call ``fn`` in the model's thread, soon.
+
+        Raises:
+            RuntimeError: If WebMap has not been started.
+
+        """
+        loop = self._loop
+        if loop is None:
+            raise RuntimeError("WebMap has not been started: call webmap.start()")
+        loop.call_soon_threadsafe(fn, *args)
+
+    def on_stop(self, fn: Callable[[], None]) -> None:
+        """Call ``fn`` in the model's thread whenever it is about to end."""
+        self._on_stop.append(fn)
+
+    def watch(self, watcher: Watcher) -> Removal:
+        """Tick ``watcher`` until the removal; called in the model's thread."""
+        self._watchers[id(watcher)] = watcher
+        self._looked_at.set()
+
+        def undo() -> None:
+            self._watchers.pop(id(watcher), None)
+            if not self._watchers:
+                self._looked_at.clear()
+
+        return Removal(undo)
+
+    def _run(self, ready: threading.Event, failure: list[BaseException]) -> None:
+        try:
+            with asyncio.Runner(loop_factory=_new_loop) as runner:
+                runner.run(self._live(ready))
+        except BaseException as error:
+            failure.append(error)
+            log.exception("the model's thread ended")
+        finally:
+            self._loop = None
+            ready.set()
+
+    async def _live(self, ready: threading.Event) -> None:
+        from webmap.gate.client import GateClient
+
+        loop = self._loop = asyncio.get_running_loop()
+        gate = self.gate = GateClient()
+        gate.on_report(lambda report: loop.call_soon_threadsafe(self._heard, report))
+        gate.start()
+        try:
+            lifecycle.begin(loop)
+            MotionRoad.gate = gate
+            for road in list(roads):
+                road.declare()
+            ready.set()
+            ticking = spawn(self._tick_on())
+            await self._ending.wait()
+            ticking.cancel()
+        finally:
+            for fn in self._on_stop:
+                fn()
+            MotionRoad.gate = None
+            await asyncio.to_thread(gate.stop)
+            self.gate = None
+            await lifecycle.end()
+
+    async def _tick_on(self) -> None:
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while True:
+            await self._looked_at.wait()
+            now = loop.time()
+            due = max(due + TICK, now)
+            for watcher in list(self._watchers.values()):
+                try:
+                    watcher.tick(now)
+                except Exception:
+                    log.exception("a frame for %r failed", watcher)
+            await asyncio.sleep(max(0.0, due - loop.time()))
+
+    def _heard(self, report: object) -> None:
+        name = getattr(report, "robot", None)
+        robot = None if name is None else robots.get(name)
+        if robot is None:
+            return
+        if isinstance(report, RobotReport):
+            robot.on_gate_report(report)
+        elif isinstance(report, SentTwist):
+            robot.on_written("twist", twist_message(report))
+        elif isinstance(report, SentGoal):
+            robot.on_written("move", goal_message(report))
+
+
+def twist_message(sent: SentTwist) -> dict[str, Any]:
+    """Return what was written as ``geometry_msgs/Twist`` has it."""
+    return {
+        "linear": {"x": sent.vx, "y": sent.vy, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": sent.wz},
+    }
+
+
+def goal_message(sent: SentGoal) -> dict[str, Any]:
+    """Return what was written as ``geometry_msgs/Pose`` has it."""
+    q = Quaternion.from_yaw(sent.yaw)
+    return {
+        "position": {"x": sent.x, "y": sent.y, "z": 0.0},
+        "orientation": {"x": q.x, "y": q.y, "z": q.z, "w": q.w},
+    }
+
+
+def _new_loop() -> asyncio.AbstractEventLoop:
+    try:
+        import uvloop
+    except ImportError:
+        return asyncio.new_event_loop()
+    return uvloop.new_event_loop()
+
+
+runtime = Runtime()
+"""The one model of this process."""

@@ -1,0 +1,36 @@
+"""The name of the selected robot, somewhere on the page."""
+
+from typing import TYPE_CHECKING
+
+from webmap.scene.element import Element
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class ShowSelected:
+    """Shows the name of the selected robot in an element of the page.
+
+    Args:
+        map: The map.
+        element: The element; all that it holds is replaced by the name.
+        default_msg: What it shows when no robot is selected.
+
+    """
+
+    def __init__(
+        self, map: "Map", element: Element, default_msg: str = "No selection"
+    ) -> None:
+        self.map = map
+        self.element = element
+        self.default_msg = default_msg
+        self.on_select()
+
+    def destroy(self) -> None:
+        """Clear the element."""
+        self.element.text = ""
+
+    def on_select(self) -> None:
+        """Show the robot that is selected now."""
+        selected = self.map.selected
+        self.element.text = self.default_msg if selected is None else selected.name

@@ -1,0 +1,103 @@
+"""A page with a channel that writes down what it is asked."""
+
+import itertools
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from webmap.core.page import Page, PageEntry
+
+
+@dataclass
+class Channel:
+    """Writes down every call, in order."""
+
+    calls: list[tuple[Any, ...]] = field(default_factory=list)
+    mounted: dict[int, Any] = field(default_factory=dict)
+    listening: set[tuple[int, int, str]] = field(default_factory=set)
+    numbers: Any = field(default_factory=lambda: itertools.count(1))
+
+    def mount(self, fragment, *, under, order=0, within=None):
+        number = next(self.numbers)
+        self.mounted[number] = fragment
+        return number
+
+    def unmount(self, mount):
+        del self.mounted[mount]
+
+    def set_class(self, mount, name, on):
+        self.calls.append(("class", self.mounted[mount], name, on))
+
+    def listen(self, mount, element, event, *, prevent, stop):
+        self.listening.add((mount, element, event))
+
+    def unlisten(self, mount, element, event):
+        self.listening.discard((mount, element, event))
+
+    def view(self, map_element, operation, *args):
+        self.calls.append((operation, *args))
+
+    def attach(self, map_element, instance, module_url, options, css_url=None):
+        self.calls.append(("attach", instance, module_url, options))
+
+    def detach(self, instance):
+        self.calls.append(("detach", instance))
+
+    def send(self, instance, message):
+        self.calls.append(("send", instance, message))
+
+    def error(self, text):
+        self.calls.append(("error", text))
+
+    @property
+    def errors(self) -> list[str]:
+        return [call[1] for call in self.calls if call[0] == "error"]
+
+
+@dataclass(frozen=True)
+class Someone:
+    id: str = "v1"
+    name: str = "Ann"
+    role: str = "operator"
+
+
+class Publisher:
+    def __init__(self) -> None:
+        self.images: list[str] = []
+
+    def publish_file(self, path: Path) -> str:
+        return f"/_webmap/files/{path.name}"
+
+    def publish_image(self, image: Path) -> str:
+        from webmap.errors import ConfigError
+
+        if not image.is_file():
+            raise ConfigError(f"there is no file {str(image)!r}")
+        self.images.append(image.name)
+        return f"/_webmap/images/{image.name}"
+
+    def withdraw_image(self, url: str) -> None:
+        self.images.remove(url.rpartition("/")[2])
+
+
+@pytest.fixture
+def publisher() -> Publisher:
+    return Publisher()
+
+
+@pytest.fixture
+def channel() -> Channel:
+    return Channel()
+
+
+@pytest.fixture
+def page(channel: Channel, publisher: Publisher, tmp_path: Path) -> Page:
+    entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
+    return Page(entry, channel, Someone(), publisher, {"webmap_container": (700, 500)})
+
+
+@pytest.fixture
+def container(page: Page):
+    return page.element("webmap_container")

@@ -1,0 +1,140 @@
+"""Modules: any object, by name, and never at another's cost."""
+
+import pytest
+
+from webmap import Extendable, Namespace, Robot
+from webmap.errors import ModuleNotFound
+from webmap.scope import Removal, keep
+
+
+@pytest.fixture
+def namespace() -> Namespace:
+    return Namespace("test")
+
+
+def test_a_module_is_constructed_with_its_owner_and_the_arguments(namespace):
+    @namespace.register
+    class Horn:
+        def __init__(self, owner, tone, *, loud=False) -> None:
+            self.made_with = (owner, tone, loud)
+
+    owner = Extendable(namespace)
+    module = owner.add_module("Horn", 440, loud=True)
+    assert module.made_with == (owner, 440, True)
+    assert owner.modules == [module]
+
+
+def test_an_unknown_name_lists_what_there_is_and_the_nearest(namespace):
+    namespace.register(dict, name="Horn")
+    namespace.register(list, name="Lamp")
+    with pytest.raises(ModuleNotFound, match=r"'Hron'.*mean 'Horn'.*Horn, Lamp"):
+        Extendable(namespace).add_module("Hron")
+
+
+def test_the_built_in_modules_are_found_by_name():
+    import webmap
+
+    assert {"MouseViewControl", "MapViewControl", "ShowSelected", "Teleop"} <= set(
+        webmap.modules.map.namespace.names()
+    )
+    assert "LaserScanner" in dir(webmap.modules.robot)
+    view_control = webmap.modules.map.MouseViewControl
+    assert view_control is webmap.modules.map.MapViewControl
+
+
+def test_a_name_is_taken_only_once(namespace):
+    namespace.register(dict, name="Horn")
+    with pytest.raises(ValueError, match="already registered as builtins.dict"):
+        namespace.register(list, name="Horn")
+
+
+def test_removing_a_module_destroys_it_and_releases_what_it_made(namespace):
+    gone = []
+
+    class Tidy:
+        def __init__(self, owner) -> None:
+            keep(Removal(lambda: gone.append("listener")))
+
+        def destroy(self):
+            gone.append("destroyed")
+
+    owner = Extendable(namespace)
+    module = owner.add_module(Tidy)
+    owner.remove_module(module)
+    assert gone == ["destroyed", "listener"]
+    with pytest.raises(ValueError, match="not a module"):
+        owner.remove_module(module)
+
+
+def test_a_module_whose_constructor_raises_leaves_nothing(namespace):
+    gone = []
+
+    def broken(owner):
+        keep(Removal(lambda: gone.append("listener")))
+        raise RuntimeError("no")
+
+    owner = Extendable(namespace)
+    with pytest.raises(RuntimeError):
+        owner.add_module(broken)
+    assert owner.modules == []
+    assert gone == ["listener"]
+
+
+def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
+    heard, reported = [], []
+
+    class Bad:
+        def __init__(self, owner) -> None:
+            pass
+
+        def on_ring(self, n):
+            raise RuntimeError("flat battery")
+
+    class Good(Bad):
+        def on_ring(self, n):
+            heard.append(n)
+
+    class Owner(Extendable):
+        def report_error(self, text):
+            reported.append(text)
+
+    owner = Owner(namespace)
+    owner.add_module(Bad)
+    owner.add_module(Good)
+    owner.notify_modules("on_ring", 3)
+    owner.notify_modules("on_silence")
+    assert heard == [3]
+    assert reported == ["Bad.on_ring failed: RuntimeError: flat battery"]
+
+
+def test_modules_may_fire_triggers_of_their_own():
+    heard = []
+
+    class Bumper:
+        def __init__(self, robot) -> None:
+            self.robot = robot
+
+        def hit(self):
+            self.robot.notify_modules("on_bump", "left")
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_bump(self, side):
+            heard.append(side)
+
+    robot = Robot("Bob")
+    robot.add_module(Listener)
+    robot.add_module(Bumper).hit()
+    assert heard == ["left"]
+
+
+def test_a_subclass_may_have_a_namespace_of_its_own(namespace):
+    namespace.register(lambda owner: "a wheel", name="Wheel")
+
+    class Cart(Robot):
+        def __init__(self, name) -> None:
+            super().__init__(name, namespace=namespace)
+
+    assert Cart("cart").add_module("Wheel") == "a wheel"

@@ -1,0 +1,315 @@
+"""What a robot promises: the seed's chapter 5.3."""
+
+import asyncio
+import contextlib
+import math
+
+import pytest
+
+from webmap import Robot, svg
+from webmap.core.runtime import goal_message, twist_message
+from webmap.errors import ConfigError, MotionError
+from webmap.gate.messages import SentGoal, SentTwist
+from webmap.ros import messages
+from webmap.scope import Removal, Scope
+
+
+class Link:
+    """A bridge that is open at once and says what it is told to say."""
+
+    url = "ws://test:9090"
+
+    def __init__(self, **types: str) -> None:
+        self.types = {f"/{topic}": type for topic, type in types.items()}
+        self.subscribed: list[tuple] = []
+        self.protected: set[str] = set()
+
+    def on_open(self, fn):
+        with contextlib.suppress(RuntimeError):
+            asyncio.get_running_loop().call_soon(fn)
+        return Removal(lambda: None)
+
+    async def topic_type(self, topic):
+        return self.types.get(topic)
+
+    def subscribe(self, topic, callback, type=None, *, throttle=0, decode=None, **kw):
+        entry = (topic, callback, type, throttle, decode)
+        self.subscribed.append(entry)
+        return Removal(lambda: self.subscribed.remove(entry))
+
+    def protect(self, topic):
+        self.protected.add(topic)
+
+    def say(self, topic, message):
+        for name, callback, _, _, decode in tuple(self.subscribed):
+            if name == topic:
+                if decode is not None:
+                    import msgspec
+
+                    callback(msgspec.convert(message, decode, strict=False))
+                else:
+                    callback(message)
+
+
+async def settle():
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+def pose(x=1.0, y=2.0, yaw=math.pi / 2, **more):
+    q = {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)}
+    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": q, **more}
+
+
+HEADER = {"seq": 1, "stamp": {"secs": 0, "nsecs": 0}, "frame_id": "map"}
+ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+SHAPES = {
+    "geometry_msgs/Pose": pose(),
+    "geometry_msgs/PoseStamped": {"header": HEADER, "pose": pose()},
+    "geometry_msgs/PoseWithCovarianceStamped": {
+        "header": HEADER,
+        "pose": {"pose": pose(), "covariance": [0.0] * 36},
+    },
+    "geometry_msgs/Pose2D": {"x": 1.0, "y": 2.0, "theta": math.pi / 2},
+    "nav_msgs/Odometry": {
+        "header": HEADER,
+        "child_frame_id": "base_link",
+        "pose": {"pose": pose(), "covariance": [0.0] * 36},
+        "twist": {"twist": {"linear": {**ZERO, "x": 0.5}, "angular": ZERO}},
+    },
+}
+
+
+@pytest.mark.parametrize("known", ["rosapi knows the type", "only the shape tells"])
+@pytest.mark.parametrize("type_name", SHAPES)
+def test_a_robot_follows_each_type_of_pose(type_name, known):
+    async def scenario():
+        link = Link(odom=type_name) if known.startswith("rosapi") else Link()
+        robot = Robot("Bob")
+        robot.set_odometry_topic(link, "/odom", throttle=50)
+        await settle()
+        link.say("/odom", SHAPES[type_name])
+        assert robot.valid
+        assert (robot.position.x, robot.position.y) == (1.0, 2.0)
+        assert robot.angle == pytest.approx(90.0)
+        assert robot.yaw == pytest.approx(math.pi / 2)
+        (topic, _, asked, throttle, _) = link.subscribed[0]
+        assert (topic, asked, throttle) == ("/odom", type_name, 50)
+        assert len(link.subscribed) == 1
+        robot.destroy()
+        assert link.subscribed == []
+
+    asyncio.run(scenario())
+
+
+def test_a_ros_2_type_name_is_the_same_type():
+    async def scenario():
+        link = Link(odom="nav_msgs/msg/Odometry")
+        robot = Robot("Bob")
+        robot.set_odometry_topic(link, "/odom")
+        await settle()
+        assert link.subscribed[0][4] is messages.OdometryMsg
+
+    asyncio.run(scenario())
+
+
+def test_a_topic_of_another_type_is_a_clear_error():
+    async def scenario():
+        link = Link(odom="std_msgs/String")
+        robot = Robot("Bob")
+        robot.set_odometry_topic(link, "/odom")
+        await settle()
+        assert "std_msgs/String" in robot.error
+        assert "these do: nav_msgs/Odometry" in robot.error
+        assert link.subscribed == []
+
+    asyncio.run(scenario())
+
+
+def test_a_message_of_another_shape_is_a_clear_error():
+    async def scenario():
+        link = Link()
+        robot = Robot("Bob")
+        robot.set_odometry_topic(link, "/odom")
+        await settle()
+        link.say("/odom", {"data": "hello"})
+        assert "with the fields data says nowhere" in robot.error
+        assert not robot.valid
+
+    asyncio.run(scenario())
+
+
+def test_a_type_without_a_pose_is_refused_at_once():
+    with pytest.raises(ConfigError, match="does not say where"):
+        Robot("Bob").set_odometry_topic(Link(), "/odom", type="std_msgs/String")
+
+
+def test_odometry_update_fires_only_when_something_changed():
+    heard = []
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_odometry_update(self):
+            heard.append(1)
+
+    link = Link()
+    robot = Robot("Bob")
+    robot.add_module(Listener)
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    link.say("/odom", pose())
+    link.say("/odom", pose())
+    link.say("/odom", pose(x=3.0))
+    assert len(heard) == 2
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_pose_that_is_no_pose_is_ignored_and_said(bad):
+    link = Link()
+    robot = Robot("Bob")
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    link.say("/odom", pose())
+    link.say("/odom", pose(x=bad))
+    zeros = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
+    link.say("/odom", {**pose(), "orientation": zeros})
+    assert (robot.position.x, robot.position.y) == (1.0, 2.0)
+    assert "ignored" in robot.error
+
+
+def test_a_robot_that_was_never_placed_is_marked_so():
+    link = Link()
+    robot = Robot("Bob")
+    assert "unplaced" in robot.svg.classes
+    assert robot.pose_age is None
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    link.say("/odom", pose())
+    assert "unplaced" not in robot.svg.classes
+    assert robot.pose_age < 10
+
+
+def test_the_group_of_a_robot_names_it_and_holds_its_model():
+    model = svg.circle(r=0.2)
+    robot = Robot("<Bob>", model)
+    assert robot.svg.get("data-name") == "<Bob>"
+    assert robot.svg.get("data-robot") == robot.id
+    assert "robot" in robot.svg.classes
+    assert [child.tag for child in robot.svg.children] == ["title", "circle"]
+    assert robot.svg.children[0].text == "<Bob>"
+
+
+def test_nothing_moves_before_the_start():
+    robot = Robot("Bob")
+    robot.set_twist_topic(Link(), "/cmd_vel")
+    with pytest.raises(MotionError, match="before webmap.start"):
+        robot.twist(1.0)
+
+
+def test_velocity_and_goal_topics_are_protected_on_the_bridge():
+    link = Link()
+    robot = Robot("Bob")
+
+    async def scenario():
+        robot.set_twist_topic(link, "/cmd_vel")
+        robot.set_move_topic(link, "/goal", cancel_topic="/cancel")
+
+    asyncio.run(scenario())
+    assert link.protected == {"/cmd_vel", "/goal", "/cancel"}
+
+
+def test_a_velocity_topic_of_another_type_is_refused():
+    with pytest.raises(ConfigError, match="velocity goes to"):
+        Robot("Bob").set_twist_topic(Link(), "/cmd_vel", type="std_msgs/String")
+
+
+def test_what_the_gate_is_told_of_a_robot():
+    async def scenario():
+        link = Link(cmd_vel="geometry_msgs/msg/TwistStamped")
+        robot = Robot("Bob")
+        robot.set_twist_topic(link, "/cmd_vel", stops_within=0.25, v_max=1.0)
+        robot.set_move_topic(link, "/goal")
+        await settle()
+        spec = robot.motion.spec()
+        assert spec.twist_type == "geometry_msgs/msg/TwistStamped"
+        assert (spec.stops_within, spec.v_max, spec.w_max) == (0.25, 1.0, None)
+        assert (spec.goal_topic, spec.goal_frame) == ("/goal", "map")
+        robot.unadvertise_twist_topic()
+        assert robot.motion.spec().twist_topic is None
+        robot.unadvertise_move_topic()
+        assert robot.motion.spec() is None
+
+    asyncio.run(scenario())
+
+
+def test_triggers_tell_what_the_gate_wrote():
+    heard = []
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_send_twist(self, message):
+            heard.append(message["linear"]["x"])
+
+        def on_send_move(self, message):
+            heard.append(message["position"]["y"])
+
+    robot = Robot("Bob")
+    robot.add_module(Listener)
+    robot.on_written("twist", twist_message(SentTwist(robot.id, 0.5, 0, 0, "c1")))
+    robot.on_written("move", goal_message(SentGoal(robot.id, 1, 2, 3, "c1")))
+    assert heard == [0.5, 2]
+
+
+def test_a_robot_made_for_a_page_ends_with_it():
+    link = Link()
+    scope = Scope()
+    with scope.active():
+        robot = Robot("Bob")
+        robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    assert len(link.subscribed) == 1
+    scope.close()
+    assert link.subscribed == []
+
+
+def test_a_topic_set_for_a_shared_robot_outlives_the_page_that_set_it():
+    link = Link()
+    robot = Robot("Bob")
+    with Scope().active() as scope:
+        robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    scope.close()
+    assert len(link.subscribed) == 1
+
+
+def test_a_robot_is_plain_data_and_back():
+    link = Link()
+
+    async def scenario():
+        robot = Robot("Bob", svg.g(svg.circle(r=0.2, fill="red")))
+        robot.svg.classes.add("big")
+        robot.set_odometry_topic(link, "/odom", 50, type="nav_msgs/Odometry")
+        robot.set_twist_topic(link, "/cmd_vel", stops_within=0.25)
+        robot.set_move_topic(link, "/goal")
+        data = robot.to_dict()
+        again = Robot.from_dict(data, {link.url: link})
+        assert again.to_dict() == data
+        assert data["classes"] == ["big"]
+        assert data["twist"]["stops_within"] == 0.25
+        assert data["model"]["children"][0]["attributes"]["fill"] == "red"
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ({}, "missing required field `name`"),
+        ({"name": "Bob", "odom": {}}, "unknown field `odom`"),
+        ({"name": "Bob", "odometry": {"bridge": "ws://x"}}, "field `topic`"),
+        ({"name": "Bob", "modules": [{"name": 3}]}, "Expected `str`"),
+        ({"name": "Bob", "model": {"r": 1}}, "with a tag"),
+    ],
+)
+def test_plain_data_that_is_wrong_is_named(data, said):
+    with pytest.raises(ConfigError, match=said):
+        Robot.from_dict(data)
