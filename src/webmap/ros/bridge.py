@@ -17,6 +17,7 @@ from webmap.ros.connection import Lane, State
 from webmap.ros.events import CallService, Event, Malformed, Publish, Status
 from webmap.ros.graph import Graph
 from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
+from webmap.ros.offload import Offload
 from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
 from webmap.ros.publications import Publications
@@ -67,6 +68,7 @@ class Bridge:
         self._publications = Publications()
         self._calls = Calls(self.url)
         self._graph = Graph(self.call_service)
+        self._offload = Offload()
         self._tasks: set[asyncio.Task[None]] = set()
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
@@ -269,6 +271,7 @@ class Bridge:
         if self._lane is not None:
             await self._lane.stop()
         await self._calls.stop()
+        await self._offload.stop()
 
     def _new_topic(self, name: str) -> Topic:
         return Topic(
@@ -360,6 +363,15 @@ class Bridge:
             self._hold(listener)
 
     def _give(self, message: Publish, listeners: list[Subscription]) -> None:
+        if self._offload.wants(message):
+            types = frozenset(listener.decode for listener in listeners)
+            self._offload.decode(
+                message, types, lambda: self._deliver(message, listeners)
+            )
+        else:
+            self._deliver(message, listeners)
+
+    def _deliver(self, message: Publish, listeners: list[Subscription]) -> None:
         for listener in listeners:
             listener.deliver(message)
 

@@ -48,6 +48,10 @@ class Publish:
             raise value
         return value
 
+    def is_decoded(self, type: type[msgspec.Struct] | None) -> bool:
+        """Return whether :meth:`decode` knows its answer already."""
+        return type in self._decoded
+
     def prime(self, type: type[msgspec.Struct] | None, value: Any) -> None:
         """Take over what another process decoded, or the error that it met."""
         self._decoded[type] = value

@@ -1,0 +1,184 @@
+import asyncio
+import os
+import signal
+from pathlib import Path
+
+import msgspec
+import pytest
+from fake_rosbridge import bridged, until
+
+from webmap.errors import ProtocolError
+from webmap.ros import offload, worker
+from webmap.ros.events import Publish
+from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
+from webmap.ros.offload import Offload
+
+CAPTURED = Path(__file__).parent / "captured"
+MAP = (CAPTURED / "ros2/publish_map.ros2.json").read_bytes()
+
+
+class Grid(msgspec.Struct):
+    data: list[int]
+
+
+def run(scenario):
+    asyncio.run(asyncio.wait_for(scenario(), 30))
+    assert offload._shared is None
+
+
+def large(data="x"):
+    padding = "y" * offload.LARGE
+    frame = f'{{"op":"publish","topic":"/a","msg":{{"data":"{data}","p":"{padding}"}}}}'
+    return Publish("/a", frame.encode())
+
+
+async def decoded(message, *types):
+    aside, done = Offload(), asyncio.Event()
+    assert aside.wants(message)
+    aside.decode(message, frozenset(types), done.set)
+    await done.wait()
+    await aside.stop()
+
+
+@pytest.mark.parametrize("view", [None, OccupancyGridMsg, Grid])
+def test_a_large_message_decodes_elsewhere_as_it_would_here(view):
+    async def scenario():
+        here, there = Publish("/map", MAP), Publish("/map", MAP)
+        await decoded(there, view)
+        assert there.is_decoded(view)
+        assert there.decode(view) == here.decode(view)
+
+    run(scenario)
+
+
+def test_a_large_message_of_another_type_says_the_same_elsewhere():
+    async def scenario():
+        message = Publish("/map", MAP)
+        await decoded(message, LaserScanMsg)
+        with pytest.raises(ProtocolError, match="angle_min"):
+            message.decode(LaserScanMsg)
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("view", [None, LaserScanMsg])
+def test_typed_arrays_survive_the_way_through_the_worker(view, monkeypatch):
+    monkeypatch.setattr(offload, "LARGE", 1000)
+    frame = (CAPTURED / "ros1/cbor_scan_inf_nan.bin").read_bytes()
+
+    async def scenario():
+        there = Publish("/robot_0/base_scan", frame)
+        await decoded(there, view)
+        scan = there.decode(view)
+        values = scan["ranges"] if view is None else scan.range_values.values
+        assert len(values) == 720
+        assert values.typecode == "f"
+
+    run(scenario)
+
+
+def test_a_large_frame_that_is_broken_is_an_error_and_the_worker_lives():
+    async def scenario():
+        aside, done = Offload(), []
+        broken, good = Publish("/map", MAP[:-100]), large()
+        for message in (broken, good):
+            aside.decode(message, frozenset([None]), lambda m=message: done.append(m))
+        await until(lambda: done == [broken, good])
+        with pytest.raises(ProtocolError, match="not JSON"):
+            broken.decode()
+        assert good.decode()["data"] == "x"
+        process = offload._shared._process
+        assert process.returncode is None
+        await aside.stop()
+        assert process.returncode is not None
+
+    run(scenario)
+
+
+def test_a_worker_that_dies_costs_one_message():
+    async def scenario():
+        aside, done = Offload(), asyncio.Event()
+        first = large()
+        aside.decode(first, frozenset([None]), done.set)
+        await until(lambda: offload._shared and offload._shared._process)
+        os.kill(offload._shared._process.pid, signal.SIGKILL)
+        await done.wait()
+        done.clear()
+        second = large()
+        aside.decode(second, frozenset([None]), done.set)
+        await done.wait()
+        assert second.decode()["data"] == "x"
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_what_waits_is_replaced_by_what_is_newer_and_order_is_kept():
+    async def scenario():
+        aside, got = Offload(), []
+        small = Publish("/a", b'{"op":"publish","topic":"/a","msg":{"data":"last"}}')
+        for message in (large("1"), large("2"), large("3"), small):
+            assert aside.wants(message)
+            aside.decode(
+                message,
+                frozenset([None]),
+                lambda m=message: got.append(m.decode()["data"]),
+            )
+        await until(lambda: got[-1:] == ["last"])
+        assert got == ["1", "last"]
+        assert not aside.wants(small)
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_two_that_wait_for_one_message_both_get_it():
+    async def scenario():
+        aside, got = Offload(), []
+        message = large()
+        aside.decode(large(), frozenset([None]), lambda: got.append(0))
+        aside.decode(message, frozenset([None]), lambda: got.append(1))
+        aside.decode(message, frozenset([None]), lambda: got.append(2))
+        await until(lambda: len(got) == 3)
+        assert got == [0, 1, 2]
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_a_bridge_hands_over_a_large_map_and_ends_the_worker(caplog):
+    async def scenario():
+        got = []
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/map", got.append, decode=OccupancyGridMsg)
+            await server.send(MAP.decode())
+            await until(lambda: got)
+            assert got[0].cells.shape == (320, 400)
+            process = offload._shared._process
+            assert process.returncode is None
+        assert process.returncode is not None
+
+    run(scenario)
+    assert "lost" not in caplog.text
+
+
+def test_stopping_in_the_middle_leaves_nothing():
+    async def scenario():
+        aside = Offload()
+        aside.decode(large(), frozenset([None]), print)
+        await until(lambda: offload._shared and offload._shared._process)
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_only_types_of_webmap_are_named_to_the_worker():
+    assert worker.view_name(OccupancyGridMsg) == "webmap.ros.messages:OccupancyGridMsg"
+    assert worker.view_name(Grid) is None
+    assert worker.view_name(None) is None
+
+
+def test_the_worker_answers_any_frame():
+    for frame in (b"", b"{", b"\xa1\xff", b"[" * 10000):
+        reply = worker.answer(worker.Request("/a", frame, None))
+        assert reply.error
