@@ -1,3 +1,5 @@
+import { rotate, scale, scaleOf, translate } from "../view.js";
+
 /**
  * What hands do to a view: moves, zooms and turns as arithmetic, without a browser.
  *
@@ -5,13 +7,8 @@
  * one sees them, since y points down on a screen.
  */
 
-/**
- * Takes metres to pixels: `x' = a x + c y + e`, `y' = b x + d y + f`.
- *
- * @typedef {{a: number, b: number, c: number, d: number, e: number, f: number}} Matrix
- */
-
-/** @typedef {readonly [number, number]} Point */
+/** @typedef {import('../view.js').Matrix} Matrix */
+/** @typedef {import('../view.js').Point} Point */
 
 /** @typedef {{min: number, max: number}} Zoom Least and greatest pixels per metre. */
 
@@ -22,24 +19,6 @@ const PIXELS = [1, 16, 400];
 export const DRAG_THRESHOLD = 4;
 
 /**
- * @param {Matrix} view
- * @returns {number} How many pixels a metre is long.
- */
-export function pixelsPerMetre(view) {
-  return Math.sqrt(Math.abs(view.a * view.d - view.b * view.c));
-}
-
-/**
- * @param {Matrix} view
- * @param {number} dx
- * @param {number} dy
- * @returns {Matrix}
- */
-export function move(view, dx, dy) {
-  return { ...view, e: view.e + dx, f: view.f + dy };
-}
-
-/**
  * Zoom and turn about a point that stays where it is.
  *
  * @param {Matrix} view
@@ -48,18 +27,9 @@ export function move(view, dx, dy) {
  * @param {number} angle
  * @returns {Matrix}
  */
-export function zoomAndTurn(view, [x, y], factor, angle) {
-  const cos = factor * Math.cos(angle);
-  const sin = factor * Math.sin(angle);
-  const { a, b, c, d, e, f } = view;
-  return {
-    a: cos * a - sin * b,
-    b: sin * a + cos * b,
-    c: cos * c - sin * d,
-    d: sin * c + cos * d,
-    e: cos * (e - x) - sin * (f - y) + x,
-    f: sin * (e - x) + cos * (f - y) + y,
-  };
+export function zoomAndTurn(view, { x, y }, factor, angle) {
+  // `rotate` counts in degrees, counter-clockwise.
+  return rotate(scale(view, factor, x, y), (-angle * 180) / Math.PI, x, y);
 }
 
 /**
@@ -74,7 +44,7 @@ export function zoomAndTurn(view, [x, y], factor, angle) {
  * @returns {number}
  */
 export function allowedFactor(view, factor, zoom) {
-  const now = pixelsPerMetre(view);
+  const now = scaleOf(view);
   if (!(factor > 0) || !Number.isFinite(factor) || !(now > 0)) return 1;
   const most = Math.max(1, zoom.max / now);
   const least = Math.min(1, zoom.min / now);
@@ -143,63 +113,19 @@ export function pinch(view, from, to, zoom) {
   const factor = known ? allowedFactor(view, after.length / before.length, zoom) : 1;
   const angle = known ? after.angle - before.angle : 0;
   const turned = zoomAndTurn(view, before.middle, factor, angle);
-  return move(
+  return translate(
     turned,
-    after.middle[0] - before.middle[0],
-    after.middle[1] - before.middle[1],
+    after.middle.x - before.middle.x,
+    after.middle.y - before.middle.y,
   );
-}
-
-/**
- * Show a part of the world as large as it goes, turned as the view is now.
- *
- * @param {Matrix} view
- * @param {{x: number, y: number, width: number, height: number}} box In metres.
- * @param {number} width The map's, in pixels.
- * @param {number} height
- * @param {Zoom} zoom
- * @returns {Matrix} The same view when the box is empty.
- */
-export function fit(view, box, width, height, zoom) {
-  const corners = [0, 1, 2, 3].map((i) =>
-    apply(view, box.x + (i & 1) * box.width, box.y + (i >> 1) * box.height),
-  );
-  const xs = corners.map(([x]) => x);
-  const ys = corners.map(([, y]) => y);
-  const [left, right, top, bottom] = [
-    Math.min(...xs),
-    Math.max(...xs),
-    Math.min(...ys),
-    Math.max(...ys),
-  ];
-  const room = 0.92 * Math.min(width / (right - left), height / (bottom - top));
-  if (!(room > 0) || !Number.isFinite(room)) return view;
-  /** @type {Point} */
-  const middle = [(left + right) / 2, (top + bottom) / 2];
-  const factor = allowedFactor(view, room, zoom);
-  return move(
-    zoomAndTurn(view, middle, factor, 0),
-    width / 2 - middle[0],
-    height / 2 - middle[1],
-  );
-}
-
-/**
- * @param {Matrix} view
- * @param {number} x
- * @param {number} y
- * @returns {Point}
- */
-function apply({ a, b, c, d, e, f }, x, y) {
-  return [a * x + c * y + e, b * x + d * y + f];
 }
 
 /** @param {readonly [Point, Point]} points */
-function between([[x0, y0], [x1, y1]]) {
+function between([one, other]) {
+  const [dx, dy] = [other.x - one.x, other.y - one.y];
   return {
-    /** @type {Point} */
-    middle: [(x0 + x1) / 2, (y0 + y1) / 2],
-    length: Math.hypot(x1 - x0, y1 - y0),
-    angle: Math.atan2(y1 - y0, x1 - x0),
+    middle: { x: one.x + dx / 2, y: one.y + dy / 2 },
+    length: Math.hypot(dx, dy),
+    angle: Math.atan2(dy, dx),
   };
 }

@@ -1,18 +1,17 @@
+import { fit, translate } from "../view.js";
 import {
   DRAG_THRESHOLD,
   allowedFactor,
-  fit,
-  move,
   pinch,
   wheelAngle,
   wheelFactor,
   zoomAndTurn,
 } from "./gestures.js";
 
-/** @typedef {import('./gestures.js').Matrix} Matrix */
-/** @typedef {import('./gestures.js').Point} Point */
-/** @typedef {import('./half.js').MapCanvas} MapCanvas */
-/** @typedef {import('./half.js').Half} Half */
+/** @typedef {import('../view.js').Matrix} Matrix */
+/** @typedef {import('../view.js').Point} Point */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../halves.js').Half} Half */
 
 /** What a key press zooms by, and turns by in radians. */
 const KEY_FACTOR = 1.25;
@@ -49,7 +48,7 @@ class MouseViewControl {
      */
     this._pointers = new Map();
     /** @type {Point} */
-    this._start = [0, 0];
+    this._start = { x: 0, y: 0 };
     this._dragging = false;
     this._ending = new AbortController();
     this._listen(map.svg);
@@ -82,27 +81,13 @@ class MouseViewControl {
     svg.addEventListener("dragstart", (event) => event.preventDefault(), { signal });
   }
 
-  /**
-   * @param {MouseEvent} event
-   * @returns {Point}
-   */
-  _point(event) {
-    const { left, top } = this._map.svg.getBoundingClientRect();
-    return [event.clientX - left, event.clientY - top];
-  }
-
-  /** @param {Matrix} view */
-  _set(view) {
-    this._map.setView(view, { user: true });
-  }
-
   /** @param {PointerEvent} event */
   _down(event) {
     if (event.pointerType === "mouse" && event.button > 1) return;
     // The middle button scrolls the page by itself otherwise.
     if (event.button === 1) event.preventDefault();
-    this._pointers.set(event.pointerId, this._point(event));
-    if (this._pointers.size === 1) this._start = this._point(event);
+    this._pointers.set(event.pointerId, this._map.pointOf(event));
+    if (this._pointers.size === 1) this._start = this._map.pointOf(event);
     else if (this._pointers.size === 2) this._drag(event);
   }
 
@@ -115,9 +100,9 @@ class MouseViewControl {
       this._up(event, false);
       return;
     }
-    const to = this._point(event);
+    const to = this._map.pointOf(event);
     if (!this._dragging) {
-      const way = Math.hypot(to[0] - this._start[0], to[1] - this._start[1]);
+      const way = Math.hypot(to.x - this._start.x, to.y - this._start.y);
       if (way < DRAG_THRESHOLD) return;
       this._drag(event);
     }
@@ -133,8 +118,9 @@ class MouseViewControl {
   _follow(id, from, to) {
     const { view } = this._map;
     const [other] = [...this._pointers].filter(([pointer]) => pointer !== id);
-    if (other) this._set(pinch(view, [from, other[1]], [to, other[1]], this._zoom));
-    else this._set(move(view, to[0] - from[0], to[1] - from[1]));
+    if (other) {
+      this._map.setView(pinch(view, [from, other[1]], [to, other[1]], this._zoom));
+    } else this._map.setView(translate(view, to.x - from.x, to.y - from.y));
   }
 
   /** @param {PointerEvent} event */
@@ -161,14 +147,13 @@ class MouseViewControl {
     event.preventDefault();
     const turning = event.shiftKey && !event.ctrlKey;
     const factor = turning ? 1 : wheelFactor(event);
-    this._about(this._point(event), factor, turning ? wheelAngle(event) : 0);
+    this._about(this._map.pointOf(event), factor, turning ? wheelAngle(event) : 0);
   }
 
   /** @param {KeyboardEvent} event */
   _key(event) {
     if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing) return;
-    /** @type {Point} */
-    const middle = [this._map.width / 2, this._map.height / 2];
+    const middle = { x: this._map.width / 2, y: this._map.height / 2 };
     if (event.key === "+" || event.key === "=") this._about(middle, KEY_FACTOR, 0);
     else if (event.key === "-") this._about(middle, 1 / KEY_FACTOR, 0);
     else if (event.key === "[") this._about(middle, 1, -KEY_ANGLE);
@@ -185,11 +170,16 @@ class MouseViewControl {
    */
   _about(point, factor, angle) {
     const { view } = this._map;
-    this._set(zoomAndTurn(view, point, allowedFactor(view, factor, this._zoom), angle));
+    this._map.setView(
+      zoomAndTurn(view, point, allowedFactor(view, factor, this._zoom), angle),
+    );
   }
 
   _showAll() {
     const { view, world, width, height } = this._map;
-    this._set(fit(view, world.getBBox(), width, height, this._zoom));
+    const box = world.getBBox();
+    if (box.width === 0 && box.height === 0) return;
+    const [right, top] = [box.x + box.width, box.y + box.height];
+    this._map.setView(fit(view, [box.x, box.y, right, top], width, height));
   }
 }

@@ -1,7 +1,8 @@
 import { html, say } from "./elements.js";
+import { lay } from "./overlay.js";
 
-/** @typedef {import('./half.js').MapCanvas} MapCanvas */
-/** @typedef {import('./half.js').Half} Half */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../halves.js').Half} Half */
 
 /**
  * Show where the pointer is, in metres of the map.
@@ -17,22 +18,21 @@ export default function attach(map, { digits = 2 }) {
     "aria-label": "Pointer position in metres",
   });
   output.hidden = true;
-  map.overlay.append(output);
+  const take = lay(map, output);
 
   /** @type {{x: number, y: number} | null} */
   let pointer = null;
   const show = () => {
     output.hidden = pointer === null;
     if (pointer === null) return;
-    const [x, y] = map.toWorld(pointer.x, pointer.y);
+    const { x, y } = map.toWorld(pointer.x, pointer.y);
     say(output, `x ${metres(x, digits)}  y ${metres(y, digits)} m`);
   };
 
   const ending = new AbortController();
   const { signal } = ending;
   const move = (/** @type {PointerEvent} */ event) => {
-    const { left, top } = map.svg.getBoundingClientRect();
-    pointer = { x: event.clientX - left, y: event.clientY - top };
+    pointer = map.pointOf(event);
     show();
   };
   const leave = () => {
@@ -46,7 +46,7 @@ export default function attach(map, { digits = 2 }) {
     destroy() {
       ending.abort();
       off();
-      output.remove();
+      take();
     },
   };
 }

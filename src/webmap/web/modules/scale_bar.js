@@ -1,8 +1,9 @@
+import { scaleOf } from "../view.js";
 import { html, svg } from "./elements.js";
-import { pixelsPerMetre } from "./gestures.js";
+import { lay } from "./overlay.js";
 
-/** @typedef {import('./half.js').MapCanvas} MapCanvas */
-/** @typedef {import('./half.js').Half} Half */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../halves.js').Half} Half */
 
 /**
  * Return the longest round length that fits.
@@ -47,11 +48,11 @@ export default function attach(map, { width = 120 }) {
     line,
   );
   const element = html("div", "webmap-panel webmap-scale-bar", {}, text, drawing);
-  map.overlay.append(element);
+  const take = lay(map, element);
 
   let shown = NaN;
   const show = () => {
-    const scale = pixelsPerMetre(map.view);
+    const scale = scaleOf(map.view);
     if (scale === shown) return;
     shown = scale;
     const length = roundLength(scale, width);
@@ -66,7 +67,7 @@ export default function attach(map, { width = 120 }) {
   return {
     destroy() {
       off();
-      element.remove();
+      take();
     },
   };
 }

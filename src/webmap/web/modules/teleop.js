@@ -1,10 +1,11 @@
 import { deskOf } from "../inputs/desk.js";
 import { capOf, describe } from "../motion/status.js";
 import { button, html, say } from "./elements.js";
+import { lay, overlayOf } from "./overlay.js";
 
-/** @typedef {import('./half.js').MapCanvas} MapCanvas */
-/** @typedef {import('./half.js').Send} Send */
-/** @typedef {import('./half.js').Half} Half */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {(message: object) => void} Send */
+/** @typedef {import('../halves.js').Half} Half */
 
 /** From this loop age on it is said aloud, in ms. */
 const SLOW = 150;
@@ -34,12 +35,14 @@ class Teleop {
    */
   constructor(map, { holonomic = false }, send) {
     this._map = map;
+    /** @type {import('../drive.js').Drive} */
+    this._drive = map.drive;
     this._panel = new Panel({
       stop: () => this._stop(),
       lease: () => this._lease(),
     });
-    map.overlay.append(this._panel.element);
-    this._desk = deskOf(map.drive);
+    const take = lay(map, this._panel.element);
+    this._desk = deskOf(this._drive);
     this._seat = {
       map,
       holonomic,
@@ -51,18 +54,19 @@ class Teleop {
     };
     this._ending = new AbortController();
     const touched = { capture: true, signal: this._ending.signal };
-    for (const part of [map.svg, map.overlay]) {
+    for (const part of [map.svg, overlayOf(map)]) {
       for (const kind of ["pointerdown", "focusin"]) {
-        part.addEventListener(kind, () => this._desk.activate(this._seat), touched);
+        part?.addEventListener(kind, () => this._desk.activate(this._seat), touched);
       }
     }
     const show = () => this._show();
     this._offs = [
+      take,
       this._desk.sit(this._seat),
       map.onSelect(() => this._select()),
-      map.drive.on("step", show),
-      map.drive.on("state", show),
-      map.drive.on("robot", show),
+      this._drive.on("step", show),
+      this._drive.on("state", show),
+      this._drive.on("robot", show),
     ];
     this._show();
   }
@@ -70,12 +74,11 @@ class Teleop {
   destroy() {
     this._ending.abort();
     for (const off of this._offs) off();
-    this._panel.element.remove();
   }
 
   get _report() {
     const robot = this._map.selected;
-    return robot === null ? null : (this._map.drive.robots.get(robot) ?? null);
+    return robot === null ? null : (this._drive.robots.get(robot) ?? null);
   }
 
   _select() {
@@ -84,20 +87,20 @@ class Teleop {
   }
 
   _stop() {
-    const robot = this._map.drive.status.driven ?? this._map.selected;
-    if (robot !== null) this._map.drive.stop(robot);
+    const robot = this._drive.status.driven ?? this._map.selected;
+    if (robot !== null) this._drive.stop(robot);
   }
 
   _lease() {
     const robot = this._map.selected;
     if (robot === null) return;
-    if (this._report?.mine) this._map.drive.release(robot);
-    else this._map.drive.take(robot);
+    if (this._report?.mine) this._drive.release(robot);
+    else this._drive.take(robot);
   }
 
   _show() {
     const active = this._desk.active === this._seat;
-    const status = this._map.drive.status;
+    const status = this._drive.status;
     const report = this._report;
     this._panel.show(
       describe(status, this._map.selected, report, active),
