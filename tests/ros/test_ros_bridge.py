@@ -1,9 +1,9 @@
 import asyncio
-import contextlib
 import json
 import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import msgspec
@@ -303,7 +303,7 @@ def test_a_message_of_another_type_is_told_once_with_both_types():
 
 
 def test_silence_under_a_wrong_type_is_explained(monkeypatch):
-    monkeypatch.setattr("webmap.ros.bridge.SILENCE", 0.02)
+    monkeypatch.setattr("webmap.ros.doubts.SILENCE", 0.02)
 
     async def scenario():
         errors = []
@@ -525,6 +525,40 @@ def test_a_silent_robot_over_a_live_link_is_not_dead(fast):
     run(scenario)
 
 
+def test_a_callback_that_blocks_does_not_make_the_link_look_dead(fast, monkeypatch):
+    monkeypatch.setattr(liveness.Liveness, "LATE", 0.3)
+    monkeypatch.setattr("webmap.ros.connection.LOOK_PERIOD", 0.05)
+
+    async def scenario():
+        reasons, got = [], []
+        async with bridged() as (server, bridge):
+            bridge.on_close(reasons.append)
+            bridge.subscribe("/a", lambda _: time.sleep(0.5))
+            bridge.subscribe("/a", got.append)
+            for _ in range(2):
+                await server.publish("/a", {})
+            await until(lambda: len(got) == 2)
+            heard = bridge.last_heard
+            await until(lambda: bridge.last_heard > heard)
+            assert reasons == []
+
+    run(scenario)
+
+
+def test_a_link_that_takes_nothing_refuses_more_instead_of_piling_it_up():
+    async def scenario():
+        async with bridged() as (server, bridge):
+            server.links[0].transport.pause_reading()
+            big = {"data": "x" * (1 << 20)}
+            with pytest.raises(BridgeClosed, match="stuck"):
+                for _ in range(50):
+                    bridge.publish("/a", big, "std_msgs/String")
+                    await asyncio.sleep(0)
+            server.links[0].transport.abort()
+
+    run(scenario)
+
+
 def test_a_service_answers_on_a_socket_of_its_own():
     async def scenario():
         async with bridged(get_time={"time": {"sec": 5}}) as (server, bridge):
@@ -694,12 +728,11 @@ def test_a_thousand_listeners_leave_nothing_behind():
         async with bridged() as (server, bridge):
             tasks = len(asyncio.all_tasks())
             for _ in range(1000):
-                with contextlib.ExitStack() as stack:
-                    scope = Scope()
-                    stack.callback(scope.close)
-                    with scope.active():
-                        bridge.on_open(print)
-                        bridge.subscribe("/a", print, throttle=100)
+                scope = Scope()
+                with scope.active():
+                    bridge.on_open(print)
+                    bridge.subscribe("/a", print, throttle=100)
+                scope.close()
             await server.heard("unsubscribe", 1000)
             assert bridge._topics == {}
             await until(lambda: len(asyncio.all_tasks()) <= tasks)

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,20 +14,18 @@ from webmap.lifecycle import lifecycle
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.calls import Calls
 from webmap.ros.connection import Lane, State
+from webmap.ros.doubts import Doubts
 from webmap.ros.events import CallService, Event, Malformed, Publish, Status
 from webmap.ros.graph import Graph
-from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
+from webmap.ros.names import normalise_topic, normalise_url, split_type
 from webmap.ros.offload import Offload
 from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
 from webmap.ros.publications import Publications
 from webmap.ros.subscriptions import Subscription, Topic, Wish, checked
-from webmap.scope import Removal, no_scope
+from webmap.scope import Removal
 
 log = logging.getLogger("webmap.ros")
-
-SILENCE = 3.0
-"""How long a topic of a stated type may be silent before its type is asked, in s."""
 
 
 @dataclass(slots=True)
@@ -37,6 +35,8 @@ class BridgeStats:
     frames: int = 0
     bytes: int = 0
     malformed: int = 0
+    """Frames that were not rosbridge."""
+
     links: int = 0
     """How often the link was opened."""
 
@@ -69,7 +69,7 @@ class Bridge:
         self._calls = Calls(self.url)
         self._graph = Graph(self.call_service)
         self._offload = Offload()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._doubts = Doubts(self.name, self._graph, self._report)
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
@@ -153,12 +153,12 @@ class Bridge:
         if listener.removed:  # its scope has ended already
             return listener
         self._topics[name] = book
-        late = book.replay if book.listeners else None
+        late, is_first = book.replay, not book.listeners
         book.add(listener)
-        if late is not None and self._loop is not None:
+        if is_first and self.state == "open":
+            self._doubts.watch(book)
+        elif late is not None and self._loop is not None:
             self._loop.call_soon(self._give, late, [listener])
-        elif self.state == "open":
-            self._watch_silence(book)
         return listener
 
     def publish(
@@ -266,18 +266,17 @@ class Bridge:
 
     async def stop(self) -> None:
         """Close every link; listeners stay, for another :meth:`start`."""
-        for task in list(self._tasks):
-            task.cancel()
         if self._lane is not None:
             await self._lane.stop()
         await self._calls.stop()
         await self._offload.stop()
+        await self._doubts.stop()
 
     def _new_topic(self, name: str) -> Topic:
         return Topic(
             name,
             send=self._send,
-            complain=self._message_failed,
+            complain=self._doubts.message_failed,
             emptied=self._topic_emptied,
         )
 
@@ -307,11 +306,12 @@ class Bridge:
             self._send(frame)
         for topic in list(self._topics.values()):
             topic.again()
-            self._watch_silence(topic)
+            self._doubts.watch(topic)
         self._on_open.call()
 
     def _link_lost(self, reason: str) -> None:
         log.warning("%s: the link ended: %s", self.name, reason)
+        self._doubts.forget()
         for topic in self._topics.values():
             topic.link_lost()
         self._on_close.call(reason)
@@ -398,47 +398,3 @@ class Bridge:
             )
             log.warning("%s", error)
             self._report(error)
-
-    def _message_failed(
-        self, topic: Topic, expected: str, error: ProtocolError
-    ) -> None:
-        self.stats.malformed += 1
-        self._spawn(self._explain_failure(topic.name, expected, error))
-
-    async def _explain_failure(
-        self, topic: str, expected: str, error: ProtocolError
-    ) -> None:
-        got = await self.topic_type(topic)
-        said = f"the bridge says it is {got}" if got else "its type is not known"
-        full = ProtocolError(f"{topic}: expected {expected}, {said}: {error}")
-        log.warning("%s: %s", self.name, full)
-        self._report(full)
-
-    def _watch_silence(self, topic: Topic) -> None:
-        """Ask for the type of a topic that stays silent: bridges say nothing.
-
-        A subscription with a wrong type is met with silence by most of them.
-        """
-        if topic.message_type is not None and self._loop is not None:
-            self._loop.call_later(SILENCE, self._look_at_silence, topic)
-
-    def _look_at_silence(self, topic: Topic) -> None:
-        listening = self._topics.get(topic.name) is topic
-        if listening and self.state == "open" and topic.count == 0:
-            self._spawn(self._explain_silence(topic))
-
-    async def _explain_silence(self, topic: Topic) -> None:
-        got = await self.topic_type(topic.name)
-        wanted = topic.message_type
-        if got is None or wanted is None or topic.count or same_type(got, wanted):
-            return
-        topic.complain(ProtocolError("nothing will come"), None)
-
-    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
-        if self._loop is None or self.state == "closed":
-            work.close()
-            return
-        with no_scope():
-            task = self._loop.create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)

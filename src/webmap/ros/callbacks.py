@@ -21,19 +21,23 @@ class Callback:
 
     """
 
-    __slots__ = ("_report", "_scope", "_tasks", "fn", "what")
+    __slots__ = ("_report", "_scope", "_tasks", "fn", "removed", "what")
 
     def __init__(
         self, fn: Callable[..., Any], what: str, report: Callable[[Exception], None]
     ) -> None:
         self.fn = fn
         self.what = what
+        self.removed = False
+        """Whether it is not to be called any more."""
         self._report = report
         self._scope = current_scope()
         self._tasks: set[asyncio.Future[Any]] = set()
 
     def __call__(self, *args: Any) -> None:
         """Call the function; what it raises is logged and reported, never raised."""
+        if self.removed:
+            return
         try:
             with self._scope.active() if self._scope is not None else no_scope():
                 result = self.fn(*args)
@@ -74,6 +78,7 @@ class Callbacks:
         scope = current_scope()
 
         def undo() -> None:
+            callback.removed = True
             self._each.pop(key, None)
             if scope is not None:
                 scope.discard(removal)
@@ -85,6 +90,5 @@ class Callbacks:
 
     def call(self, *args: Any) -> None:
         """Call every function; none of them can keep the others from being called."""
-        for key, callback in list(self._each.items()):
-            if key in self._each:
-                callback(*args)
+        for callback in list(self._each.values()):
+            callback(*args)

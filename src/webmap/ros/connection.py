@@ -75,11 +75,10 @@ class Lane:
     async def stop(self) -> None:
         """Close the link and do not open it again."""
         task, self._task = self._task, None
-        if task is None:
-            self.state = "closed"
-            return
-        task.cancel()
-        await asyncio.wait([task])
+        if task is not None:
+            task.cancel()
+            await asyncio.wait([task])
+        self.state = "closed"
 
     def send(self, frame: bytes) -> None:
         """Send ``frame`` as text, now.

@@ -71,9 +71,6 @@ class Protocol:
 
     def __init__(self, fragments: Fragments | None = None) -> None:
         self._fragments = Fragments() if fragments is None else fragments
-        self.frames = 0
-        self.bytes = 0
-        self.malformed = 0
 
     def receive(self, frame: bytes | str, now: float) -> Event | None:
         """Return what ``frame`` says, or None if it is a part of something.
@@ -91,12 +88,9 @@ class Protocol:
         """
         if isinstance(frame, str):
             frame = frame.encode(errors="replace")
-        self.frames += 1
-        self.bytes += len(frame)
         try:
             return self._read(frame, now, nested=False)
         except ProtocolError as error:
-            self.malformed += 1
             return Malformed(str(error), len(frame))
 
     def _read(self, frame: bytes, now: float, *, nested: bool) -> Event | None:

@@ -1,0 +1,84 @@
+"""Finding out, for people, what bridges leave unsaid.
+
+Most bridges meet a subscription with a wrong type with silence, and send a message of
+whatever type the topic has where none was stated. Rosapi then tells what is wrong.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from webmap.errors import ProtocolError
+from webmap.ros.graph import Graph
+from webmap.ros.names import same_type
+from webmap.ros.subscriptions import Topic
+from webmap.scope import no_scope
+
+log = logging.getLogger("webmap.ros")
+
+SILENCE = 3.0
+"""How long a topic of a stated type may be silent before its type is asked, in s."""
+
+
+class Doubts:
+    """The questions about one bridge's topics, each of them asked once.
+
+    Args:
+        name: What people call the bridge.
+        graph: Knows the topics' types.
+        report: Is told what was found out.
+
+    """
+
+    def __init__(
+        self, name: str, graph: Graph, report: Callable[[Exception], None]
+    ) -> None:
+        self._name = name
+        self._graph = graph
+        self._report = report
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def message_failed(self, topic: Topic, expected: str, error: ProtocolError) -> None:
+        """Report a message that does not decode, with the type that it really has."""
+        self._ask(self._explain(topic.name, expected, error))
+
+    def watch(self, topic: Topic) -> None:
+        """Report a topic that stays silent because its type was stated wrongly."""
+        if topic.message_type is not None:
+            self._ask(self._explain_silence(topic))
+
+    async def stop(self) -> None:
+        """Ask no more."""
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def forget(self) -> None:
+        """Drop the questions about a link that has ended."""
+        for task in self._tasks:
+            task.cancel()
+
+    async def _explain(self, topic: str, expected: str, error: ProtocolError) -> None:
+        got = await self._graph.topic_type(topic)
+        said = f"the bridge says it is {got}" if got else "its type is not known"
+        full = ProtocolError(f"{topic}: expected {expected}, {said}: {error}")
+        log.warning("%s: %s", self._name, full)
+        self._report(full)
+
+    async def _explain_silence(self, topic: Topic) -> None:
+        await asyncio.sleep(SILENCE)
+        if topic.count or not topic.listeners:
+            return
+        got = await self._graph.topic_type(topic.name)
+        wanted = topic.message_type
+        if got is None or wanted is None or topic.count or same_type(got, wanted):
+            return
+        topic.complain(ProtocolError("nothing will come"), None)
+
+    def _ask(self, question: Coroutine[Any, Any, None]) -> None:
+        with no_scope():
+            task = asyncio.get_running_loop().create_task(question)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
