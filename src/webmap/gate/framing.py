@@ -1,11 +1,14 @@
 """Messages on a pipe: four bytes of length (little-endian), then MessagePack."""
 
+import logging
 import struct
 from typing import Any
 
 import msgspec
 
 from webmap.errors import WireError
+
+log = logging.getLogger("webmap.gate")
 
 MAX_FRAME = 1 << 20
 """The longest message that either side takes, in bytes."""
@@ -35,8 +38,10 @@ class Unpacker:
     def feed(self, data: bytes) -> list[Any]:
         """Return the messages that ``data`` completes, oldest first.
 
+        What is no message is logged and left out.
+
         Raises:
-            WireError: If the bytes are no message; the pipe is then of no more use.
+            WireError: If the bytes are no frames; the pipe is then of no more use.
 
         """
         buffer = self._buffer
@@ -53,13 +58,13 @@ class Unpacker:
             end = start + _length.size + length
             if len(buffer) < end:
                 break
-            messages.append(self._read(bytes(buffer[start + _length.size : end])))
+            self._read(bytes(buffer[start + _length.size : end]), messages)
             start = end
         del buffer[:start]
         return messages
 
-    def _read(self, body: bytes) -> Any:
+    def _read(self, body: bytes, messages: list[Any]) -> None:
         try:
-            return self._decode(body)
+            messages.append(self._decode(body))
         except msgspec.DecodeError as error:
-            raise WireError(f"not a message on the gate's pipe: {error}") from error
+            log.error("not a message on the gate's pipe: %s", error)

@@ -19,9 +19,6 @@ def checked(spec: RobotSpec) -> RobotSpec:
     """
     if not spec.id or len(spec.id) > 64 or not spec.id.isprintable() or spec.id == "*":
         raise ConfigError(f"a robot's id is a short plain text, got {spec.id!r}")
-    for limit in ("v_max", "w_max", "stops_within"):
-        _check_number(spec, limit, least=0.0)
-    _check_number(spec, "a_max", least=1e-3)
     if spec.twist_topic and not is_type(
         spec.twist_type, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
     ):
@@ -47,6 +44,10 @@ def checked(spec: RobotSpec) -> RobotSpec:
         goal_topic=_topic(spec.goal_topic),
         cancel_topic=_topic(spec.cancel_topic),
         action=_topic(spec.action),
+        v_max=_number(spec, "v_max", least=0.0),
+        w_max=_number(spec, "w_max", least=0.0),
+        a_max=_number(spec, "a_max", least=1e-3),
+        stops_within=_number(spec, "stops_within", least=0.0),
     )
 
 
@@ -61,15 +62,16 @@ def key_of(spec: RobotSpec) -> Key:
     return Key(spec.goal_url or spec.bridge_url, f"goal {goal}")
 
 
-def _check_number(spec: RobotSpec, field: str, least: float) -> None:
+def _number(spec: RobotSpec, field: str, least: float) -> float | None:
     value = getattr(spec, field)
     if value is None:
-        return
+        return None
     if not (math.isfinite(value) and value >= least):
         raise ConfigError(
             f"robot {spec.name!r}: {field} is {value}, expected a number from "
             f"{least:g} on"
         )
+    return float(value)
 
 
 def _topic(topic: str | None) -> str | None:

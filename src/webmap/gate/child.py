@@ -1,0 +1,117 @@
+"""One process of the gate, seen from the display: started, written to, read, ended."""
+
+import logging
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+
+import msgspec
+
+from webmap.errors import WireError
+from webmap.gate import framing
+from webmap.gate.messages import FromGate
+
+log = logging.getLogger("webmap.gate")
+
+MAX_UNSENT = 1 << 20
+"""Bytes that a gate may leave unread before it is taken for hung."""
+
+
+class Child:
+    """A running gate.
+
+    Args:
+        hear: Called with each message, in a thread of the child's own.
+        ended: Called once, in that thread, when the gate has closed its end.
+
+    """
+
+    def __init__(
+        self,
+        hear: Callable[["Child", FromGate], None],
+        ended: Callable[["Child"], None],
+    ) -> None:
+        self._hear = hear
+        self._ended = ended
+        self._lock = threading.Lock()
+        self._unsent = bytearray()
+        # -P: no file that lies about in the working folder is taken for a module.
+        # A session of its own: Ctrl-C in the terminal reaches the display, which
+        # lets the gate stop the robots in order.
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "webmap.gate"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._in = self._process.stdin.fileno()
+        self._out = self._process.stdout.fileno()
+        if sys.platform != "win32":
+            os.set_blocking(self._in, False)
+        self._reader = threading.Thread(
+            target=self._read, name="webmap-gate-reader", daemon=True
+        )
+
+    @property
+    def pid(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._reader.start()
+
+    def send(self, *messages: msgspec.Struct) -> None:
+        """Write messages without waiting; what does not fit goes with the next."""
+        data = b"".join(map(framing.pack, messages))
+        with self._lock:
+            if self._in < 0:
+                return
+            self._unsent += data
+            try:
+                while self._unsent:
+                    del self._unsent[: os.write(self._in, self._unsent)]
+            except BlockingIOError:
+                if len(self._unsent) > MAX_UNSENT:
+                    self.kill("it does not read")
+            except OSError:
+                self._unsent.clear()  # it is gone; the reader says so
+
+    def kill(self, why: str) -> None:
+        """End the process at once: only for one that does not work any more."""
+        log.error("the gate (process %d) is killed: %s", self.pid, why)
+        self._process.kill()
+
+    def stop(self, timeout: float) -> None:
+        """Close the pipe, by which the gate stops its robots and ends."""
+        assert self._process.stdin is not None
+        with self._lock:
+            self._in = -1
+            self._process.stdin.close()
+        try:
+            self._process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.kill(f"it has not ended within {timeout:g} s")
+            self._process.wait()
+        if self._reader.is_alive() and self._reader is not threading.current_thread():
+            self._reader.join(1.0)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        unpacker = framing.Unpacker(FromGate)
+        try:
+            while data := os.read(self._out, 1 << 16):
+                for message in unpacker.feed(data):
+                    self._hear(self, message)
+        except WireError as error:
+            self.kill(str(error))
+        except Exception:
+            log.exception("the reader of the gate's pipe failed")
+            self.kill("its words could not be dealt with")
+        finally:
+            self._process.stdout.close()
+            self._ended(self)

@@ -1,0 +1,157 @@
+"""Every lane to every bridge, and which robot needs which of them."""
+
+import asyncio
+from collections.abc import Callable
+
+from webmap.gate import actions
+from webmap.gate.control import ControlLane
+from webmap.gate.events import Event, Key, Wrote, WroteGoal
+from webmap.gate.messages import RobotSpec
+from webmap.gate.motion import ZERO
+from webmap.gate.tasks import TasksLane
+from webmap.gate.witness import WitnessLane
+
+
+class Links:
+    """Does what the decisions ask for on the links to the bridges.
+
+    Args:
+        tell: Takes the events; may be called from within :meth:`perform`.
+
+    """
+
+    def __init__(self, tell: Callable[[Event], None]) -> None:
+        self._tell = tell
+        self._control: dict[str, ControlLane] = {}
+        self._witness: dict[str, WitnessLane] = {}
+        self._tasks: dict[str, TasksLane] = {}
+        self._robots: dict[Key, dict[str, RobotSpec]] = {}
+        self._watched: dict[Key, list[RobotSpec]] = {}
+
+    def perform(self, action: actions.Action) -> Event | None:
+        """Do one thing; return what came of it, where that matters."""
+        match action:
+            case actions.WriteTwist(key, twist, epoch, by):
+                lane = self._control.get(key.url)
+                done = lane is not None and lane.write(key.topic, twist)
+                return Wrote(key, twist, epoch, by, done)
+            case actions.SendGoal():
+                return self._send_goal(action)
+            case actions.CancelGoals(key, robot):
+                spec = self._robots[key][robot]
+                self._tasks[_goal_url(spec)].cancel(spec)
+            case actions.Watch(key, on):
+                self._unwatch(key)
+                if on:
+                    self._watch(key)
+            case actions.CutLink(url):
+                if url in self._control:
+                    self._control[url].lane.cut("it carries nothing")
+            case actions.Attach(key, spec):
+                self._attach(key, spec)
+            case actions.Detach(key, robot):
+                self._detach(key, self._robots[key].pop(robot))
+                self._close_unwanted()
+        return None
+
+    def zero_all(self) -> None:
+        """Write zero to whatever may be driven, by itself and without asking."""
+        for key in self._watched:
+            if key.url in self._control:
+                self._control[key.url].write(key.topic, ZERO)
+
+    async def settle(self) -> None:
+        """Wait until cancels that are under way have arrived, or cannot."""
+        await asyncio.gather(*(tasks.settle() for tasks in self._tasks.values()))
+
+    def close(self) -> None:
+        """End every link for good."""
+        for tasks in self._tasks.values():
+            tasks.close()
+        for witness in self._witness.values():
+            witness.lane.close()
+        for control in self._control.values():
+            control.lane.close()
+
+    def _send_goal(self, goal: actions.SendGoal) -> WroteGoal:
+        spec = self._robots[goal.key][goal.robot]
+        done = self._tasks[_goal_url(spec)].send(spec, goal)
+        return WroteGoal(goal.robot, goal.id, goal.x, goal.y, goal.yaw, goal.by, done)
+
+    # Which lane is needed.
+
+    def _attach(self, key: Key, spec: RobotSpec) -> None:
+        robots = self._robots.setdefault(key, {})
+        earlier = robots.pop(spec.id, None)
+        watched = key in self._watched
+        self._unwatch(key)
+        if earlier is not None:
+            self._detach(key, earlier)
+        robots[spec.id] = spec
+        if spec.twist_topic is not None:
+            control = self._control.get(spec.bridge_url)
+            if control is None:
+                control = ControlLane(spec.bridge_url, self._tell)
+                self._control[spec.bridge_url] = control
+            control.attach(spec.twist_topic, spec.twist_type)
+        if spec.odometry_topic is not None:
+            self._witness_of(spec).lane.hold("robots")
+        tasks = self._tasks.get(_goal_url(spec))
+        if tasks is None:
+            tasks = self._tasks[_goal_url(spec)] = TasksLane(
+                _goal_url(spec), self._tell
+            )
+        tasks.lane.hold("robots")
+        tasks.attach(spec)
+        if watched:
+            self._watch(key)
+        self._close_unwanted()
+
+    def _detach(self, key: Key, spec: RobotSpec) -> None:
+        if spec.twist_topic is not None:
+            self._control[spec.bridge_url].detach(spec.twist_topic, spec.twist_type)
+        if spec.odometry_topic is not None:
+            self._witness_of(spec).lane.let_go("robots")
+        tasks = self._tasks[_goal_url(spec)]
+        tasks.detach(spec)
+        tasks.lane.let_go("robots")
+
+    def _watch(self, key: Key) -> None:
+        specs = list(self._robots[key].values())
+        self._watched[key] = specs
+        if any(spec.twist_topic is not None for spec in specs):
+            self._control[key.url].listen(key.topic)
+        for spec in specs:
+            if spec.odometry_topic is not None:
+                self._witness_of(spec).watch(
+                    spec.odometry_topic, spec.odometry_type, key
+                )
+
+    def _unwatch(self, key: Key) -> None:
+        specs = self._watched.pop(key, [])
+        if any(spec.twist_topic is not None for spec in specs):
+            self._control[key.url].ignore(key.topic)
+        for spec in specs:
+            if spec.odometry_topic is not None:
+                self._witness_of(spec).unwatch(spec.odometry_topic, key)
+
+    def _witness_of(self, spec: RobotSpec) -> WitnessLane:
+        url = spec.odometry_url or spec.bridge_url
+        if url not in self._witness:
+            self._witness[url] = WitnessLane(url, self._tell)
+        return self._witness[url]
+
+    def _close_unwanted(self) -> None:
+        for url, control in list(self._control.items()):
+            if not control.lane.wanted:
+                self._control.pop(url).lane.close()
+        for url, witness in list(self._witness.items()):
+            if not witness.lane.wanted:
+                self._witness.pop(url).lane.close()
+        for url, tasks in list(self._tasks.items()):
+            if not tasks.lane.wanted:
+                self._tasks.pop(url).close()
+
+
+def _goal_url(spec: RobotSpec) -> str:
+    return spec.goal_url or spec.bridge_url

@@ -1,0 +1,208 @@
+"""The gate's process: the decisions, the links, and the pipe to the display.
+
+Its end is the end of the pipe, a signal, or an error of its own; in each case it first
+sends zero to whatever is driven, for half a second at most.
+"""
+
+import asyncio
+import contextlib
+import gc
+import logging
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from types import FrameType
+
+from webmap.errors import WireError
+from webmap.gate import actions, events, framing, messages
+from webmap.gate.clock import now
+from webmap.gate.gate import Gate
+from webmap.gate.links import Links
+from webmap.gate.locks import Locks, state_folder
+from webmap.gate.outbox import BackgroundHandler, Outbox
+
+log = logging.getLogger("webmap.gate")
+
+STEP = 0.01
+"""Seconds between two looks at the clock while a machine is held or moves."""
+
+IDLE_STEP = 0.02
+"""Seconds between two looks at the clock otherwise."""
+
+DRAIN = 0.5
+"""The longest time for zeros at the end, in seconds (S14)."""
+
+LOCK_RETRY = 1.0
+"""Seconds between two attempts to have a machine that another gate has."""
+
+
+class Shell:
+    """Runs the decisions: brings them what happens and does what they ask for.
+
+    Args:
+        outbox: Takes what the display is told.
+        locks: The machines of this computer.
+
+    """
+
+    def __init__(self, outbox: Outbox, locks: Locks) -> None:
+        self.failed = False
+        self._gate = Gate()
+        self._outbox = outbox
+        self._locks = locks
+        self._links = Links(self.tell)
+        self._inbox: deque[messages.ToGate | events.Event] = deque()
+        self._working = False
+        self._ending = asyncio.Event()
+        self._silent = asyncio.Event()
+        self._waiting_for_lock: dict[events.Key, asyncio.TimerHandle] = {}
+
+    def tell(self, event: messages.ToGate | events.Event) -> None:
+        """Bring an event; called from within an action, it waits its turn."""
+        if isinstance(event, events.Shutdown):
+            self._ending.set()
+        self._inbox.append(event)
+        if self._working:
+            return
+        self._working = True
+        try:
+            while self._inbox:
+                self._do(self._gate.handle(self._inbox.popleft(), now()))
+        except Exception:
+            self._fail()
+        finally:
+            self._working = False
+
+    async def run(self) -> None:
+        """Go on until told to end, then send zeros and close the links."""
+        stepping = asyncio.create_task(self._keep_stepping())
+        await self._ending.wait()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(DRAIN):
+                await self._silent.wait()
+                await self._links.settle()
+        stepping.cancel()
+        self._links.close()
+        await asyncio.sleep(0)  # the loop's chance to write what it still holds
+
+    async def _keep_stepping(self) -> None:
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while not self.failed:
+            try:
+                self._do(self._gate.step(now()))
+            except Exception:
+                self._fail()
+            if self._ending.is_set() and self._gate.silent:
+                self._silent.set()
+            due += STEP if self._gate.busy else IDLE_STEP
+            late = loop.time() - due
+            if late > 0:
+                due += late
+            await asyncio.sleep(max(0.0, -late))
+
+    def _do(self, todo: list[actions.Action]) -> None:
+        for action in todo:
+            result = self._perform(action)
+            if result is not None:
+                self._do(self._gate.handle(result, now()))
+
+    def _perform(self, action: actions.Action) -> events.Event | None:
+        match action:
+            case actions.Say(message):
+                self._outbox.put(message)
+            case actions.Lock(key):
+                return self._lock(key)
+            case actions.Unlock(key):
+                timer = self._waiting_for_lock.pop(key, None)
+                if timer is not None:
+                    timer.cancel()
+                self._locks.release(key)
+            case actions.MarkDriven(key, driven):
+                self._locks.mark(key, driven)
+            case _:
+                return self._links.perform(action)
+        return None
+
+    def _lock(self, key: events.Key) -> events.LockState:
+        state = self._locks.acquire(key)
+        self._waiting_for_lock.pop(key, None)
+        if not state.held:
+            loop = asyncio.get_running_loop()
+            self._waiting_for_lock[key] = loop.call_later(
+                LOCK_RETRY, lambda: self.tell(self._lock(key))
+            )
+        return state
+
+    def _fail(self) -> None:
+        """An error of our own: stop everything and let the display start anew."""
+        log.exception("the gate has failed; every driven robot is stopped")
+        self.failed = True
+        self._links.zero_all()
+        self._ending.set()
+        self._silent.set()
+
+
+def main() -> int:
+    """Run the gate on this process's standard input and output."""
+    pipe_in, pipe_out = _take_pipes()
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+    background = BackgroundHandler(handler)
+    logging.basicConfig(level=logging.INFO, handlers=[background])
+    logging.getLogger("websockets").setLevel(logging.WARNING)
+    outbox = Outbox(pipe_out)
+    code = asyncio.run(_serve(pipe_in, outbox))
+    outbox.close(0.2)
+    background.drain(0.2)
+    return code
+
+
+async def _serve(pipe_in: int, outbox: Outbox) -> int:
+    loop = asyncio.get_running_loop()
+    shell = Shell(outbox, Locks(state_folder()))
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        why = f"the gate was ended by {signal.Signals(number).name}"
+        loop.call_soon_threadsafe(shell.tell, events.Shutdown(why))
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, on_signal)
+    threading.Thread(
+        target=_read, args=(pipe_in, loop, shell), name="gate-inbox", daemon=True
+    ).start()
+    outbox.put(messages.Ready(os.getpid()))
+    gc.freeze()  # what is there now stays; collecting should not look at it again
+    await shell.run()
+    return 1 if shell.failed else 0
+
+
+def _read(file: int, loop: asyncio.AbstractEventLoop, shell: Shell) -> None:
+    """Bring what comes on the pipe to the loop; runs in a thread of its own."""
+    unpacker = framing.Unpacker(messages.ToGate)
+    why = "the display process has ended"
+    with contextlib.suppress(RuntimeError):  # the loop has ended before the pipe
+        try:
+            while data := os.read(file, 1 << 16):
+                for message in unpacker.feed(data):
+                    loop.call_soon_threadsafe(shell.tell, message)
+        except (OSError, WireError) as error:
+            why = f"the pipe from the display is broken: {error}"
+        loop.call_soon_threadsafe(shell.tell, events.Shutdown(why))
+
+
+def _take_pipes() -> tuple[int, int]:
+    """Return the two pipes for this module alone: no print can get in between."""
+    pipe_in, pipe_out = os.dup(0), os.dup(1)
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.setmode(pipe_in, os.O_BINARY)
+        msvcrt.setmode(pipe_out, os.O_BINARY)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    return pipe_in, pipe_out

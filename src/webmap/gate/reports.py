@@ -1,0 +1,64 @@
+"""What a page hears on ``/drive``: JSON objects, one in a text frame.
+
+::
+
+    {"op": "hello", "connection": "c5"}
+    {"op": "tick", "tick": 812, "ack": 16}
+    {"op": "robot", "robot": "r1", "name": "Bob", "state": "held",
+     "holder": {"connection": "c5", "name": "Ann"}, "mine": true, "epoch": 3,
+     "armed": false, "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
+     "sent": [0.0, 0.0, 0.0], "echoed": null, "measured": [0.0, 0.0, 0.0],
+     "armable": true, "reason": null}
+    {"op": "gone", "robot": "r1"}
+    {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
+
+``hello`` comes first, also when the gate was started anew (all leases are then gone),
+and after it every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest accepted
+``seq`` of this connection, -1 at first. ``robot`` comes when something changed,
+velocities (``[forward, left, counter-clockwise]``) at 10 Hz at most. ``holder`` and
+``epoch`` are null without a lease; ``armed`` says whether a command to move would be
+taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force; ``armable`` and
+``reason``, whether it can be taken, and what stands against that or against moving it.
+``refused`` names the ``op`` (``what``) that was refused, or ``"command"`` for words
+that made no sense (``robot`` is then null), or ``"lease"`` when a lease has ended. The
+same refusal is said once a second.
+
+What a page may say stands in :mod:`webmap.gate.commands`.
+"""
+
+import json
+
+import msgspec
+
+from webmap.gate.messages import Hello, Refused, RobotGone, RobotReport
+
+
+def hello_text(hello: Hello) -> str:
+    """Return the greeting of a connection."""
+    return _text("hello", connection=hello.connection)
+
+
+def tick_text(tick: int, ack: int) -> str:
+    """Return a tick, with what was acknowledged on this connection."""
+    return f'{{"op":"tick","tick":{tick},"ack":{ack}}}'
+
+
+def robot_text(report: RobotReport, *, mine: bool) -> str:
+    """Return a report, for the holder of the lease (``mine``) or for the others."""
+    fields = msgspec.to_builtins(report)
+    del fields["type"]
+    return _text("robot", mine=mine, **fields)
+
+
+def gone_text(gone: RobotGone) -> str:
+    """Return that a robot is no longer there."""
+    return _text("gone", robot=gone.robot)
+
+
+def refused_text(refused: Refused) -> str:
+    """Return that a command was not taken."""
+    return _text("refused", robot=refused.robot, what=refused.what, why=refused.why)
+
+
+def _text(op: str, **fields: object) -> str:
+    return json.dumps({"op": op, **fields}, allow_nan=False, separators=(",", ":"))

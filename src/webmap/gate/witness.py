@@ -1,0 +1,55 @@
+"""The witness lane: odometry in, of which only the velocity is read."""
+
+from collections.abc import Callable
+
+from webmap.gate import words
+from webmap.gate.events import Event, Key, LinkDown, LinkUp, Measured
+from webmap.gate.lanes import Lane
+from webmap.ros import ops
+
+THROTTLE = 50
+"""Milliseconds between two messages at least."""
+
+
+class WitnessLane:
+    """The socket of one bridge that odometry comes through.
+
+    Args:
+        url: The bridge's address.
+        tell: Takes the events.
+
+    """
+
+    def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
+        self._tell = tell
+        self._watchers: dict[str, list[Key]] = {}
+        self.lane = Lane(
+            url,
+            up=lambda: tell(LinkUp(url, "witness")),
+            down=lambda: tell(LinkDown(url, "witness")),
+            text=self._hear,
+        )
+
+    def watch(self, topic: str, type: str | None, key: Key) -> None:
+        """Hear how the machine ``key`` moves."""
+        self._watchers.setdefault(topic, []).append(key)
+        id = f"webmap-gate odometry {topic}"
+        self.lane.hold(
+            id,
+            ops.subscribe(topic, id=id, type=type, throttle_rate=THROTTLE),
+            ops.unsubscribe(topic, id=id),
+        )
+
+    def unwatch(self, topic: str, key: Key) -> None:
+        """Undo one :meth:`watch`."""
+        self._watchers[topic].remove(key)
+        if not self._watchers[topic]:
+            del self._watchers[topic]
+        self.lane.let_go(f"webmap-gate odometry {topic}")
+
+    def _hear(self, data: bytes) -> None:
+        heard = words.hear(data)
+        if heard is None or heard.op != "publish" or heard.topic is None:
+            return
+        for key in self._watchers.get(heard.topic, ()):
+            self._tell(Measured(key, heard.twist))

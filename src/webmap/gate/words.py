@@ -1,0 +1,150 @@
+"""What the gate says to a robot's ROS and what it understands of the answers. No I/O.
+
+A type written ``package/msg/Name`` is of ROS 2, whose stamps have ``sec`` and
+``nanosec``; else they have ``secs`` and ``nsecs``. Every stamp sent is zero: a robot
+whose clock differs from ours would refuse a command, or take an old one for a new one.
+"""
+
+import json
+import math
+from typing import Any
+
+import msgspec
+
+from webmap.gate.actions import SendGoal
+from webmap.gate.messages import RobotSpec
+from webmap.geometry import Quaternion, Twist
+from webmap.ros import ops
+from webmap.ros.names import is_type
+
+
+def velocity(topic: str, type: str, twist: Twist) -> bytes:
+    """Return the operation that publishes ``twist``."""
+    message: dict[str, Any] = {
+        "linear": {"x": twist.vx, "y": twist.vy, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": twist.wz},
+    }
+    if is_type(type, "geometry_msgs/TwistStamped"):
+        message = {"header": _header(type, ""), "twist": message}
+    return ops.publish(topic, message)
+
+
+def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
+    """Return the operation that sends the robot to a goal."""
+    if spec.goal_topic is not None:
+        return ops.publish(spec.goal_topic, _pose(spec.goal_type, spec, goal))
+    pose = _pose("geometry_msgs/msg/PoseStamped", spec, goal)
+    return json.dumps(
+        {
+            "op": "send_action_goal",
+            "id": goal.id,
+            "action": spec.action,
+            "action_type": spec.action_type,
+            "args": {"pose": pose, "behavior_tree": ""},
+            "feedback": False,
+        },
+        allow_nan=False,
+    ).encode()
+
+
+def cancel_by_topic(topic: str) -> bytes:
+    """Return the operation that cancels every goal of an actionlib server."""
+    return ops.publish(topic, {})
+
+
+def cancel_by_service(action: str, id: str) -> bytes:
+    """Return the operation that cancels every goal of a ROS 2 action."""
+    return ops.call_service(
+        f"{action}/_action/cancel_goal",
+        {"goal_info": {}},
+        id=id,
+        type="action_msgs/srv/CancelGoal",
+    )
+
+
+def _pose(type: str, spec: RobotSpec, goal: SendGoal) -> dict[str, Any]:
+    q = Quaternion.from_yaw(goal.yaw)
+    return {
+        "header": _header(type, spec.goal_frame),
+        "pose": {
+            "position": {"x": goal.x, "y": goal.y, "z": 0.0},
+            "orientation": {"x": q.x, "y": q.y, "z": q.z, "w": q.w},
+        },
+    }
+
+
+def _header(type: str, frame: str) -> dict[str, Any]:
+    ros2 = "/msg/" in type
+    stamp = {"sec": 0, "nanosec": 0} if ros2 else {"secs": 0, "nsecs": 0}
+    return {"stamp": stamp, "frame_id": frame}
+
+
+class _Linear(msgspec.Struct):
+    x: float | None = 0.0
+    y: float | None = 0.0
+
+
+class _Angular(msgspec.Struct):
+    z: float | None = 0.0
+
+
+class _Twist(msgspec.Struct):
+    """A Twist, or something with a twist in it: TwistStamped, Odometry."""
+
+    linear: _Linear | None = None
+    angular: _Angular | None = None
+    twist: "_Twist | None" = None
+
+
+class _Frame(msgspec.Struct):
+    op: str = ""
+    id: str | int | None = None
+    topic: str | None = None
+    msg: _Twist | None = None
+
+
+_decode_frame = msgspec.json.Decoder(_Frame).decode
+
+
+class Heard(msgspec.Struct, frozen=True):
+    """What came from a bridge, as far as the gate cares."""
+
+    op: str
+    id: str | None
+    topic: str | None
+    twist: Twist | None
+    """The velocity in a published message, if there is one of finite numbers."""
+
+
+def hear(data: bytes) -> Heard | None:
+    """Return what a message from a bridge says; ``None`` if it makes no sense."""
+    frame: _Frame | None
+    try:
+        frame = _decode_frame(data)
+    except msgspec.DecodeError:
+        frame = _lenient(data)
+    if frame is None:
+        return None
+    id = None if frame.id is None else str(frame.id)
+    return Heard(frame.op, id, frame.topic, _velocity(frame.msg))
+
+
+def _lenient(data: bytes) -> _Frame | None:
+    """Read what is JSON but for a bare NaN, as some bridges write it."""
+    try:
+        return msgspec.convert(json.loads(data), _Frame)
+    except (ValueError, RecursionError, msgspec.ValidationError):
+        return None
+
+
+def _velocity(message: _Twist | None) -> Twist | None:
+    for _ in range(3):  # Odometry has a TwistWithCovariance, which has a Twist
+        if message is None:
+            return None
+        if message.linear is not None and message.angular is not None:
+            found = (message.linear.x, message.linear.y, message.angular.z)
+            if any(part is None or not math.isfinite(part) for part in found):
+                return None
+            return Twist(*(float(part or 0.0) for part in found))
+        message = message.twist
+    return None
