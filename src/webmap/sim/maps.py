@@ -1,6 +1,7 @@
 """Floor plans in the form of ROS's map_server: a YAML file and an image."""
 
 import math
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,6 @@ FLOOR = Path(__file__).parent / "data" / "floor.yaml"
 """The floor plan that comes with the simulator."""
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
-
-_MOST_CELLS = 64_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,18 +121,21 @@ def _read_pixels(image: Path) -> NDArray[np.float64]:
     """Return how light each pixel is, 0 to 1, the upper row first."""
     from PIL import Image
 
+    too_large = (Image.DecompressionBombError, Image.DecompressionBombWarning)
     try:
-        with Image.open(image) as opened:
-            if opened.width * opened.height > _MOST_CELLS:
-                raise ConfigError(f"{image}: more than {_MOST_CELLS} cells")
-            deep = opened.mode.startswith("I")
-            pixels = np.asarray(opened if deep else opened.convert("RGB"), np.float64)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(image) as opened:
+                deep = opened.mode.startswith("I")
+                pixels = np.asarray(opened if deep else opened.convert("RGB"))
+    except too_large as error:
+        raise ConfigError(f"{image}: too large for a map: {error}") from error
     except FileNotFoundError as error:
         raise ConfigError(f"{image}: no such image") from error
     except (OSError, ValueError, SyntaxError) as error:
         raise ConfigError(f"{image}: not an image that can be read: {error}") from error
     if deep:
-        return pixels / 65535
+        return np.asarray(pixels / 65535)
     # As map_server: colours count by their mean.
     return np.asarray(pixels.mean(axis=2) / 255)
 

@@ -70,7 +70,7 @@ def chebyshev_distance(solid: NDArray[np.bool_], farthest: int) -> NDArray[np.in
 def dilate(solid: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
     """Return the cells whose middle is within ``radius`` cells of a solid one's."""
     rows, columns = solid.shape
-    reach = math.floor(radius)
+    reach = min(math.floor(radius), rows - 1)
     grown = np.zeros_like(solid)
     for up in range(-reach, reach + 1):
         across = math.floor(math.sqrt(radius * radius - up * up))

@@ -11,6 +11,7 @@ from webmap.geometry import Pose
 from webmap.sim.obstacles import Obstacles
 
 _NUDGE = 1e-6
+_TINY = 1e-12
 _NAN_SHARE = 0.03
 
 
@@ -122,8 +123,10 @@ def cast_rays(
     result = np.full(xs.shape, np.inf)
     left = np.arange(len(xs))
     gone = np.zeros(len(xs))
-    with np.errstate(divide="ignore"):
-        per_x, per_y = 1 / along_x, 1 / along_y
+    # A ray along an axis meets the other axis' edges only beyond everything.
+    along_x = np.where(np.abs(along_x) < _TINY, _TINY, along_x)
+    along_y = np.where(np.abs(along_y) < _TINY, _TINY, along_y)
+    per_x, per_y = 1 / along_x, 1 / along_y
     right, up = along_x > 0, along_y > 0
     while len(left):
         column = np.floor(x0 + gone * along_x).astype(np.intp)
@@ -143,9 +146,8 @@ def cast_rays(
         per_x, per_y = per_x[on], per_y[on]
         edge_x = np.where(right, column + clear, column - clear + 1)
         edge_y = np.where(up, row + clear, row - clear + 1)
-        to_x = np.where(np.isinf(per_x), np.inf, (edge_x - x0) * per_x)
-        to_y = np.where(np.isinf(per_y), np.inf, (edge_y - y0) * per_y)
-        gone = np.maximum(np.minimum(to_x, to_y), gone) + _NUDGE
+        leap = np.minimum((edge_x - x0) * per_x, (edge_y - y0) * per_y)
+        gone = np.maximum(leap, gone) + _NUDGE
     return np.asarray(result * plan.resolution)
 
 

@@ -48,9 +48,10 @@ def _fields(schema: Schema, name: str) -> tuple[Field, ...]:
 
 
 def _spell(schema: Schema, name: str) -> str:
+    # Definitions say pkg/Name in both dialects.
     if name in TIMES and schema.dialect.is_ros2:
         return f"builtin_interfaces/{name.capitalize()}"
-    return schema.dialect.spell(name) if "/" in name else name
+    return name
 
 
 def _definition(schema: Schema, name: str) -> dict[str, Any]:

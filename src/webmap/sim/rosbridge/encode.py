@@ -26,7 +26,6 @@ _ARRAY_TAGS = {
     "f8": 86,
 }
 _NAN = msgspec.Raw(b"NaN")
-_ONE_FRAGMENT = 1
 
 
 class Publication:
@@ -128,8 +127,10 @@ class Encoder:
         if len(text) <= size:
             return [text]
         pieces = [text[start : start + size] for start in range(0, len(text), size)]
-        float_total = self.quirks.float_fragments
-        total = len(text) / size + _ONE_FRAGMENT if float_total else len(pieces)
+        total: float = len(pieces)
+        if self.quirks.float_fragments:
+            # Written for a division that drops the rest; the count is its floor.
+            total = (len(text) - 1) / size + 1
         return [
             self.json(
                 {

@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 _MOST_KEPT = 64 * 1024
-_MOST_STARTS = 50
+_MOST_FAILURES = 50
 
 
 class IncomingText:
@@ -40,12 +40,12 @@ class IncomingText:
         found: list[dict[str, Any]] = []
         rest_from: int | None = None
         start = text.find("{")
-        for _ in range(_MOST_STARTS):
-            if start < 0:
-                break
+        failures = 0
+        while start >= 0 and failures < _MOST_FAILURES:
             try:
                 value, end = self._decoder.raw_decode(text, start)
             except (ValueError, RecursionError):
+                failures += 1
                 rest_from = start if rest_from is None else rest_from
                 start = text.find("{", start + 1)
                 continue

@@ -1,0 +1,160 @@
+"""Frames of real servers, decoded, and encoded again to the same bytes."""
+
+import base64
+import io
+import json
+import math
+from pathlib import Path
+
+import cbor2
+import numpy as np
+import pytest
+from PIL import Image
+
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder, Publication
+from webmap.sim.rosbridge.quirks import POLITE, REAL
+from webmap.sim.rosbridge.raw import serialize
+from webmap.sim.rosbridge.schema import Schema
+
+CAPTURED = Path(__file__).parent / "captured"
+TYPES = {
+    "odom": "nav_msgs/Odometry",
+    "scan_inf_nan": "sensor_msgs/LaserScan",
+    "map": "nav_msgs/OccupancyGrid",
+    "tf": "tf2_msgs/TFMessage",
+    "tf_static": "tf2_msgs/TFMessage",
+    "amcl_pose": "geometry_msgs/PoseWithCovarianceStamped",
+}
+DTYPES = {72: "<i1", 85: "<f4"}
+
+
+def encoder(dialect, quirks=None):
+    return Encoder(Schema(Dialect(dialect)), quirks or REAL[dialect])
+
+
+def arrays(value):
+    """A decoded message with its typed arrays as the graph holds them."""
+    if isinstance(value, cbor2.CBORTag):
+        return np.frombuffer(value.value, DTYPES[value.tag])
+    if isinstance(value, dict):
+        return {name: arrays(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [arrays(item) for item in value]
+    return value
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+@pytest.mark.parametrize("name", ["odom", "map", "tf", "tf_static", "amcl_pose"])
+def test_json_is_written_as_the_real_server_wrote_it(dialect, name):
+    text = (CAPTURED / dialect / f"publish_{name}.json").read_text()
+    operation = json.loads(text)
+    made = encoder(dialect)
+    message = made.schema.conform(TYPES[name], operation["msg"])
+    publication = Publication(operation["topic"], TYPES[name], message, 0.0)
+    assert publication.form("none", made) == text
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+@pytest.mark.parametrize("name", ["scan_inf_nan", "map", "tf"])
+def test_cbor_is_written_as_the_real_server_wrote_it(dialect, name):
+    frame = (CAPTURED / dialect / f"cbor_{name}.bin").read_bytes()
+    operation = cbor2.loads(frame)
+    publication = Publication(
+        operation["topic"], TYPES[name], arrays(operation["msg"]), 0.0
+    )
+    assert publication.form("cbor", encoder(dialect)) == frame
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_a_scan_in_json_has_null_for_nan_and_infinity(dialect):
+    operation = cbor2.loads((CAPTURED / dialect / "cbor_scan_inf_nan.bin").read_bytes())
+    message = arrays(operation["msg"])
+    text = Publication("/scan", TYPES["scan_inf_nan"], message, 0.0).form(
+        "none", encoder(dialect)
+    )
+    ranges = json.loads(text)["msg"]["ranges"]
+    for value, written in zip(message["ranges"], ranges, strict=True):
+        assert (written is None) == (not math.isfinite(value))
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_ros_serialisation_has_the_lengths_and_numbers_of_the_real_one(dialect):
+    folder = CAPTURED / dialect
+    real = cbor2.loads((folder / "cborraw_odom.bin").read_bytes())["msg"]["bytes"]
+    schema = Schema(Dialect(dialect))
+    text = (folder / "publish_odom.json").read_text()
+    message = schema.conform(TYPES["odom"], json.loads(text)["msg"])
+    made = serialize(schema, TYPES["odom"], message)
+    assert len(made) == len(real)
+    # Both end with the same covariance, and begin with the frames' names.
+    assert made[-8 * 36 :] == real[-8 * 36 :]
+    assert b"robot_0/odom" in made
+
+
+def test_the_bare_token_nan_is_in_fixed_arrays_only_and_only_if_asked_for():
+    captured = (CAPTURED / "ros2" / "nan_covariance.txt").read_text()
+    real = encoder("ros2")
+    message = real.schema.conform(TYPES["odom"], json.loads(captured)["msg"])
+    publication = Publication("/robot_0/odom", TYPES["odom"], message, 0.0)
+    assert publication.form("none", real) == captured
+    again = Publication("/robot_0/odom", TYPES["odom"], message, 0.0)
+    polite = again.form("none", encoder("ros2", POLITE))
+    assert "NaN" not in polite
+    assert json.loads(polite)["msg"]["pose"]["covariance"][1] is None
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_odometry_comes_in_cbor_only_from_a_polite_server(dialect):
+    schema = Schema(Dialect(dialect))
+    message = schema.conform(TYPES["odom"], {})
+    real = Publication("/odom", TYPES["odom"], message, 0.0)
+    assert real.form("cbor", Encoder(schema, REAL[dialect])) is None
+    polite = Publication("/odom", TYPES["odom"], message, 0.0)
+    frame = polite.form("cbor", Encoder(schema, POLITE))
+    assert cbor2.loads(frame)["msg"]["pose"]["covariance"] == [0.0] * 36
+
+
+def test_png_holds_the_text_in_its_pixels():
+    text = (CAPTURED / "ros1" / "publish_odom.json").read_text()
+    operation = json.loads(text)
+    made = encoder("ros1")
+    message = made.schema.conform(TYPES["odom"], operation["msg"])
+    publication = Publication(operation["topic"], TYPES["odom"], message, 0.0)
+    frame = json.loads(publication.form("png", made))
+    assert frame["op"] == "png"
+    assert pixels(frame["data"]) == text
+    captured = json.loads((CAPTURED / "ros1" / "png_odom.json").read_text())
+    assert pixels(captured["data"]).startswith('{"op":"publish"')
+
+
+def pixels(data):
+    image = Image.open(io.BytesIO(base64.b64decode(data)))
+    return image.convert("RGB").tobytes().decode().rstrip("\n")
+
+
+def test_ros2_never_sends_png():
+    made = encoder("ros2")
+    publication = Publication("/x", "std_msgs/String", {"data": "x"}, 0.0)
+    assert publication.form("png", made) is None
+
+
+def test_fragments_are_cut_as_the_real_server_cut_them():
+    lines = (CAPTURED / "ros1" / "fragments_odom.jsonl").read_text().splitlines()
+    fragments = [json.loads(line) for line in lines[:3]]
+    whole = "".join(fragment["data"] for fragment in fragments)
+    assert encoder("ros1").fragments(whole, 300) == lines[:3]
+
+
+def test_polite_fragments_have_a_whole_total():
+    frames = encoder("ros1", POLITE).fragments("x" * 700, 300, "call:7")
+    decoded = [json.loads(frame) for frame in frames]
+    assert [f["total"] for f in decoded] == [3, 3, 3]
+    assert [f["num"] for f in decoded] == [0, 1, 2]
+    assert {f["id"] for f in decoded} == {"call:7"}
+
+
+def test_a_form_is_made_once():
+    made = encoder("ros1")
+    publication = Publication("/x", "std_msgs/String", {"data": "x"}, 0.0)
+    assert publication.form("none", made) is publication.form("none", made)
