@@ -62,12 +62,16 @@ def listen_with_roslibpy(port: int, topic: str, meter: Meter) -> None:
     ros.terminate()
 
 
-def listen_with_webmap(port: int, topic: str, meter: Meter, cbor: bool) -> None:
+def listen_with_webmap(
+    port: int, topic: str, meter: Meter, compression: str | None
+) -> None:
     """Take the messages as WebMap's own modules do: typed, the ranges an array."""
-    asyncio.run(_listen_with_webmap(port, topic, meter, cbor))
+    asyncio.run(_listen_with_webmap(port, topic, meter, compression))
 
 
-async def _listen_with_webmap(port: int, topic: str, meter: Meter, cbor: bool) -> None:
+async def _listen_with_webmap(
+    port: int, topic: str, meter: Meter, compression: str | None
+) -> None:
     from webmap import Bridge
     from webmap.ros.messages import LaserScanMsg, OdometryMsg
 
@@ -92,7 +96,7 @@ async def _listen_with_webmap(port: int, topic: str, meter: Meter, cbor: bool) -
         on_odometry if topic == ODOM else on_scan,
         TYPES[topic],
         decode=OdometryMsg if topic == ODOM else LaserScanMsg,
-        compression="cbor" if cbor else None,
+        compression=compression,
     )
     bridge.start(asyncio.get_running_loop())
     async with asyncio.timeout(120):
@@ -106,7 +110,8 @@ def main(client: str, port: int, topic: str, count: int) -> None:
     if client == "roslibpy":
         listen_with_roslibpy(port, topic, meter)
     else:
-        listen_with_webmap(port, topic, meter, cbor=client == "webmap-cbor")
+        compression = "none" if client == "webmap-json" else None
+        listen_with_webmap(port, topic, meter, compression)
     print(json.dumps(meter.figures()), flush=True)
 
 
