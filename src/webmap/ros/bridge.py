@@ -13,7 +13,7 @@ from webmap.errors import BridgeClosed, BridgeError, ProtocolError
 from webmap.lifecycle import lifecycle
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.calls import Calls
-from webmap.ros.connection import Lane, State
+from webmap.ros.connection import CLOSED_HERE, Lane, State
 from webmap.ros.doubts import Doubts
 from webmap.ros.events import CallService, Event, Malformed, Publish, Status
 from webmap.ros.graph import Graph
@@ -310,7 +310,8 @@ class Bridge:
         self._on_open.call()
 
     def _link_lost(self, reason: str) -> None:
-        log.warning("%s: the link ended: %s", self.name, reason)
+        level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
+        log.log(level, "%s: the link ended: %s", self.name, reason)
         self._doubts.forget()
         for topic in self._topics.values():
             topic.link_lost()

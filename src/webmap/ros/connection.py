@@ -23,6 +23,7 @@ CONNECT_TIMEOUT = 5.0
 MAX_FRAME = 64 << 20
 MAX_UNSENT = 4 << 20
 LOOK_PERIOD = 0.25
+CLOSED_HERE = "the link was closed here"
 
 
 class Lane:
@@ -123,7 +124,7 @@ class Lane:
             self._failed(_not_reached(self.url, error))
             return 0.0
         began = time.monotonic()
-        reason = "the link was closed here"
+        reason = CLOSED_HERE
         try:
             reason = await self._serve(socket)
         except asyncio.CancelledError:
