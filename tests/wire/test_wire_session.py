@@ -67,6 +67,18 @@ def test_what_did_not_change_is_not_sent_again():
     assert session.frame(0.0) is None
 
 
+def test_a_page_that_was_spoken_to_is_told_the_time():
+    session = SceneSession()
+    assert session.frame(100.0) is None
+    session.error("hello")
+    next_frame(session, now=100.0)
+    assert session.frame(100.9) is None
+    heartbeat = next_frame(session, now=101.0)
+    assert len(heartbeat) == HEADER.size
+    assert header(heartbeat)[1:] == (0, 2, 101.0)
+    assert session.frame(101.5) is None
+
+
 def test_a_viewer_that_acknowledges_nothing_gets_no_third_frame():
     session = SceneSession()
     root = svg.g()

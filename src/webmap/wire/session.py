@@ -1,6 +1,7 @@
 """The display's side of one page's ``/scene``, without a socket."""
 
 import itertools
+import math
 import secrets
 import struct
 from typing import Any
@@ -41,6 +42,7 @@ class SceneSession:
     """
 
     WINDOW = 2
+    HEARTBEAT = 1.0
     MESSAGES_KEPT = 1000
     BYTES_KEPT = 256 * 1024
 
@@ -55,6 +57,7 @@ class SceneSession:
         self._frame = 0
         self._seen = 0
         self._tell_all = False
+        self._spoke = math.inf
         # What is next in the coming frame, by kind; all but messages can be made
         # again from the state above.
         self._gone = bytearray()
@@ -311,6 +314,9 @@ class SceneSession:
     def frame(self, now: float) -> bytes | None:
         """Return the next frame, or None if there is nothing to say, or not yet.
 
+        A page that was spoken to is told the time every :data:`HEARTBEAT` seconds at
+        the latest, so that it notices when nobody speaks any more.
+
         Args:
             now: Seconds of :func:`time.monotonic`.
 
@@ -318,12 +324,13 @@ class SceneSession:
         if self._frame - self._seen >= self.WINDOW:
             return None
         body = None if self._tell_all else self._changes()
-        if body == b"":
+        if body == b"" and now - self._spoke < self.HEARTBEAT:
             return None
         if body is None:
             body = self._everything()
         head = _HEADER(VERSION, RESET * self._tell_all, self._frame + 1, now)
         self._frame += 1
+        self._spoke = now
         self._tell_all = False
         self._gone, self._records = bytearray(), bytearray()
         self._new, self._messages = [], []

@@ -1,0 +1,41 @@
+/** Where WebMap's own files and sockets are: beside this one. */
+export const BASE = new URL(".", import.meta.url);
+
+const OURS = "/_webmap/";
+
+/**
+ * Resolve an address that the server gave for a file of the page.
+ *
+ * @param {string} address Ours begin with "/_webmap/", whatever the server is under.
+ * @param {string | URL} base What other addresses are relative to.
+ * @returns {string | null} null if it leads to another origin.
+ */
+export function resolve(address, base) {
+  const ours = address.startsWith(OURS);
+  try {
+    const url = ours ? new URL(address.slice(OURS.length), BASE) : new URL(address, base);
+    const web = url.protocol === "http:" || url.protocol === "https:";
+    return web && url.origin === BASE.origin ? url.href : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * @param {string} path Below {@link BASE}.
+ * @param {Record<string, string>} query
+ * @returns {URL} The address of a socket.
+ */
+export function socketAddress(path, query) {
+  const url = new URL(path, BASE);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  url.search = new URLSearchParams(query).toString();
+  return url;
+}
+
+/** @returns {string} The path of this page, from the application's root. */
+export function pagePath() {
+  const root = new URL("..", BASE).pathname;
+  const path = decodeURI(location.pathname);
+  return path.startsWith(root) ? `/${path.slice(root.length)}` : path;
+}

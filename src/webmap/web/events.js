@@ -1,0 +1,122 @@
+import { FLAG } from "./opcodes.js";
+
+/** @typedef {import('./item.js').Item} Item */
+
+/**
+ * @typedef {object} Listening
+ * @property {number | undefined} owner Flags, if the element's owner listens.
+ * @property {number | undefined} viewer Flags, if somebody listens on this page only.
+ * @property {(event: Event) => void} handler
+ */
+
+/** The events of one element that somebody listens to, one DOM listener for each. */
+export class Listeners {
+  /**
+   * @param {Item} item
+   * @param {(kind: string, event: Event) => void} hear
+   */
+  constructor(item, hear) {
+    this._item = item;
+    this._hear = hear;
+    /** @type {Map<string, Listening>} */
+    this._kinds = new Map();
+  }
+
+  /** @param {Map<string, number>} listening What the element's owner listens to. */
+  setOwner(listening) {
+    for (const kind of new Set([...this._kinds.keys(), ...listening.keys()])) {
+      this._set(kind, { owner: listening.get(kind) });
+    }
+  }
+
+  /**
+   * @param {string} kind
+   * @param {number | undefined} flags undefined to listen no more.
+   */
+  setViewer(kind, flags) {
+    this._set(kind, { viewer: flags });
+  }
+
+  /** Listen to nothing any more. */
+  clear() {
+    for (const [kind, { handler }] of this._kinds) {
+      this._item.element.removeEventListener(kind, handler);
+    }
+    this._kinds.clear();
+  }
+
+  /**
+   * @param {string} kind
+   * @param {{owner?: number, viewer?: number}} change
+   */
+  _set(kind, change) {
+    const known = this._kinds.get(kind);
+    const listening = known ?? this._listen(kind);
+    Object.assign(listening, change);
+    if (listening.owner === undefined && listening.viewer === undefined) {
+      this._item.element.removeEventListener(kind, listening.handler);
+      this._kinds.delete(kind);
+    }
+  }
+
+  /**
+   * @param {string} kind
+   * @returns {Listening}
+   */
+  _listen(kind) {
+    /** @type {Listening} */
+    const listening = {
+      owner: undefined,
+      viewer: undefined,
+      handler: (event) => {
+        const flags = (listening.owner ?? 0) | (listening.viewer ?? 0);
+        if (flags & FLAG.PREVENT) event.preventDefault();
+        if (flags & FLAG.STOP) event.stopPropagation();
+        this._hear(kind, event);
+      },
+    };
+    // Not passive, because the flags may come to ask for preventDefault.
+    this._item.element.addEventListener(kind, listening.handler, { passive: false });
+    this._kinds.set(kind, listening);
+    return listening;
+  }
+}
+
+/**
+ * @param {Event} event
+ * @returns {Record<string, string | number | boolean>} What the server is told of it,
+ *     without what is as it is most of the time.
+ */
+export function describe(event) {
+  /** @type {Record<string, string | number | boolean>} */
+  const told = {};
+  if (event instanceof MouseEvent) {
+    Object.assign(told, { x: event.clientX, y: event.clientY });
+    if (event.button > 0) told.button = event.button;
+  }
+  if (event instanceof WheelEvent) told.delta = event.deltaY;
+  if (event instanceof KeyboardEvent) told.key = event.key.slice(0, 64);
+  if (event instanceof MouseEvent || event instanceof KeyboardEvent) {
+    if (event.shiftKey) told.shift = true;
+    if (event.ctrlKey) told.ctrl = true;
+    if (event.altKey) told.alt = true;
+    if (event.metaKey) told.meta = true;
+  }
+  Object.assign(told, describeInput(event.currentTarget));
+  return told;
+}
+
+/**
+ * @param {EventTarget | null} target
+ * @returns {{value?: string, checked?: boolean}}
+ */
+function describeInput(target) {
+  if (target instanceof HTMLInputElement) {
+    return { value: target.value.slice(0, 8192), checked: target.checked };
+  }
+  if (target instanceof HTMLSelectElement || target instanceof HTMLTextAreaElement) {
+    return { value: target.value.slice(0, 8192) };
+  }
+  if (target instanceof HTMLDetailsElement) return { checked: target.open };
+  return {};
+}

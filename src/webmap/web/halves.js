@@ -1,0 +1,122 @@
+import { BASE, resolve } from "./addresses.js";
+
+/** @typedef {import('./map.js').MapCanvas} MapCanvas */
+
+/**
+ * The browser's half of a module, as its default export gives it.
+ *
+ * @typedef {object} Half
+ * @property {(message: any) => void} [receive] Takes what the other half sends.
+ * @property {() => void} destroy Undoes everything that the half did.
+ */
+
+/**
+ * @typedef {object} Attached
+ * @property {MapCanvas} canvas
+ * @property {Half | null} half null until the module has come.
+ * @property {unknown[]} waiting Messages that came before the module.
+ */
+
+/**
+ * @typedef {object} HalvesPage
+ * @property {(message: object) => void} send Tells the server.
+ * @property {(text: string) => void} notice Tells the viewer and the server.
+ * @property {() => Promise<unknown>} ready What must be there before any module.
+ * @property {() => void} onStyles Called when a style sheet has come.
+ */
+
+/** The browser's halves of modules: loaded, attached, and taken away again. */
+export class Halves {
+  /** @param {HalvesPage} page */
+  constructor(page) {
+    this._page = page;
+    /** @type {Map<number, Attached>} */
+    this._attached = new Map();
+    /** @type {Set<string>} */
+    this._styles = new Set();
+  }
+
+  /**
+   * @param {MapCanvas} canvas
+   * @param {number} instance
+   * @param {string} module
+   * @param {string} css "" for none.
+   * @param {unknown} options
+   */
+  attach(canvas, instance, module, css, options) {
+    this.detach(instance);
+    /** @type {Attached} */
+    const attached = { canvas, half: null, waiting: [] };
+    this._attached.set(instance, attached);
+    if (css) this._addStyle(css);
+    this._load(attached, instance, module, options).catch((error) => {
+      this._page.notice(`Module ${module} does not work: ${error}`);
+    });
+  }
+
+  /**
+   * @param {Attached} attached
+   * @param {number} instance
+   * @param {string} module
+   * @param {unknown} options
+   */
+  async _load(attached, instance, module, options) {
+    const url = resolve(module, BASE);
+    if (url === null) throw new Error("it is on another server");
+    const [code] = await Promise.all([import(url), this._page.ready()]);
+    // It may have been taken away while it was on its way.
+    if (this._attached.get(instance) !== attached) return;
+    const { send } = this._page;
+    /** @param {object} data */
+    const sendData = (data) => send({ op: "module", instance, data });
+    attached.half = code.default(attached.canvas, options, sendData) ?? null;
+    send({ op: "ready", instance });
+    for (const message of attached.waiting.splice(0)) this.receive(instance, message);
+  }
+
+  /**
+   * @param {number} instance
+   * @param {unknown} message
+   */
+  receive(instance, message) {
+    const attached = this._attached.get(instance);
+    if (!attached) return;
+    if (!attached.half) attached.waiting.push(message);
+    else this._try(() => attached.half?.receive?.(message));
+  }
+
+  /** @param {number} instance */
+  detach(instance) {
+    const attached = this._attached.get(instance);
+    this._attached.delete(instance);
+    if (attached) this._try(() => attached.half?.destroy());
+  }
+
+  /** @param {MapCanvas} canvas All modules of this map go. */
+  detachFrom(canvas) {
+    for (const [instance, attached] of [...this._attached].reverse()) {
+      if (attached.canvas === canvas) this.detach(instance);
+    }
+  }
+
+  /** @param {() => void} fn */
+  _try(fn) {
+    try {
+      fn();
+    } catch (error) {
+      this._page.notice(`A module failed: ${error}`);
+    }
+  }
+
+  /** @param {string} css */
+  _addStyle(css) {
+    const url = resolve(css, BASE);
+    if (url === null || this._styles.has(url)) return;
+    this._styles.add(url);
+    const link = document.createElement("link");
+    link.rel = "stylesheet";
+    link.href = url;
+    link.addEventListener("load", () => this._page.onStyles());
+    document.head.append(link);
+  }
+}

@@ -1,0 +1,264 @@
+import { resolve } from "./addresses.js";
+import { BOOLEAN_ATTRIBUTES } from "./opcodes.js";
+
+/** @typedef {import('./wire.js').Matrix} Matrix */
+/** @typedef {SVGElement | HTMLElement} AnyElement */
+
+const SVG = "http://www.w3.org/2000/svg";
+const BOOLEANS = new Set(BOOLEAN_ATTRIBUTES);
+/** What a hand changes; its attribute tells only what it was at first. */
+const PROPERTIES = new Set(["value", "checked", "selected", "open"]);
+const DOT_SIZE = 0.05;
+
+/** Makes matrices and transforms; elements need not be in the document for that. */
+const maker = document.createElementNS(SVG, "svg");
+
+/**
+ * @param {string} tag
+ * @param {boolean} svg
+ * @returns {AnyElement}
+ */
+export function createElement(tag, svg) {
+  return svg ? document.createElementNS(SVG, tag) : document.createElement(tag);
+}
+
+/** One element of the scene at one place of the page. */
+export class Item {
+  /**
+   * @param {number} id
+   * @param {AnyElement} element
+   * @param {Item | null} parent
+   */
+  constructor(id, element, parent) {
+    this.id = id;
+    this.element = element;
+    this.parent = parent;
+    /** @type {Map<number, Item | Text>} What the server put into it. */
+    this.children = new Map();
+    /** @type {ChildNode | null} What goes before the server's children, if anything. */
+    this.anchor = null;
+    /** @type {ChildNode | null} What goes after everything of the server's. */
+    this.tail = null;
+    /** @type {string[]} */
+    this._classes = [];
+    /** @type {SVGMatrix | null} */
+    this._matrix = null;
+    /** @type {SVGTransform | null} */
+    this._transform = null;
+    /** @type {{unit: number, points: Int16Array} | null} */
+    this._dots = null;
+    /** @type {number | null} */
+    this._dotSize = null;
+  }
+
+  /**
+   * @param {string} name
+   * @param {string | null} value null to unset it.
+   */
+  setAttribute(name, value) {
+    const { element } = this;
+    if (name === "transform") this._setTransform(value);
+    else if (value === null) element.removeAttribute(name);
+    else if (name === "href" || name === "src") this._setAddress(name, value);
+    else element.setAttribute(name, value);
+    if (PROPERTIES.has(name) && name in element) {
+      const property = BOOLEANS.has(name) ? value !== null : (value ?? "");
+      Object.assign(element, { [name]: property });
+    }
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} value
+   */
+  _setAddress(name, value) {
+    const address = value.startsWith("#") ? value : resolve(value, document.baseURI);
+    if (address !== null) this.element.setAttribute(name, address);
+    else throw new Error(`${value} leads to another server and is not followed`);
+  }
+
+  /** @param {string} names What Python gave; what a page added itself stays. */
+  setClasses(names) {
+    const classes = names.split(" ").filter(Boolean);
+    const { classList } = this.element;
+    classList.remove(...this._classes.filter((name) => !classes.includes(name)));
+    classList.add(...classes);
+    this._classes = classes;
+  }
+
+  /**
+   * @param {string} name A custom property.
+   * @param {string} value "" to unset it.
+   */
+  setStyle(name, value) {
+    if (name.startsWith("--")) this.element.style.setProperty(name, value);
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   * @param {number} yaw
+   */
+  setPose(x, y, yaw) {
+    const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+    this._place(cos, sin, -sin, cos, x, y);
+  }
+
+  /** @param {Matrix} m */
+  setMatrix({ a, b, c, d, e, f }) {
+    this._place(a, b, c, d, e, f);
+  }
+
+  /**
+   * @param {number} a
+   * @param {number} b
+   * @param {number} c
+   * @param {number} d
+   * @param {number} e
+   * @param {number} f
+   */
+  _place(a, b, c, d, e, f) {
+    // The same matrix is used again and again: nothing is allocated at a tick.
+    const matrix = (this._matrix ??= maker.createSVGMatrix());
+    matrix.a = a;
+    matrix.b = b;
+    matrix.c = c;
+    matrix.d = d;
+    matrix.e = e;
+    matrix.f = f;
+    if (this._transform) this._transform.setMatrix(matrix);
+    else this._startTransform(matrix);
+  }
+
+  /** @param {SVGMatrix} matrix */
+  _startTransform(matrix) {
+    const { element } = this;
+    if (!(element instanceof SVGGraphicsElement)) return;
+    const list = element.transform.baseVal;
+    this._transform = list.initialize(maker.createSVGTransformFromMatrix(matrix));
+    this._scaleDots();
+  }
+
+  /** @param {string | null} value */
+  _setTransform(value) {
+    this._transform = null;
+    if (value === null) this.element.removeAttribute("transform");
+    else this.element.setAttribute("transform", value);
+    this._scaleDots();
+  }
+
+  /**
+   * Take points to draw as dots; {@link drawDots} draws them.
+   *
+   * @param {number} unit Metres in one unit of `points`.
+   * @param {Int16Array} points
+   */
+  setDots(unit, points) {
+    const scaled = this._dots?.unit === unit;
+    this._dots = { unit, points };
+    if (scaled) return;
+    // The list is made anew, so that there is one scale at its end.
+    if (this._transform) this._startTransform(this._transform.matrix);
+    else this._place(1, 0, 0, 1, 0, 0);
+  }
+
+  _scaleDots() {
+    if (!this._dots || !(this.element instanceof SVGGraphicsElement)) return;
+    const scale = maker.createSVGTransform();
+    scale.setScale(this._dots.unit, this._dots.unit);
+    this.element.transform.baseVal.appendItem(scale);
+  }
+
+  /**
+   * Read how large dots are, which makes the browser work out styles.
+   *
+   * @returns {boolean} Whether it is another size than before.
+   */
+  readDotSize() {
+    const text = getComputedStyle(this.element).getPropertyValue("--dot-size");
+    const size = Number.parseFloat(text);
+    const before = this._dotSize;
+    this._dotSize = size > 0 ? size : DOT_SIZE;
+    return this._dotSize !== before;
+  }
+
+  get knowsDotSize() {
+    return this._dotSize !== null;
+  }
+
+  /** Draw the points as squares, in whole units: quick to write and quick to fill. */
+  drawDots() {
+    if (!this._dots) return;
+    const { unit, points } = this._dots;
+    const size = Math.max(1, Math.round((this._dotSize ?? DOT_SIZE) / unit));
+    const half = size >> 1;
+    const square = `h${size}v${size}h-${size}z`;
+    let d = "";
+    for (let i = 0; i + 1 < points.length; i += 2) {
+      d += `M${points[i] - half} ${points[i + 1] - half}${square}`;
+    }
+    this.element.setAttribute("d", d);
+  }
+
+  /** Take the element off the page. */
+  release() {
+    if (this.element !== document.body) this.element.remove();
+  }
+
+  /**
+   * @param {string} seconds What `data-age` says.
+   * @param {string | null} text What the element says, if it shows the age.
+   */
+  showAge(seconds, text) {
+    const { element } = this;
+    if (element.getAttribute("data-age") !== seconds) {
+      element.setAttribute("data-age", seconds);
+    }
+    if (text !== null && element.textContent !== text) element.textContent = text;
+  }
+}
+
+/** An element of the user's own page, with what was there kept to put it back. */
+export class BoundItem extends Item {
+  /**
+   * @param {number} id
+   * @param {HTMLElement} element
+   * @param {Item | null} parent
+   */
+  constructor(id, element, parent) {
+    super(id, element, parent);
+    this.anchor = element.lastChild;
+    /** @type {Map<string, string | null>} */
+    this._own = new Map();
+  }
+
+  /**
+   * @override
+   * @param {string} name
+   * @param {string | null} value
+   */
+  setAttribute(name, value) {
+    if (!this._own.has(name)) this._own.set(name, this.element.getAttribute(name));
+    super.setAttribute(name, value);
+  }
+
+  /** Drop what the page had in the element. */
+  empty() {
+    while (this.anchor) {
+      const before = this.anchor.previousSibling;
+      this.anchor.remove();
+      this.anchor = before;
+    }
+  }
+
+  /**
+   * Put back what the page had, but for what it had in the element.
+   *
+   * @override
+   */
+  release() {
+    for (const [name, value] of this._own) super.setAttribute(name, value);
+    this.setClasses("");
+    this.element.classList.remove("stale");
+  }
+}

@@ -1,0 +1,91 @@
+/** Milliseconds before a lost link is tried again: at first, and at the most. */
+const FIRST_WAIT = 250;
+const LONGEST_WAIT = 5000;
+/** Close codes after which another try would end the same way. */
+const FOR_GOOD = new Set([1008, 4001]);
+
+/**
+ * @typedef {object} LinkEvents
+ * @property {() => void} opened
+ * @property {(data: ArrayBuffer) => void} received
+ * @property {(reason: string, forGood: boolean) => void} closed
+ */
+
+/** A WebSocket that comes back by itself; what cannot be sent now is not sent. */
+export class Link {
+  /**
+   * @param {() => URL} address
+   * @param {LinkEvents} events
+   */
+  constructor(address, events) {
+    this._address = address;
+    this._events = events;
+    this._wait = FIRST_WAIT;
+    /** @type {WebSocket | null} */
+    this._socket = null;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this._timer = undefined;
+    addEventListener("online", () => this._hurry());
+    this._open();
+  }
+
+  get isOpen() {
+    return this._socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** @param {object} message Goes out now or not at all. */
+  send(message) {
+    if (this.isOpen) this._socket?.send(JSON.stringify(message));
+  }
+
+  /** The other side speaks sense, so the next loss is tried again at once. */
+  settle() {
+    this._wait = FIRST_WAIT;
+  }
+
+  /** Give the link up and try again. */
+  renew() {
+    const socket = this._socket;
+    if (!socket) return;
+    // A dead link takes its time to close; nobody waits for that.
+    this._lost(socket, "no answer", 1006);
+    socket.close();
+  }
+
+  _open() {
+    this._timer = undefined;
+    const socket = new WebSocket(this._address());
+    this._socket = socket;
+    socket.binaryType = "arraybuffer";
+    socket.addEventListener("open", () => this._events.opened());
+    socket.addEventListener("message", ({ data }) => {
+      if (this._socket === socket && data instanceof ArrayBuffer) {
+        this._events.received(data);
+      }
+    });
+    socket.addEventListener("close", ({ code, reason }) => this._lost(socket, reason, code));
+  }
+
+  /**
+   * @param {WebSocket} socket
+   * @param {string} reason
+   * @param {number} code
+   */
+  _lost(socket, reason, code) {
+    if (this._socket !== socket) return;
+    this._socket = null;
+    const forGood = FOR_GOOD.has(code);
+    if (!forGood) {
+      const jitter = 0.75 + Math.random() / 2;
+      this._timer = setTimeout(() => this._open(), this._wait * jitter);
+      this._wait = Math.min(this._wait * 2, LONGEST_WAIT);
+    }
+    this._events.closed(reason, forGood);
+  }
+
+  _hurry() {
+    if (this._timer === undefined) return;
+    clearTimeout(this._timer);
+    this._open();
+  }
+}

@@ -1,0 +1,429 @@
+import {
+  apply,
+  fit,
+  initialView,
+  isSame,
+  isShifted,
+  isView,
+  resize,
+  rotate,
+  scale,
+  translate,
+  unapply,
+} from "./view.js";
+
+/** @typedef {import('./view.js').Matrix} Matrix */
+/** @typedef {import('./view.js').Point} Point */
+/** @typedef {import('./wire.js').ViewState} ViewState */
+
+/**
+ * What a map asks of the page that it is on.
+ *
+ * @typedef {object} Surroundings
+ * @property {(report: object) => void} send Tells the server.
+ * @property {(id: number) => Element | null} find The element of a mounted fragment.
+ * @property {() => any} drive The page's one line to the gate.
+ */
+
+const SVG = "http://www.w3.org/2000/svg";
+/** Milliseconds between two reports of the view, at least. */
+const REPORT_PERIOD = 100;
+/** Milliseconds for which the click that ends a drag may keep us waiting. */
+const CLICK_PATIENCE = 500;
+
+/**
+ * A map on the page: an `<svg>` whose world group shows metres, x right and y up.
+ *
+ * The browser owns the view. Programs send operations, hands use {@link setView};
+ * whatever it is, the server gets to know it afterwards.
+ */
+export class MapCanvas {
+  /**
+   * @param {number} id The server's name of the `<svg>`.
+   * @param {SVGSVGElement} svg
+   * @param {SVGGElement} world
+   * @param {{width: number, height: number}} size Pixels; 0 to fill what it is in.
+   * @param {Surroundings} surroundings
+   */
+  constructor(id, svg, world, size, surroundings) {
+    this.id = id;
+    /** The root of everything that the map shows; screen pixels. */
+    this.svg = svg;
+    /** What is in metres goes in here. */
+    this.world = world;
+    this._surroundings = surroundings;
+    /** @type {SVGGElement | null} */
+    this._overlay = null;
+    /** @type {Set<(view: Matrix) => void>} */
+    this._onView = new Set();
+    /** @type {Set<(selected: string | null) => void>} */
+    this._onSelect = new Set();
+    /** @type {string | null} */
+    this._selected = null;
+    /** @type {Array<() => void>} Operations that wait until the map has a size. */
+    this._waiting = [];
+    this._follow = 0;
+    /** @type {Point | null} Where on the screen the followed element stays. */
+    this._place = null;
+    this._applied = 0;
+    this._session = 0;
+    this._reported = -Infinity;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this._timer = undefined;
+    this._changed = false;
+    this._suppressed = -Infinity;
+    this._matrix = svg.createSVGMatrix();
+
+    this._setSize(size);
+    const { width, height } = contentSize(svg);
+    /** Pixels across. */
+    this.width = width;
+    /** Pixels down. */
+    this.height = height;
+    this._view = initialView(width, height);
+    this._transform = world.transform.baseVal.initialize(svg.createSVGTransform());
+    this._show();
+    this._listen();
+    this.reportSoon();
+  }
+
+  /** @param {{width: number, height: number}} size */
+  _setSize({ width, height }) {
+    this.svg.classList.toggle("fill", width === 0 && height === 0);
+    this.svg.setAttribute("width", width > 0 ? String(width) : "100%");
+    this.svg.setAttribute("height", height > 0 ? String(height) : "100%");
+  }
+
+  _listen() {
+    this._ends = new AbortController();
+    const { signal } = this._ends;
+    const options = { capture: true, signal };
+    this.svg.addEventListener("click", (event) => this._filterClick(event), options);
+    this.svg.addEventListener("pointerdown", () => (this._suppressed = -Infinity), options);
+    addEventListener("scroll", () => this.reportSoon(), { ...options, passive: true });
+    this._observer = new ResizeObserver(() => this._resized());
+    this._observer.observe(this.svg);
+  }
+
+  /** The element that the map was put into. */
+  get element() {
+    return this.svg.parentElement;
+  }
+
+  /** A group beside the world, in pixels, for what lies over the map. */
+  get overlay() {
+    if (!this._overlay?.isConnected) {
+      this._overlay = document.createElementNS(SVG, "g");
+      this._overlay.classList.add("overlay");
+      this.svg.append(this._overlay);
+    }
+    return this._overlay;
+  }
+
+  /** The page's one line to the gate; see `drive.js`. */
+  get drive() {
+    return this._surroundings.drive();
+  }
+
+  /** @returns {Matrix} From the world to the map's pixels. */
+  get view() {
+    return this._view;
+  }
+
+  /**
+   * Show the world another way, by hand: what only moves the view ends following.
+   *
+   * @param {Matrix} view
+   */
+  setView(view) {
+    if (!isView(view) || isSame(view, this._view)) return;
+    if (isShifted(view, this._view)) this._stopFollowing();
+    this._program(view);
+    this.reportSoon();
+  }
+
+  /**
+   * @param {(view: Matrix) => void} fn Called whenever the view is another.
+   * @returns {() => void} What ends that.
+   */
+  onView(fn) {
+    this._onView.add(fn);
+    return () => this._onView.delete(fn);
+  }
+
+  /**
+   * @param {number} x Pixels from the map's left.
+   * @param {number} y Pixels from the map's top.
+   * @returns {Point} Metres in the world.
+   */
+  toWorld(x, y) {
+    return unapply(this._view, x, y);
+  }
+
+  /**
+   * @param {number} x Metres in the world.
+   * @param {number} y Metres in the world.
+   * @returns {Point} Pixels from the map's left and top.
+   */
+  toScreen(x, y) {
+    return apply(this._view, x, y);
+  }
+
+  /**
+   * @param {{clientX: number, clientY: number}} event
+   * @returns {Point} Where it happened, in pixels from the map's left and top.
+   */
+  pointOf(event) {
+    const matrix = this.svg.getScreenCTM()?.inverse();
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix);
+    return { x: point.x, y: point.y };
+  }
+
+  /** The robot that this viewer selected: its id at the gate, or null. */
+  get selected() {
+    return this._selected;
+  }
+
+  /**
+   * @param {(selected: string | null) => void} fn Called when another is selected.
+   * @returns {() => void} What ends that.
+   */
+  onSelect(fn) {
+    this._onSelect.add(fn);
+    return () => this._onSelect.delete(fn);
+  }
+
+  /** Swallow the click with which the browser ends a drag; call it when one ends. */
+  suppressNextClick() {
+    this._suppressed = performance.now();
+  }
+
+  /** @param {MouseEvent} event */
+  _filterClick(event) {
+    const waited = performance.now() - this._suppressed;
+    this._suppressed = -Infinity;
+    // A click without a pointer comes from a key and ends no drag.
+    if (event.detail === 0 || waited > CLICK_PATIENCE) return;
+    event.stopImmediatePropagation();
+    event.preventDefault();
+  }
+
+  /** The element that the view follows, or 0. */
+  get following() {
+    return this._follow;
+  }
+
+  /** @param {number} id The element to follow, or 0. */
+  follow(id) {
+    this._follow = id;
+    this._place = this._followedPlace();
+    this.reportSoon();
+  }
+
+  // For the scene --------------------------------------------------------------
+
+  /**
+   * Take up what the server knows of the map.
+   *
+   * @param {ViewState} state
+   * @param {ViewState | undefined} kept What this page knew before it was told anew.
+   */
+  restore(state, kept) {
+    this._session = state.session;
+    const { applied, matrix, follow } =
+      kept && kept.applied >= state.applied ? kept : state;
+    this._applied = Math.max(this._applied, applied);
+    if (!matrix) return;
+    this._whenSized(() => {
+      if (isView(matrix)) this._change(matrix);
+      this.follow(follow);
+    });
+  }
+
+  /** @returns {ViewState} */
+  get state() {
+    const { _session: session, _applied: applied, _follow: follow } = this;
+    return { session, applied, matrix: this._view, follow };
+  }
+
+  /**
+   * @param {number} number Counts operations, so that none is applied twice.
+   * @param {string} operation
+   * @param {number[]} args
+   */
+  operate(number, operation, args) {
+    if (number <= this._applied) return;
+    this._applied = number;
+    this._whenSized(() => this._operate(operation, args));
+  }
+
+  /**
+   * @param {string} operation
+   * @param {number[]} args
+   */
+  _operate(operation, args) {
+    const { _view: view, width, height } = this;
+    const [first, x = width / 2, y = height / 2] = args;
+    if (operation === "follow") this.follow(first);
+    else if (operation === "translate") this._program(translate(view, first, args[1]));
+    else if (operation === "scale") this._program(scale(view, first, x, y));
+    else if (operation === "rotate") this._program(rotate(view, first, x, y));
+    else if (operation === "fit") this._fit(args);
+    else if (operation === "set") this._set(args);
+  }
+
+  /** @param {number[]} bounds */
+  _fit([x0, y0, x1, y1]) {
+    this._stopFollowing();
+    this._program(fit(this._view, [x0, y0, x1, y1], this.width, this.height));
+  }
+
+  /** @param {number[]} numbers */
+  _set([a, b, c, d, e, f]) {
+    this._stopFollowing();
+    this._program({ a, b, c, d, e, f });
+  }
+
+  /** @param {Matrix} view */
+  _program(view) {
+    if (!isView(view)) return;
+    this._change(view);
+    this._place = this._followedPlace();
+  }
+
+  /**
+   * A frame has been applied: keep up with what is followed, and tell the server.
+   *
+   * @param {boolean} reselected Whether another robot may be selected.
+   */
+  settle(reselected) {
+    this._keepUp();
+    if (reselected) this._checkSelection();
+    if (this._changed) this._report();
+  }
+
+  /** Leave the elements alone from now on. */
+  destroy() {
+    this._ends?.abort();
+    this._observer?.disconnect();
+    clearTimeout(this._timer);
+    this._overlay?.remove();
+    this._onView.clear();
+    this._onSelect.clear();
+  }
+
+  // Its own affairs ------------------------------------------------------------
+
+  /** @param {Matrix} view */
+  _change(view) {
+    this._view = view;
+    this._show();
+    this._changed = true;
+    for (const fn of [...this._onView]) fn(view);
+  }
+
+  _show() {
+    const { _matrix: matrix, _view: view } = this;
+    matrix.a = view.a;
+    matrix.b = view.b;
+    matrix.c = view.c;
+    matrix.d = view.d;
+    matrix.e = view.e;
+    matrix.f = view.f;
+    this._transform.setMatrix(matrix);
+  }
+
+  _resized() {
+    const [before, after] = [{ width: this.width, height: this.height }, contentSize(this.svg)];
+    if (before.width === after.width && before.height === after.height) return;
+    Object.assign(this, after);
+    this._change(resize(this._view, before, after));
+    if (this._sized) {
+      for (const operate of this._waiting.splice(0)) operate();
+    }
+    this._place = this._followedPlace();
+    this.reportSoon();
+  }
+
+  get _sized() {
+    return this.width > 0 && this.height > 0;
+  }
+
+  /** @param {() => void} operate */
+  _whenSized(operate) {
+    if (this._sized) operate();
+    else this._waiting.push(operate);
+  }
+
+  _stopFollowing() {
+    this._follow = 0;
+    this._place = null;
+  }
+
+  /** @returns {Point | null} Where the followed element is, in the map's pixels. */
+  _followedPlace() {
+    if (!this._follow) return null;
+    const element = this._surroundings.find(this._follow);
+    if (!(element instanceof SVGGraphicsElement)) return null;
+    const matrix = element.getCTM();
+    return matrix && { x: matrix.e, y: matrix.f };
+  }
+
+  _keepUp() {
+    const now = this._followedPlace();
+    if (!now) return;
+    this._place ??= now;
+    const [x, y] = [this._place.x - now.x, this._place.y - now.y];
+    if (Math.hypot(x, y) < 0.01) return;
+    this._change(translate(this._view, x, y));
+  }
+
+  _checkSelection() {
+    const robot = this.world.querySelector(".robot.selected");
+    const selected = robot?.getAttribute("data-robot") ?? null;
+    if (selected === this._selected) return;
+    this._selected = selected;
+    for (const fn of [...this._onSelect]) fn(selected);
+  }
+
+  /** Tell the server of the view, soon and not too often. */
+  reportSoon() {
+    this._changed = true;
+    const wait = this._reported + REPORT_PERIOD - performance.now();
+    this._timer ??= setTimeout(() => this._report(), Math.max(0, wait));
+  }
+
+  _report() {
+    clearTimeout(this._timer);
+    this._timer = undefined;
+    this._changed = false;
+    this._reported = performance.now();
+    const place = this.svg.getScreenCTM();
+    this._surroundings.send({
+      op: "view",
+      map_element: this.id,
+      ...this._view,
+      width: this.width,
+      height: this.height,
+      left: place?.e ?? 0,
+      top: place?.f ?? 0,
+      follow: this._follow,
+      applied: this._applied,
+    });
+  }
+}
+
+/**
+ * @param {Element} element
+ * @returns {{width: number, height: number}} Pixels within border and padding.
+ */
+export function contentSize(element) {
+  const style = getComputedStyle(element);
+  /** @param {string[]} names */
+  const sum = (...names) =>
+    names.reduce((all, name) => all + Number.parseFloat(style.getPropertyValue(name)), 0);
+  const { width, height } = element.getBoundingClientRect();
+  const across = sum("border-left-width", "border-right-width", "padding-left", "padding-right");
+  const down = sum("border-top-width", "border-bottom-width", "padding-top", "padding-bottom");
+  return { width: Math.max(0, width - across), height: Math.max(0, height - down) };
+}

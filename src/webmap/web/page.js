@@ -1,0 +1,197 @@
+import { BASE, pagePath, socketAddress } from "./addresses.js";
+import { Halves } from "./halves.js";
+import { takeIdentity } from "./identity.js";
+import { Link } from "./link.js";
+import { contentSize } from "./map.js";
+import { Notices } from "./notices.js";
+import { Reports } from "./reports.js";
+import { Scene } from "./scene.js";
+
+/** Milliseconds without a word from the server until the page says so, and acts. */
+const SILENT = 3000;
+const DEAD = 10_000;
+/** The server says something at least every second, so this is often enough. */
+const LOOK_PERIOD = 500;
+/** Frames in a row that may fail before the page gives up asking for new ones. */
+const FAILURES = 3;
+
+/** One open page: its link to the display, the scene that it shows, its notices. */
+export class Page {
+  constructor() {
+    this.path = pagePath();
+    this.id = takeIdentity(this.path);
+    this.notices = new Notices();
+    this.halves = new Halves({
+      send: (message) => this.send(message),
+      notice: (text) => this.trouble(text),
+      ready: () => this._loadDrive(),
+      onStyles: () => this.scene.restyle(),
+    });
+    this.scene = new Scene({
+      send: (message) => this.send(message),
+      notice: (text) => this.trouble(text),
+      error: (text) => this.notices.error(text),
+      hear: (mount, item, kind, event) => this._reports.hear(mount, item, kind, event),
+      drive: () => this.drive,
+      halves: this.halves,
+    });
+    this._reports = new Reports(
+      (message) => this.send(message),
+      (node) => this.scene.mapOf(node),
+    );
+    /** @type {any} The page's one line to the gate, made when it is first asked for. */
+    this._drive = null;
+    /** @type {(new (base: string, options: object) => any) | null} */
+    this._Drive = null;
+    /** @type {Array<{data: ArrayBuffer, received: number}>} */
+    this._frames = [];
+    this._drawing = 0;
+    this._failures = 0;
+    this._heard = performance.now();
+    this._theme = matchMedia("(prefers-color-scheme: dark)");
+    this._theme.addEventListener("change", () => this.scene.restyle());
+    this._link = new Link(() => socketAddress("scene", { page: this.path, id: this.id }), {
+      opened: () => this._opened(),
+      received: (data) => this._received(data),
+      closed: (reason, forGood) => this._closed(reason, forGood),
+    });
+    setInterval(() => this._look(), LOOK_PERIOD);
+  }
+
+  /** The page's one line to the gate; null until the first module has come. */
+  get drive() {
+    if (!this._drive && this._Drive) {
+      this._drive = new this._Drive(BASE.href, { page: this.id });
+    }
+    return this._drive;
+  }
+
+  async _loadDrive() {
+    this._Drive ??= (await import("./drive.js")).Drive;
+  }
+
+  /**
+   * Tell the server; nothing is kept for later.
+   *
+   * @param {object} message
+   */
+  send(message) {
+    this._link.send(message);
+  }
+
+  /**
+   * Tell the viewer and the server of something that did not work.
+   *
+   * @param {string} text
+   */
+  trouble(text) {
+    this.notices.error(text);
+    this.send({ op: "trouble", text: text.slice(0, 2000) });
+  }
+
+  // The link -------------------------------------------------------------------
+
+  _opened() {
+    this._heard = performance.now();
+    this._frames = [];
+    this.send({
+      op: "hello",
+      page: this.id,
+      url: (this.path + location.search).slice(0, 2048),
+      width: innerWidth,
+      height: innerHeight,
+      dpr: devicePixelRatio,
+      theme: this._theme.matches ? "dark" : "light",
+      containers: containers(),
+    });
+  }
+
+  /** @param {ArrayBuffer} data */
+  _received(data) {
+    this._heard = performance.now();
+    this._frames.push({ data, received: performance.now() / 1000 });
+    this._drawing ||= requestAnimationFrame(() => this._draw());
+    this._connected();
+  }
+
+  _connected() {
+    document.documentElement.classList.remove("disconnected");
+    this.notices.hide("link");
+    this._link.settle();
+  }
+
+  /**
+   * @param {string} reason
+   * @param {boolean} forGood
+   */
+  _closed(reason, forGood) {
+    this._frames = [];
+    const what = reason ? `No connection to the server: ${reason}.` : "No connection to the server.";
+    this._disconnected(`${what} ${forGood ? "Reload the page." : "Trying again…"}`);
+  }
+
+  /** @param {string} text */
+  _disconnected(text) {
+    document.documentElement.classList.add("disconnected");
+    this.notices.show("link", text);
+  }
+
+  /** Notice a link that is open and says nothing. */
+  _look() {
+    // A hidden page draws nothing, so that the server rightly stops talking to it.
+    if (document.hidden || this._frames.length > 0) this._heard = performance.now();
+    const silent = performance.now() - this._heard;
+    if (silent < SILENT || !this._link.isOpen) return;
+    this._disconnected("The server says nothing. What you see is old.");
+    if (silent > DEAD) this._link.renew();
+  }
+
+  // Frames ---------------------------------------------------------------------
+
+  _draw() {
+    this._drawing = 0;
+    for (const { data, received } of this._frames.splice(0)) {
+      if (!this._apply(data, received)) return;
+    }
+  }
+
+  /**
+   * @param {ArrayBuffer} data
+   * @param {number} received
+   * @returns {boolean} Whether the page understood.
+   */
+  _apply(data, received) {
+    try {
+      this.send({ op: "seen", frame: this.scene.apply(data, received) });
+      this._failures = 0;
+      return true;
+    } catch (error) {
+      this._misunderstood(error);
+      return false;
+    }
+  }
+
+  /** @param {unknown} error */
+  _misunderstood(error) {
+    this._frames = [];
+    this._failures += 1;
+    this.trouble(`This page did not understand the server: ${error}`);
+    if (this._failures < FAILURES) this.send({ op: "resync" });
+    else this.notices.error("Reload the page: it may be older than the server.");
+  }
+}
+
+/** @returns {Record<string, [number, number]>} The sizes of the page's own elements. */
+function containers() {
+  /** @type {Record<string, [number, number]>} */
+  const sizes = {};
+  const elements = [...document.body.querySelectorAll("[id]")];
+  for (const element of elements.filter(({ id }) => id.length <= 64).slice(0, 100)) {
+    const { width, height } = contentSize(element);
+    sizes[element.id] = [Math.round(width), Math.round(height)];
+  }
+  return sizes;
+}
+
+/** This page. */
+export const page = new Page();

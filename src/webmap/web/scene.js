@@ -1,0 +1,467 @@
+import { Ages } from "./ages.js";
+import { DisplayClock } from "./clock.js";
+import { Dots } from "./dots.js";
+import { Listeners } from "./events.js";
+import { BoundItem } from "./item.js";
+import { Maps } from "./maps.js";
+import { Mount } from "./mount.js";
+import { readFrame } from "./wire.js";
+
+/** @typedef {import('./item.js').Item} Item */
+/** @typedef {import('./map.js').MapCanvas} MapCanvas */
+/** @typedef {import('./wire.js').Matrix} Matrix */
+/** @typedef {import('./wire.js').Sink} Sink */
+/** @typedef {import('./wire.js').ViewState} ViewState */
+
+/**
+ * What the scene asks of the page that it is on.
+ *
+ * @typedef {object} ScenePage
+ * @property {(message: object) => void} send Tells the server.
+ * @property {(text: string) => void} notice Tells the viewer and the server.
+ * @property {(text: string) => void} error Shows what the server says.
+ * @property {(mount: number, item: Item, kind: string, event: Event) => void} hear
+ *     Takes an event.
+ * @property {() => any} drive The page's one line to the gate.
+ * @property {import('./halves.js').Halves} halves
+ */
+
+/**
+ * The scene on this page: applies frames to the document, whole ones at a time.
+ *
+ * @implements {Sink}
+ */
+export class Scene {
+  /** @param {ScenePage} page */
+  constructor(page) {
+    this._page = page;
+    this._clock = new DisplayClock();
+    this._ages = new Ages(this._clock, () => this.restyle());
+    this._dots = new Dots();
+    this._maps = new Maps(
+      (svg) => this._surroundings(svg),
+      (canvas) => page.halves.detachFrom(canvas),
+    );
+    /** @type {Map<number, Mount>} */
+    this._mounts = new Map();
+    /** @type {Map<number, Set<Mount>>} The mounts of each fragment. */
+    this._fragments = new Map();
+    /** @type {Iterable<Mount>} Where the records of elements go. */
+    this._targets = [];
+    /** @type {WeakMap<Item, Listeners>} */
+    this._listeners = new WeakMap();
+    /** @type {WeakMap<Mount, Map<number, Map<string, number>>>} */
+    this._heard = new WeakMap();
+    this._reselected = false;
+    this._onGone = this._onGone.bind(this);
+  }
+
+  /**
+   * @param {ArrayBuffer} buffer One frame.
+   * @param {number} received This page's clock when it came, in seconds.
+   * @returns {number} The number of the frame.
+   */
+  apply(buffer, received) {
+    const header = readFrame(buffer, ({ reset, now }) => {
+      if (reset) this._clear();
+      this._clock.hear(now, received);
+      return this;
+    });
+    this._targets = [];
+    // A map begins once all its elements are there, and may be large then.
+    this._maps.settle(this._reselected);
+    this._reselected = false;
+    this._dots.draw();
+    this._ages.flush();
+    return header.frame;
+  }
+
+  /** Everything is told again, maybe by another server with another clock. */
+  _clear() {
+    for (const mount of [...this._mounts.values()].reverse()) this.unmount(mount.id);
+    this._targets = [];
+    this._clock.reset();
+  }
+
+  /** Sizes that styles give may be others now. */
+  restyle() {
+    this._dots.restyle();
+    queueMicrotask(() => this._dots.draw());
+  }
+
+  /** @returns {MapCanvas[]} The maps on the page. */
+  get maps() {
+    return this._maps.all;
+  }
+
+  /**
+   * @param {Node} node
+   * @returns {MapCanvas | undefined} The map that a node is on.
+   */
+  mapOf(node) {
+    return this.maps.find(({ svg }) => svg.contains(node));
+  }
+
+  /** @param {Element} svg */
+  _surroundings(svg) {
+    this._reselected = true;
+    return {
+      send: (/** @type {object} */ report) => this._page.send(report),
+      find: (/** @type {number} */ id) => this._find(svg, id),
+      drive: () => this._page.drive(),
+    };
+  }
+
+  /**
+   * @param {Element} svg
+   * @param {number} id
+   * @returns {Element | null}
+   */
+  _find(svg, id) {
+    for (const { items } of this._mounts.values()) {
+      const element = items.get(id)?.element;
+      if (element && svg.contains(element)) return element;
+    }
+    return null;
+  }
+
+  /** @param {Item} item Goes, with what is known of it. */
+  _onGone(item) {
+    this._maps.end(item);
+    this._ages.forget(item);
+    this._dots.forget(item);
+    this._listeners.get(item)?.clear();
+  }
+
+  // Records about the page -----------------------------------------------------
+
+  /** @param {number} fragment */
+  delta(fragment) {
+    this._targets = this._fragments.get(fragment) ?? [];
+  }
+
+  /** @param {number} mount */
+  snapshot(mount) {
+    const known = this._mounts.get(mount);
+    this._targets = known ? [known] : [];
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} fragment
+   * @param {number} within
+   * @param {number} under
+   * @param {number} order
+   */
+  mount(id, fragment, within, under, order) {
+    const mount = new Mount(id, fragment, this._mounts.get(within) ?? null, under, order);
+    this._mounts.set(id, mount);
+    const mounts = this._fragments.get(fragment) ?? new Set();
+    this._fragments.set(fragment, mounts.add(mount));
+  }
+
+  /** @param {number} id */
+  unmount(id) {
+    const mount = this._mounts.get(id);
+    if (!mount) return;
+    mount.removeRoot(this._onGone);
+    mount.leave();
+    this._mounts.delete(id);
+    const mounts = this._fragments.get(mount.fragment);
+    mounts?.delete(mount);
+    if (mounts?.size === 0) this._fragments.delete(mount.fragment);
+    this._reselected = true;
+  }
+
+  /**
+   * @param {number} id
+   * @param {boolean} on
+   * @param {string} name
+   */
+  mountClass(id, on, name) {
+    this._mounts.get(id)?.root?.element.classList.toggle(name, on);
+    this._dots.restyle();
+    this._reselected = true;
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} element
+   * @param {string} kind
+   * @param {number} flags
+   */
+  listen(id, element, kind, flags) {
+    this._hear(id, element, kind, flags);
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} element
+   * @param {string} kind
+   */
+  unlisten(id, element, kind) {
+    this._hear(id, element, kind, undefined);
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} element
+   * @param {string} kind
+   * @param {number | undefined} flags undefined to hear no more.
+   */
+  _hear(id, element, kind, flags) {
+    const mount = this._mounts.get(id);
+    if (!mount) return;
+    // Kept besides, for an element that is made again with the same id.
+    const heard = this._heard.get(mount) ?? new Map();
+    this._heard.set(mount, heard);
+    const kinds = heard.get(element) ?? new Map();
+    if (flags === undefined) kinds.delete(kind);
+    else kinds.set(kind, flags);
+    if (kinds.size > 0) heard.set(element, kinds);
+    else heard.delete(element);
+    const item = mount.items.get(element);
+    if (item) this._listenersOf(mount, item).setViewer(kind, flags);
+  }
+
+  /**
+   * @param {Mount} mount
+   * @param {Item} item
+   * @returns {Listeners}
+   */
+  _listenersOf(mount, item) {
+    const known = this._listeners.get(item);
+    if (known) return known;
+    const { id } = mount;
+    const listeners = new Listeners(item, (kind, event) =>
+      this._page.hear(id, item, kind, event),
+    );
+    this._listeners.set(item, listeners);
+    return listeners;
+  }
+
+  /** @param {string} text */
+  error(text) {
+    this._page.error(text);
+  }
+
+  // Records about maps and modules ---------------------------------------------
+
+  /**
+   * @param {number} svg
+   * @param {ViewState} state
+   */
+  viewState(svg, state) {
+    this._maps.restore(svg, state);
+  }
+
+  /**
+   * @param {number} svg
+   * @param {number} number
+   * @param {string} operation
+   * @param {number[]} args
+   */
+  view(svg, number, operation, args) {
+    this._maps.get(svg)?.operate(number, operation, args);
+  }
+
+  /**
+   * @param {number} svg
+   * @param {number} instance
+   * @param {string} module
+   * @param {string} css
+   * @param {unknown} options
+   */
+  attach(svg, instance, module, css, options) {
+    const canvas = this._maps.get(svg);
+    if (canvas) this._page.halves.attach(canvas, instance, module, css, options);
+  }
+
+  /** @param {number} instance */
+  detach(instance) {
+    this._page.halves.detach(instance);
+  }
+
+  /**
+   * @param {number} instance
+   * @param {unknown} message
+   */
+  message(instance, message) {
+    this._page.halves.receive(instance, message);
+  }
+
+  // Records about elements -----------------------------------------------------
+
+  /**
+   * @param {number} id
+   * @param {number} parent
+   * @param {number} place
+   * @param {string} tag
+   * @param {boolean} svg
+   */
+  create(id, parent, place, tag, svg) {
+    for (const mount of this._targets) {
+      const item = mount.create(id, parent, place, tag, svg);
+      const heard = item && this._heard.get(mount)?.get(id);
+      if (!heard) continue;
+      for (const [kind, flags] of heard) {
+        this._listenersOf(mount, item).setViewer(kind, flags);
+      }
+    }
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} parent
+   * @param {number} place
+   * @param {string} data
+   */
+  text(id, parent, place, data) {
+    for (const mount of this._targets) mount.createText(id, parent, place, data);
+  }
+
+  /** @param {number} id */
+  document(id) {
+    for (const mount of this._targets) mount.createDocument(id);
+  }
+
+  /**
+   * @param {number} id
+   * @param {string} htmlId
+   */
+  bind(id, htmlId) {
+    const found = document.getElementById(htmlId);
+    if (!found) this._page.notice(`This page has no element with the id "${htmlId}".`);
+    // What is not there is filled all the same, where nobody sees it.
+    const element = found ?? document.createElement("div");
+    for (const mount of this._targets) mount.bind(id, element);
+  }
+
+  /** @param {number} id */
+  remove(id) {
+    for (const mount of this._targets) mount.remove(id, this._onGone);
+  }
+
+  /**
+   * @param {number} id
+   * @param {(item: Item, mount: Mount) => void} fn
+   */
+  _each(id, fn) {
+    for (const mount of this._targets) {
+      const item = mount.items.get(id);
+      if (item) fn(item, mount);
+    }
+  }
+
+  /**
+   * @param {number} id
+   * @param {string} name
+   * @param {string | null} value
+   */
+  attribute(id, name, value) {
+    this._each(id, (item) => {
+      try {
+        item.setAttribute(name, value);
+      } catch (error) {
+        this._page.notice(`${name} of ${item.element.tagName} cannot be set: ${error}`);
+      }
+    });
+  }
+
+  /**
+   * @param {number} id
+   * @param {string} classes
+   */
+  classes(id, classes) {
+    this._each(id, (item) => item.setClasses(classes));
+    this._dots.restyle();
+    this._reselected = true;
+  }
+
+  /**
+   * @param {number} id
+   * @param {string} name
+   * @param {string} value
+   */
+  style(id, name, value) {
+    this._each(id, (item) => item.setStyle(name, value));
+    this._dots.restyle();
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} x
+   * @param {number} y
+   * @param {number} yaw
+   */
+  pose(id, x, y, yaw) {
+    this._each(id, (item) => item.setPose(x, y, yaw));
+  }
+
+  /**
+   * @param {number} id
+   * @param {Matrix} matrix
+   */
+  matrix(id, matrix) {
+    this._each(id, (item) => item.setMatrix(matrix));
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} unit
+   * @param {Int16Array} points
+   */
+  dots(id, unit, points) {
+    this._each(id, (item) => this._dots.set(item, unit, points));
+  }
+
+  /**
+   * @param {number} id
+   * @param {number | null} measured
+   */
+  age(id, measured) {
+    this._each(id, (item) => this._ages.set(item, measured));
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} limit
+   * @param {boolean} shown
+   */
+  ageLimit(id, limit, shown) {
+    this._each(id, (item) => this._ages.limit(item, limit, shown));
+  }
+
+  /**
+   * @param {number} id
+   * @param {string} data
+   */
+  data(id, data) {
+    for (const mount of this._targets) mount.setText(id, data);
+  }
+
+  /**
+   * @param {number} id
+   * @param {Map<string, number>} listening
+   */
+  events(id, listening) {
+    this._each(id, (item, mount) => this._listenersOf(mount, item).setOwner(listening));
+  }
+
+  /** @param {number} id */
+  empty(id) {
+    this._each(id, (item) => {
+      if (item instanceof BoundItem) item.empty();
+    });
+  }
+
+  /**
+   * @param {number} id
+   * @param {number} world
+   * @param {number} width
+   * @param {number} height
+   */
+  map(id, world, width, height) {
+    this._each(id, (item, mount) => this._maps.add(mount, item, world, { width, height }));
+  }
+}
