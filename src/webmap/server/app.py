@@ -43,10 +43,11 @@ class WebApp:
         self.settings = settings
         self.published = published
         hops = Hops()
-        limit = settings.max_pages
+        scene = SceneSockets(site, model, hops, settings.max_pages)
+        drive = DriveSockets(model, gate, hops, settings.max_pages)
         self.routes = [
-            WebSocketRoute("/_webmap/scene", SceneSockets(site, model, hops, limit)),
-            WebSocketRoute("/_webmap/drive", DriveSockets(model, gate, hops, limit)),
+            WebSocketRoute("/_webmap/scene", scene.serve),
+            WebSocketRoute("/_webmap/drive", drive.serve),
             Route(FILES + "{name:path}", self._published_file),
             Route(IMAGES + "{tag}", self._published_image),
             Route("/_webmap/{name:path}", self._static),

@@ -31,7 +31,7 @@ class DriveSockets:
         self._hops = hops
         self._seats: Seats[Line] = Seats(limit)
 
-    async def __call__(self, socket: WebSocket) -> None:
+    async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
         viewer: Viewer = socket.scope[VIEWER]
         # Without an id it drives all the same, as a page of its own.
@@ -45,11 +45,11 @@ class DriveSockets:
         line = Line(socket, name, self._hops.here(), DRIVE, DriveQueue())
         async with self._seats.taken((viewer.id, page_id), line) as seated:
             if seated:
-                await self._serve(line, page_id, viewer)
+                await self._carry(line, page_id, viewer)
             else:
                 await line.refuse_full()
 
-    async def _serve(self, line: Line, page_id: str, viewer: Viewer) -> None:
+    async def _carry(self, line: Line, page_id: str, viewer: Viewer) -> None:
         try:
             connection = self._connect(line, viewer)
         except Exception:

@@ -75,6 +75,9 @@ def prepare_page(text: str, base: str) -> OwnPage:
 class _Reader(HTMLParser):
     """Finds the head of a page, what it loads, and what will be blocked."""
 
+    # Older Pythons look for tags in titles, too.
+    CDATA_CONTENT_ELEMENTS = ("script", "style", "title", "textarea")
+
     def __init__(self, text: str) -> None:
         super().__init__()
         self.blocked: list[str] = []

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Protocol
 
-from webmap.server.viewer import Viewer
+from webmap.server.viewer import Role, Viewer
 
 
 class PageEntry(Protocol):
@@ -94,7 +94,7 @@ class Gate(Protocol):
     def connect(
         self,
         name: str,
-        role: str,
+        role: Role,
         send: Callable[[str], None],
         close: Callable[[str], None],
     ) -> DriveConnection:

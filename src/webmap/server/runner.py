@@ -1,6 +1,5 @@
 """What runs the web application: uvicorn, set up for small messages and quick ends."""
 
-import asyncio
 import logging
 import socket
 from collections.abc import Callable
@@ -68,17 +67,20 @@ def serve(
     url = url_of(listener, host)
     if not app.settings.authenticate:
         url += f"?token={app.settings.token}"
-    server = _Server(_config(app), lambda: on_ready(url))
+    server = make_server(app, lambda: on_ready(url))
     try:
         server.run(sockets=[listener])
     except SystemExit as error:
         raise WebMapError("the web application did not start") from error
     finally:
         listener.close()
+    if server.failure is not None:
+        raise server.failure
 
 
-def _config(app: Application) -> uvicorn.Config:
-    return uvicorn.Config(
+def make_server(app: Application, on_ready: Callable[[], object]) -> "Server":
+    """Return what :func:`serve` runs, for those who start and stop it themselves."""
+    config = uvicorn.Config(
         app,
         interface="asgi3",
         ws="websockets-sansio",
@@ -97,21 +99,28 @@ def _config(app: Application) -> uvicorn.Config:
         limit_concurrency=_MAX_REQUESTS_AT_ONCE,
         timeout_graceful_shutdown=1,
     )
+    return Server(config, on_ready)
 
 
-class _Server(uvicorn.Server):
+class Server(uvicorn.Server):
     """A server that says when it is ready, and takes a signal as a wish to end."""
 
     def __init__(self, config: uvicorn.Config, on_ready: Callable[[], object]) -> None:
         super().__init__(config)
         self._on_ready = on_ready
+        self.failure: Exception | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start to listen, then say so."""
         await super().startup(sockets)
-        if self.started:
+        try:
             self._on_ready()
+        except Exception as error:
+            # Not out of here: what has started would be left as it is.
+            self.failure, self.should_exit = error, True
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Take a signal as a wish to end; the second one does not wait."""
         # uvicorn's own remembers the signal and raises it again at the end, and the
         # process would not exit with 0.
         del sig, frame

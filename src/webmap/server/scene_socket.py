@@ -43,7 +43,7 @@ class SceneSockets:
         self._hops = hops
         self._seats: Seats[Line] = Seats(limit)
 
-    async def __call__(self, socket: WebSocket) -> None:
+    async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
         viewer: Viewer = socket.scope[VIEWER]
         page_id = page_id_of(socket.query_params)
@@ -59,11 +59,11 @@ class SceneSockets:
         line = Line(socket, name, self._hops.here(), SCENE, FrameQueue())
         async with self._seats.taken((viewer.id, page_id), line) as seated:
             if seated:
-                await self._serve(line, entry.path, page_id, viewer)
+                await self._carry(line, entry.path, page_id, viewer)
             else:
                 await line.refuse_full()
 
-    async def _serve(self, line: Line, path: str, page_id: str, viewer: Viewer) -> None:
+    async def _carry(self, line: Line, path: str, page_id: str, viewer: Viewer) -> None:
         try:
             handle = self._model.open_scene(path, page_id, viewer, SceneOutbox(line))
         except Exception:

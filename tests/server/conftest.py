@@ -1,0 +1,58 @@
+"""What the tests of the server share."""
+
+import warnings
+from types import SimpleNamespace
+
+import pytest
+from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite
+
+with warnings.catch_warnings():
+    # Starlette wants another client library under its test client; httpx serves.
+    warnings.simplefilter("ignore")
+    from starlette.testclient import TestClient
+
+from webmap.server.app import create_app
+from webmap.server.settings import Settings
+
+HOST = "127.0.0.1:8000"
+
+
+@pytest.fixture
+def rooms() -> SimpleNamespace:
+    """The rooms below the server, all of them fakes."""
+    return SimpleNamespace(
+        site=FakeSite(FakePage("/"), FakePage("/lab/", title="The <lab>")),
+        model=FakeModel(),
+        gate=FakeGate(),
+    )
+
+
+@pytest.fixture
+def app(rooms):
+    return create_app(rooms.site, rooms.model, rooms.gate, Settings(token=TOKEN))
+
+
+@pytest.fixture
+def make_client():
+    """Make a client of an ASGI application that follows no redirect by itself."""
+
+    def make(app, **options):
+        return TestClient(
+            app, base_url=f"http://{HOST}", follow_redirects=False, **options
+        )
+
+    return make
+
+
+@pytest.fixture
+def stranger(app, make_client):
+    """A client that has not signed in."""
+    return make_client(app)
+
+
+@pytest.fixture
+def client(app, make_client):
+    """A client that has signed in."""
+    client = make_client(app)
+    assert client.get(f"/?token={TOKEN}").status_code == 303
+    return client

@@ -1,0 +1,136 @@
+"""Stand-ins for the rooms below the server, and a way to run it for real."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx
+
+from webmap.server.app import WebApp
+from webmap.server.listening import listen
+from webmap.server.ports import DriveConnection, Outbox
+from webmap.server.runner import make_server
+from webmap.server.viewer import Viewer
+
+TOKEN = "t0ken-" + "A" * 43
+
+
+def wait_for(condition: Callable[[], object], *, seconds: float = 5.0) -> None:
+    """Return once the condition holds; fail if it does not within the time."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "the condition was never met"
+        time.sleep(0.002)
+
+
+@dataclass
+class FakePage:
+    path: str
+    html: Path | None = None
+    folder: Path | None = None
+    title: str = "WebMap"
+
+
+class FakeSite:
+    def __init__(self, *pages: FakePage) -> None:
+        self.pages = {page.path: page for page in pages}
+
+
+@dataclass
+class FakeScene:
+    path: str
+    page_id: str
+    viewer: Viewer
+    outbox: Outbox
+    received: list[str] = field(default_factory=list)
+    times_closed: int = 0
+
+    def receive(self, text: str) -> None:
+        self.received.append(text)
+
+    def closed(self) -> None:
+        self.times_closed += 1
+
+
+class FakeModel:
+    def __init__(self) -> None:
+        self.scenes: list[FakeScene] = []
+        self.drives: list[tuple[str, str, DriveConnection]] = []
+
+    def open_scene(
+        self, entry_path: str, page_id: str, viewer: Viewer, outbox: Outbox
+    ) -> FakeScene:
+        scene = FakeScene(entry_path, page_id, viewer, outbox)
+        self.scenes.append(scene)
+        return scene
+
+    def drive_opened(self, page_id, viewer, connection) -> None:
+        self.drives.append(("opened", page_id, connection))
+
+    def drive_closed(self, page_id, viewer, connection) -> None:
+        self.drives.append(("closed", page_id, connection))
+
+
+@dataclass
+class FakeDrive:
+    name: str
+    role: str
+    send: Callable[[str], None]
+    end: Callable[[str], None]
+    received: list[str] = field(default_factory=list)
+    times_closed: int = 0
+
+    def receive(self, text: str) -> None:
+        self.received.append(text)
+
+    def close(self) -> None:
+        self.times_closed += 1
+
+
+class FakeGate:
+    def __init__(self) -> None:
+        self.connections: list[FakeDrive] = []
+
+    def connect(self, name, role, send, close) -> FakeDrive:
+        connection = FakeDrive(name, role, send, close)
+        self.connections.append(connection)
+        return connection
+
+
+class Running:
+    """A server that runs in a thread of its own."""
+
+    def __init__(self, app: WebApp, port: int) -> None:
+        self.origin = f"http://127.0.0.1:{port}"
+        self.port = port
+        self._app = app
+
+    def sign_in(self) -> str:
+        """Return the Cookie header of a new viewer."""
+        answer = httpx.get(f"{self.origin}/?token={self._app.settings.token}")
+        assert answer.status_code == 303
+        return answer.headers["set-cookie"].partition(";")[0]
+
+    def socket_url(self, name: str) -> str:
+        return f"ws://127.0.0.1:{self.port}/_webmap/{name}"
+
+
+@contextlib.contextmanager
+def running(app: WebApp) -> Iterator[Running]:
+    """Serve an application on a port that the kernel picks."""
+    ready = threading.Event()
+    listener = listen("127.0.0.1", 0)
+    port = listener.getsockname()[1]
+    server = make_server(app, ready.set)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        assert ready.wait(5)
+        yield Running(app, port)
+    finally:
+        server.should_exit = True
+        thread.join(5)
+        assert not thread.is_alive()

@@ -1,0 +1,337 @@
+import logging
+
+import pytest
+from server_fakes import TOKEN, FakePage
+from starlette.applications import Starlette
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.websockets import WebSocketDisconnect
+
+from webmap.server.app import create_app
+from webmap.server.headers import CONTENT_SECURITY_POLICY
+from webmap.server.settings import Settings
+from webmap.server.viewer import Viewer
+
+ORIGIN = {"origin": "http://127.0.0.1:8000"}
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def socket_url(name, **query):
+    text = "&".join(f"{key}={value}" for key, value in query.items())
+    return f"ws://127.0.0.1:8000/_webmap/{name}?{text}"
+
+
+def refused(client, url, headers):
+    """Return the status with which a socket is refused before the upgrade."""
+    with (
+        pytest.raises(WebSocketDisconnect) as caught,
+        client.websocket_connect(url, headers=dict(headers)),
+    ):
+        pass
+    return getattr(caught.value, "status_code", None)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "index.html").write_text("<head></head><p>Grüße", encoding="utf-8")
+    (tmp_path / "style.css").write_text("a{}")
+    (tmp_path / "main.py").write_text("secret")
+    return tmp_path
+
+
+@pytest.fixture
+def with_page(app, rooms, folder, client):
+    """A client of an application with a page of the user's own at /own/page."""
+    page = FakePage("/own/page", folder / "index.html", folder)
+    rooms.site.pages["/own/page"] = page
+    return client
+
+
+def every_path(app):
+    """Return a path for every route of the application, found by looking at them."""
+    paths = [
+        route.path.replace("{name:path}", "x.js")
+        .replace("{tag}", "x")
+        .replace("{path:path}", "x")
+        for route in app.routes
+    ]
+    return [*paths, "/", "/lab/", "/_webmap/page.js", "/_webmap/made_page.css"]
+
+
+def test_every_route_needs_a_sign_in(app, stranger):
+    assert {type(route) for route in app.routes} == {Route, WebSocketRoute}
+    paths = every_path(app)
+    assert len(paths) == len(app.routes) + 4
+    for path in paths:
+        for method in ("GET", "HEAD", "OPTIONS"):
+            assert stranger.request(method, path).status_code == 401, (method, path)
+        for method in ("POST", "PUT", "DELETE", "PATCH"):
+            assert stranger.request(method, path).status_code == 403, (method, path)
+            answer = stranger.request(method, path, headers=ORIGIN)
+            assert answer.status_code == 401, (method, path)
+
+
+def test_every_socket_needs_a_sign_in_and_the_origin_before_the_upgrade(
+    app, stranger, client
+):
+    sockets = [route for route in app.routes if isinstance(route, WebSocketRoute)]
+    assert len(sockets) == 2
+    for route in sockets:
+        url = socket_url(route.path.rpartition("/")[2], id="p")
+        assert refused(stranger, url, ORIGIN) == 401
+        assert refused(client, url, {}) == 403
+        assert refused(client, url, {"origin": "http://127.0.0.1:9000"}) == 403
+
+
+def test_every_answer_has_every_header(app, client, stranger):
+    answers = [client.get(path) for path in every_path(app)]
+    answers += [client.post("/", headers=ORIGIN), client.post("/")]
+    answers += [stranger.get("/"), stranger.get("/", headers={"host": "evil.com"})]
+    answers += [stranger.get(f"/?token={TOKEN}"), stranger.get("/?token=wrong")]
+    assert {answer.status_code for answer in answers} == {
+        200, 303, 401, 403, 404, 405, 421,
+    }  # fmt: skip
+    for answer in answers:
+        headers = answer.headers
+        policy = headers["content-security-policy"]
+        assert policy.startswith(CONTENT_SECURITY_POLICY)
+        assert "unsafe" not in policy
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["referrer-policy"] == "no-referrer"
+        assert headers["cross-origin-opener-policy"] == "same-origin"
+        assert headers["cross-origin-resource-policy"] == "same-origin"
+        assert "cache-control" in headers
+        assert "server" not in headers
+
+
+def test_a_failing_page_gets_the_headers_too(app, rooms, make_client):
+    class Broken:
+        @property
+        def pages(self):
+            raise RuntimeError("broken")
+
+    app = create_app(Broken(), rooms.model, rooms.gate, Settings(token=TOKEN))
+    client = make_client(app, raise_server_exceptions=False)
+    client.get(f"/?token={TOKEN}")
+    answer = client.get("/")
+    assert answer.status_code == 500
+    assert answer.headers["content-security-policy"] == CONTENT_SECURITY_POLICY
+    assert "broken" not in answer.text
+
+
+def test_a_browser_is_asked_to_sign_in_and_other_programs_are_told(stranger):
+    page = stranger.get("/", headers={"accept": "text/html,*/*"})
+    assert page.status_code == 401
+    assert '<input name="token"' in page.text
+    assert "<script" not in page.text
+    assert stranger.get("/").headers["content-type"].startswith("text/plain")
+
+
+def test_signing_in_leads_to_the_page_and_leaves_no_token_behind(stranger, caplog):
+    with caplog.at_level(logging.DEBUG):
+        answer = stranger.get(f"/lab/?token={TOKEN}")
+        assert answer.headers["location"] == "/lab/"
+        assert answer.headers["cache-control"] == "no-store"
+        page = stranger.get(answer.headers["location"])
+        wrong = stranger.get("/?token=not-the-token", headers={"host": "x"})
+    assert page.status_code == 200
+    for text in (str(answer.headers), page.text, str(page.headers), wrong.text):
+        assert TOKEN not in text
+        assert "not-the-token" not in text
+    ours = [one for one in caplog.records if one.name.startswith("webmap")]
+    assert ours
+    assert not any("oken" in one.getMessage() for one in ours)
+
+
+def test_a_made_page_is_served(client):
+    answer = client.get("/lab/")
+    assert answer.headers["content-type"] == "text/html; charset=utf-8"
+    assert "<title>The &lt;lab&gt;</title>" in answer.text
+    assert 'src="/_webmap/page.js"' in answer.text
+
+
+def test_a_missing_or_additional_slash_leads_to_the_page(client, with_page):
+    assert client.get("/lab").headers["location"] == "/lab/"
+    assert client.get("/own/page/").headers["location"] == "/own/page"
+
+
+def test_the_users_own_page_is_served_with_the_files_beside_it(with_page):
+    page = with_page.get("/own/page")
+    assert "Grüße" in page.text
+    assert 'src="/_webmap/page.js"' in page.text
+    sheet = with_page.get("/own/style.css")
+    assert (sheet.status_code, sheet.text) == (200, "a{}")
+    assert sheet.headers["content-type"] == "text/css; charset=utf-8"
+    for path in (
+        "/own/main.py",
+        "/own/index.html",
+        "/style.css",
+        "/own/page/style.css",
+    ):
+        assert with_page.get(path).status_code == 404
+
+
+def test_a_made_page_serves_nothing_beside_it(rooms, folder, client):
+    rooms.site.pages["/"] = FakePage("/", None, folder)
+    assert client.get("/style.css").status_code == 404
+
+
+def test_an_html_file_that_cannot_be_read_is_said_without_its_path(
+    with_page, folder, caplog
+):
+    (folder / "index.html").write_bytes(b"\xff\xfe\xfa")
+    answer = with_page.get("/own/page")
+    assert answer.status_code == 500
+    assert str(folder) not in answer.text
+    assert "index.html" in caplog.text
+
+
+def test_what_the_policy_will_block_is_logged_once(with_page, folder, caplog):
+    (folder / "index.html").write_text("<head></head>\n<script>x()</script>")
+    for _ in range(3):
+        with_page.get("/own/page")
+    assert caplog.text.count("line 2: an inline script is blocked") == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "media_type"),
+    [
+        ("/_webmap/made_page.css", "text/css; charset=utf-8"),
+        ("/_webmap/icon.svg", "image/svg+xml; charset=utf-8"),
+        ("/_webmap/drive.js", "text/javascript; charset=utf-8"),
+    ],
+)
+def test_the_packages_own_files_are_served_with_their_type(client, path, media_type):
+    answer = client.get(path)
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == media_type
+    assert answer.headers["cache-control"] == "no-cache"
+
+
+def test_a_file_that_the_browser_has_is_not_sent_again(client):
+    tag = client.get("/_webmap/icon.svg").headers["etag"]
+    again = client.get("/_webmap/icon.svg", headers={"if-none-match": tag})
+    assert (again.status_code, again.content) == (304, b"")
+
+
+def test_head_is_answered_like_get_without_the_body(client):
+    answer = client.head("/_webmap/icon.svg")
+    assert answer.status_code == 200
+    assert answer.content == b""
+    assert int(answer.headers["content-length"]) > 0
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/_webmap/",
+        "/_webmap/nothing.js",
+        "/_webmap/..%2f__init__.py",
+        "/_webmap/%2e%2e/__init__.py",
+        "/_webmap/..%5capp.py",
+        "/_webmap//etc/passwd",
+        "/_webmap/icon.svg%00.js",
+        "/_webmap/files/x/y.js",
+        "/_webmap/images/x",
+        "/nothing",
+    ],
+)
+def test_everything_else_is_not_there(client, path):
+    answer = client.get(path)
+    assert answer.status_code == 404
+    assert answer.text.startswith("404 Not Found\n\nThere is nothing")
+
+
+def test_what_was_published_is_served(app, client, folder):
+    sheet = client.get(app.published.publish_file(folder / "style.css"))
+    assert (sheet.text, sheet.headers["cache-control"]) == ("a{}", "no-cache")
+    url = app.published.publish_image(PNG, "image/png")
+    image = client.get(url)
+    assert image.content == PNG
+    assert image.headers["content-type"] == "image/png"
+    assert "immutable" in image.headers["cache-control"]
+    assert image.headers["content-security-policy"].endswith("; sandbox")
+    app.published.withdraw_image(url)
+    assert client.get(url).status_code == 404
+
+
+def test_ten_wrong_tokens_make_an_address_wait_and_say_how_long(stranger):
+    for _ in range(10):
+        assert stranger.get("/?token=wrong").status_code == 401
+    answer = stranger.get("/?token=wrong")
+    assert answer.status_code == 429
+    assert 0 < int(answer.headers["retry-after"]) <= 60
+
+
+def test_what_a_stranger_sends_writes_no_lines_of_its_own_into_the_log(
+    stranger, caplog
+):
+    stranger.get("/a%0Aroot: all is well", headers={"host": "evil.com"})
+    assert len(caplog.messages) == 1
+    assert "\n" not in caplog.messages[0]
+
+
+def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page):
+    host = Starlette(routes=[Mount("/robots", app)])
+    client = make_client(host)
+    assert client.get("/robots/").status_code == 401
+    answer = client.get(f"/robots/lab/?token={TOKEN}")
+    assert answer.headers["location"] == "/robots/lab/"
+    assert "Path=/robots/;" in answer.headers["set-cookie"]
+    assert 'src="/robots/_webmap/page.js"' in client.get("/robots/lab/").text
+    assert client.get("/robots/lab").headers["location"] == "/robots/lab/"
+    assert client.get("/robots/_webmap/icon.svg").status_code == 200
+    assert client.get("/robots/own/style.css").text == "a{}"
+    url = socket_url("scene", page="lab/", id="p").replace(
+        "/_webmap", "/robots/_webmap"
+    )
+    with client.websocket_connect(url, headers=dict(ORIGIN)) as socket:
+        socket.send_text("hello")
+        socket.close()
+    assert rooms.model.scenes[0].path == "/lab/"
+    assert rooms.model.scenes[0].received == ["hello"]
+
+
+@pytest.mark.parametrize("is_async", [False, True])
+def test_a_host_application_can_tell_who_somebody_is(rooms, make_client, is_async):
+    def tell(scope):
+        known = any(name == b"x-user" for name, _ in scope["headers"])
+        return Viewer("1", "Ada", "viewer") if known else None
+
+    async def tell_later(scope):
+        return tell(scope)
+
+    settings = Settings(authenticate=tell_later if is_async else tell)
+    app = create_app(rooms.site, rooms.model, rooms.gate, settings)
+    client = make_client(app)
+    assert client.get(f"/?token={settings.token}").status_code == 403
+    headers = {"x-user": "ada"}
+    assert client.get("/", headers=headers).status_code == 200
+    url = socket_url("drive", id="p")
+    assert refused(client, url, headers) == 403
+    assert refused(client, url, ORIGIN) == 403
+    with client.websocket_connect(url, headers={**headers, **ORIGIN}) as socket:
+        socket.close()
+    connection = rooms.gate.connections[0]
+    assert (connection.name, connection.role) == ("Ada", "viewer")
+
+
+def test_the_lifespan_is_the_hosts_own(rooms, make_client):
+    from contextlib import asynccontextmanager
+
+    events = []
+
+    @asynccontextmanager
+    async def life(app):
+        events.append("start")
+        yield
+        events.append("stop")
+
+    app = create_app(rooms.site, rooms.model, rooms.gate, lifespan=life)
+    with make_client(app):
+        assert events == ["start"]
+    assert events == ["start", "stop"]
+
+
+def test_a_weak_token_stops_the_start(rooms):
+    with pytest.raises(ValueError, match="43"):
+        create_app(rooms.site, rooms.model, rooms.gate, Settings(token="weak"))

@@ -1,0 +1,87 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.errors import ConfigError
+from webmap.server.auth import Attempts, Token, new_token
+
+SECRET = "s" * 43
+
+
+def test_a_new_token_is_different_each_time_and_taken():
+    first, second = new_token(), new_token()
+    assert first != second
+    assert Token(first).matches(first)
+    assert not Token(first).matches(second)
+
+
+@pytest.mark.parametrize("secret", ["", "short", "s" * 42, "s" * 42 + "/", "s" * 257])
+def test_a_weak_or_unsafe_token_is_refused_without_being_repeated(secret):
+    with pytest.raises(ConfigError) as caught:
+        Token(secret)
+    if secret:
+        assert secret not in str(caught.value)
+    assert "token_urlsafe(32)" in str(caught.value)
+
+
+@given(st.text())
+def test_no_other_text_is_the_token(text):
+    assert Token(SECRET).matches(text) == (text == SECRET)
+
+
+def test_a_lone_surrogate_is_not_the_token():
+    assert not Token(SECRET).matches("\ud800")
+
+
+def test_a_cookie_proves_its_session_and_does_not_hold_the_token():
+    token = Token(SECRET)
+    cookie = token.issue()
+    assert token.session(cookie) == cookie.partition(".")[0]
+    assert SECRET not in cookie
+    assert token.issue() != cookie
+
+
+def test_a_server_that_starts_again_with_the_same_token_knows_its_viewers():
+    assert Token(SECRET).session(Token(SECRET).issue()) is not None
+
+
+def test_a_cookie_of_another_token_proves_nothing():
+    assert Token(new_token()).session(Token(SECRET).issue()) is None
+
+
+@given(st.text())
+def test_no_text_is_a_cookie(text):
+    assert Token(SECRET).session(text) is None
+
+
+def test_every_changed_character_spoils_a_cookie():
+    token = Token(SECRET)
+    cookie = token.issue()
+    for at in range(len(cookie)):
+        other = "0" if cookie[at] != "0" else "1"
+        assert token.session(cookie[:at] + other + cookie[at + 1 :]) is None
+
+
+def test_ten_failures_in_a_minute_make_an_address_wait():
+    attempts = Attempts()
+    for second in range(10):
+        assert attempts.wait("a", float(second)) == 0
+        attempts.failed("a", float(second))
+    assert attempts.wait("a", 10.0) == 50
+    assert attempts.wait("a", 59.5) == 1
+    assert attempts.wait("b", 10.0) == 0
+    assert attempts.wait("a", 60.0) == 0
+
+
+def test_old_failures_do_not_add_up():
+    attempts = Attempts()
+    for attempt in range(100):
+        attempts.failed("a", attempt * 7.0)
+        assert attempts.wait("a", attempt * 7.0) == 0
+
+
+def test_addresses_that_failed_are_forgotten_from_the_oldest_on():
+    attempts = Attempts(limit=1, addresses=2)
+    for address in ("a", "b", "c"):
+        attempts.failed(address, 0.0)
+    assert [attempts.wait(address, 0.0) for address in "abc"] == [0, 60, 60]

@@ -1,0 +1,308 @@
+import pytest
+from server_fakes import TOKEN
+
+from webmap.errors import ConfigError
+from webmap.server.door import Door, Refusal, SignedIn
+from webmap.server.origins import Hosts, checked_origin
+from webmap.server.request import Request, redact
+from webmap.server.settings import Settings
+from webmap.server.viewer import Viewer
+
+HOST = "127.0.0.1:8080"
+
+
+def scope(
+    *,
+    host=(HOST,),
+    origin=(),
+    cookie=(),
+    path="/",
+    query="",
+    type="http",
+    method="GET",
+    scheme="http",
+    root="",
+):
+    headers = [(b"host", one.encode("latin-1")) for one in host]
+    headers += [(b"origin", one.encode("latin-1")) for one in origin]
+    headers += [(b"cookie", one.encode("latin-1")) for one in cookie]
+    made = {
+        "type": type,
+        "path": path,
+        "root_path": root,
+        "scheme": scheme,
+        "query_string": query.encode(),
+        "headers": headers,
+        "client": ("127.0.0.1", 5000),
+    }
+    return {**made, "method": method} if type == "http" else made
+
+
+def status(door, **kwargs):
+    refusal = door.check_address(Request.of(scope(**kwargs)))
+    return None if refusal is None else refusal.status
+
+
+@pytest.fixture
+def door():
+    return Door(Settings(token=TOKEN))
+
+
+# The table of origins. The page is http://127.0.0.1:8080.
+ORIGINS = [
+    (["http://127.0.0.1:8080"], None),
+    ([], 403),
+    (["null"], 403),
+    ([""], 403),
+    (["http://127.0.0.1:8080", "http://127.0.0.1:8080"], 403),
+    (["http://127.0.0.1:8081"], 403),
+    (["http://127.0.0.1"], 403),
+    (["https://127.0.0.1:8080"], 403),
+    (["ws://127.0.0.1:8080"], 403),
+    (["http://localhost:8080"], 403),
+    (["http://[::1]:8080"], 403),
+    (["http://2130706433:8080"], 403),
+    (["http://127.0.0.1:8080.evil.com"], 403),
+    (["http://evil.127.0.0.1:8080"], 403),
+    (["http://127.0.0.1:8080/"], 403),
+    (["http://127.0.0.1:8080@evil.com"], 403),
+    (["http://user@127.0.0.1:8080"], 403),
+    (["http://127.0.0.1:8080 http://evil.com"], 403),
+    (["HTTP://127.0.0.1:8080"], 403),
+    (["file://"], 403),
+    (["http://192.168.1.5:8080"], 403),
+    (["http://evil.com"], 403),
+]
+
+
+@pytest.mark.parametrize(("origin", "expected"), ORIGINS)
+@pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
+def test_only_the_very_origin_may_open_sockets_and_change_things(
+    door, origin, expected, opening
+):
+    assert status(door, origin=origin, **opening) == expected
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS"])
+def test_reading_needs_no_origin(door, method):
+    assert status(door, method=method) is None
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "FOO", "get"])
+def test_every_other_method_needs_one(door, method):
+    assert status(door, method=method) == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "scheme", "expected"),
+    [
+        ("localhost:8080", "http://localhost:8080", "ws", None),
+        ("LOCALHOST:8080", "http://localhost:8080", "ws", None),
+        ("localhost:8080", "http://sub.localhost:8080", "ws", 403),
+        ("[::1]:8080", "http://[::1]:8080", "ws", None),
+        ("localhost", "http://localhost", "ws", None),
+        ("localhost:80", "http://localhost", "ws", None),
+        ("localhost", "https://localhost", "wss", None),
+        ("localhost:443", "https://localhost", "wss", None),
+        ("localhost", "http://localhost", "wss", 403),
+        ("localhost", "https://localhost", "ws", 403),
+    ],
+)
+def test_the_origin_follows_scheme_host_and_port(door, host, origin, scheme, expected):
+    got = status(door, host=[host], origin=[origin], scheme=scheme, type="websocket")
+    assert got == expected
+
+
+def test_an_origin_that_was_named_may_open_sockets():
+    origin = checked_origin("https://Robots.example.com:443")
+    door = Door(Settings(token=TOKEN, origins=frozenset({origin})))
+    good, bad = "https://robots.example.com", "https://x.robots.example.com"
+    assert status(door, origin=[good], type="websocket") is None
+    assert status(door, origin=[bad], type="websocket") == 403
+
+
+@pytest.mark.parametrize(
+    "text", ["", "robots", "ftp://robots", "https://", "https://r/", "https://u@r"]
+)
+def test_what_is_no_origin_cannot_be_named(text):
+    with pytest.raises(ConfigError, match="an origin is"):
+        checked_origin(text)
+
+
+HOSTS = [
+    (["127.0.0.1"], None),
+    (["127.0.0.1:1"], None),
+    (["localhost:8080"], None),
+    (["LocalHost"], None),
+    (["[::1]:8080"], None),
+    ([], 421),
+    ([""], 421),
+    (["127.0.0.1:8080", "127.0.0.1:8080"], 421),
+    (["localhost."], 421),
+    (["127.1"], 421),
+    (["127.0.0.2"], 421),
+    (["0.0.0.0:8080"], 421),
+    (["2130706433"], 421),
+    (["::1"], 421),
+    (["evil.com"], 421),
+    (["evil.com:8080"], 421),
+    (["localhost.evil.com"], 421),
+    (["localhost:8080.evil.com"], 421),
+    (["localhost:80:80"], 421),
+    (["localhost:"], 421),
+    (["localhost:x"], 421),
+    (["u@localhost"], 421),
+    (["localhost/"], 421),
+    (["localhost localhost"], 421),
+    (["192.168.1.5"], 421),
+    (["lo\xeccalhost"], 421),
+]
+
+
+@pytest.mark.parametrize(("host", "expected"), HOSTS)
+@pytest.mark.parametrize("type", ["http", "websocket"])
+def test_only_known_hosts_are_answered(door, host, expected, type):
+    origin = [f"http://{host[0].lower()}"] if host else []
+    assert status(door, host=host, origin=origin, type=type) == expected
+
+
+def test_the_address_that_is_listened_on_is_a_host_and_so_are_the_extra_names():
+    hosts = Hosts.of_binding("192.168.1.5", ["Robots.example.com", "fd00::1"])
+    assert hosts.allow("192.168.1.5:8000")
+    assert hosts.allow("robots.example.com")
+    assert hosts.allow("[fd00::1]:8000")
+    assert hosts.allow("localhost")
+    assert not hosts.allow("192.168.1.6")
+
+
+def test_a_server_on_all_addresses_answers_to_any_address_but_not_to_any_name():
+    hosts = Hosts.of_binding("0.0.0.0")
+    assert hosts.allow("192.168.1.5:8000")
+    assert hosts.allow("[fe80::1]")
+    assert not hosts.allow("evil.com")
+
+
+@pytest.mark.parametrize("name", ["", "a b", "http://a", "a:80", "a/b"])
+def test_what_is_no_host_cannot_be_named(name):
+    with pytest.raises(ConfigError, match="a host is"):
+        Hosts.of_binding("127.0.0.1", [name])
+
+
+def cookie_of(signed_in):
+    assert isinstance(signed_in, SignedIn)
+    assert signed_in.cookie is not None
+    return signed_in.cookie.partition(";")[0]
+
+
+def sign_in(door, **kwargs):
+    return door.identify(Request.of(scope(query=f"token={TOKEN}", **kwargs)), 0.0)
+
+
+def test_the_token_is_exchanged_for_a_cookie_and_a_clean_url(door):
+    query = f"a=1&token={TOKEN}&b=%2F"
+    got = door.identify(Request.of(scope(path="/lab", query=query)), 0.0)
+    assert isinstance(got, SignedIn)
+    assert got.location == "/lab?a=1&b=%2F"
+    assert got.cookie.startswith("webmap_8080=")
+    assert got.cookie.endswith("; Path=/; HttpOnly; SameSite=Strict")
+    assert TOKEN not in got.cookie
+
+
+def test_the_cookie_is_bound_to_prefix_and_port_and_to_tls(door):
+    got = sign_in(door, host=["localhost"], scheme="https", root="/robots", path="/x")
+    assert got.cookie.startswith("webmap_443=")
+    assert got.cookie.endswith("; Path=/robots/; HttpOnly; SameSite=Strict; Secure")
+
+
+def test_the_cookie_tells_who_it_is(door):
+    cookie = cookie_of(sign_in(door))
+    got = door.identify(Request.of(scope(cookie=[f"a=b; {cookie}; c=d"])), 0.0)
+    assert isinstance(got, Viewer)
+    assert got.role == "operator"
+    again = door.identify(Request.of(scope(cookie=["x=y", cookie])), 9.0)
+    assert again == got
+
+
+def test_a_cookie_of_another_path_before_ours_does_no_harm(door):
+    cookie = cookie_of(sign_in(door))
+    cookies = [f"webmap_8080=old; {cookie}"]
+    assert isinstance(door.identify(Request.of(scope(cookie=cookies)), 0.0), Viewer)
+
+
+def test_two_browsers_are_two_viewers(door):
+    first, second = (
+        door.identify(Request.of(scope(cookie=[cookie_of(sign_in(door))])), 0.0)
+        for _ in range(2)
+    )
+    assert first.id != second.id
+
+
+@pytest.mark.parametrize("cookie", [[], ["webmap_8080="], ["webmap_8080=a.b"], ["="]])
+def test_without_a_cookie_nobody_comes_in(door, cookie):
+    got = door.identify(Request.of(scope(cookie=cookie)), 0.0)
+    assert isinstance(got, Refusal)
+    assert got.status == 401
+
+
+def test_the_token_itself_is_no_cookie(door):
+    got = door.identify(Request.of(scope(cookie=[f"webmap_8080={TOKEN}"])), 0.0)
+    assert got.status == 401
+
+
+@pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
+def test_a_token_opens_no_socket_and_changes_nothing(door, opening):
+    assert sign_in(door, **opening).status == 401
+
+
+def test_wrong_tokens_run_into_a_wall_that_the_right_one_meets_too(door):
+    for _ in range(10):
+        request = Request.of(scope(query="token=wrong"))
+        assert door.identify(request, 0.0).status == 401
+    got = sign_in(door)
+    assert (got.status, got.retry_after) == (429, 60)
+    after = door.identify(Request.of(scope(query=f"token={TOKEN}")), 60.0)
+    assert isinstance(after, SignedIn)
+
+
+def test_who_has_signed_in_is_not_kept_out_by_the_wall(door):
+    cookie = cookie_of(sign_in(door))
+    for _ in range(20):
+        door.identify(Request.of(scope(query="token=wrong")), 0.0)
+    assert isinstance(door.identify(Request.of(scope(cookie=[cookie])), 0.0), Viewer)
+
+
+def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(door):
+    cookie = cookie_of(sign_in(door))
+    for _ in range(20):
+        request = Request.of(scope(query="token=wrong", cookie=[cookie], path="/lab"))
+        assert door.identify(request, 0.0) == SignedIn("/lab", None)
+    assert isinstance(sign_in(door), SignedIn)
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("//evil.com/", "/evil.com/"),
+        ("/\\evil.com", "/evil.com"),
+        ("/a b\r\nSet-Cookie: x", "/a%20b%0D%0ASet-Cookie:%20x"),
+        ("/é?#", "/%C3%A9%3F%23"),
+    ],
+)
+def test_the_redirect_stays_on_this_origin(door, path, expected):
+    assert sign_in(door, path=path).location == expected
+
+
+def test_refusals_never_repeat_what_was_sent(door):
+    secret = "wrong-but-nearly-right"
+    got = door.identify(Request.of(scope(query=f"token={secret}")), 0.0)
+    assert secret not in got.text
+
+
+def test_the_token_is_taken_out_of_what_servers_log():
+    one = scope(query=f"a=1&token={TOKEN}&token=x")
+    redact(one)
+    assert one["query_string"] == b"a=1&token=...&token=..."
+
+
+def test_settings_do_not_show_their_token():
+    assert TOKEN not in repr(Settings(token=TOKEN))

@@ -1,0 +1,79 @@
+import pytest
+
+from webmap.server.html import base_of, make_page, prepare_page
+
+SHEET = '<link rel="stylesheet" href="/_webmap/webmap.css">'
+SCRIPT = '<script type="module" src="/_webmap/page.js"></script>'
+ICON = '<link rel="icon" href="/_webmap/icon.svg" type="image/svg+xml">'
+
+
+def test_a_made_page_has_one_container_and_its_title_is_only_text():
+    text = make_page("A <b>", base_of(""))
+    assert '<div id="webmap_container"></div>' in text
+    assert "<title>A &lt;b&gt;</title>" in text
+    assert prepare_page(text, base_of("")).text == text
+    assert prepare_page(text, base_of("")).blocked == []
+
+
+def test_the_base_follows_the_prefix():
+    assert base_of("") == "/_webmap/"
+    assert base_of("/robots/") == "/robots/_webmap/"
+    assert base_of('/a "b"') == "/a%20%22b%22/_webmap/"
+
+
+def test_the_users_own_sheets_come_after_ours_and_the_script_comes_last():
+    text = '<html><head><link rel="stylesheet" href="a.css"></head><body></body></html>'
+    assert prepare_page(text, base_of("")).text == (
+        f'<html><head>{SHEET}<link rel="stylesheet" href="a.css">{SCRIPT}{ICON}</head>'
+        "<body></body></html>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", f"{SHEET}{SCRIPT}{ICON}"),
+        ("<p>hello", f"{SHEET}{SCRIPT}{ICON}<p>hello"),
+        ("<!doctype html>\n<p>é", f"<!doctype html>\n{SHEET}{SCRIPT}{ICON}<p>é"),
+        ("<html><body>x", f"<html>{SHEET}{SCRIPT}{ICON}<body>x"),
+        (
+            "<!-- <head> -->\r\n<HEAD lang=en>\r\n<title></head></title>\r\n</HEAD >",
+            f"<!-- <head> -->\r\n<HEAD lang=en>{SHEET}\r\n<title></head></title>\r\n"
+            f"{SCRIPT}{ICON}</HEAD >",
+        ),
+        (
+            "<head><title>x</title><body><header>",
+            f"<head>{SHEET}<title>x</title>{SCRIPT}{ICON}<body><header>",
+        ),
+    ],
+)
+def test_pages_of_every_shape_get_what_they_need(text, expected):
+    assert prepare_page(text, base_of("")).text == expected
+
+
+def test_what_a_page_loads_by_itself_is_not_loaded_twice():
+    text = (
+        '<head><link rel="stylesheet" href="_webmap/webmap.css">'
+        '<link rel="shortcut icon" href="me.png">'
+        '<script type="module" src="_webmap/page.js"></script></head>'
+    )
+    assert prepare_page(text, base_of("")).text == text
+
+
+def test_what_the_policy_blocks_is_named_with_its_line():
+    page = prepare_page(
+        "<head>\n<style>a{}</style>\n<script>x()</script>\n"
+        '<script type="application/json">{}</script>\n'
+        '<script src="https://cdn.example.com/x.js"></script>\n'
+        '<img src="//example.com/x.png">\n</head>\n'
+        '<body onload="x()">\n<p style="color:red">\n<a href="https://ros.org">',
+        base_of(""),
+    )
+    assert [sentence.partition(" is blocked")[0] for sentence in page.blocked] == [
+        "line 2: an inline style",
+        "line 3: an inline script",
+        "line 5: 'https://cdn.example.com/x.js'",
+        "line 6: '//example.com/x.png'",
+        "line 8: a handler in an attribute",
+        "line 9: an inline style",
+    ]

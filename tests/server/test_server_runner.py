@@ -1,0 +1,180 @@
+"""The process around the application: one line, clear refusals, a clean end."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite
+from websockets.sync.client import connect
+
+from webmap.errors import ConfigError, WebMapError
+from webmap.server.app import create_app
+from webmap.server.listening import check_exposure, listen, url_of
+from webmap.server.runner import announce, serve
+from webmap.server.settings import Settings
+
+PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
+from webmap.server.app import create_app
+from webmap.server.runner import serve
+from webmap.server.settings import Settings
+
+app = create_app(
+    FakeSite(FakePage("/")), FakeModel(), FakeGate(), Settings(token=sys.argv[2])
+)
+serve(app, port=0)
+print("ended", flush=True)
+"""
+
+
+@pytest.fixture
+def process():
+    """A process that serves, and whatever it has printed and logged at its end."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(Path(__file__).parent), TOKEN],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    yield child
+    child.kill()
+    child.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly_and_soon_with_sockets_open(process, number):
+    line = process.stdout.readline()
+    assert line.startswith("WebMap is ready at http://127.0.0.1:")
+    assert line.endswith(f"/?token={TOKEN}\n")
+    url = line.split()[-1]
+    origin = url.partition("/?")[0]
+    cookie = httpx.get(url).headers["set-cookie"].partition(";")[0]
+    with contextlib.ExitStack() as stack:
+        for name in ("scene?id=p", "drive?id=p"):
+            address = f"ws{origin[4:]}/_webmap/{name}"
+            headers = {"cookie": cookie}
+            stack.enter_context(
+                connect(address, origin=origin, additional_headers=headers)
+            )
+        idle = stack.enter_context(httpx.Client(headers={"cookie": cookie}))
+        assert idle.get(origin).status_code == 200
+        half = socket.create_connection(("127.0.0.1", int(origin.rpartition(":")[2])))
+        stack.enter_context(half)
+        half.sendall(b"GET / HT")
+        began = time.monotonic()
+        os.kill(process.pid, number)
+        out, log = process.communicate(timeout=10)
+    assert time.monotonic() - began < 2.0
+    assert process.returncode == 0
+    assert out == "ended\n"
+    assert "Traceback" not in log
+    assert TOKEN not in log
+
+
+def app(settings=None, lifespan=None):
+    return create_app(
+        FakeSite(FakePage("/")),
+        FakeModel(),
+        FakeGate(),
+        settings or Settings(token=TOKEN),
+        lifespan=lifespan,
+    )
+
+
+def test_the_ready_line_is_printed_at_once(capsys):
+    announce("http://127.0.0.1:1/")
+    assert capsys.readouterr().out == "WebMap is ready at http://127.0.0.1:1/\n"
+
+
+def test_a_port_in_use_is_one_clear_sentence():
+    with listen("127.0.0.1", 0) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError, match=f"port {port} on 127.0.0.1 is in use"):
+            serve(app(), port=port)
+
+
+@pytest.mark.parametrize("port", [-1, 65536])
+def test_what_is_no_port_is_refused(port):
+    with pytest.raises(ConfigError, match="from 0 to 65535"):
+        listen("127.0.0.1", port)
+
+
+@pytest.mark.parametrize("host", ["no such host", "a" * 300, "192.0.2.1"])
+def test_what_is_no_address_of_this_machine_is_refused(host):
+    with pytest.raises(ConfigError, match=r"host|address"):
+        listen(host, 0)
+
+
+@pytest.mark.parametrize(
+    "host", ["", "0.0.0.0", "::", "192.168.1.5", "robots.example.com", "127.0.0.1.x"]
+)
+def test_other_machines_are_served_only_when_that_was_said(host):
+    with pytest.raises(ConfigError, match="insecure"):
+        serve(app(), host=host, port=0)
+    check_exposure(host, insecure_lan=True)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "127.9.9.9"])
+def test_this_machine_alone_needs_no_word(host):
+    check_exposure(host, insecure_lan=False)
+
+
+def test_the_url_is_one_that_a_browser_here_can_open():
+    with listen("0.0.0.0", 0) as listener:
+        port = listener.getsockname()[1]
+        assert url_of(listener, "0.0.0.0") == f"http://127.0.0.1:{port}/"
+        assert url_of(listener, "::1") == f"http://[::1]:{port}/"
+        assert url_of(listener, "localhost") == f"http://localhost:{port}/"
+
+
+def serve_in_thread(application, **options):
+    """Run :func:`serve` until it has failed; return the error."""
+    errors = []
+
+    def run():
+        try:
+            serve(application, port=0, **options)
+        except BaseException as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join(5)
+    assert not thread.is_alive()
+    return errors
+
+
+def test_an_application_that_does_not_start_is_an_error_and_no_ready_line(caplog):
+    @contextlib.asynccontextmanager
+    async def life(_):
+        raise RuntimeError("no gate")
+        yield
+
+    ready = []
+    errors = serve_in_thread(app(lifespan=life), on_ready=ready.append)
+    assert [type(error) for error in errors] == [WebMapError]
+    assert ready == []
+    assert "no gate" in caplog.text
+
+
+def test_where_a_host_tells_who_somebody_is_the_url_has_no_token():
+    def stop(url):
+        urls.append(url)
+        raise BrokenPipeError
+
+    urls = []
+    settings = Settings(token=TOKEN, authenticate=lambda scope: None)
+    errors = serve_in_thread(app(settings), on_ready=stop)
+    assert [type(error) for error in errors] == [BrokenPipeError]
+    assert len(urls) == 1
+    assert "token" not in urls[0]

@@ -1,0 +1,405 @@
+"""The two sockets, over a real server and a client that is not ours."""
+
+import asyncio
+import contextlib
+import logging
+import socket as sockets
+
+import pytest
+from server_fakes import TOKEN, running, wait_for
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from webmap.server.app import create_app
+from webmap.server.seats import REPLACED
+from webmap.server.settings import Settings
+
+TICK = '{"op":"tick","tick":%d,"ack":-1}'
+
+
+@pytest.fixture(scope="module")
+def module_rooms():
+    from types import SimpleNamespace
+
+    from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
+
+    return SimpleNamespace(
+        site=FakeSite(FakePage("/"), FakePage("/lab")),
+        model=FakeModel(),
+        gate=FakeGate(),
+    )
+
+
+@pytest.fixture(scope="module")
+def server(module_rooms):
+    rooms = module_rooms
+    app = create_app(
+        rooms.site, rooms.model, rooms.gate, Settings(token=TOKEN, max_pages=4)
+    )
+    with running(app) as server:
+        yield server
+
+
+@pytest.fixture
+def rooms(module_rooms):
+    """The server's rooms, as if nobody had been there before."""
+    wait_for(lambda: all(s.times_closed for s in module_rooms.model.scenes))
+    wait_for(lambda: all(c.times_closed for c in module_rooms.gate.connections))
+    module_rooms.model.scenes.clear()
+    module_rooms.model.drives.clear()
+    module_rooms.gate.connections.clear()
+    return module_rooms
+
+
+@pytest.fixture
+def open_socket(server):
+    """Open sockets as one viewer's browser does."""
+    cookie = server.sign_in()
+
+    def opened(name, cookie=cookie, **options):
+        return connect(
+            server.socket_url(name),
+            origin=server.origin,
+            additional_headers={"cookie": cookie},
+            max_size=None,
+            **options,
+        )
+
+    return opened
+
+
+async def reason_of(socket):
+    """Read until the socket ends; return its close code and reason."""
+    with contextlib.suppress(ConnectionClosed):
+        async with asyncio.timeout(5):
+            while True:
+                await socket.recv()
+    return socket.close_code, socket.close_reason
+
+
+def test_a_scene_carries_both_ways_and_tells_the_model_once_that_it_closed(
+    rooms, open_socket
+):
+    async def scenario():
+        async with open_socket("scene?page=lab&id=p1") as socket:
+            await socket.send("hello")
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes[0].received)
+            scene = rooms.model.scenes[0]
+            await asyncio.to_thread(scene.outbox.offer, b"frame 1")
+            await asyncio.to_thread(scene.outbox.offer, b"frame 2")
+            assert [await socket.recv(), await socket.recv()] == [
+                b"frame 1",
+                b"frame 2",
+            ]
+            assert socket.response.headers.get("sec-websocket-extensions") is None
+
+    asyncio.run(scenario())
+    scene = rooms.model.scenes[0]
+    assert (scene.path, scene.page_id, scene.received) == ("/lab", "p1", ["hello"])
+    wait_for(lambda: scene.times_closed)
+    scene.outbox.offer(b"too late")
+    scene.outbox.close("too late")
+    assert scene.times_closed == 1
+
+
+def test_a_drive_carries_both_ways_and_its_end_reaches_the_gate(rooms, open_socket):
+    async def scenario():
+        async with open_socket("drive?id=p1") as socket:
+            await socket.send('{"op":"take","robot":"r1"}')
+            await asyncio.to_thread(
+                wait_for, lambda: rooms.gate.connections[0].received
+            )
+            rooms.gate.connections[0].send(TICK % 7)
+            assert await socket.recv() == TICK % 7
+
+    asyncio.run(scenario())
+    connection = rooms.gate.connections[0]
+    assert connection.role == "operator"
+    assert connection.received == ['{"op":"take","robot":"r1"}']
+    wait_for(lambda: len(rooms.model.drives) == 2)
+    assert connection.times_closed == 1
+    assert rooms.model.drives == [
+        ("opened", "p1", connection),
+        ("closed", "p1", connection),
+    ]
+
+
+def test_a_drive_without_an_id_is_a_page_of_its_own(rooms, open_socket):
+    async def scenario():
+        async with open_socket("drive") as first, open_socket("drive") as second:
+            await first.send("x")
+            await second.send("x")
+            await asyncio.to_thread(
+                wait_for, lambda: all(c.received for c in rooms.gate.connections)
+            )
+
+    asyncio.run(scenario())
+    assert len({page_id for _, page_id, _ in rooms.model.drives}) == 2
+
+
+def test_the_gate_can_end_a_drive_and_say_why(rooms, open_socket):
+    async def scenario():
+        async with open_socket("drive?id=p") as socket:
+            await socket.send("rubbish")
+            await asyncio.to_thread(wait_for, lambda: rooms.gate.connections)
+            rooms.gate.connections[0].end("20 bad messages in a second")
+            return await reason_of(socket)
+
+    assert asyncio.run(scenario()) == (1008, "20 bad messages in a second")
+
+
+def test_the_model_can_end_a_scene_and_say_why(rooms, open_socket):
+    async def scenario():
+        async with open_socket("scene?id=p") as socket:
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
+            rooms.model.scenes[0].outbox.close("the page was closed " + "€" * 99)
+            return await reason_of(socket)
+
+    code, reason = asyncio.run(scenario())
+    assert code == 1011
+    assert reason.startswith("the page was closed €")
+
+
+@pytest.mark.parametrize(
+    ("name", "message", "reason"),
+    [
+        (
+            "scene?id=p",
+            "x" * (16 * 1024 + 1),
+            "a message of 16385 bytes, at most 16384",
+        ),
+        ("drive?id=p", "x" * 1025, "a message of 1025 bytes, at most 1024 are taken"),
+        ("scene?id=p", b"binary", "a binary message; only text is taken"),
+        ("drive?id=p", b"binary", "a binary message; only text is taken"),
+    ],
+)
+def test_what_is_too_large_or_binary_ends_the_socket(
+    rooms, open_socket, name, message, reason
+):
+    async def scenario():
+        async with open_socket(name) as socket:
+            await socket.send(message)
+            return await reason_of(socket)
+
+    code, said = asyncio.run(scenario())
+    assert code == 1008
+    assert said.startswith(reason)
+    assert not any(s.received for s in (*rooms.model.scenes, *rooms.gate.connections))
+
+
+def test_a_message_far_above_the_bound_is_not_even_read(rooms, open_socket):
+    async def scenario():
+        async with open_socket("scene?id=p") as socket:
+            await socket.send("x" * 1_000_000)
+            return (await reason_of(socket))[0]
+
+    assert asyncio.run(scenario()) == 1009
+
+
+@pytest.mark.parametrize(("name", "rate"), [("scene?id=p", 120), ("drive?id=p", 60)])
+def test_a_page_that_floods_is_closed(rooms, open_socket, name, rate):
+    async def scenario():
+        async with open_socket(name) as socket:
+            with contextlib.suppress(ConnectionClosed):
+                for _ in range(1000):
+                    await socket.send("x")
+            return await reason_of(socket)
+
+    assert asyncio.run(scenario()) == (1008, f"more than {rate} messages a second")
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("scene?page=nothing&id=p", "there is no page at this address"),
+        ("scene?page=/", "id must be"),
+        ("scene?page=/&id=a/b", "id must be"),
+        ("drive?id=", "id must be"),
+        (f"drive?id={'x' * 65}", "id must be"),
+    ],
+)
+def test_a_socket_for_no_page_is_closed_with_a_reason(rooms, open_socket, name, reason):
+    async def scenario():
+        async with open_socket(name) as socket:
+            return await reason_of(socket)
+
+    code, said = asyncio.run(scenario())
+    assert code == 1008
+    assert said.startswith(reason)
+    assert rooms.model.scenes == []
+
+
+@pytest.mark.parametrize("name", ["scene?id=p", "drive?id=p"])
+def test_a_page_that_opens_again_replaces_its_lost_socket(rooms, open_socket, name):
+    async def scenario():
+        async with open_socket(name) as old:
+            await old.send("old")
+            async with open_socket(name) as new:
+                assert (await reason_of(old))[0] == REPLACED
+                await new.send("new")
+                sides = rooms.model.scenes or rooms.gate.connections
+                await asyncio.to_thread(wait_for, lambda: sides[1].received)
+                assert sides[1].times_closed == 0
+                await asyncio.to_thread(wait_for, lambda: sides[0].times_closed)
+
+    asyncio.run(scenario())
+
+
+def test_two_viewers_may_call_their_pages_the_same(rooms, server, open_socket):
+    other = server.sign_in()
+
+    async def scenario():
+        async with (
+            open_socket("scene?id=p") as first,
+            open_socket("scene?id=p", cookie=other) as second,
+        ):
+            await second.send("second")
+            await asyncio.to_thread(wait_for, lambda: len(rooms.model.scenes) == 2)
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes[1].received)
+            await first.send("first")
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes[0].received)
+
+    asyncio.run(scenario())
+    assert len({scene.viewer.id for scene in rooms.model.scenes}) == 2
+
+
+@pytest.mark.parametrize("name", ["scene", "drive"])
+def test_there_are_so_many_pages_and_no_more(rooms, open_socket, name):
+    async def scenario():
+        async with contextlib.AsyncExitStack() as stack:
+            for number in range(4):
+                await stack.enter_async_context(open_socket(f"{name}?id={number}"))
+            async with open_socket(f"{name}?id=last") as socket:
+                return await reason_of(socket)
+
+    code, reason = asyncio.run(scenario())
+    assert code == 1013
+    assert "no more pages" in reason
+
+
+def test_a_page_that_stops_reading_is_closed_and_holds_nothing(rooms, open_socket):
+    async def scenario():
+        async with open_socket("scene?id=p", max_queue=1) as socket:
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
+            scene = rooms.model.scenes[0]
+
+            def flood():
+                scene.outbox.offer(bytes(900_000))
+                return scene.times_closed
+
+            await asyncio.to_thread(wait_for, flood, seconds=10)
+            socket.transport.abort()
+
+    asyncio.run(scenario())
+    assert rooms.model.scenes[0].times_closed == 1
+
+
+def test_a_slow_scene_holds_no_tick_up(rooms, open_socket):
+    async def scenario():
+        async with (
+            open_socket("scene?id=p", max_queue=1) as slow,
+            open_socket("drive?id=p") as quick,
+        ):
+            await asyncio.to_thread(
+                wait_for, lambda: rooms.model.scenes and rooms.gate.connections
+            )
+            for number in range(20):
+                rooms.model.scenes[0].outbox.offer(bytes(700_000))
+                rooms.gate.connections[0].send(TICK % number)
+                async with asyncio.timeout(1):
+                    assert await quick.recv() == TICK % number
+            slow.transport.abort()
+
+    asyncio.run(scenario())
+
+
+def test_a_browser_that_vanishes_is_missed(rooms, open_socket):
+    async def scenario():
+        async with open_socket("drive?id=p") as socket:
+            await asyncio.to_thread(wait_for, lambda: rooms.gate.connections)
+            socket.transport.abort()
+            await asyncio.to_thread(
+                wait_for, lambda: rooms.gate.connections[0].times_closed
+            )
+
+    asyncio.run(scenario())
+
+
+def test_a_model_that_fails_costs_one_page_only(
+    rooms, open_socket, caplog, monkeypatch
+):
+    def fail(*args):
+        raise RuntimeError("the model is not there")
+
+    async def scenario():
+        with monkeypatch.context() as patch:
+            patch.setattr(rooms.model, "open_scene", fail)
+            patch.setattr(rooms.gate, "connect", fail)
+            async with open_socket("scene?id=p") as socket:
+                scene = await reason_of(socket)
+            async with open_socket("drive?id=p") as socket:
+                drive = await reason_of(socket)
+        async with open_socket("scene?id=p") as socket:
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
+            rooms.model.scenes[0].received = None
+            await socket.send("x")
+            message = await reason_of(socket)
+        return scene, drive, message
+
+    scene, drive, message = asyncio.run(scenario())
+    assert scene == (1011, "the page could not be opened; the log says why")
+    assert drive == (1011, "the gate cannot be reached; the log says why")
+    assert message == (1011, "the server failed on this page; its log says why")
+    assert "the model is not there" in caplog.text
+    assert "has no attribute 'append'" in caplog.text
+
+
+@pytest.mark.parametrize("name", ["scene?id=p", "drive?id=p"])
+@pytest.mark.parametrize(
+    ("origin", "cookie", "status"),
+    [
+        (None, True, 403),
+        ("null", True, 403),
+        ("http://localhost:{port}", True, 403),
+        ("http://127.0.0.1:1", True, 403),
+        ("http://127.0.0.1:{port}.evil.com", True, 403),
+        ("http://127.0.0.1:{port}", False, 401),
+    ],
+)
+def test_a_refused_socket_is_never_upgraded(
+    rooms, server, name, origin, cookie, status
+):
+    async def scenario():
+        headers = {"cookie": server.sign_in()} if cookie else {}
+        with pytest.raises(InvalidStatus) as caught:
+            async with connect(
+                server.socket_url(name),
+                origin=origin.format(port=server.port) if origin else None,
+                additional_headers=headers,
+            ):
+                pass
+        return caught.value.response
+
+    response = asyncio.run(scenario())
+    assert response.status_code == status
+    assert "default-src 'none'" in response.headers["content-security-policy"]
+    assert rooms.model.scenes == []
+    assert rooms.gate.connections == []
+
+
+def test_the_token_is_in_no_log_of_the_server(rooms, server, caplog):
+    with (
+        caplog.at_level(logging.DEBUG),
+        sockets.create_connection(("127.0.0.1", server.port)) as raw,
+    ):
+        raw.sendall(
+            f"GET /?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+            "Connection: close\r\n\r\n".encode()
+        )
+        answer = b""
+        while data := raw.recv(4096):
+            answer += data
+    assert answer.startswith(b"HTTP/1.1 303")
+    assert b"server:" not in answer.lower()
+    assert TOKEN.encode() not in answer
+    assert TOKEN not in caplog.text
