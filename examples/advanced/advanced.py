@@ -52,8 +52,8 @@ def main(page):
     map.add_module("ShowSelected", page.element("selected"))
 
     map.add_module("Teleop", 1.0, 1.5)
-    map.add_image("background.png", -20.0, -12.5, 40.0, 25.0)
-    map.scale(700 / 40.0, map.canvas_width * 0.5, map.canvas_height * 0.5)
+    map.add_image("background.png", -21.0, -13.5, 42.0, 27.0)
+    map.scale(700 / 42.0, map.canvas_width * 0.5, map.canvas_height * 0.5)
 
     # These listeners end with the page.
     bridge.on_close(lambda reason: log.prepend(f"Connection closed: {reason}.\n"))

@@ -38,10 +38,10 @@ def main(page):
     map.add_module("Teleop", 1.0, 1.5)
 
     # The background image, in metres.
-    map.add_image("background.png", -20.0, -12.5, 40.0, 25.0)
+    map.add_image("background.png", -21.0, -13.5, 42.0, 27.0)
 
     # A nice initial view that centers the background as large as possible.
-    map.scale(700 / 40.0, map.canvas_width * 0.5, map.canvas_height * 0.5)
+    map.scale(700 / 42.0, map.canvas_width * 0.5, map.canvas_height * 0.5)
 
     map.add_robot(bob)
 

@@ -201,7 +201,7 @@ def test_the_group_of_a_robot_names_it_and_holds_its_model():
 def test_nothing_moves_before_the_start():
     robot = Robot("Bob")
     robot.set_twist_topic(Link(), "/cmd_vel")
-    with pytest.raises(MotionError, match="before webmap.start"):
+    with pytest.raises(MotionError, match="cannot be moved before"):
         robot.twist(1.0)
 
 

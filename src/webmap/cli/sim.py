@@ -2,9 +2,9 @@
 
 import os
 import signal
-import sys
 import threading
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -16,9 +16,7 @@ from webmap.cli.options import PORT, verbose_option
     "--robots",
     "-n",
     type=click.IntRange(1, 500),
-    default=2,
-    show_default=True,
-    help="How many robots.",
+    help="How many robots; 2 if not said, and 1 with --flat.",
 )
 @click.option(
     "--port",
@@ -80,12 +78,12 @@ from webmap.cli.options import PORT, verbose_option
 @click.option("--with-parent", is_flag=True, hidden=True)
 @verbose_option
 def sim(
-    robots: int,
+    robots: int | None,
     port: int,
     seed: int,
     map_file: Path | None,
-    dialect: str,
-    twist: str,
+    dialect: Literal["ros1", "ros2"],
+    twist: Literal["Twist", "TwistStamped"],
     robot_timeout: float,
     drift: float,
     nan: bool,
@@ -106,7 +104,7 @@ def sim(
         threading.Thread(target=_end_with_parent, daemon=True).start()
     asyncio.run(
         run_simulator(
-            robots=robots,
+            robots=robots or (1 if flat else 2),
             port=port,
             seed=seed,
             map=map_file,
@@ -125,5 +123,7 @@ def sim(
 
 def _end_with_parent() -> None:
     """End when standard input does: the parent holds its other end while it lives."""
-    sys.stdin.buffer.read()
+    # Not through sys.stdin, whose lock would be held while the interpreter ends.
+    while os.read(0, 4096):
+        pass
     os.kill(os.getpid(), signal.SIGTERM)

@@ -12,6 +12,7 @@ from webmap.core.extendable import Extendable
 from webmap.core.motion import MotionRoad, MoveTopic, TwistTopic
 from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.registry import Namespace, robot_modules
+from webmap.errors import MotionError
 from webmap.gate.messages import RobotReport
 from webmap.geometry import Quaternion, Twist, Vector3
 from webmap.ros.bridge import Bridge
@@ -271,19 +272,37 @@ class Robot(Extendable):
         """Give up the move topic; does nothing if there is none."""
         self.motion.set_move(None)
 
-    async def acquire_lease(self) -> int:
+    async def acquire_lease(self, *, timeout: float = 5.0) -> int:
         """Take the right to drive this robot, on behalf of this program.
 
         Any operator takes it away by driving.
+
+        Args:
+            timeout: Seconds to wait until the robot can be driven: the links over
+                which it is driven open now, and its odometry must be heard.
 
         Returns:
             The lease's epoch.
 
         Raises:
             NoLease: If somebody else drives.
+            MotionError: If the robot cannot be driven, and why.
 
         """
-        return await asyncio.wrap_future(self.motion.take())
+        epoch = await asyncio.wrap_future(self.motion.take())
+        deadline = time.monotonic() + timeout
+        while (why := self._not_drivable(epoch)) is not None:
+            if time.monotonic() > deadline:
+                self.release_lease()
+                raise MotionError(f"robot {self.name!r} cannot be driven: {why}")
+            await asyncio.sleep(0.02)
+        return epoch
+
+    def _not_drivable(self, epoch: int) -> str | None:
+        report = self.report
+        if report is None or report.epoch != epoch:
+            return "the gate has not said that it can"
+        return report.reason
 
     def release_lease(self) -> None:
         """Give the right to drive back; the robot is stopped if it moves."""

@@ -39,10 +39,10 @@ class Messages:
 
     def odometry(self, topic: str, stamp: float, robot: Robot) -> Message:
         """Return ``nav_msgs/Odometry``."""
-        name = robot.name
+        frames = robot.frames
         return {
-            "header": self.dialect.header(topic, stamp, f"{name}/odom"),
-            "child_frame_id": f"{name}/base_link",
+            "header": self.dialect.header(topic, stamp, f"{frames}odom"),
+            "child_frame_id": f"{frames}base_link",
             "pose": {"pose": pose(robot.odometry), "covariance": self._covariance},
             "twist": {
                 "twist": {
@@ -64,7 +64,7 @@ class Messages:
         """Return ``sensor_msgs/LaserScan``."""
         increment = math.tau / options.beams
         return {
-            "header": self.dialect.header(topic, stamp, f"{robot.name}/base_laser"),
+            "header": self.dialect.header(topic, stamp, f"{robot.frames}base_laser"),
             "angle_min": _float32(-math.pi),
             "angle_max": _float32(-math.pi + (options.beams - 1) * increment),
             "angle_increment": _float32(increment),
@@ -80,7 +80,7 @@ class Messages:
         """Return ``sensor_msgs/BatteryState``; NaN is what nobody measures."""
         nothing = np.empty(0, np.float32)
         return {
-            "header": self.dialect.header(topic, stamp, f"{robot.name}/base_link"),
+            "header": self.dialect.header(topic, stamp, f"{robot.frames}base_link"),
             "voltage": _float32(_EMPTY + (_FULL - _EMPTY) * robot.charge),
             "temperature": math.nan,
             "current": _float32(-0.8 - 2.5 * abs(robot.twist.vx)),
@@ -116,7 +116,7 @@ class Messages:
         """Return ``tf2_msgs/TFMessage`` with each robot's map to odom to base."""
         found = []
         for robot in robots:
-            odom, base = f"{robot.name}/odom", f"{robot.name}/base_link"
+            odom, base = f"{robot.frames}odom", f"{robot.frames}base_link"
             map_from_odom = robot.pose @ robot.odometry.inverse
             found.append(self._transform(topic, stamp, "map", odom, map_from_odom))
             found.append(self._transform(topic, stamp, odom, base, robot.odometry))
@@ -131,8 +131,8 @@ class Messages:
                 self._transform(
                     topic,
                     stamp,
-                    f"{robot.name}/base_link",
-                    f"{robot.name}/base_laser",
+                    f"{robot.frames}base_link",
+                    f"{robot.frames}base_laser",
                     Pose(),
                     z=0.2,
                 )

@@ -54,7 +54,7 @@ class RobotsNode:
         self._publish_fixed()
         self._advertise("/tf", "tf2_msgs/TFMessage")
         for index, robot in enumerate(self.world.robots):
-            self._start_robot(index, f"/{robot.name}")
+            self._start_robot(index, robot.topics)
 
     def _start_robot(self, index: int, prefix: str) -> None:
         self._advertise(f"{prefix}/odom", "nav_msgs/Odometry")
@@ -109,7 +109,7 @@ class RobotsNode:
         robot = self.world.robots[index]
         if at is None or frame in ("", "map"):
             return at
-        if frame in ("odom", f"{robot.name}/odom"):
+        if frame in ("odom", f"{robot.frames}odom"):
             return robot.pose @ robot.odometry.inverse @ at
         log.warning("%s: a goal in an unknown frame %r", robot.name, frame)
         return None
@@ -150,7 +150,7 @@ class RobotsNode:
     def _publish_poses(self) -> None:
         now = self.graph.clock()
         for robot in self.world.robots:
-            topic = f"/{robot.name}/odom"
+            topic = f"{robot.topics}/odom"
             if self.graph.is_wanted(topic):
                 self.publish(topic, self.messages.odometry(topic, now, robot))
         if self.graph.is_wanted("/tf"):
@@ -161,14 +161,14 @@ class RobotsNode:
         wanted = [
             i
             for i, robot in enumerate(robots)
-            if self.graph.is_wanted(f"/{robot.name}/base_scan")
+            if self.graph.is_wanted(f"{robot.topics}/base_scan")
         ]
         if not wanted:
             return
         now = self.graph.clock()
         options = self.world.options.scanner
         for i, ranges in zip(wanted, self.world.sweep(wanted), strict=True):
-            topic = f"/{robots[i].name}/base_scan"
+            topic = f"{robots[i].topics}/base_scan"
             self.publish(
                 topic, self.messages.scan(topic, now, robots[i], options, ranges)
             )
@@ -176,7 +176,7 @@ class RobotsNode:
     def _publish_batteries(self) -> None:
         now = self.graph.clock()
         for robot in self.world.robots:
-            topic = f"/{robot.name}/battery_state"
+            topic = f"{robot.topics}/battery_state"
             if self.graph.is_wanted(topic):
                 self.publish(topic, self.messages.battery(topic, now, robot))
 
@@ -184,7 +184,7 @@ class RobotsNode:
         for i, navigator in enumerate(self.world.navigators):
             is_new = navigator.path_changes != self._paths_seen[i]
             self._paths_seen[i] = navigator.path_changes
-            topic = f"/{navigator.robot.name}/plan"
+            topic = f"{navigator.robot.topics}/plan"
             repeats = all_of_them and navigator.path
             if (is_new or repeats) and self.graph.is_wanted(topic):
                 now = self.graph.clock()

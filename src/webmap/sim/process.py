@@ -33,6 +33,7 @@ async def run_simulator(
     nan: bool = False,
     quirks: str = "real",
     wander: bool = False,
+    flat: bool = False,
     host: str = "127.0.0.1",
     refuse_nan: bool = True,
     on_ready: Callable[[str], None] | None = None,
@@ -54,6 +55,7 @@ async def run_simulator(
         quirks: ``real``, ``polite``, or one of them with changes; see
             :func:`webmap.sim.rosbridge.quirks.parse_quirks`.
         wander: Whether robots that nobody commands drive to random places.
+        flat: Whether the only robot has its topics without a prefix: ``/odom``.
         host: The address to listen on.
         refuse_nan: Whether the bases ignore a twist with NaN or infinity.
         on_ready: Called with the URL once clients can connect.
@@ -79,6 +81,8 @@ async def run_simulator(
     from webmap.sim.world import World, WorldOptions
 
     _check(robots, dialect, twist, robot_timeout)
+    if flat and robots != 1:
+        raise ConfigError(f"without prefixes there can be one robot only, not {robots}")
     behaviour = parse_quirks(quirks, dialect)
     options = WorldOptions(
         robots=robots,
@@ -86,6 +90,7 @@ async def run_simulator(
         base=BaseOptions(timeout=robot_timeout, drift=drift, refuse_nan=refuse_nan),
         scanner=ScannerOptions(nan=nan),
         wander=wander,
+        flat=flat,
     )
     world = World(load_map(map or FLOOR), options)
     schema = Schema(Dialect(dialect))

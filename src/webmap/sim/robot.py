@@ -50,6 +50,11 @@ class Robot:
         self, name: str, pose: Pose, options: BaseOptions, seed: int = 0
     ) -> None:
         self.name = name
+        """Empty if it is alone in its ROS system and its names have no prefix."""
+        self.topics = f"/{name}" if name else ""
+        """What the names of its topics begin with."""
+        self.frames = f"{name}/" if name else ""
+        """What the names of its frames begin with."""
         self.options = options
         self.pose = pose
         """True pose in the map's frame."""

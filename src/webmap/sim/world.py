@@ -32,6 +32,8 @@ class WorldOptions:
     scanner: ScannerOptions = field(default_factory=ScannerOptions)
     wander: bool = False
     """Whether robots without a goal or a command choose goals themselves."""
+    flat: bool = False
+    """Whether the only robot's topics and frames have no prefix."""
 
 
 class World:
@@ -53,7 +55,12 @@ class World:
         self._random = Random(options.seed)  # noqa: S311 - reproducible by design
         poses = self._spawn(options.robots)
         self.robots = [
-            Robot(f"robot_{i}", pose, options.base, options.seed + i)
+            Robot(
+                "" if options.flat else f"robot_{i}",
+                pose,
+                options.base,
+                options.seed + i,
+            )
             for i, pose in enumerate(poses)
         ]
         self.navigators = [Navigator(robot, self.planner) for robot in self.robots]

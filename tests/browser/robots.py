@@ -1,0 +1,58 @@
+"""What a robot's ROS says, heard by a client that this project did not write."""
+
+import threading
+import time
+from urllib.parse import urlsplit
+
+import roslibpy
+
+
+class Witness:
+    """Listens to the topics of a robot through roslibpy."""
+
+    def __init__(self, url: str) -> None:
+        parts = urlsplit(url)
+        self.ros = roslibpy.Ros(parts.hostname, parts.port)
+        self.ros.run(timeout=10)
+        self._newest: dict[str, dict] = {}
+        self._count: dict[str, int] = {}
+        self._lock = threading.Lock()
+
+    def follow(self, topic: str, type_name: str) -> None:
+        """Keep the newest message of a topic."""
+
+        def heard(message) -> None:
+            with self._lock:
+                self._newest[topic] = message
+                self._count[topic] = self._count.get(topic, 0) + 1
+
+        roslibpy.Topic(self.ros, topic, type_name).subscribe(heard)
+
+    def count(self, topic: str) -> int:
+        """How many messages of a topic came."""
+        with self._lock:
+            return self._count.get(topic, 0)
+
+    def newest(self, topic: str, within: float = 10.0) -> dict:
+        """Return the newest message of a topic; wait for the first."""
+        deadline = time.monotonic() + within
+        while time.monotonic() < deadline:
+            with self._lock:
+                if topic in self._newest:
+                    return self._newest[topic]
+            time.sleep(0.02)
+        raise AssertionError(f"nothing came on {topic}")
+
+    def place(self, topic: str) -> tuple[float, float]:
+        """Where odometry says the robot is."""
+        position = self.newest(topic)["pose"]["pose"]["position"]
+        return position["x"], position["y"]
+
+    def speed(self, topic: str) -> tuple[float, float]:
+        """How fast odometry says the robot is: forward, turning."""
+        twist = self.newest(topic)["twist"]["twist"]
+        return twist["linear"]["x"], twist["angular"]["z"]
+
+    def close(self) -> None:
+        """Leave."""
+        self.ros.close()
