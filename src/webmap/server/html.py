@@ -75,9 +75,6 @@ def prepare_page(text: str, base: str) -> OwnPage:
 class _Reader(HTMLParser):
     """Finds the head of a page, what it loads, and what will be blocked."""
 
-    # Older Pythons look for tags in titles, too.
-    CDATA_CONTENT_ELEMENTS = ("script", "style", "title", "textarea")
-
     def __init__(self, text: str) -> None:
         super().__init__()
         self.blocked: list[str] = []
@@ -112,6 +109,8 @@ class _Reader(HTMLParser):
             self._head_end = self._here()
         if tag not in {"html", "head"} and self._content is None:
             self._content = self._here()
+        if tag in {"title", "textarea"}:
+            self.set_cdata_mode(tag)  # Older Pythons look for tags in these, too.
 
     def handle_endtag(self, tag: str) -> None:
         if tag == "head" and self._head_end is None:
