@@ -45,6 +45,7 @@ class Line:
         self._allowance = Allowance(bounds, time.monotonic())
         self._queue = queue
         self._wake = asyncio.Event()
+        self._over = asyncio.Event()
         self._ended: tuple[int, str] | None = None
         self._gone = False
 
@@ -74,15 +75,18 @@ class Line:
             on_text: Called with each text message that is within the bounds.
 
         """
-        reader = asyncio.create_task(self._read(on_text))
-        writer = asyncio.create_task(self._write())
+        # The third waits for an end that comes while the other two are stuck.
+        tasks = [
+            asyncio.create_task(self._read(on_text)),
+            asyncio.create_task(self._write()),
+            asyncio.create_task(self._over.wait()),
+        ]
         try:
-            await asyncio.wait({reader, writer}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            reader.cancel()
-            writer.cancel()
-            results = await asyncio.gather(reader, writer, return_exceptions=True)
-            for result in results:
+            for task in tasks:
+                task.cancel()
+            for result in await asyncio.gather(*tasks, return_exceptions=True):
                 if isinstance(result, Exception):
                     log.error("%s failed", self._name, exc_info=result)
                     self._end(
@@ -99,7 +103,7 @@ class Line:
     def _end(self, code: int, reason: str) -> None:
         if self._ended is None:
             self._ended = (code, reason)
-            self._wake.set()
+            self._over.set()
 
     async def _read(self, on_text: Callable[[str], None]) -> None:
         while self._ended is None:
@@ -118,7 +122,7 @@ class Line:
             on_text(text)
 
     async def _write(self) -> None:
-        while self._ended is None:
+        while True:
             item = self._queue.pop()
             if item is None:
                 self._wake.clear()
@@ -129,6 +133,7 @@ class Line:
                     await self._send(item)
             except TimeoutError:
                 self._end(COME_BACK, f"this page read nothing for {STALLED_S:.0f} s")
+                return
             except (WebSocketDisconnect, OSError):
                 self._gone = True
                 return
