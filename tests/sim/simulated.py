@@ -1,6 +1,10 @@
 """Small worlds and clients without sockets, for the simulator's tests."""
 
+import contextlib
 import json
+import signal
+import subprocess
+import sys
 
 import cbor2
 import numpy as np
@@ -146,3 +150,19 @@ class Client:
         self.send(**operation)
         responses = self.operations("service_response")
         return responses[-1] if responses else None
+
+
+@contextlib.contextmanager
+def running(*options, module="webmap.sim"):
+    """Run a server as a process of its own, and give its URL."""
+    command = [sys.executable, "-m", module, *options]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        line = process.stdout.readline()
+        prefix = "rosbridge is ready at "
+        assert line.startswith(prefix), line
+        yield line.removeprefix(prefix).strip()
+    finally:
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+        process.stdout.close()

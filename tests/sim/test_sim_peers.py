@@ -1,0 +1,83 @@
+"""Clients that this project did not write, against the simulator's server."""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from simulated import running
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+pytestmark = pytest.mark.peer
+
+
+def told_by(*command):
+    """Run a client to its end and return what it told."""
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_roslibpy_gets_what_it_expects(dialect):
+    with running("--dialect", dialect) as url:
+        told = told_by(sys.executable, str(HERE / "roslibpy_client.py"), url, dialect)
+    ros2 = dialect == "ros2"
+    assert {"/map", "/robot_0/odom", "/robot_1/base_scan"} <= set(told["topics"])
+    assert told["odom_type"] == (
+        "nav_msgs/msg/Odometry" if ros2 else "nav_msgs/Odometry"
+    )
+    assert told["odom_topics"] == ["/robot_0/odom", "/robot_1/odom"]
+    assert {"/robot_0/stop", "/rosapi/topics"} <= set(told["services"])
+    assert told["stop_type"] == ("std_srvs/srv/Trigger" if ros2 else "std_srvs/Trigger")
+    assert "/robots" in told["nodes"]
+    assert "/robot_0/cmd_vel" in told["details"]["subscribing"]
+    assert told["ranges"] == 360
+    assert told["cells"] == 840 * 540
+    assert told["way"] > 0.3
+    assert told["stop"] == {"success": True, "message": "stopped"}
+    if not ros2:
+        assert told["time"]["secs"] > 1_600_000_000
+        assert told["twist"]["typedefs"][0]["fieldnames"] == ["linear", "angular"]
+        assert told["params"] == []
+        assert told["goal"] == 3
+
+
+@pytest.mark.parametrize("package", ["roslib", "roslib2"])
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_roslib_gets_what_it_expects(dialect, package):
+    node = shutil.which("node")
+    if node is None or not (ROOT / "node_modules" / package).is_dir():
+        pytest.skip(f"needs node, and {package} from npm")
+    with running("--dialect", dialect) as url:
+        told = told_by(node, str(HERE / "roslib_client.mjs"), url, dialect, package)
+    ros2 = dialect == "ros2"
+    odometry = "nav_msgs/msg/Odometry" if ros2 else "nav_msgs/Odometry"
+    assert told["topics"]["/robot_0/odom"] == odometry
+    assert told["odomType"] == odometry
+    assert told["odomTopics"] == ["/robot_0/odom", "/robot_1/odom"]
+    assert told["stopType"] == ("std_srvs/srv/Trigger" if ros2 else "std_srvs/Trigger")
+    assert {"/robots", "/rosapi"} <= set(told["nodes"])
+    assert "/rosapi/topics" in told["services"]
+    action = "/robot_0/navigate_to_pose" if ros2 else "/robot_0/move_base"
+    assert action in told["actionServers"]
+    assert set(told["ranges"].values()) == {360}
+    assert {"none", "cbor"} <= set(told["ranges"])
+    assert told["cells"] == told["size"][0] * told["size"][1] == 840 * 540
+    before, after = told["before"], told["after"]
+    assert math.hypot(after["x"] - before["x"], after["y"] - before["y"]) > 0.3
+    assert told["stop"] == {"success": True, "message": "stopped"}
+    assert "does not exist" in told["missing"]
+    assert told["served"] == {"success": True, "message": "from roslib"}
+    if not ros2:
+        assert told["twist"][0] if isinstance(told["twist"], list) else told["twist"]
+        assert told["goal"] == 3
+    elif package == "roslib2":
+        assert told["goal"]["error_code"] == 0

@@ -1,0 +1,258 @@
+"""The simulator and the player as processes, and the server's sockets."""
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from simulated import room, running
+from websockets.asyncio.client import connect
+
+from webmap.errors import ConfigError
+from webmap.sim import run_simulator
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import POLITE, REAL, Quirks, parse_quirks
+from webmap.sim.rosbridge.rosapi import Rosapi
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+CAPTURED = Path(__file__).parent / "captured"
+
+
+async def subscribe(socket_, topic, **more):
+    await socket_.send(json.dumps({"op": "subscribe", "topic": topic, **more}))
+
+
+async def next_of(socket_, topic):
+    async with asyncio.timeout(20):
+        while True:
+            operation = json.loads(await socket_.recv())
+            if operation.get("topic") == topic:
+                return operation["msg"]
+
+
+@contextlib.asynccontextmanager
+async def simulated(**options):
+    """Run a simulator in this loop, and give its URL."""
+    ready, stop = asyncio.get_running_loop().create_future(), asyncio.Event()
+    task = asyncio.create_task(
+        run_simulator(on_ready=ready.set_result, stop=stop, **options)
+    )
+    try:
+        await asyncio.wait([ready, task], return_when=asyncio.FIRST_COMPLETED)
+        if task.done():
+            await task
+        yield ready.result()
+    finally:
+        stop.set()
+        await asyncio.wait([task])
+
+
+def test_a_client_drives_a_robot_over_a_socket():
+    async def scenario():
+        async with simulated() as url, connect(url, max_size=None) as client:
+            await subscribe(client, "/robot_0/odom")
+            for _ in range(10):
+                message = {"linear": {"x": 0.4}}
+                operation = {"op": "publish", "topic": "/robot_0/cmd_vel"}
+                await client.send(json.dumps({**operation, "msg": message}))
+                odometry = await next_of(client, "/robot_0/odom")
+            assert odometry["twist"]["twist"]["linear"]["x"] == pytest.approx(0.4)
+
+    asyncio.run(scenario())
+
+
+def test_a_port_in_use_is_an_error():
+    async def scenario():
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            with pytest.raises(OSError, match="in use"):
+                await run_simulator(port=taken.getsockname()[1])
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"robots": 0},
+        {"dialect": "ros3"},
+        {"twist": "Wrench"},
+        {"robot_timeout": 0},
+        {"quirks": "odd"},
+        {"quirks": "real,nonsense"},
+        {"map": "/no/such/map.yaml"},
+    ],
+)
+def test_options_that_make_no_sense_are_said(options):
+    with pytest.raises(ConfigError):
+        asyncio.run(run_simulator(**options))
+
+
+def test_quirks_are_named():
+    assert parse_quirks("polite", "ros2") == POLITE
+    assert parse_quirks("real", "ros2") == REAL["ros2"]
+    assert parse_quirks("polite, bare_nan", "ros1") == Quirks(bare_nan=True)
+    assert not parse_quirks("real,-silent", "ros1").silent
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_process_cleanly(number):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "webmap.sim"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline().startswith("rosbridge is ready at ws://127.0.0.1:")
+    process.send_signal(number)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert out == ""
+    assert "Traceback" not in err
+
+
+def test_the_process_may_end_with_its_standard_input():
+    process = subprocess.Popen(
+        [sys.executable, "-m", "webmap.sim", "--until-eof"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    process.stdout.readline()
+    process.communicate(timeout=20)
+    assert process.returncode == 0
+
+
+def test_a_wrong_option_ends_the_process_with_a_sentence():
+    for options in (["--map", "absent.yaml"], ["--robots", "0"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "webmap.sim", *options],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 2
+        assert done.stderr.startswith("error: ")
+        assert done.stderr.count("\n") == 1
+
+
+def test_a_client_that_stops_reading_delays_nobody_and_stays_small():
+    psutil = pytest.importorskip("psutil")
+
+    async def scenario(url):
+        async with (
+            connect(url, max_size=None, max_queue=1) as stalled,
+            connect(url, max_size=None) as good,
+        ):
+            # A stalled client that asks for much: the map, again and again.
+            for number in range(200):
+                await subscribe(stalled, "/map", id=str(number), queue_length=1)
+            await subscribe(stalled, "/robot_0/base_scan", queue_length=1)
+            await subscribe(good, "/robot_0/odom")
+            for _ in range(40):
+                await next_of(good, "/robot_0/odom")
+            stalled.transport.abort()
+
+    with running() as url:
+        port = int(url.rpartition(":")[2])
+        (server,) = [
+            c
+            for c in psutil.Process(os.getpid()).children()
+            if any(n.laddr.port == port for n in c.net_connections())
+        ]
+        before = server.memory_info().rss
+        asyncio.run(scenario(url))
+        grown = server.memory_info().rss - before
+    assert grown < 40_000_000
+
+
+def test_many_clients_come_and_go_and_leave_nothing():
+    async def scenario():
+        schema = Schema(Dialect("ros1"))
+        graph = Graph(schema)
+        Rosapi(graph, POLITE).start()
+        server = RosbridgeServer(graph, Encoder(schema, POLITE))
+        url = await server.start("127.0.0.1", 0)
+        graph.advertise("talker", "/chatter", "std_msgs/String")
+        for _ in range(5):
+            async with contextlib.AsyncExitStack() as stack:
+                for _ in range(10):
+                    client = await stack.enter_async_context(connect(url))
+                    await subscribe(client, "/chatter")
+                    call = {"op": "call_service", "service": "/rosapi/get_time"}
+                    await client.send(json.dumps(call))
+                    await client.recv()
+                assert len(graph.topics["/chatter"].subscribers) == 10
+        async with asyncio.timeout(10):
+            while server.sessions:
+                await asyncio.sleep(0)
+        assert graph.topics["/chatter"].subscribers == {}
+        await server.stop()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_the_player_sends_what_was_captured_byte_for_byte(dialect):
+    folder = CAPTURED / dialect
+
+    async def scenario(url):
+        async with connect(url, max_size=None) as client:
+            await subscribe(client, "/robot_0/odom")
+            assert await client.recv() == (folder / "publish_odom.json").read_text()
+        async with connect(url, max_size=None) as client:
+            await subscribe(client, "/map", compression="cbor")
+            assert await client.recv() == (folder / "cbor_map.bin").read_bytes()
+            # Latched: once, whatever else comes.
+            await subscribe(client, "/robot_1/odom")
+            second = json.loads(await client.recv())
+            assert second["topic"] == "/robot_1/odom"
+            assert second["msg"]["pose"]["pose"]["position"]["x"] > 5
+
+    with running(str(folder), module="webmap.sim.player") as url:
+        asyncio.run(scenario(url))
+
+
+def test_the_player_answers_what_rosapi_was_asked():
+    async def scenario(url):
+        async with connect(url) as client:
+            for name in ("robot_0", "robot_1"):
+                args = {"topic": f"/{name}/base_scan"}
+                call = {"op": "call_service", "service": "/rosapi/topic_type"}
+                await client.send(json.dumps({**call, "args": args, "id": name}))
+                response = json.loads(await client.recv())
+                assert response["id"] == name
+                assert response["values"] == {"type": "sensor_msgs/LaserScan"}
+            await client.send("nonsense")
+            await client.send('{"op": "call_service", "service": "/no/such"}')
+            assert json.loads(await client.recv())["result"] is False
+
+    with running(str(CAPTURED / "ros1"), module="webmap.sim.player") as url:
+        asyncio.run(scenario(url))
+
+
+def test_the_player_needs_frames(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "webmap.sim.player", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "no captured publications" in done.stderr
+
+
+def test_the_room_of_the_tests_is_closed():
+    cells = room(2, 2).occupancy
+    assert (cells[0] == 100).all()
+    assert (cells[:, -1] == 100).all()
