@@ -254,6 +254,12 @@ def test_what_was_published_is_served(app, client, folder):
     assert client.get(url).status_code == 404
 
 
+def test_a_published_file_may_have_any_name(app, client, folder):
+    odd = folder / "50% of #1 ü?.css"
+    odd.write_text("odd{}")
+    assert client.get(app.published.publish_file(odd)).text == "odd{}"
+
+
 def test_ten_wrong_tokens_make_an_address_wait_and_say_how_long(stranger):
     for _ in range(10):
         assert stranger.get("/?token=wrong").status_code == 401

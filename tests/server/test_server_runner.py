@@ -51,6 +51,7 @@ def process():
     child.communicate()
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly_and_soon_with_sockets_open(process, number):
     line = process.stdout.readline()

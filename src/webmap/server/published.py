@@ -8,6 +8,7 @@ import hashlib
 import threading
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 from webmap.errors import ConfigError
 from webmap.server.files import MEDIA_TYPES, File, NoSuchFile, media_type_of, read_file
@@ -59,7 +60,7 @@ class Published:
         name = f"{folder.hexdigest()[:16]}/{path.name}"
         with self._lock:
             self._files[name] = path
-        return FILES + name
+        return FILES + quote(name)
 
     def publish_image(self, image: Path | bytes, media_type: str | None = None) -> str:
         """Let browsers load an image, and return a URL of this very version of it.
