@@ -24,6 +24,7 @@ Whatever is not one of these is refused whole. What the gate says back stands in
 
 import json
 import math
+import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -233,10 +234,7 @@ _READERS: dict[str, Callable[[_Fields], Command]] = {
 
 def _short(value: object) -> str:
     """Return ``value`` as it may stand in a log: ASCII, and not much of it."""
-    try:
-        text = ascii(value)
-    except (ValueError, RecursionError):  # an int of very many digits, for one
-        return "something too large to show"
+    text = reprlib.repr(value).encode("ascii", "backslashreplace").decode()
     return text if len(text) <= 60 else text[:57] + "..."
 
 

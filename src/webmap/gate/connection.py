@@ -74,4 +74,7 @@ class Connection:
         told = {key: at for key, at in self._told.items() if now - at < QUIET}
         self._told = told
         key = (robot, what, why)
-        return told.setdefault(key, now) == now
+        if key in told:
+            return False
+        told[key] = now
+        return True

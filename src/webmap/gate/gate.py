@@ -14,7 +14,6 @@ from webmap.gate import events, messages
 from webmap.gate.actions import Action, Say
 from webmap.gate.base import Base
 from webmap.gate.commands import (
-    Cancel,
     Command,
     Drive,
     Goal,
@@ -193,9 +192,12 @@ class Gate:
                 self._take(connection, robot, now)
             case Release(robot):
                 self._release(connection, robot, now)
-            case Cancel(robot):
-                check_role(connection.role)
-                self._fleet.find(robot).goals[robot].cancel()
+            case _:
+                self._cancel(connection, command.robot)
+
+    def _cancel(self, connection: Connection, robot: str) -> None:
+        check_role(connection.role)
+        self._fleet.find(robot).goals[robot].cancel()
 
     def _stop(self, robot: str | None, by: Connection, now: float) -> None:
         for base in self._fleet if robot is None else [self._fleet.find(robot)]:
@@ -235,7 +237,7 @@ class Gate:
             connection, command.robot, command.epoch, command.tick, now
         )
         if command.seq <= connection.acked:
-            raise Refusal(f"seq {command.seq} came after {connection.acked}")
+            raise Refusal("its seq is not larger than the one before")
         connection.acked = command.seq
         return base
 
@@ -293,13 +295,7 @@ class Gate:
 
     def _program_cancel(self, message: messages.ProgramCancel, now: float) -> None:
         program, robot = self._people.program, message.robot
-        self._attempt(
-            program,
-            robot,
-            "cancel",
-            lambda: self._fleet.find(robot).goals[robot].cancel(),
-            now,
-        )
+        self._attempt(program, robot, "cancel", lambda: self._cancel(program, robot), now)
 
 
 def _finite(numbers: messages.Velocity) -> messages.Velocity:

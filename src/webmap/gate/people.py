@@ -1,7 +1,6 @@
 """Everybody who may say something: the pages' connections and the program. No I/O."""
 
 import logging
-from collections.abc import Iterator
 
 from webmap.gate.actions import Emit, Say
 from webmap.gate.connection import Connection
@@ -28,9 +27,6 @@ class People:
         self.program = Connection(PROGRAM, PROGRAM, "operator")
         self._emit = emit
         self._all = {PROGRAM: self.program}
-
-    def __iter__(self) -> Iterator[Connection]:
-        return iter(list(self._all.values()))
 
     @property
     def acks(self) -> dict[str, int]:

@@ -1,0 +1,207 @@
+"""A bench for the gate's decisions: a virtual clock and a shell that only notes."""
+
+import json
+from dataclasses import dataclass, field
+
+from webmap.gate import actions, events, messages
+from webmap.gate.events import Key
+from webmap.gate.gate import Gate
+from webmap.gate.lease import Epochs
+from webmap.gate.messages import RobotSpec
+from webmap.gate.ticks import Ticks
+from webmap.geometry import Twist
+
+URL = "ws://robot:9090"
+KEY = Key(URL, "/cmd_vel")
+ZERO = Twist()
+
+
+def spec(**changes):
+    fields = {
+        "id": "r1",
+        "name": "Bob",
+        "bridge_url": URL,
+        "twist_topic": "/cmd_vel",
+        "stops_within": 0.25,
+        "v_max": 1.0,
+        "w_max": 1.5,
+        "cancel_topic": "/cancel",
+        "goal_topic": "/goal",
+    }
+    return RobotSpec(**{**fields, **changes})
+
+
+@dataclass
+class Written:
+    at: float
+    key: Key
+    twist: Twist
+    epoch: int | None
+    by: str | None
+
+
+@dataclass
+class Bench:
+    """Plays the shell and the display; what goes out to the robots is ``written``."""
+
+    now: float = 1000.0
+    beating: bool = True
+    """Whether the display sends its heartbeats by itself."""
+    answering: bool = True
+    """Whether the bridge answers pings by itself."""
+    clear: bool = True
+    """Whether nothing waits to be sent on the control link."""
+    losing_zeros: bool = False
+    """Whether the control link drops every zero without saying so."""
+    up: bool = True
+    lock_held: bool = True
+    was_driven: bool = False
+    gate: Gate = field(default_factory=lambda: Gate(Ticks(5000), Epochs(0)))
+    written: list[Written] = field(default_factory=list)
+    dropped: list[Written] = field(default_factory=list)
+    done: list[actions.Action] = field(default_factory=list)
+    said: list[messages.FromGate] = field(default_factory=list)
+    tick: int = -1
+    seq: int = 0
+
+    def tell(self, event):
+        self._do(self.gate.handle(event, self.now))
+
+    def run(self, seconds, each=None, step=0.01):
+        """Let time pass; ``each`` is called every 50 ms, before the gate's own step."""
+        steps = round(seconds / step)
+        for n in range(steps):
+            self.now += step
+            if self.beating:
+                self.tell(messages.Heartbeat())
+            if self.answering and self.up:
+                self.tell(events.Alive(URL))
+            if each is not None and n % round(0.05 / step) == 0:
+                each()
+            self._do(self.gate.step(self.now))
+
+    def _do(self, todo):
+        for action in todo:
+            self.done.append(action)
+            match action:
+                case actions.Say(message):
+                    self.said.append(message)
+                    if isinstance(message, messages.Tick):
+                        self.tick = message.tick
+                case actions.Lock(key):
+                    why = None if self.lock_held else "another has it"
+                    self.tell(
+                        events.LockState(key, self.lock_held, self.was_driven, why)
+                    )
+                case actions.WriteTwist(_, twist) if (
+                    self.losing_zeros and twist.is_zero
+                ):
+                    pass
+                case actions.WriteTwist(key, twist, epoch, by):
+                    out = self.up and (self.clear or twist.is_zero)
+                    log = self.written if out else self.dropped
+                    log.append(Written(self.now, key, twist, epoch, by))
+                    self.tell(events.Wrote(key, twist, epoch, by, out))
+                case actions.SendGoal(_, robot, id, x, y, yaw, by):
+                    self.tell(events.WroteGoal(robot, id, x, y, yaw, by, self.clear))
+                case actions.CutLink(url):
+                    self.up = False
+                    self.tell(events.LinkDown(url, "control"))
+
+    # What happens outside.
+
+    def begin(self, *specs):
+        for one in specs or (spec(),):
+            self.tell(one)
+        self.connect_links()
+        self.join("a")
+        self.join("b")
+        self.run(0.1)
+        return self
+
+    def connect_links(self):
+        self.up = True
+        self.tell(events.LinkUp(URL, "control"))
+        self.tell(events.LinkUp(URL, "tasks"))
+
+    def break_links(self):
+        self.up = False
+        self.tell(events.LinkDown(URL, "control"))
+        self.tell(events.LinkDown(URL, "tasks"))
+
+    def join(self, who, role="operator"):
+        self.tell(messages.Connect(who, who.upper(), role))
+
+    def say(self, who, **command):
+        self.tell(messages.FromBrowser(who, json.dumps(command).encode()))
+
+    def take(self, who="a", robot="r1"):
+        """Take the robot and return the epoch, if it was given."""
+        self.say(who, op="take", robot=robot)
+        report = self.report(robot)
+        mine = report.holder is not None and report.holder.connection == who
+        return report.epoch if mine else None
+
+    def drive(self, who="a", x=0.0, turn=0.0, robot="r1", **changes):
+        self.seq += 1
+        fields = {
+            "op": "drive",
+            "robot": robot,
+            "epoch": self.report(robot).epoch or 0,
+            "seq": self.seq,
+            "tick": self.tick,
+            "x": x,
+            "y": 0.0,
+            "turn": turn,
+        }
+        self.say(who, **{**fields, **changes})
+
+    def hold(self, seconds, who="a", **axes):
+        """Have a page send its state at 20 Hz for a while."""
+        self.run(seconds, lambda: self.drive(who, **axes))
+
+    def drive_off(self, who="a", x=1.0, robot="r1"):
+        """Take the robot, let go of everything, press, and be under way."""
+        epoch = self.take(who, robot)
+        self.hold(0.3, who, robot=robot)
+        self.hold(0.3, who, x=x, robot=robot)
+        return epoch
+
+    def goal(self, who="a", robot="r1", **changes):
+        self.seq += 1
+        fields = {
+            "op": "goal",
+            "robot": robot,
+            "epoch": self.report(robot).epoch or 0,
+            "seq": self.seq,
+            "tick": self.tick,
+            "x": 1.0,
+            "y": 2.0,
+            "yaw": 0.5,
+        }
+        self.say(who, **{**fields, **changes})
+
+    # What was seen.
+
+    def of(self, type):
+        return [message for message in self.said if isinstance(message, type)]
+
+    def did(self, type):
+        return [action for action in self.done if isinstance(action, type)]
+
+    def report(self, robot="r1"):
+        reports = self.of(messages.RobotReport)
+        return next(r for r in reversed(reports) if r.robot == robot)
+
+    def refusals(self, who="a"):
+        return [r for r in self.of(messages.Refused) if r.connection == who]
+
+    @property
+    def state(self):
+        return self.report().state
+
+    def since(self, at):
+        return [w for w in self.written if w.at > at]
+
+    def moving_since(self, at):
+        return [w for w in self.written if w.at >= at and not w.twist.is_zero]

@@ -1,0 +1,618 @@
+"""The gate's decisions on a virtual clock, story by story."""
+
+import json
+
+import pytest
+
+from gate_harness import KEY, URL, ZERO, Bench, spec
+from webmap.gate import actions, events, messages
+from webmap.gate.events import Key
+from webmap.gate.messages import PROGRAM
+from webmap.geometry import Twist
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin()
+
+
+class TestTaking:
+    def test_a_free_robot_is_held_by_who_takes_it(self, bench):
+        assert bench.report().state == "free"
+        epoch = bench.take("a")
+        report = bench.report()
+        assert epoch is not None
+        assert report.state == "held"
+        assert report.holder == messages.Holder("a", "A")
+        assert not report.armed
+
+    def test_taking_it_twice_changes_nothing(self, bench):
+        assert bench.take("a") == bench.take("a")
+
+    def test_another_does_not_get_it(self, bench):
+        bench.take("a")
+        assert bench.take("b") is None
+        assert bench.refusals("b")[-1].why == "A drives it"
+
+    def test_a_viewer_does_not_get_it(self, bench):
+        bench.join("v", "viewer")
+        assert bench.take("v") is None
+        assert "viewers" in bench.refusals("v")[-1].why
+
+    def test_after_release_another_gets_it_under_a_new_epoch(self, bench):
+        first = bench.take("a")
+        bench.say("b", op="release", robot="r1")  # not b's to give
+        assert bench.state == "held"
+        bench.say("a", op="release", robot="r1")
+        assert bench.state == "free"
+        assert bench.take("b") > first
+
+    def test_a_robot_that_is_not_there_is_refused_by_name(self, bench):
+        bench.say("a", op="take", robot="r9")
+        assert "'r9'" in bench.refusals()[-1].why
+
+    @pytest.mark.parametrize(
+        ("bench", "why"),
+        [
+            (Bench(lock_held=False), "another has it"),
+            (Bench(beating=False), "the display process is silent"),
+        ],
+    )
+    def test_a_robot_that_cannot_be_driven_says_why(self, bench, why):
+        bench.begin()
+        report = bench.report()
+        assert not report.armable
+        assert report.reason == why
+        assert bench.take() is None
+        assert bench.refusals()[-1].why == why
+
+    def test_without_a_link_nobody_gets_it(self, bench):
+        bench.break_links()
+        assert bench.report().link == "down"
+        assert bench.take() is None
+        assert URL in bench.refusals()[-1].why
+
+    def test_the_lease_ends_with_its_connection(self, bench):
+        bench.take("a")
+        bench.tell(messages.Disconnect("a"))
+        assert bench.state == "free"
+        assert bench.take("b")
+
+    def test_a_connection_that_opens_again_holds_nothing(self, bench):
+        bench.take("a")
+        bench.join("a")
+        assert bench.state == "free"
+
+
+class TestDriving:
+    def test_nothing_moves_before_200_ms_of_released_inputs(self, bench):
+        bench.take()
+        bench.hold(0.5, x=1.0)
+        assert bench.written == []
+        assert bench.refusals()[-1].why == "release every input first"
+
+    def test_idle_hands_write_nothing(self, bench):
+        bench.take()
+        bench.hold(2.0)
+        assert bench.written == []
+        assert bench.report().armed
+
+    def test_a_press_drives_at_the_speed_in_force(self, bench):
+        bench.drive_off(x=0.5)
+        assert bench.state == "driving"
+        assert {w.twist for w in bench.written} == {Twist(0.5, 0.0, 0.0)}
+        bench.hold(0.2, x=-1.0, turn=0.5)
+        assert bench.written[-1].twist == Twist(-1.0, 0.0, 0.75)
+
+    def test_release_is_zero_at_once_then_zeros_for_500_ms_then_silence(self, bench):
+        bench.drive_off()
+        bench.drive(x=0)
+        at = bench.now
+        assert bench.written[-1].twist == ZERO
+        assert bench.state == "stopping"
+        bench.hold(2.0)
+        zeros = [w for w in bench.written if w.at >= at]
+        assert {w.twist for w in zeros} == {ZERO}
+        assert 9 <= len(zeros) <= 11
+        assert zeros[-1].at < at + 0.5
+        assert bench.state == "held"
+
+    def test_after_release_a_new_press_drives_at_once(self, bench):
+        bench.drive_off()
+        bench.drive(x=0)
+        bench.run(0.05)
+        bench.drive(x=1.0)
+        assert bench.written[-1].twist == Twist(1.0)
+
+    def test_zero_leaves_200_ms_after_the_last_command(self, bench):
+        bench.drive_off()
+        last = bench.now
+        bench.drive(x=1.0)
+        bench.run(0.5)
+        first = next(w for w in bench.since(last) if w.twist == ZERO)
+        assert 0.2 <= first.at - last <= 0.2101
+
+    def test_after_the_dead_man_a_key_that_is_still_held_moves_nothing(self, bench):
+        bench.drive_off()
+        bench.run(0.5)
+        at = bench.now
+        bench.hold(2.0, x=1.0)
+        assert bench.moving_since(at) == []
+        bench.hold(0.3)
+        bench.hold(0.1, x=1.0)
+        assert bench.moving_since(at) != []
+
+    def test_idle_hands_that_fall_silent_must_be_seen_again(self, bench):
+        bench.take()
+        bench.hold(0.3)
+        bench.run(0.3)
+        assert not bench.report().armed
+        bench.hold(0.3, x=1.0)
+        assert bench.written == []
+
+    def test_commands_are_not_repeated_by_the_gate(self, bench):
+        bench.take()
+        bench.hold(0.3)
+        bench.drive(x=1.0)
+        bench.run(0.15)
+        assert len(bench.written) == 1
+
+    def test_many_commands_at_once_become_the_newest_one(self, bench):
+        bench.drive_off()
+        at = bench.now
+        bench.run(0.05)
+        for x in (0.1, 0.2, 0.3, 0.4):
+            bench.drive(x=x)
+        bench.run(0.05)
+        written = bench.since(at)
+        assert len(written) == 2
+        assert written[-1].twist.vx == 0.4
+
+    def test_more_than_full_speed_is_full_speed(self, bench):
+        bench.drive_off(x=100)
+        bench.drive(x=100)
+        assert bench.written[-1].twist == Twist(1.0)
+
+    def test_a_base_that_is_not_holonomic_never_goes_sideways(self, bench):
+        bench.drive_off()
+        bench.drive(y=1.0, x=0.0, turn=0.0)
+        bench.run(0.05)
+        assert bench.written[-1].twist.vy == 0
+
+    def test_a_holonomic_base_goes_sideways_within_the_limit(self):
+        bench = Bench().begin(spec(holonomic=True))
+        bench.drive_off()
+        bench.run(0.05)
+        bench.drive(x=1.0, y=1.0)
+        twist = bench.written[-1].twist
+        assert twist.vx == pytest.approx(2**-0.5)
+        assert twist.vy == pytest.approx(2**-0.5)
+
+    def test_the_pages_own_limit_counts_also_while_driving(self, bench):
+        bench.tell(messages.Speeds("a", 0.5, 9.0))
+        bench.drive_off()
+        assert bench.written[-1].twist.vx == 0.5
+        assert bench.report().why == ("limit of the robot", "limit of the page")
+        bench.tell(messages.Speeds("a", 0.2, 9.0))
+        bench.hold(0.1, x=1.0)
+        assert bench.written[-1].twist.vx == 0.2
+        bench.tell(messages.Speeds("nobody", 0.1, 0.1))
+        bench.tell(messages.Speeds("b", 0.1, 0.1))
+        assert bench.report().v == 0.2
+
+    def test_a_lower_limit_counts_for_what_waits_to_be_written(self, bench):
+        bench.drive_off()
+        bench.run(0.05)
+        bench.drive(x=0.9)
+        bench.drive(x=1.0)  # too soon: it waits
+        bench.tell(messages.Speeds("a", 0.3, 0.3))
+        bench.run(0.05)
+        assert bench.written[-1].twist.vx == 0.3
+
+    def test_speeding_up_is_ramped_and_stopping_is_not(self):
+        bench = Bench().begin(spec(a_max=0.5))
+        bench.drive_off()
+        speeds = [w.twist.vx for w in bench.written]
+        assert speeds[0] <= 0.05 + 1e-9
+        assert speeds == sorted(speeds)
+        assert speeds[-1] < 0.25
+        bench.drive(x=0.0)
+        assert bench.written[-1].twist == ZERO
+
+
+class TestFreshness:
+    @pytest.fixture
+    def driving(self, bench):
+        bench.drive_off()
+        bench.run(0.05)
+        self.at = bench.now
+        return bench
+
+    def refused(self, bench, why):
+        assert bench.since(self.at) == []
+        assert why in bench.refusals()[-1].why
+
+    def test_an_old_tick_is_refused(self, driving):
+        driving.drive(x=0.5, tick=driving.tick - 7)
+        self.refused(driving, "older than 300 ms")
+
+    def test_a_tick_of_another_session_is_refused(self, driving):
+        driving.drive(x=0.5, tick=1)
+        self.refused(driving, "another session")
+
+    def test_a_seq_that_does_not_grow_is_refused(self, driving):
+        driving.drive(x=0.5, seq=driving.seq)
+        self.refused(driving, "seq")
+
+    def test_another_epoch_is_refused(self, driving):
+        driving.drive(x=0.5, epoch=driving.report().epoch - 1)
+        self.refused(driving, "epoch")
+
+    def test_another_connection_is_refused(self, driving):
+        driving.drive("b", x=0.5)
+        assert driving.since(self.at) == []
+        assert driving.refusals("b")[-1].why == "A drives it"
+
+    def test_a_driver_without_a_lease_is_refused(self, bench):
+        bench.drive(x=0.5)
+        assert "take it first" in bench.refusals()[-1].why
+
+    def test_what_is_refused_does_not_feed_the_dead_man(self, bench):
+        bench.drive_off()
+        last = bench.now
+        bench.run(0.4, lambda: bench.drive(x=1.0, tick=1))
+        first = next(w for w in bench.since(last) if w.twist == ZERO)
+        assert first.at - last <= 0.21
+
+    def test_a_backlog_after_a_stall_moves_nothing(self, bench):
+        bench.drive_off()
+        stale = []
+        bench.run(3.0, lambda: stale.append(bench.tick))
+        at = bench.now
+        for tick in stale:
+            bench.drive(x=1.0, tick=tick)
+        bench.run(0.3)
+        assert bench.moving_since(at) == []
+
+    def test_the_newest_accepted_seq_is_acknowledged(self, bench):
+        bench.take()
+        bench.hold(0.3)
+        bench.drive(tick=1)  # refused
+        bench.run(0.06)
+        tick = bench.of(messages.Tick)[-1]
+        assert tick.acks["a"] == bench.seq - 1
+        assert tick.acks["b"] == -1
+
+
+class TestGarbage:
+    def test_among_good_commands_it_is_as_if_it_were_not_there(self, bench):
+        bench.drive_off()
+        last = bench.now
+
+        def mixed():
+            for _ in range(9):
+                bench.tell(messages.FromBrowser("a", b'{"op":"drive","x":NaN}'))
+
+        bench.run(0.4, mixed)
+        first = next(w for w in bench.since(last) if w.twist == ZERO)
+        assert first.at - last <= 0.21
+
+    def test_much_of_it_closes_the_connection_once(self, bench):
+        for _ in range(50):
+            bench.tell(messages.FromBrowser("a", b"rubbish"))
+        (close,) = bench.of(messages.CloseConnection)
+        assert close.connection == "a"
+        refused = [r for r in bench.refusals() if r.what == "command"]
+        assert len(refused) == 1
+
+    def test_a_little_of_it_does_not(self, bench):
+        bench.run(3.0, lambda: bench.say("a", op="nonsense"), step=0.06)
+        assert bench.of(messages.CloseConnection) == []
+
+    def test_a_flood_of_sense_closes_the_connection_too(self, bench):
+        for _ in range(500):
+            bench.say("a", op="take", robot="r9")
+        assert len(bench.of(messages.CloseConnection)) == 1
+
+    def test_who_is_not_connected_is_not_heard(self, bench):
+        bench.say("nobody", op="take", robot="r1")
+        bench.say(PROGRAM, op="take", robot="r1")
+        assert bench.state == "free"
+        bench.tell(messages.Connect(PROGRAM, "x", "viewer"))
+        bench.tell(messages.Disconnect(PROGRAM))
+        bench.tell(messages.Disconnect("nobody"))
+        bench.tell(messages.ProgramTake(1, "r1"))
+        assert bench.state == "held"
+
+
+class TestStop:
+    @pytest.mark.parametrize("robot", ["r1", "*"])
+    @pytest.mark.parametrize("who", ["a", "b", "v"])
+    def test_any_viewer_stops_a_driven_robot_at_once(self, bench, who, robot):
+        bench.join("v", "viewer")
+        epoch = bench.drive_off()
+        before = len(bench.written)
+        bench.say(who, op="stop", robot=robot)
+        assert bench.written[before].twist == ZERO
+        assert len(bench.written) == before + 1
+        report = bench.report()
+        assert report.state == "stopping"
+        assert report.holder is None
+        assert bench.did(actions.CancelGoals)
+        at = bench.now
+        bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
+        assert bench.moving_since(at) == []
+        assert bench.state == "free"
+
+    def test_a_robot_that_nobody_drives_gets_its_zeros_too(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        assert bench.written[0].twist == ZERO
+        bench.run(1.0)
+        assert len(bench.written) in (10, 11)
+        assert bench.state == "free"
+
+    def test_pressing_it_again_and_again_is_zero_each_time(self, bench):
+        bench.drive_off()
+        for _ in range(5):
+            bench.run(0.02)
+            before = len(bench.written)
+            bench.say("b", op="stop", robot="*")
+            bench.say("b", op="stop", robot="*")
+            assert len(bench.written) == before + 1
+
+    def test_the_driver_is_told_who_it_was(self, bench):
+        bench.take("a")
+        bench.say("b", op="stop", robot="r1")
+        refused = bench.refusals("a")[-1]
+        assert (refused.what, refused.why) == ("lease", "STOP by B")
+
+    def test_a_robot_that_is_not_there_does_no_harm(self, bench):
+        bench.say("b", op="stop", robot="r9")
+        assert bench.refusals("b")[-1].what == "stop"
+
+    def test_python_can_do_it(self, bench):
+        bench.drive_off()
+        bench.tell(messages.Stop(None))
+        assert bench.written[-1].twist == ZERO
+        bench.drive_off()
+        bench.tell(messages.Stop("r1"))
+        assert bench.written[-1].twist == ZERO
+        bench.tell(messages.Stop("r9"))
+
+    def test_without_a_link_it_is_the_first_thing_sent_when_there_is_one(self, bench):
+        bench.break_links()
+        bench.say("b", op="stop", robot="r1")
+        assert bench.written == []
+        bench.run(3.0)
+        bench.connect_links()
+        assert bench.written[0].twist == ZERO
+        assert len(bench.did(actions.CancelGoals)) == 1
+        bench.run(2.0)
+        assert len(bench.written) in (10, 11)
+
+
+class TestHandOver:
+    def test_two_drivers_are_parted_by_a_zero(self, bench):
+        first = bench.drive_off("a")
+        bench.say("a", op="release", robot="r1")
+        second = bench.drive_off("b", x=0.5)
+        epochs = [w.epoch for w in bench.written if not w.twist.is_zero]
+        assert set(epochs) == {first, second}
+        assert epochs == sorted(epochs)
+        last = max(n for n, w in enumerate(bench.written) if w.epoch == first)
+        assert bench.written[last].twist == ZERO
+
+    def test_a_zero_that_did_not_go_out_comes_before_anything_else(self, bench):
+        bench.drive_off("a")
+        # The socket takes nothing, although nobody has noticed yet that it is gone.
+        bench.up = False
+        bench.say("a", op="release", robot="r1")
+        bench.take("b")
+        bench.run(0.2)
+        bench.up = True
+        before = len(bench.written)
+        bench.hold(1.0, "b")
+        bench.hold(0.3, "b", x=1.0)
+        assert bench.written[before].twist == ZERO
+        assert bench.written[-1].twist == Twist(1.0)
+
+    def test_even_if_every_other_zero_was_lost_there_is_one_between_epochs(self, bench):
+        bench.drive_off("a")
+        bench.losing_zeros = True
+        bench.say("a", op="release", robot="r1")
+        bench.take("b")
+        bench.hold(1.0, "b")
+        before = len(bench.written)
+        bench.losing_zeros = False
+        bench.hold(0.2, "b", x=1.0)
+        assert bench.written[before].twist == ZERO
+        assert bench.written[-1].twist == Twist(1.0)
+
+
+class TestLinks:
+    def test_a_lost_link_disarms_and_zero_comes_first_on_the_next(self, bench):
+        bench.drive_off()
+        bench.break_links()
+        bench.hold(1.0, x=1.0)
+        before = len(bench.written)
+        bench.connect_links()
+        assert bench.written[before].twist == ZERO
+        at = bench.now
+        bench.hold(1.0, x=1.0)
+        assert bench.moving_since(at) == []
+        bench.hold(0.3)
+        bench.hold(0.1, x=1.0)
+        assert bench.moving_since(at) != []
+
+    def test_released_inputs_do_not_count_while_there_is_no_link(self, bench):
+        bench.take()
+        bench.break_links()
+        bench.hold(1.0)
+        bench.connect_links()
+        bench.hold(1.0, x=1.0)
+        assert bench.moving_since(0) == []
+
+    def test_a_robot_that_stood_hears_nothing_when_its_link_comes_back(self, bench):
+        bench.take()
+        bench.hold(0.5)
+        bench.break_links()
+        bench.run(1.0)
+        bench.connect_links()
+        bench.run(1.0)
+        assert bench.written == []
+
+    def test_a_link_that_does_not_answer_stops_and_then_is_cut(self, bench):
+        bench.drive_off()
+        bench.answering = False
+        at = bench.now
+        bench.hold(2.0, x=1.0)
+        moving = bench.moving_since(at)
+        assert len(moving) <= 7
+        assert max(w.at for w in moving) <= at + 0.31
+        assert bench.since(at)[len(moving)].twist == ZERO
+        assert bench.did(actions.CutLink) == [actions.CutLink(URL)]
+        assert "no link" in bench.refusals()[-1].why
+
+    def test_a_link_that_answers_again_before_it_is_cut_needs_a_new_press(self, bench):
+        bench.drive_off()
+        bench.answering = False
+        bench.hold(0.6, x=1.0)
+        assert bench.report().reason == f"{URL} does not answer"
+        bench.answering = True
+        at = bench.now
+        bench.hold(1.0, x=1.0)
+        assert bench.moving_since(at) == []
+
+    def test_a_command_that_cannot_go_out_at_once_is_dropped_and_told(self, bench):
+        bench.drive_off()
+        bench.clear = False
+        at = bench.now
+        bench.hold(0.5, x=1.0)
+        assert bench.moving_since(at) == []
+        assert bench.dropped
+        assert "backed up" in bench.refusals()[-1].why
+        bench.clear = True
+        bench.hold(0.1, x=1.0)
+        assert len(bench.moving_since(at)) <= 2
+
+    def test_events_of_machines_that_are_gone_do_nothing(self, bench):
+        gone = Key(URL, "/gone")
+        bench.tell(events.Wrote(gone, ZERO, 1, "a", True))
+        bench.tell(events.Echoed(gone, ZERO))
+        bench.tell(events.Measured(gone, ZERO))
+        bench.tell(events.LockState(gone, held=True))
+        bench.tell(events.WroteGoal("r9", "g", 0, 0, 0, "a", True))
+        bench.tell(events.GoalEnded("r9", "g"))
+        bench.tell(events.LinkUp("ws://other", "witness"))
+        bench.tell(events.LinkDown("ws://other", "witness"))
+        assert bench.written == []
+
+
+class TestDisplay:
+    def test_its_silence_stops_every_driven_robot_within_250_ms(self, bench):
+        bench.drive_off()
+        bench.beating = False
+        at = bench.now
+        bench.hold(0.5, x=1.0)
+        first = next(w for w in bench.since(at) if w.twist == ZERO)
+        assert first.at - at <= 0.2701
+        at = bench.now
+        bench.beating = True
+        bench.hold(0.5, x=1.0)
+        assert bench.moving_since(at) == []
+        assert bench.report().reason is None
+
+    def test_its_end_stops_them_and_nothing_is_taken_after(self, bench):
+        bench.drive_off()
+        bench.tell(events.Shutdown("the end"))
+        assert bench.written[-1].twist == ZERO
+        assert not bench.gate.silent
+        assert bench.refusals("a")[-1].why == "the end"
+        assert bench.take("b") is None
+        bench.run(0.52)
+        assert bench.gate.silent
+
+    def test_ticks_come_at_20_hz(self, bench):
+        before = len(bench.of(messages.Tick))
+        bench.run(1.0)
+        ticks = [t.tick for t in bench.of(messages.Tick)][before:]
+        assert len(ticks) in (19, 20, 21)
+        assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+
+
+class TestBlindness:
+    @pytest.fixture
+    def bench(self):
+        return Bench().begin(spec(odometry_topic="/odom"))
+
+    def moves(self, bench, *, seen):
+        def each():
+            if seen:
+                bench.tell(events.Measured(KEY, Twist(0.1)))
+            bench.drive(x=x)
+
+        at = bench.now
+        for x, seconds in ((0.0, 0.4), (1.0, 0.5)):  # noqa: B007 - each() reads it
+            bench.run(seconds, each)
+        return bench.moving_since(at)
+
+    def test_a_robot_that_is_not_heard_of_is_not_driven(self, bench):
+        bench.take()
+        assert self.moves(bench, seen=False) == []
+        assert bench.report().reason == "no odometry yet"
+        assert self.moves(bench, seen=True) != []
+
+    def test_a_robot_that_falls_silent_is_stopped_after_a_second(self, bench):
+        bench.take()
+        assert self.moves(bench, seen=True)
+        at = bench.now
+        bench.hold(2.0, x=1.0)
+        assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
+        assert bench.report().reason == "no odometry for 1 s"
+
+    def test_it_is_listened_to_only_while_it_matters(self, bench):
+        bench.tell(events.Measured(KEY, Twist(0.1)))
+        assert bench.report().measured is None
+        bench.take()
+        assert bench.did(actions.Watch) == [actions.Watch(KEY, True)]
+        bench.tell(events.Measured(KEY, Twist(0.1)))
+        bench.tell(events.Echoed(KEY, Twist(0.2, 0, -0.0)))
+        bench.run(0.2)
+        report = bench.report()
+        assert report.measured == (0.1, 0, 0)
+        assert report.echoed == (0.2, 0, 0)
+        bench.say("a", op="release", robot="r1")
+        assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
+        bench.tell(events.Echoed(KEY, Twist(0.2)))
+        bench.run(0.2)
+        assert bench.report().measured is None
+        assert bench.report().echoed is None
+
+
+class TestReports:
+    def test_velocities_are_told_ten_times_a_second_at_most(self, bench):
+        bench.drive_off()
+        before = len(bench.of(messages.RobotReport))
+        n = iter(range(1000))
+
+        def each():
+            bench.tell(events.Measured(KEY, Twist(next(n) / 100)))
+            bench.drive(x=1.0)
+
+        bench.run(1.0, each)
+        told = bench.of(messages.RobotReport)[before:]
+        assert 8 <= len(told) <= 11
+        bench.run(0.2)
+        assert bench.report().measured is None or bench.report().measured[0] == 0.19
+
+    def test_what_was_written_is_told_with_its_author(self, bench):
+        bench.drive_off(x=0.5)
+        sent = bench.of(messages.SentTwist)
+        assert sent[-1] == messages.SentTwist("r1", 0.5, 0.0, 0.0, "a")
+        bench.run(0.5)
+        assert bench.of(messages.SentTwist)[-1].by is None
+
+    def test_they_can_be_written_as_json(self, bench):
+        bench.drive_off()
+        for report in bench.of(messages.RobotReport):
+            json.dumps(messages.msgspec.to_builtins(report), allow_nan=False)

@@ -1,0 +1,228 @@
+"""Robots as they are declared, changed, shared and forgotten."""
+
+import math
+
+import pytest
+
+from gate_harness import KEY, URL, ZERO, Bench, spec
+from webmap.errors import ConfigError
+from webmap.gate import actions, events, messages
+from webmap.gate.events import Key
+from webmap.gate.specs import checked, key_of
+from webmap.geometry import Twist
+
+
+class TestSpecs:
+    def test_names_are_brought_into_one_spelling(self):
+        one = checked(spec(bridge_url="ws://ROBOT:9090/", twist_topic="cmd_vel"))
+        assert key_of(one) == key_of(checked(spec())) == KEY
+        assert one.goal_url == one.odometry_url == URL
+
+    def test_other_bridges_for_other_things_are_kept(self):
+        one = checked(spec(goal_url="ws://g:1/", odometry_url="ws://o:1/"))
+        assert (one.goal_url, one.odometry_url) == ("ws://g:1", "ws://o:1")
+
+    def test_a_robot_without_velocity_is_known_by_its_goals(self):
+        goal_only = checked(spec(twist_topic=None, goal_url="ws://g:1"))
+        assert key_of(goal_only) == Key("ws://g:1", "goal /goal")
+        nothing = spec(twist_topic=None, goal_topic=None)
+        assert key_of(nothing) == Key(URL, "goal robot r1")
+
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {"id": ""},
+            {"id": "*"},
+            {"id": "r" * 65},
+            {"id": "r\n"},
+            {"bridge_url": "http://robot"},
+            {"twist_topic": "not a topic"},
+            {"twist_type": "std_msgs/String"},
+            {"goal_type": "geometry_msgs/Pose"},
+            {"odometry_type": "Odometry"},
+            {"v_max": math.nan},
+            {"v_max": -1.0},
+            {"w_max": math.inf},
+            {"a_max": 0.0},
+            {"stops_within": -0.1},
+        ],
+    )
+    def test_what_cannot_be_meant_is_refused(self, changes):
+        with pytest.raises(ConfigError):
+            checked(spec(**changes))
+
+    def test_a_robot_that_cannot_be_meant_is_not_there(self, caplog):
+        bench = Bench()
+        bench.tell(spec(v_max=math.nan))
+        assert bench.done == []
+        assert "v_max" in caplog.text
+
+
+class TestDeclaring:
+    def test_the_same_again_changes_nothing(self):
+        bench = Bench().begin()
+        epoch = bench.drive_off()
+        done = len(bench.done)
+        bench.tell(spec())
+        assert len(bench.done) == done
+        assert bench.report().epoch == epoch
+
+    def test_a_change_ends_the_lease_and_counts_from_then_on(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        bench.tell(spec(v_max=0.5))
+        assert bench.written[-1].twist == ZERO
+        assert bench.report().holder is None
+        assert bench.refusals()[-1].why == "the robot was declared anew"
+        bench.drive_off()
+        assert bench.written[-1].twist == Twist(0.5)
+
+    def test_another_topic_makes_it_another_machine(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        bench.tell(spec(twist_topic="/other"))
+        assert bench.written[-1].twist == ZERO
+        other = Key(URL, "/other")
+        assert bench.did(actions.Lock) == [actions.Lock(KEY), actions.Lock(other)]
+        assert bench.did(actions.Unlock) == []
+        bench.run(1.0)
+        assert bench.did(actions.Unlock) == [actions.Unlock(KEY)]
+        assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
+        bench.drive_off()
+        assert bench.written[-1].key == other
+
+    def test_a_forgotten_robot_is_stopped_before_it_is_dropped(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        bench.tell(messages.Forget("r1"))
+        assert bench.of(messages.RobotGone) == [messages.RobotGone("r1")]
+        bench.say("b", op="take", robot="r1")
+        assert "no robot" in bench.refusals("b")[-1].why
+        at = bench.now
+        assert bench.gate.busy
+        assert bench.did(actions.Detach) == []
+        bench.run(1.0)
+        assert len([w for w in bench.written if w.at >= at]) >= 10
+        assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
+        bench.tell(messages.Forget("r1"))
+        assert not bench.gate.busy
+
+    def test_one_that_stands_is_dropped_at_once(self):
+        bench = Bench().begin()
+        bench.tell(messages.Forget("r1"))
+        assert bench.did(actions.Detach)
+        assert bench.did(actions.Unlock)
+
+    def test_one_that_comes_back_while_it_is_being_stopped_stays(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        bench.tell(messages.Forget("r1"))
+        bench.tell(spec())
+        bench.run(1.0)
+        assert bench.did(actions.Detach) == []
+        bench.drive_off()
+        assert bench.written[-1].twist == Twist(1.0)
+
+
+class TestSharing:
+    """Two robots of the display that are one machine."""
+
+    @pytest.fixture
+    def bench(self):
+        return Bench().begin(spec(), spec(id="r2", name="Bob again", v_max=0.4))
+
+    def test_they_share_one_lease(self, bench):
+        assert bench.take("a", "r1")
+        assert bench.take("b", "r2") is None
+        assert bench.report("r2").holder.connection == "a"
+
+    def test_the_lower_limits_count(self, bench):
+        bench.drive_off(robot="r1")
+        assert bench.written[-1].twist == Twist(0.4)
+        assert {s.robot for s in bench.of(messages.SentTwist)} == {"r1", "r2"}
+
+    def test_forgetting_one_leaves_the_other_driving(self, bench):
+        bench.drive_off(robot="r1")
+        bench.tell(messages.Forget("r2"))
+        bench.hold(0.1, x=1.0)
+        assert bench.written[-1].twist == Twist(1.0)
+        assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
+
+    def test_forgetting_both_stops_the_machine_first(self, bench):
+        bench.drive_off(robot="r1")
+        bench.tell(messages.Forget("r2"))
+        bench.tell(messages.Forget("r1"))
+        assert bench.written[-1].twist == ZERO
+        bench.run(1.0)
+        assert len(bench.did(actions.Detach)) == 2
+
+    def test_stopping_all_stops_it_once(self, bench):
+        bench.say("b", op="stop", robot="*")
+        assert len(bench.written) == 1
+
+
+class TestSeveral:
+    def test_one_robots_stop_leaves_the_other_alone(self):
+        bench = Bench().begin(spec(), spec(id="r2", twist_topic="/r2/cmd_vel"))
+        bench.drive_off("b", robot="r2")
+        bench.say("a", op="stop", robot="r1")
+        assert bench.report("r2").state == "driving"
+        bench.say("a", op="stop", robot="*")
+        assert bench.report("r2").state == "stopping"
+
+    def test_links_of_other_bridges_do_not_matter(self):
+        other = "ws://other:9090"
+        bench = Bench().begin(spec(), spec(id="r2", bridge_url=other))
+        bench.tell(events.LinkUp(other, "control"))
+        bench.tell(events.LinkUp(other, "tasks"))
+        bench.drive_off()
+        bench.tell(events.LinkDown(other, "control"))
+        assert bench.state == "driving"
+        assert bench.report("r2").link == "down"
+        bench.tell(messages.Speeds("a", 0.5, 0.5))
+        assert bench.report("r2").v == 1.0
+
+
+class TestAfterACrash:
+    def test_a_machine_that_was_driven_gets_zeros_on_first_contact(self):
+        bench = Bench(was_driven=True).begin()
+        assert bench.written[0].twist == ZERO
+        bench.run(2.0)
+        assert len(bench.written) in (10, 11)
+        assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
+
+    def test_also_if_the_link_was_there_before_the_lock(self):
+        bench = Bench(lock_held=False).begin()
+        bench.run(1.0)
+        assert bench.written == []
+        bench.tell(events.LockState(KEY, held=True, driven=True))
+        assert bench.written[0].twist == ZERO
+
+    def test_a_machine_that_stood_hears_nothing(self):
+        bench = Bench().begin()
+        bench.run(2.0)
+        assert bench.written == []
+        assert bench.did(actions.MarkDriven) == []
+
+    def test_driving_is_marked_before_anything_moves_and_unmarked_after_zeros(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        kept = (actions.MarkDriven, actions.WriteTwist)
+        order = [a for a in bench.done if isinstance(a, kept)]
+        assert order[0] == actions.MarkDriven(KEY, True)
+        bench.run(1.0)
+        assert bench.did(actions.MarkDriven) == [
+            actions.MarkDriven(KEY, True),
+            actions.MarkDriven(KEY, False),
+        ]
+        assert not bench.did(actions.WriteTwist)[-1].twist.vx
+
+    def test_a_machine_whose_link_broke_stays_marked_until_it_is_stopped(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        bench.break_links()
+        bench.run(5.0)
+        assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
+        bench.connect_links()
+        bench.run(1.0)
+        assert len(bench.did(actions.MarkDriven)) == 2

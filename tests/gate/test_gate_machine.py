@@ -1,0 +1,341 @@
+"""Whatever happens in whatever order, what the robot is told keeps five promises.
+
+1. A velocity is written only in answer to a command of the lease's holder that was
+   accepted just now, and when the newest such command is older than the limit, what is
+   written is zero, or nothing.
+2. Between two epochs in the log of a robot there is a zero.
+3. No velocity of an old epoch comes after one of a newer epoch.
+4. No velocity exceeds the limit in force.
+5. After half a second of zeros there is silence.
+
+And, of hands: after any doubt nothing moves before they were seen to be off.
+"""
+
+import os
+from dataclasses import dataclass
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+)
+
+from gate_harness import URL, Bench, spec
+from webmap.gate import events, messages
+from webmap.gate.messages import PROGRAM
+from webmap.geometry import Twist
+
+PEOPLE = ("a", "b")
+LATE = 0.0101
+"""One step of the gate's loop."""
+
+
+@dataclass
+class Sent:
+    at: float
+    who: str
+    epoch: int
+    neutral: bool
+    valid: bool
+
+
+class Motion(RuleBasedStateMachine):
+    @initialize(odometry=st.booleans(), a_max=st.sampled_from([None, 0.5]))
+    def begin(self, odometry, a_max):
+        self.odometry = "/odom" if odometry else None
+        self.a_max = a_max
+        self.v_max = 1.0
+        self.bench = Bench()
+        self.bench.begin(self._spec())
+        self.sent: list[Sent] = []
+        self.doubts = [self.bench.now]
+        """When hands were last known to be in doubt, for a reason outside of them."""
+        self.speeds = dict.fromkeys((*PEOPLE, PROGRAM), 9.0)
+        self.last_seq = dict.fromkeys(PEOPLE, 0)
+        self.seeing = True
+        self.checked = 0
+        self.request = 0
+
+    def _spec(self):
+        return spec(v_max=self.v_max, odometry_topic=self.odometry, a_max=self.a_max)
+
+    # People.
+
+    @rule(who=st.sampled_from(PEOPLE))
+    def take(self, who):
+        before = self.bench.report().epoch
+        if self.bench.take(who) != before:
+            self._doubt()
+
+    @rule(who=st.sampled_from(PEOPLE))
+    def release(self, who):
+        self.bench.say(who, op="release", robot="r1")
+
+    @rule(
+        who=st.sampled_from(PEOPLE),
+        x=st.sampled_from([0.0, 0.5, 1.0, -1.0, 3.0]),
+        old_tick=st.sampled_from([0, 0, 0, 0, 3, 8]),
+        old_epoch=st.sampled_from([0, 0, 0, 0, 1]),
+        old_seq=st.sampled_from([0, 0, 0, 0, 1]),
+    )
+    def command(self, who, x, old_tick, old_epoch, old_seq):
+        self._command(who, x, old_tick, old_epoch, old_seq)
+
+    @rule(
+        who=st.sampled_from(PEOPLE),
+        x=st.sampled_from([0.0, 0.0, 0.5, 1.0, -1.0]),
+        seconds=st.sampled_from([0.1, 0.3, 0.3, 0.6]),
+    )
+    def hold_keys(self, who, x, seconds):
+        self._run(seconds, lambda: self._command(who, x))
+
+    def _command(self, who, x, old_tick=0, old_epoch=0, old_seq=0):
+        bench, report = self.bench, self.bench.report()
+        mine = report.holder is not None and report.holder.connection == who
+        epoch = (report.epoch or 0) - old_epoch
+        seq = bench.seq if old_seq else bench.seq + 1
+        fresh = bench.gate._ticks.age(bench.tick - old_tick, bench.now)
+        valid = (
+            mine
+            and not old_epoch
+            and fresh is not None
+            and fresh <= 0.3
+            and seq > self.last_seq[who]
+        )
+        if valid:
+            self.last_seq[who] = seq
+        self.sent.append(Sent(bench.now, who, epoch, x == 0, valid))
+        bench.drive(who, x=x, epoch=epoch, tick=bench.tick - old_tick, seq=seq)
+
+    @rule(who=st.sampled_from(PEOPLE))
+    def goal(self, who):
+        self.bench.goal(who)
+        self.last_seq[who] = self.bench.seq
+        self._doubt()
+
+    @rule(who=st.sampled_from(PEOPLE), robot=st.sampled_from(["r1", "*"]))
+    def stop(self, who, robot):
+        at, before = self.bench.now, len(self._attempts())
+        self.bench.say(who, op="stop", robot=robot)
+        assert self.bench.report().holder is None
+        zeros = [w for w in self._attempts() if w.at == at and w.twist.is_zero]
+        assert zeros, "STOP is zero at once"
+        assert len(self._attempts()) <= before + 1
+
+    @rule(who=st.sampled_from(PEOPLE), v=st.sampled_from([0.2, 0.8, 9.0]))
+    def speeds_of_page(self, who, v):
+        self.bench.tell(messages.Speeds(who, v, v))
+        self.speeds[who] = v
+
+    @rule(who=st.sampled_from(PEOPLE))
+    def page_is_reloaded(self, who):
+        self.bench.tell(messages.Disconnect(who))
+        self.bench.join(who)
+        self.last_seq[who], self.speeds[who] = -1, 9.0
+
+    @rule(who=st.sampled_from(PEOPLE), words=st.binary(max_size=30))
+    def garbage(self, who, words):
+        self.bench.tell(messages.FromBrowser(who, words))
+
+    # The program.
+
+    @rule()
+    def program_takes(self):
+        self.request += 1
+        self.bench.tell(messages.ProgramTake(self.request, "r1"))
+
+    @rule(vx=st.sampled_from([0.0, 0.4, 2.0]), old=st.sampled_from([0, 0, 8]))
+    def program_twists(self, vx, old):
+        bench, report = self.bench, self.bench.report()
+        held = report.holder is not None and report.holder.connection == PROGRAM
+        tick, epoch = bench.tick - old, report.epoch or 0
+        age = bench.gate._ticks.age(tick, bench.now)
+        valid = held and age is not None and age <= 0.3
+        self.sent.append(Sent(bench.now, PROGRAM, epoch, vx == 0, valid))
+        bench.tell(messages.ProgramTwist("r1", epoch, tick, (vx, 0.0, 0.0)))
+
+    @rule(v_max=st.sampled_from([0.4, 1.0]))
+    def declared_anew(self, v_max):
+        self.v_max = v_max
+        self.bench.tell(self._spec())
+
+    @rule()
+    def forgotten_and_declared(self):
+        self.bench.tell(messages.Forget("r1"))
+        self.bench.tell(self._spec())
+
+    # The world.
+
+    def _run(self, seconds, each=None):
+        def fiftieth():
+            if self.odometry and self.seeing:
+                self.bench.tell(events.Measured(self.bench_key, Twist()))
+            if each is not None:
+                each()
+
+        self.bench.run(seconds, fiftieth)
+        if not self.bench.beating or not self.bench.answering:
+            self._doubt_if_silent(seconds)
+
+    @property
+    def bench_key(self):
+        return next(iter(self.bench.gate._fleet._bases))
+
+    def _doubt_if_silent(self, seconds):
+        self.silent_for += seconds
+        if self.silent_for > 0.32:
+            self._doubt()
+
+    silent_for = 0.0
+
+    @rule(seconds=st.sampled_from([0.01, 0.05, 0.15, 0.25, 0.5]))
+    def time_passes(self, seconds):
+        self._run(seconds)
+
+    @rule(seconds=st.sampled_from([0.1, 0.5, 3.0]))
+    def gate_stands_still(self, seconds):
+        self.bench.now += seconds
+        if seconds > 0.32:
+            self._doubt()
+
+    @rule()
+    def everybody_rests(self):
+        self._run(1.6)
+        late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
+        assert late == [], "after zeros there is silence"
+        assert self.bench.gate.silent
+
+    @rule()
+    def link_breaks(self):
+        self.bench.break_links()
+        self._doubt()
+
+    @precondition(lambda self: not self.bench.up)
+    @rule()
+    def link_comes_back(self):
+        self.bench.connect_links()
+
+    @rule(answering=st.booleans())
+    def bridge_answers(self, answering):
+        self.bench.answering = answering
+        self.silent_for = 0.0
+
+    @rule(beating=st.booleans())
+    def display_beats(self, beating):
+        self.bench.beating = beating
+        self.silent_for = 0.0
+
+    @rule(clear=st.booleans())
+    def link_is_backed_up(self, clear):
+        self.bench.clear = clear
+
+    @rule(seeing=st.booleans())
+    def odometry_comes(self, seeing):
+        self.seeing = seeing
+
+    # The promises.
+
+    def _doubt(self):
+        self.doubts.append(self.bench.now)
+
+    def _attempts(self):
+        both = self.bench.written + self.bench.dropped
+        return sorted(both, key=lambda w: w.at)
+
+    @invariant()
+    def velocity_answers_an_accepted_command(self):
+        for write in self.bench.written[self.checked :]:
+            if write.twist.is_zero:
+                continue
+            causes = [
+                s
+                for s in self.sent
+                if s.valid
+                and s.who == write.by
+                and s.epoch == write.epoch
+                and not s.neutral
+                and write.at - 0.02 - LATE <= s.at <= write.at
+            ]
+            assert causes, "nobody asked for this"
+            assert write.twist.vy == 0
+            limit = max(self.v_max, 0.0)
+            assert abs(write.twist.vx) <= limit + 1e-9
+            if write.by != PROGRAM:
+                self._check_hands(write, causes[-1])
+        self.checked = len(self.bench.written)
+
+    def _check_hands(self, write, cause):
+        """Since the last doubt the hands were off for 200 ms."""
+        since = max(at for at in self.doubts if at <= write.at)
+        mine = [
+            s
+            for s in self.sent
+            if s.valid
+            and s.who == write.by
+            and s.epoch == write.epoch
+            and since <= s.at <= cause.at
+        ]
+        run_start = last = None
+        seen = False
+        for s in mine:
+            if last is not None and s.at >= last + 0.2 + 1e-6:
+                run_start, seen = None, False
+            if not s.neutral:
+                run_start = None
+            elif run_start is None:
+                run_start = s.at
+            elif s.at - run_start >= 0.2 - 1e-6:
+                seen = True
+            last = s.at
+        assert seen, "the hands were not seen to be off"
+
+    @invariant()
+    def speed_is_within_what_the_page_asks_for(self):
+        for write in self.bench.written[-3:]:
+            if write.at == self.bench.now and write.by is not None:
+                assert abs(write.twist.vx) <= self.speeds[write.by] + 1e-9
+
+    @invariant()
+    def the_dead_man_holds(self):
+        attempts = self._attempts()
+        if not attempts or attempts[-1].twist.is_zero:
+            return
+        newest = max(s.at for s in self.sent if s.valid)
+        assert self.bench.now - newest <= 0.2 + LATE or self._stood_still(newest)
+
+    def _stood_still(self, since):
+        """Whether the gate has not had its say since the limit passed."""
+        self.bench._do(self.bench.gate.step(self.bench.now))
+        return self._attempts()[-1].twist.is_zero
+
+    @invariant()
+    def epochs_are_parted_by_zeros_and_only_grow(self):
+        epoch, zero_since = None, True
+        for write in self.bench.written:
+            if write.twist.is_zero:
+                zero_since = True
+                continue
+            if epoch is not None and write.epoch != epoch:
+                assert zero_since, "no zero between two epochs"
+                assert write.epoch > epoch, "an old epoch came back"
+            epoch, zero_since = write.epoch, False
+
+    @invariant()
+    def reports_can_be_believed(self):
+        report = self.bench.report()
+        assert (report.holder is None) == (report.epoch is None)
+        assert report.v <= self.v_max
+        if report.state == "driving":
+            assert report.holder is not None
+            assert URL == self.bench_key.url
+
+
+full = os.environ.get("WEBMAP_FULL") == "1"
+Motion.TestCase.settings = settings(
+    max_examples=10_000 if full else 150, stateful_step_count=50, deadline=None
+)
+TestMotion = Motion.TestCase

@@ -1,0 +1,149 @@
+"""The road of the display's own Python code."""
+
+import math
+
+import pytest
+
+from gate_harness import ZERO, Bench
+from webmap.gate import actions, messages
+from webmap.gate.messages import PROGRAM
+from webmap.geometry import Twist
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin()
+
+
+def take(bench):
+    bench.tell(messages.ProgramTake(7, "r1"))
+    return bench.of(messages.TakeReply)[-1]
+
+
+def twist(bench, *velocity, epoch=None, tick=None):
+    epoch = bench.report().epoch or 0 if epoch is None else epoch
+    tick = bench.tick if tick is None else tick
+    bench.tell(messages.ProgramTwist("r1", epoch, tick, velocity))
+
+
+def test_a_program_takes_and_is_answered(bench):
+    reply = take(bench)
+    assert (reply.request, reply.robot, reply.why) == (7, "r1", None)
+    assert reply.epoch == bench.report().epoch
+    assert bench.report().holder == messages.Holder(PROGRAM, PROGRAM)
+    assert take(bench).epoch == reply.epoch
+
+
+def test_a_program_does_not_get_what_an_operator_has(bench):
+    bench.take("a")
+    assert take(bench).epoch is None
+    assert take(bench).why == "A drives it"
+
+
+def test_an_operator_gets_what_a_program_has(bench):
+    epoch = take(bench).epoch
+    twist(bench, 0.5, 0.0, 0.0)
+    assert bench.take("a")
+    assert bench.written[-1].twist == ZERO
+    twist(bench, 0.5, 0.0, 0.0, epoch=epoch)
+    assert bench.written[-1].twist == ZERO
+    assert bench.refusals(PROGRAM)[-1].why == "A drives it"
+
+
+def test_a_velocity_is_written_once_within_the_limits(bench):
+    take(bench)
+    twist(bench, 9.0, 1.0, -0.5)
+    bench.run(0.15)
+    assert [w.twist for w in bench.written] == [Twist(1.0, 0.0, -0.5)]
+    assert bench.written[0].by == PROGRAM
+
+
+def test_without_another_it_is_zero_after_200_ms_and_the_lease_stays(bench):
+    take(bench)
+    at = bench.now
+    twist(bench, 0.5, 0.0, 0.0)
+    bench.run(1.0)
+    assert 0.2 <= bench.written[1].at - at <= 0.2101
+    assert bench.state == "held"
+    at = bench.now
+    twist(bench, 0.5, 0.0, 0.0)
+    assert bench.moving_since(at)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"epoch": 99},
+        {"tick": 1},
+        {"velocity": (math.nan, 0.0, 0.0)},
+        {"velocity": (math.inf, 0.0, 0.0)},
+    ],
+)
+def test_what_is_not_right_is_refused(bench, bad):
+    take(bench)
+    velocity = bad.pop("velocity", (0.5, 0.0, 0.0))
+    twist(bench, *velocity, **bad)
+    assert bench.written == []
+    assert bench.refusals(PROGRAM)
+
+
+def test_without_a_lease_nothing_moves(bench):
+    twist(bench, 0.5, 0.0, 0.0)
+    bench.tell(messages.ProgramMove("r1", 0, bench.tick, (1.0, 2.0, 0.0)))
+    assert bench.written == []
+    assert not bench.did(actions.SendGoal)
+
+
+def test_doubt_ends_its_lease(bench):
+    take(bench)
+    twist(bench, 0.5, 0.0, 0.0)
+    bench.break_links()
+    assert bench.report().holder is None
+    lost = bench.refusals(PROGRAM)[-1]
+    assert (lost.what, "no link" in lost.why) == ("lease", True)
+    bench.connect_links()
+    take(bench)
+    bench.answering = False
+    bench.run(0.4)
+    twist(bench, 0.5, 0.0, 0.0)
+    assert bench.report().holder is None
+
+
+def test_doubt_that_a_command_meets_first_ends_its_lease_too(bench):
+    take(bench)
+    bench.beating = False
+    bench.now += 0.251  # the loop was late
+    twist(bench, 0.5, 0.0, 0.0)
+    assert bench.written == []
+    assert bench.report().holder is None
+
+
+def test_it_gives_the_lease_back(bench):
+    take(bench)
+    twist(bench, 0.5, 0.0, 0.0)
+    bench.tell(messages.ProgramRelease("r1"))
+    assert bench.written[-1].twist == ZERO
+    assert bench.report().holder is None
+    bench.tell(messages.ProgramRelease("r1"))
+    bench.tell(messages.ProgramRelease("r9"))
+
+
+def test_it_sends_goals_and_cancels_them(bench):
+    epoch = take(bench).epoch
+    bench.tell(messages.ProgramMove("r1", epoch, bench.tick, (1.0, 2.0, 0.5)))
+    assert bench.of(messages.SentGoal) == [
+        messages.SentGoal("r1", 1.0, 2.0, 0.5, PROGRAM)
+    ]
+    bench.tell(messages.ProgramMove("r1", epoch, bench.tick, (math.nan, 2.0, 0.5)))
+    assert len(bench.did(actions.SendGoal)) == 1
+    bench.tell(messages.ProgramCancel("r1"))
+    assert len(bench.did(actions.CancelGoals)) == 1
+    bench.tell(messages.ProgramCancel("r9"))
+
+
+def test_its_own_twist_of_zero_is_a_release(bench):
+    take(bench)
+    twist(bench, 0.5, 0.0, 0.0)
+    twist(bench, 0.0, 0.0, 0.0)
+    assert bench.written[-1].twist == ZERO
+    assert bench.state == "stopping"
