@@ -8,11 +8,13 @@ function circles(robots, beams) {
   const svg = document.createElementNS(SVG, "svg");
   svg.setAttribute("width", "1200");
   svg.setAttribute("height", "900");
+  svg.style.display = "block";
+  document.body.style.margin = "0";
   document.body.append(svg);
   const side = Math.ceil(Math.sqrt(robots));
   const zoom = 900 / (side * 4 + 2);
   const world = document.createElementNS(SVG, "g");
-  world.setAttribute("transform", `matrix(${zoom} 0 0 ${-zoom} 0 900)`);
+  world.setAttribute("transform", `matrix(${zoom} 0 0 ${-zoom} ${3 * zoom} ${900 - 3 * zoom})`);
   svg.append(world);
 
   const fleet = [];

@@ -30,6 +30,14 @@ WebSocket.prototype.send = function (data) {
 };
 """
 
+# What is outside the window is not drawn, and would look cheap.
+OUT_OF_SIGHT = """
+[...document.querySelectorAll("svg circle[r='0.3']")].filter((model) => {
+  const { left, top, right, bottom } = model.getBoundingClientRect();
+  return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+}).length
+"""
+
 FIGURES = {
     "main thread a frame (ms)": "TaskDuration",
     "script a frame (ms)": "ScriptDuration",
@@ -64,6 +72,8 @@ def wait_for_frames(page: Page, count: int = 5) -> None:
 def measure(page: Page, seconds: float) -> Figures:
     """Return the figures for each frame drawn while the page runs on."""
     wait_for_frames(page)
+    if hidden := page.evaluate(OUT_OF_SIGHT):
+        raise RuntimeError(f"{hidden} robots are outside the window")
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable")
 

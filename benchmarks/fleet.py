@@ -77,9 +77,9 @@ def drive() -> None:
 @webmap.page("/")
 def main(page: webmap.Page) -> None:
     """Show all robots in the window."""
-    side = math.ceil(math.sqrt(ROBOTS))
+    side = math.ceil(math.sqrt(ROBOTS)) * 4.0
     map = webmap.Map(page.element("webmap_container"), 1200, 900)
-    map.scale(900 / (side * 4.0 + 2.0), 0, 900)
+    map.fit(-3.0, -3.0, side + 2.0, side + 2.0)
     for mover in fleet:
         map.add_robot(mover.robot)
 
