@@ -14,7 +14,7 @@ import { Pilot, TAKE_PATIENCE } from "./motion/pilot.js";
  *
  * `robot`: the gate's newest word on a robot. `gone`: the gate knows a robot no more.
  * `state`: the link's state changed. `refused`: the gate refused something. `stop`:
- * STOP was sent for a robot or "*". `read`: inputs that must be asked for their state
+ * STOP was sent for a robot or "*". `goal`: a goal was sent for a robot. `read`: inputs that must be asked for their state
  * (gamepads) are asked now. `drop`: inputs must forget what is held. `step`: a 20 Hz
  * step is over.
  *
@@ -24,6 +24,7 @@ import { Pilot, TAKE_PATIENCE } from "./motion/pilot.js";
  * @property {LinkState} state
  * @property {{robot: string | null, what: string, why: string}} refused
  * @property {string} stop
+ * @property {string} goal
  * @property {null} read
  * @property {null} drop
  * @property {null} step
@@ -177,6 +178,7 @@ export class Drive {
     }
     const goal = this._pilot.goal(robot, { x, y, yaw }, performance.now());
     this._send([goal]);
+    this._tell("goal", robot);
     await this._until(robot, "goal", () => this._loop.acknowledged(goal.seq));
   }
 

@@ -1,0 +1,40 @@
+import { button } from "./elements.js";
+import { lay } from "./overlay.js";
+
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../halves.js').Half} Half */
+
+/**
+ * A button that keeps the selected robot where it is on the screen, until the view is
+ * moved by hand.
+ *
+ * Sends `{follow: id}` with the gate's id of the robot, or `{follow: null}`.
+ *
+ * @param {MapCanvas} map
+ * @param {object} _options
+ * @param {(message: object) => void} send
+ * @returns {Half}
+ */
+export default function attach(map, _options, send) {
+  const toggle = button("webmap-panel webmap-follow", "Follow", () => {
+    send({ follow: map.following ? null : map.selected });
+  });
+  const show = () => {
+    const following = String(Boolean(map.following));
+    if (toggle.getAttribute("aria-pressed") !== following) {
+      toggle.setAttribute("aria-pressed", following);
+    }
+    toggle.disabled = !map.following && map.selected === null;
+  };
+  toggle.title = "Keep the selected robot where it is on the screen";
+  /** @type {import('../drive.js').Drive} */
+  const drive = map.drive;
+  // The view does not tell when it begins to follow; it is looked at instead.
+  const offs = [lay(map, toggle), map.onSelect(show), drive.on("step", show)];
+  show();
+  return {
+    destroy() {
+      for (const off of offs) off();
+    },
+  };
+}

@@ -1,0 +1,204 @@
+/** @typedef {import('./report.js').RobotReport} RobotReport */
+
+/** Slower than this a robot stands: m/s and rad/s. */
+const STANDS = { v: 0.02, w: 0.05 };
+
+/** Faster than this a robot that was told to stop does not obey: m/s and rad/s. */
+const MOVES = { v: 0.05, w: 0.1 };
+
+/** The gate has answered a STOP by then, in ms. */
+export const ANSWER_PATIENCE = 300;
+
+/** A robot that was stopped stands by then, in ms. */
+export const STAND_PATIENCE = 1000;
+
+/** How long a verdict that is good is shown, in ms. */
+const SHOWN = 5000;
+
+/**
+ * What became of the STOP of one robot.
+ *
+ * @typedef {object} Verdict
+ * @property {string} robot
+ * @property {string} name
+ * @property {'stopping' | 'confirmed' | 'unconfirmed'} state
+ * @property {string} text
+ */
+
+/**
+ * Watches what becomes of STOPs, by what odometry says and by nothing else.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class Stopping {
+  constructor() {
+    /**
+     * @type {Map<string, {since: number, answered: boolean, stoodAt: number | null}>}
+     */
+    this._watched = new Map();
+  }
+
+  /**
+   * A STOP was sent.
+   *
+   * @param {string} robot Or "*" for all.
+   * @param {Iterable<string>} known The robots that there are.
+   * @param {number} now
+   */
+  start(robot, known, now) {
+    for (const id of robot === "*" ? known : [robot]) {
+      this._watched.set(id, { since: now, answered: false, stoodAt: null });
+    }
+  }
+
+  /**
+   * The gate spoke of a robot.
+   *
+   * @param {RobotReport} report
+   * @param {number} now
+   */
+  report(report, now) {
+    const watch = this._watched.get(report.robot);
+    if (!watch) return;
+    if (report.state === "driving" && watch.answered) {
+      // Somebody drives it again; that is another story.
+      this._watched.delete(report.robot);
+      return;
+    }
+    if (report.state !== "driving") watch.answered = true;
+    if (watch.answered && stands(report)) watch.stoodAt ??= now;
+    else watch.stoodAt = null;
+  }
+
+  /**
+   * Forget a robot.
+   *
+   * @param {string} robot
+   */
+  gone(robot) {
+    this._watched.delete(robot);
+  }
+
+  /** Forget all that is settled or was seen. */
+  dismiss() {
+    this._watched.clear();
+  }
+
+  /**
+   * @param {ReadonlyMap<string, RobotReport>} robots
+   * @param {boolean} connected Whether the gate can be heard.
+   * @param {number} now
+   * @returns {Verdict[]}
+   */
+  verdicts(robots, connected, now) {
+    const verdicts = [];
+    for (const [robot, watch] of this._watched) {
+      const settled = watch.stoodAt !== null && connected;
+      if (settled && now - Number(watch.stoodAt) > SHOWN) this._watched.delete(robot);
+      else verdicts.push(judge(robot, robots.get(robot), watch, connected, now));
+    }
+    return verdicts;
+  }
+}
+
+/**
+ * Tells which robots move although they were given zero for a second: not obeying.
+ *
+ * A robot that stood once after its zero, or was given something else since, obeys: it
+ * may be on its way to a goal, or somebody else's to drive.
+ */
+export class Obedience {
+  constructor() {
+    /**
+     * When robots that moved were given zero.
+     * @type {Map<string, number>}
+     */
+    this._zeroSince = new Map();
+    /** @type {Map<string, RobotReport>} */
+    this._last = new Map();
+  }
+
+  /**
+   * @param {RobotReport} report
+   * @param {number} now
+   */
+  report(report, now) {
+    const before = this._last.get(report.robot);
+    this._last.set(report.robot, report);
+    if (!isZero(report)) this._zeroSince.delete(report.robot);
+    else if (stands(report)) this._zeroSince.delete(report.robot);
+    else if (before && !isZero(before)) this._zeroSince.set(report.robot, now);
+  }
+
+  /**
+   * A robot was told to go somewhere by itself, or is gone.
+   *
+   * @param {string} robot
+   */
+  excuse(robot) {
+    this._zeroSince.delete(robot);
+  }
+
+  /**
+   * @param {number} now
+   * @returns {RobotReport[]} The newest word on each robot that does not obey.
+   */
+  disobeying(now) {
+    return [...this._zeroSince]
+      .filter(([robot, since]) => now - since > STAND_PATIENCE && this._moves(robot))
+      .map(([robot]) => /** @type {RobotReport} */ (this._last.get(robot)));
+  }
+
+  /** @param {string} robot */
+  _moves(robot) {
+    const measured = this._last.get(robot)?.measured;
+    if (!measured) return false;
+    const [x, y, turn] = measured;
+    return Math.hypot(x, y) > MOVES.v || Math.abs(turn) > MOVES.w;
+  }
+}
+
+/**
+ * @param {string} robot
+ * @param {RobotReport | undefined} report
+ * @param {{since: number, answered: boolean, stoodAt: number | null}} watch
+ * @param {boolean} connected
+ * @param {number} now
+ * @returns {Verdict}
+ */
+function judge(robot, report, watch, connected, now) {
+  const name = report?.name ?? robot;
+  const unsure = (/** @type {string} */ why) => ({
+    robot,
+    name,
+    state: /** @type {const} */ ("unconfirmed"),
+    text: `NOT CONFIRMED: ${why}`,
+  });
+  const waited = now - watch.since;
+  if (!connected) return unsure("no connection; STOP is sent again when there is one");
+  if (report?.link === "down") return unsure("no link to the robot");
+  if (watch.stoodAt !== null) {
+    return { robot, name, state: "confirmed", text: "stopped, confirmed by odometry" };
+  }
+  if (!watch.answered && waited > ANSWER_PATIENCE) {
+    return unsure("the gate has not answered");
+  }
+  if (waited <= STAND_PATIENCE) {
+    return { robot, name, state: "stopping", text: "stopping" };
+  }
+  if (!report?.measured) return unsure("no odometry");
+  const [x, y] = report.measured;
+  return unsure(`still moving at ${Math.hypot(x, y).toFixed(2)} m/s`);
+}
+
+/** @param {RobotReport} report */
+function stands({ measured }) {
+  if (!measured) return false;
+  const [x, y, turn] = measured;
+  return Math.hypot(x, y) < STANDS.v && Math.abs(turn) < STANDS.w;
+}
+
+/** @param {RobotReport} report */
+function isZero({ sent }) {
+  return sent.every((value) => value === 0);
+}

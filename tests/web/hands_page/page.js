@@ -1,0 +1,63 @@
+// Maps as the scene makes them, with the modules under test and a fake of the gate.
+
+import { Drive } from "/_webmap/drive.js";
+import { MapCanvas } from "/_webmap/map.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+const query = new URLSearchParams(location.search);
+const modules = (query.get("modules") ?? "teleop,mouse_view_control").split(",");
+
+const releaseAfter = Number(query.get("release") ?? 30_000);
+const drive = new Drive(new URL("/_webmap/", location.href), { id: "page1", releaseAfter });
+
+function robot(id, x, y) {
+  const g = document.createElementNS(SVG, "g");
+  const circle = document.createElementNS(SVG, "circle");
+  g.classList.add("robot");
+  g.setAttribute("data-robot", id);
+  g.setAttribute("transform", `translate(${x} ${y})`);
+  circle.setAttribute("r", "0.3");
+  g.append(circle);
+  return g;
+}
+
+async function makeMap(number) {
+  const svg = document.createElementNS(SVG, "svg");
+  const world = document.createElementNS(SVG, "g");
+  svg.classList.add("webmap");
+  svg.id = `map${number}`;
+  world.append(robot("r1", 1, 1), robot("r2", -1, 1));
+  svg.append(world);
+  document.querySelector(".place").append(svg);
+  const size = { width: 800, height: 300 };
+  const surroundings = { send() {}, find: () => null, drive: () => drive };
+  const map = new MapCanvas(number, svg, world, size, surroundings);
+  map.setView({ a: 40, b: 0, c: 0, d: -40, e: 400, f: 150 });
+  map.sent = [];
+  map.clicks = 0;
+  map.select = (id) => {
+    for (const g of world.querySelectorAll(".robot")) {
+      g.classList.toggle("selected", g.getAttribute("data-robot") === id);
+    }
+    map.settle(true);
+  };
+  svg.addEventListener("click", (event) => {
+    map.clicks += 1;
+    map.select(event.target.closest(".robot")?.getAttribute("data-robot") ?? null);
+  });
+  map.halves = [];
+  for (const name of modules) {
+    const { default: attach } = await import(`/_webmap/modules/${name}.js`);
+    const link = document.createElement("link");
+    link.rel = "stylesheet";
+    link.href = `/_webmap/modules/${name}.css`;
+    document.head.append(link);
+    map.halves.push(attach(map, {}, (message) => map.sent.push(message)));
+  }
+  return map;
+}
+
+const maps = [await makeMap(1)];
+if (query.has("two")) maps.push(await makeMap(2));
+window.bench = { drive, maps };
+document.body.dataset.ready = "yes";

@@ -1,0 +1,94 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { capOf, describe } from "../../../src/webmap/web/motion/status.js";
+
+const STATUS = {
+  link: "open",
+  choice: "r1",
+  report: null,
+  driven: null,
+  taking: false,
+  settled: false,
+  pressed: false,
+  dead: false,
+  axes: { x: 0, y: 0, turn: 0 },
+  refusal: null,
+  delay: 20,
+};
+const REPORT = {
+  robot: "r1",
+  name: "Bob",
+  state: "free",
+  holder: null,
+  mine: false,
+  epoch: null,
+  armed: false,
+  v: 0.3,
+  w: 0.6,
+  why: [],
+  link: "up",
+  sent: [0, 0, 0],
+  echoed: null,
+  measured: [0, 0, 0],
+  armable: true,
+  reason: null,
+};
+const ME = {
+  holder: { connection: "c1", name: "me" },
+  mine: true,
+  epoch: 3,
+  state: "held",
+};
+
+const cases = [
+  ["connecting", { link: "connecting" }, REPORT],
+  ["lost", { link: "lost", driven: "r1" }, { ...REPORT, ...ME, state: "driving" }],
+  ["late", { link: "late", driven: "r1" }, { ...REPORT, ...ME, state: "driving" }],
+  ["fixed", {}, null],
+  ["free", {}, REPORT],
+  ["fixed", {}, { ...REPORT, armable: false, reason: "no link" }],
+  [
+    "held",
+    {},
+    { ...REPORT, holder: { connection: "c2", name: "Ann" }, state: "driving" },
+  ],
+  ["taking", { taking: true }, REPORT],
+  ["taking", { driven: "r1" }, { ...REPORT, ...ME }],
+  ["ready", { driven: "r1", settled: true }, { ...REPORT, ...ME }],
+  ["driving", { driven: "r1", settled: true }, { ...REPORT, ...ME, state: "driving" }],
+  [
+    "stopping",
+    { driven: "r1", settled: true },
+    { ...REPORT, ...ME, state: "stopping" },
+  ],
+  ["hands-off", { driven: "r1", pressed: true, dead: true }, { ...REPORT, ...ME }],
+  ["fixed", { driven: "r1" }, { ...REPORT, ...ME, reason: "no odometry for 1 s" }],
+  ["stopped", {}, { ...REPORT, state: "stopped" }],
+];
+
+for (const [state, status, report] of cases) {
+  const told = JSON.stringify({ ...status, ...(report && { robot: report.state }) });
+  test(`${told} is shown as ${state}`, () => {
+    const description = describe({ ...STATUS, ...status }, "r1", report, true);
+    assert.equal(description.state, state);
+    assert.notEqual(description.title, "");
+  });
+}
+
+test("without a selection nothing can be driven", () => {
+  assert.equal(describe(STATUS, null, null, true).state, "none");
+});
+
+test("the name of who drives is said", () => {
+  const report = { ...REPORT, holder: { connection: "c2", name: "Ann" } };
+  assert.equal(describe(STATUS, "r1", report, true).title, "Held by Ann");
+});
+
+test("the cap says why it is in force", () => {
+  const why = ["unverified stop"];
+  assert.equal(
+    capOf({ ...REPORT, why }),
+    "Up to 0.30 m/s, 0.60 rad/s: unverified stop",
+  );
+});

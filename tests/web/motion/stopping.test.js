@@ -1,0 +1,126 @@
+import assert from "node:assert/strict";
+import { describe, test } from "node:test";
+
+import {
+  ANSWER_PATIENCE,
+  Obedience,
+  STAND_PATIENCE,
+  Stopping,
+} from "../../../src/webmap/web/motion/stopping.js";
+
+const STILL = [0, 0, 0];
+const GOING = [0.4, 0, 0];
+
+function report(fields = {}) {
+  return {
+    robot: "r1",
+    name: "Bob",
+    state: "stopping",
+    holder: null,
+    mine: false,
+    epoch: null,
+    armed: false,
+    v: 1,
+    w: 1,
+    why: [],
+    link: "up",
+    sent: STILL,
+    echoed: null,
+    measured: STILL,
+    armable: true,
+    reason: null,
+    ...fields,
+  };
+}
+
+/** Stop r1 at time 0, hear one report at `at`, and return the verdict at `now`. */
+function verdict(heard, at, now, connected = true) {
+  const stopping = new Stopping();
+  stopping.start("r1", [], 0);
+  if (heard) stopping.report(heard, at);
+  const robots = new Map(heard ? [["r1", heard]] : []);
+  return stopping.verdicts(robots, connected, now)[0];
+}
+
+describe("a STOP", () => {
+  test("is confirmed by odometry that says the robot stands", () => {
+    assert.equal(verdict(report(), 100, 200).state, "confirmed");
+  });
+
+  test("is not confirmed by a robot that was reported to stand before the gate answered", () => {
+    assert.equal(verdict(report({ state: "driving" }), 10, 20).state, "stopping");
+  });
+
+  test("that the gate does not answer in time is not confirmed", () => {
+    assert.equal(verdict(null, 0, ANSWER_PATIENCE).state, "stopping");
+    assert.match(verdict(null, 0, ANSWER_PATIENCE + 1).text, /NOT CONFIRMED: the gate/);
+  });
+
+  test("of a robot that still moves after a second is not confirmed", () => {
+    const moving = report({ measured: GOING });
+    assert.equal(verdict(moving, 100, STAND_PATIENCE).state, "stopping");
+    assert.match(verdict(moving, 100, STAND_PATIENCE + 1).text, /moving at 0.40 m\/s/);
+  });
+
+  test("of a robot without odometry is not confirmed", () => {
+    const blind = report({ measured: null });
+    assert.match(verdict(blind, 100, STAND_PATIENCE + 1).text, /no odometry/);
+  });
+
+  test("of a robot that cannot be reached says so at once", () => {
+    assert.match(verdict(report({ link: "down" }), 10, 20).text, /no link/);
+    assert.match(verdict(null, 0, 1, false).text, /no connection/);
+  });
+
+  test("of all watches every robot", () => {
+    const stopping = new Stopping();
+    stopping.start("*", ["r1", "r2"], 0);
+    const names = stopping.verdicts(new Map(), true, 1).map(({ robot }) => robot);
+    assert.deepEqual(names, ["r1", "r2"]);
+  });
+
+  test("is shown for some seconds once it is confirmed, and until then for ever", () => {
+    const stopping = new Stopping();
+    stopping.start("r1", [], 0);
+    const robots = new Map([["r1", report()]]);
+    assert.equal(stopping.verdicts(robots, true, 60_000).length, 1);
+    stopping.report(report(), 60_000);
+    assert.equal(stopping.verdicts(robots, true, 61_000).length, 1);
+    assert.equal(stopping.verdicts(robots, true, 66_000).length, 0);
+  });
+});
+
+describe("a robot", () => {
+  const driven = report({ state: "driving", sent: GOING, measured: GOING });
+  const told = report({ measured: GOING });
+
+  function obedience(...reports) {
+    const watch = new Obedience();
+    for (const [at, said] of reports) watch.report(said, at);
+    return watch;
+  }
+
+  test("that moves on for a second after zero does not obey", () => {
+    const watch = obedience([0, driven], [100, told], [900, told]);
+    assert.deepEqual(watch.disobeying(100 + STAND_PATIENCE), []);
+    assert.equal(watch.disobeying(101 + STAND_PATIENCE)[0].name, "Bob");
+  });
+
+  test("that stood meanwhile obeys, whatever moves it later", () => {
+    const watch = obedience([0, driven], [100, told], [500, report()], [600, told]);
+    assert.deepEqual(watch.disobeying(5000), []);
+  });
+
+  test("that goes to a goal obeys", () => {
+    const watch = obedience([0, told], [100, told]);
+    assert.deepEqual(watch.disobeying(5000), []);
+    const excused = obedience([0, driven], [100, told]);
+    excused.excuse("r1");
+    assert.deepEqual(excused.disobeying(5000), []);
+  });
+
+  test("whose odometry is silent is not accused", () => {
+    const watch = obedience([0, driven], [100, report({ measured: null })]);
+    assert.deepEqual(watch.disobeying(5000), []);
+  });
+});

@@ -1,0 +1,473 @@
+"""Hands on a page, in a real Chromium, against a fake of the gate."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from fake_drive import FakeDrive
+from playwright.sync_api import Browser, Page, sync_playwright
+
+pytestmark = pytest.mark.browser
+
+ARGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=ARGS
+        )
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def gate() -> Iterator[FakeDrive]:
+    with FakeDrive() as gate:
+        yield gate
+
+
+class Bench:
+    """A page with a map and the modules under test."""
+
+    def __init__(self, browser: Browser, gate: FakeDrive, query: str, **kw) -> None:
+        self.gate = gate
+        self.problems: list[str] = []
+        self.context = browser.new_context(**kw)
+        self.page: Page = self.context.new_page()
+        self.page.on("console", self._note)
+        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
+        self.page.goto(gate.url + query)
+        self.page.wait_for_selector("body[data-ready=yes]")
+        self.until(lambda: self.state == "open")
+        self.page.wait_for_timeout(250)  # the hands' own rest after loading
+
+    def _note(self, message) -> None:
+        if message.type in ("error", "warning") and "ERR_" not in message.text:
+            self.problems.append(message.text)
+
+    @property
+    def state(self) -> str:
+        return self.page.evaluate("bench.drive.state")
+
+    def until(self, true: Callable[[], object], patience: float = 5.0) -> None:
+        deadline = time.monotonic() + patience
+        while not true():
+            assert time.monotonic() < deadline, f"waited in vain; {self.gate.said[-3:]}"
+            # A turn of the loop in which the page's own events are heard.
+            self.page.wait_for_timeout(10)
+
+    def select(self, robot: str | None, map: int = 0) -> None:
+        self.page.evaluate("([m, r]) => bench.maps[m].select(r)", [map, robot])
+
+    def view(self) -> dict:
+        return self.page.evaluate("bench.maps[0].view")
+
+    def shown(self) -> str:
+        return self.page.locator(".webmap-teleop").first.get_attribute("data-state")
+
+    def drive(self) -> float:
+        """Hold W until the robot moves; return when that was seen."""
+        self.select("r1")
+        self.page.keyboard.down("w")
+        self.until(self.gate.moves)
+        return time.monotonic()
+
+    def still(self, seconds: float = 0.6, tolerance: float = 0.0) -> None:
+        """Check that nothing moves from now on."""
+        since = time.monotonic() + tolerance
+        self.page.wait_for_timeout(1000 * (seconds + tolerance))
+        assert self.gate.moves(since) == []
+
+    def neutral_within(self, ms: float) -> None:
+        """Check that the last thing said was neutral, and soon enough."""
+        self.page.wait_for_timeout(ms)
+        drives = self.gate.of("drive")
+        assert drives
+        assert (drives[-1]["x"], drives[-1]["turn"]) == (0, 0)
+
+
+@pytest.fixture
+def open_bench(browser: Browser, gate: FakeDrive) -> Iterator[Callable[..., Bench]]:
+    benches: list[Bench] = []
+
+    def open_bench(query: str = "", **kw) -> Bench:
+        benches.append(Bench(browser, gate, query, **kw))
+        return benches[-1]
+
+    yield open_bench
+    for bench in benches:
+        bench.context.close()
+    assert [problem for bench in benches for problem in bench.problems] == []
+
+
+@pytest.fixture
+def bench(open_bench: Callable[..., Bench]) -> Bench:
+    return open_bench()
+
+
+def test_holding_w_takes_the_robot_and_drives_after_neutral(bench: Bench) -> None:
+    bench.drive()
+    assert bench.gate.of("take") == [{"op": "take", "robot": "r1"}]
+    drives = bench.gate.of("drive")
+    first = next(i for i, said in enumerate(drives) if said["x"])
+    assert first >= 4
+    assert [said["seq"] for said in drives] == list(range(len(drives)))
+    assert drives[-1]["x"] == 1
+    bench.until(lambda: bench.shown() == "driving")
+
+
+def test_commands_leave_at_20_hz(bench: Bench) -> None:
+    since = bench.drive()
+    bench.page.wait_for_timeout(2000)
+    assert 35 <= len(bench.gate.moves(since)) <= 45
+
+
+def test_letting_go_is_neutral_at_once_and_pressing_again_drives(bench: Bench) -> None:
+    bench.drive()
+    bench.page.keyboard.up("w")
+    bench.neutral_within(50)
+    bench.still()
+    since = time.monotonic()
+    bench.page.keyboard.down("a")
+    bench.until(lambda: bench.gate.moves(since))
+    assert bench.gate.moves(since)[0]["turn"] == 1
+
+
+DOUBTS = {
+    "blur": "window.dispatchEvent(new Event('blur'))",
+    "pagehide": "window.dispatchEvent(new PageTransitionEvent('pagehide'))",
+    "freeze": "document.dispatchEvent(new Event('freeze'))",
+    "context menu": "document.body.dispatchEvent(new MouseEvent('contextmenu'))",
+    "text field": "document.getElementById('text').focus()",
+    "lost focus": "document.hasFocus = () => false",
+    "hidden": """
+        Object.defineProperty(document, 'visibilityState', {value: 'hidden'});
+        document.dispatchEvent(new Event('visibilitychange'));
+    """,
+    "dialog": """
+        const dialog = document.createElement('dialog');
+        document.body.append(dialog);
+        dialog.showModal();
+    """,
+    "busy page": "for (const t = performance.now(); performance.now() < t + 500;);",
+}
+
+
+@pytest.mark.parametrize("doubt", DOUBTS)
+def test_doubt_is_neutral_within_50_ms_and_nothing_resumes(
+    bench: Bench, doubt: str
+) -> None:
+    bench.drive()
+    bench.page.evaluate(f"() => {{ {DOUBTS[doubt]} }}")
+    bench.neutral_within(50)
+    # The keyboard repeats a key that is held.
+    bench.page.keyboard.down("w")
+    bench.still()
+
+
+@pytest.mark.parametrize("key", ["Meta", "Control", "Alt"])
+def test_a_modifier_is_a_doubt(bench: Bench, key: str) -> None:
+    bench.drive()
+    bench.page.keyboard.down(key)
+    bench.neutral_within(50)
+    bench.page.keyboard.up(key)
+    bench.page.keyboard.down("w")
+    bench.still()
+
+
+def test_a_hidden_page_gives_the_robot_back(bench: Bench) -> None:
+    bench.drive()
+    bench.page.evaluate(f"() => {{ {DOUBTS['hidden']} }}")
+    bench.until(lambda: bench.gate.of("release") == [{"op": "release", "robot": "r1"}])
+
+
+def test_a_silent_gate_is_lost_and_what_is_held_moves_nothing(bench: Bench) -> None:
+    bench.drive()
+    bench.gate.ticking = False
+    bench.until(lambda: bench.state == "late")
+    assert bench.shown() == "late"
+    bench.still(0.1, tolerance=0.05)
+    bench.until(lambda: bench.state == "lost")
+    bench.gate.ticking = True
+    bench.until(lambda: bench.state == "open")
+    bench.page.keyboard.down("w")
+    bench.still(1.0)
+    assert len(bench.gate.of("take")) == 1
+
+
+def test_commands_that_are_not_acknowledged_turn_the_controls_red(bench: Bench) -> None:
+    bench.drive()
+    bench.gate.acking = False
+    bench.until(lambda: bench.shown() == "late", patience=1.0)
+    bench.gate.acking = True
+    bench.until(lambda: bench.state == "open")
+    bench.still()
+
+
+def test_a_cut_connection_moves_nothing_until_a_new_press(bench: Bench) -> None:
+    bench.drive()
+    bench.gate.drop()
+    bench.until(lambda: bench.state == "lost")
+    bench.until(lambda: bench.state == "open")
+    bench.still()
+    bench.page.keyboard.up("w")
+    bench.page.wait_for_timeout(300)
+    bench.page.keyboard.down("w")
+    bench.until(lambda: len(bench.gate.of("take")) == 2)
+
+
+def test_another_selection_stops_the_old_robot_and_spares_the_new(bench: Bench) -> None:
+    bench.drive()
+    bench.select("r2")
+    bench.until(lambda: bench.gate.of("release") == [{"op": "release", "robot": "r1"}])
+    bench.page.keyboard.down("w")
+    bench.still()
+    bench.page.keyboard.up("w")
+    bench.page.wait_for_timeout(300)
+    bench.page.keyboard.down("w")
+    bench.until(lambda: bench.gate.moves() and bench.gate.moves()[-1]["robot"] == "r2")
+
+
+def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> None:
+    ann = {"connection": "c9", "name": "Ann"}
+    bench.gate.change("r1", holder=ann, epoch=7, state="driving")
+    bench.select("r1")
+    bench.until(lambda: bench.shown() == "held")
+    bench.page.keyboard.down("w")
+    bench.page.wait_for_timeout(300)
+    assert bench.gate.said == []
+    assert "Held by Ann" in bench.page.inner_text(".webmap-teleop")
+
+
+@pytest.mark.parametrize("key", ["Space", "Escape"])
+def test_space_and_escape_stop_the_robot(bench: Bench, key: str) -> None:
+    bench.drive()
+    bench.page.keyboard.press(key)
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "r1"}])
+    bench.still(tolerance=0.05)
+
+
+def test_shift_and_escape_stop_all(bench: Bench) -> None:
+    bench.page.keyboard.press("Shift+Escape")
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
+
+
+def test_space_in_a_text_field_is_a_space(bench: Bench) -> None:
+    bench.select("r1")
+    bench.page.locator("#text").press_sequentially("w a")
+    assert bench.page.locator("#text").input_value() == "w a"
+    assert bench.gate.said == []
+
+
+def test_the_stop_button_is_large_named_and_stops(bench: Bench) -> None:
+    bench.select("r1")
+    button = bench.page.get_by_role("button", name="Stop Robot r1")
+    box = button.bounding_box()
+    assert box is not None
+    assert min(box["width"], box["height"]) >= 44
+    button.click()
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "r1"}])
+
+
+def test_a_stop_without_a_connection_is_the_first_thing_said(bench: Bench) -> None:
+    bench.select("r1")
+    bench.gate.drop()
+    bench.until(lambda: bench.state == "lost")
+    bench.page.keyboard.press("Escape")
+    bench.until(lambda: bench.gate.said)
+    assert bench.gate.said[0][1] == {"op": "stop", "robot": "r1"}
+
+
+def test_the_lease_is_given_back_when_nothing_moves(open_bench) -> None:
+    bench = open_bench("?release=500")
+    bench.drive()
+    bench.page.keyboard.up("w")
+    bench.until(lambda: bench.gate.of("release"))
+
+
+def test_two_maps_do_not_both_drive(open_bench) -> None:
+    bench = open_bench("?two")
+    bench.select("r1", map=0)
+    bench.select("r2", map=1)
+    bench.page.keyboard.down("w")
+    bench.until(bench.gate.moves)
+    bench.page.keyboard.up("w")
+    bench.page.locator("#map2").click(position={"x": 360, "y": 110})
+    since = time.monotonic()
+    bench.page.wait_for_timeout(300)
+    bench.page.keyboard.down("w")
+    bench.until(lambda: bench.gate.moves(since))
+    assert {said["robot"] for said in bench.gate.moves(since)} == {"r2"}
+    assert bench.page.evaluate("bench.maps[1].sent") == [{"active": True}]
+
+
+def world_at(view: dict, x: float, y: float) -> tuple[float, float]:
+    det = view["a"] * view["d"] - view["b"] * view["c"]
+    dx, dy = x - view["e"], y - view["f"]
+    return (
+        (view["d"] * dx - view["c"] * dy) / det,
+        (view["a"] * dy - view["b"] * dx) / det,
+    )
+
+
+@pytest.fixture
+def corner(bench: Bench) -> tuple[float, float]:
+    box = bench.page.locator("#map1").bounding_box()
+    return box["x"], box["y"]
+
+
+def test_the_wheel_zooms_about_the_pointer(bench: Bench, corner) -> None:
+    before = bench.view()
+    bench.page.mouse.move(corner[0] + 200, corner[1] + 100)
+    bench.page.mouse.wheel(0, -300)
+    bench.until(lambda: bench.view()["a"] > before["a"])
+    assert world_at(bench.view(), 200, 100) == pytest.approx(world_at(before, 200, 100))
+
+
+def test_shift_and_wheel_turn_about_the_pointer(bench: Bench, corner) -> None:
+    before = bench.view()
+    bench.page.mouse.move(corner[0] + 200, corner[1] + 100)
+    bench.page.keyboard.down("Shift")
+    bench.page.mouse.wheel(0, 100)
+    bench.until(lambda: bench.view()["b"])
+    after = bench.view()
+    assert world_at(after, 200, 100) == pytest.approx(world_at(before, 200, 100))
+    assert abs(after["a"] * after["d"] - after["b"] * after["c"]) == pytest.approx(1600)
+
+
+def test_a_drag_moves_and_its_end_is_no_click(bench: Bench, corner) -> None:
+    before = bench.view()
+    bench.page.mouse.move(corner[0] + 200, corner[1] + 100)
+    bench.page.mouse.down()
+    bench.page.mouse.move(corner[0] + 220, corner[1] + 110)
+    bench.page.mouse.move(corner[0] + 250, corner[1] + 130)
+    bench.page.mouse.up()
+    after = bench.view()
+    assert (after["e"] - before["e"], after["f"] - before["f"]) == (50, 30)
+    assert bench.page.evaluate("bench.maps[0].clicks") == 0
+    bench.page.mouse.click(corner[0] + 10, corner[1] + 10)
+    assert bench.page.evaluate("bench.maps[0].clicks") == 1
+
+
+def test_a_click_with_a_trembling_hand_selects(bench: Bench, corner) -> None:
+    bench.page.mouse.move(corner[0] + 440, corner[1] + 110)
+    bench.page.mouse.down()
+    bench.page.mouse.move(corner[0] + 442, corner[1] + 111)
+    bench.page.mouse.up()
+    assert bench.page.evaluate("bench.maps[0].selected") == "r1"
+    assert bench.view()["e"] == 400
+
+
+def test_two_fingers_zoom_turn_and_move(open_bench) -> None:
+    bench = open_bench(has_touch=True)
+    box = bench.page.locator("#map1").bounding_box()
+    x, y = box["x"], box["y"]
+    before = bench.view()
+    touch = bench.context.new_cdp_session(bench.page)
+
+    def say(kind: str, *points: tuple[float, float]) -> None:
+        fingers = [
+            {"x": x + px, "y": y + py, "id": i} for i, (px, py) in enumerate(points)
+        ]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+
+    say("touchStart", (300, 150))
+    say("touchStart", (300, 150), (400, 150))
+    for part in (0.25, 0.5, 0.75, 1):
+        say("touchMove", (300, 150 - 50 * part), (400 + 50 * part, 150 + 50 * part))
+    say("touchEnd")
+    after = bench.view()
+    assert world_at(after, 300, 100) == pytest.approx(world_at(before, 300, 150))
+    assert world_at(after, 450, 200) == pytest.approx(world_at(before, 400, 150))
+
+
+def test_plus_minus_and_zero_work_on_the_focused_map(bench: Bench) -> None:
+    bench.page.locator("#map1").focus()
+    bench.page.keyboard.press("+")
+    assert bench.view()["a"] == pytest.approx(50)
+    bench.page.keyboard.press("0")
+    view = bench.view()
+    # Two robots lie 2 m apart, 0.3 m in radius: 2.6 m fill the width.
+    assert world_at(view, 400, 150) == pytest.approx((0, 1))
+
+
+def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
+    bench = open_bench("?modules=goal_tool,teleop,mouse_view_control")
+    box = bench.page.locator("#map1").bounding_box()
+    bench.select("r1")
+    bench.page.keyboard.press("g")
+    bench.page.mouse.move(box["x"] + 480, box["y"] + 150)
+    bench.page.mouse.down()
+    bench.page.mouse.move(box["x"] + 480, box["y"] + 80)
+    assert bench.page.locator(".webmap-goal-arrow.aimed").count() == 1
+    bench.page.mouse.up()
+    bench.until(lambda: bench.gate.of("goal"))
+    goal = bench.gate.of("goal")[0]
+    assert [said["op"] for _, said in bench.gate.said] == ["take", "goal"]
+    assert (goal["x"], goal["y"]) == pytest.approx((2, 0))
+    assert goal["yaw"] == pytest.approx(1.5707963)
+    assert bench.view()["e"] == 400, "aiming does not move the view"
+    assert bench.page.evaluate("bench.maps[0].selected") == "r1"
+    bench.page.get_by_role("button", name="Cancel the goal").click()
+    bench.until(lambda: bench.gate.of("cancel") == [{"op": "cancel", "robot": "r1"}])
+
+
+def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
+    bench = open_bench("?modules=goal_tool,teleop")
+    bench.select("r1")
+    bench.page.keyboard.press("g")
+    bench.page.keyboard.press("Escape")
+    bench.page.wait_for_timeout(100)
+    assert bench.gate.said == []
+    bench.page.keyboard.press("Escape")
+    bench.until(lambda: bench.gate.of("stop"))
+
+
+def test_stop_all_says_what_became_of_it(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.change("r2", measured=None)
+    bench.page.get_by_role("button", name="Stop all").click()
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
+    verdicts = bench.page.locator(".webmap-stop-verdict")
+    bench.until(lambda: "NOT CONFIRMED: no odometry" in verdicts.nth(1).inner_text())
+    assert verdicts.nth(0).inner_text().endswith("stopped, confirmed by odometry")
+
+
+def test_a_robot_that_does_not_obey_covers_the_page(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.change("r1", sent=[0.3, 0, 0], measured=[0.3, 0, 0], state="driving")
+    bench.gate.change("r1", sent=[0, 0, 0], state="stopping")
+    alarm = bench.page.get_by_role("alert")
+    alarm.wait_for(timeout=5000)
+    assert "ROBOT NOT OBEYING" in alarm.inner_text()
+    assert "Robot r1" in alarm.inner_text()
+    bench.gate.change("r1", measured=[0, 0, 0])
+    alarm.wait_for(state="detached")
+
+
+def test_readouts_follow_the_view_and_everything_goes_away(open_bench) -> None:
+    names = "teleop,mouse_view_control,goal_tool,stop,pointer_readout,scale_bar,follow"
+    bench = open_bench(f"?modules={names}")
+    box = bench.page.locator("#map1").bounding_box()
+    bench.page.mouse.move(box["x"] + 440, box["y"] + 170)
+    assert "x 1.00  y \u22120.50 m" in bench.page.inner_text(".webmap-pointer-readout")
+    assert bench.page.inner_text(".webmap-scale-bar") == "2 m"
+    bench.select("r1")
+    bench.page.get_by_role("button", name="Follow").click()
+    bench.until(lambda: {"follow": "r1"} in bench.page.evaluate("bench.maps[0].sent"))
+    bench.page.evaluate("bench.maps[0].halves.forEach((half) => half.destroy())")
+    assert bench.page.locator(".webmap-panel, .webmap-overlay").count() == 0
+    bench.page.keyboard.press("Escape")
+    bench.page.keyboard.down("w")
+    bench.page.wait_for_timeout(200)
+    assert bench.gate.said == []
