@@ -1,0 +1,75 @@
+"""How it stands with the bridges, in a word and at length."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from webmap import html
+from webmap.console.robot_card import icon
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Element
+
+WORDS = {
+    "new": ("connecting", "not started"),
+    "connecting": ("connecting", "connecting"),
+    "open": ("open", "open"),
+    "closed": ("lost", "closed, trying again"),
+}
+"""What the page calls a bridge's state, and the words for it."""
+
+
+class BridgeList:
+    """A summary of the bridges that unfolds into a list of them.
+
+    Args:
+        element: The page's element to fill.
+        bridges: The bridges.
+
+    """
+
+    def __init__(self, element: "Element", bridges: Sequence["Bridge"]) -> None:
+        self._bridges = list(bridges)
+        self._text = html.span()
+        self._summary = html.summary(
+            html.span(class_="dot").set("aria-hidden", "true"),
+            self._text,
+            icon("icon-chevron"),
+        )
+        self._words = [html.span(class_="word") for _ in self._bridges]
+        self._lines = [
+            html.li(
+                html.span(class_="dot").set("aria-hidden", "true"),
+                html.span(text=bridge.name or bridge.url, class_="url"),
+                word,
+            ).set("title", bridge.url)
+            for bridge, word in zip(self._bridges, self._words, strict=True)
+        ]
+        element.append(
+            html.details(self._summary, html.ul(*self._lines, class_="bridge-list"))
+        )
+        self.poll()
+
+    def poll(self) -> None:
+        """Look at the bridges again."""
+        states = [WORDS[bridge.state] for bridge in self._bridges]
+        for line, word, (link, text) in zip(
+            self._lines, self._words, states, strict=True
+        ):
+            line.set("data-link", link)
+            word.text = text
+        links = {link for link, _ in states}
+        worst = next((name for name in ("lost", "connecting") if name in links), "open")
+        self._summary.set("data-link", worst)
+        self._text.text = summary([link for link, _ in states])
+
+
+def summary(links: Sequence[str]) -> str:
+    """Return a few words for the states of all bridges."""
+    total, open_ = len(links), sum(link == "open" for link in links)
+    if total == 1:
+        return {"open": "Bridge open", "lost": "Bridge closed"}.get(
+            links[0], "Bridge connecting"
+        )
+    if open_ == total:
+        return f"{total} bridges open"
+    return f"{open_} of {total} bridges open"

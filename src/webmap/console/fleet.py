@@ -1,0 +1,102 @@
+"""What the console shows: robots, told by their topics."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import webmap
+from webmap.console.shapes import NameLabel, robot_model
+from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotDescription:
+    """A robot and its topics; what it does not have is empty."""
+
+    name: str
+    bridge: "Bridge"
+    odometry: str = ""
+    twist: str = ""
+    scan: str = ""
+    battery: str = ""
+    goal: str = ""
+    """A topic of ``geometry_msgs/PoseStamped`` that sends it somewhere."""
+    cancel: str = ""
+    """A topic of ``actionlib_msgs/GoalID`` that calls goals off."""
+    goal_frame: str = "map"
+    stops_within: float | None = None
+    """Seconds within which the base stops by itself when velocity ceases, if known."""
+
+
+def parse_robot(
+    text: str, bridges: Sequence["Bridge"], *, stops_within: float | None = None
+) -> RobotDescription:
+    """Read a robot as a person writes it on the command line.
+
+    Args:
+        text: ``NAME:ODOM:CMD_VEL:SCAN``; topics may be empty, and empty ones at the
+            end left out. ``2@`` before the name says that the robot is behind the
+            second bridge.
+        bridges: The bridges there are.
+        stops_within: Seconds within which the base stops by itself, if known.
+
+    Raises:
+        ConfigError: If the text is not of that form, or there is no such bridge.
+
+    """
+    number, _, rest = (
+        text.rpartition("@")
+        if "@" in text.partition(":")[0]
+        else (
+            "1",
+            "",
+            text,
+        )
+    )
+    if not (number.isascii() and number.isdigit() and 0 < int(number) <= len(bridges)):
+        raise ConfigError(
+            f"robot {text!r}: {number!r} is no bridge's number; there are "
+            f"{len(bridges)}, counted from 1"
+        )
+    name, *topics = (part.strip() for part in rest.split(":"))
+    if not name or len(topics) > 3 or not any(topics):
+        raise ConfigError(f"robot {text!r} is not of the form {FORM}")
+    odometry, twist, scan = [*topics, "", "", ""][:3]
+    return RobotDescription(
+        name=name,
+        bridge=bridges[int(number) - 1],
+        odometry=odometry,
+        twist=twist,
+        scan=scan,
+        stops_within=stops_within,
+    )
+
+
+def make_robot(about: RobotDescription) -> "Robot":
+    """Return the robot of a description, with what the console shows of it."""
+    bridge = about.bridge
+    robot = webmap.Robot(about.name, robot_model())
+    if about.odometry:
+        robot.set_odometry_topic(bridge, about.odometry)
+    if about.twist:
+        robot.set_twist_topic(bridge, about.twist, stops_within=about.stops_within)
+    if about.goal:
+        robot.set_move_topic(
+            bridge,
+            about.goal,
+            frame=about.goal_frame,
+            cancel_topic=about.cancel or None,
+        )
+    if about.scan:
+        robot.add_module(
+            "LaserScanner", bridge, about.scan, max_dots=None, throttle=100
+        )
+    if about.battery:
+        robot.add_module("Battery", bridge, about.battery)
+    robot.add_module(NameLabel)
+    return robot

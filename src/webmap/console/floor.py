@@ -1,0 +1,206 @@
+"""Floor plans: an image with the YAML beside it that ROS's map_server reads.
+
+The image is drawn anew in the console's own colours, once for the day and once for
+the night, since a page can show either without asking.
+"""
+
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import yaml
+
+from webmap import geometry
+from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+MAX_YAML = 1 << 20
+MAX_PIXELS = 1 << 26
+
+UNKNOWN = 205
+"""The grey level by which map_saver says that nobody knows."""
+
+# Wall, unknown and free; unknown is --map-void and free --map-floor of tokens.css.
+COLOURS = {
+    "day": ("#3a4654", "#dfe4ea", "#ffffff"),
+    "night": ("#8fa0b3", "#0b0f14", "#1b222b"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A floor plan, ready to be placed in the world."""
+
+    day: Path
+    night: Path
+    x: float
+    """The image's left edge before it is turned, in metres."""
+    y: float
+    """The image's lower edge before it is turned, in metres."""
+    width: float
+    """In metres."""
+    height: float
+    """In metres."""
+    yaw: float
+    """How far it is turned about its lower left corner, in radians."""
+    bounds: tuple[float, float, float, float]
+    """What is known of it: left, bottom, width and height in metres."""
+    folder: "tempfile.TemporaryDirectory[str]"
+    """Where the drawn images lie, for as long as this lives."""
+
+    @property
+    def matrix(self) -> geometry.Affine:
+        """What carries the image, which has y downward, to its place in the world."""
+        upright = geometry.Affine(1, 0, 0, -1, 0, 2 * self.y + self.height)
+        return geometry.Affine.rotation(self.yaw, self.x, self.y) @ upright
+
+
+class FloorFile(msgspec.Struct):
+    """The keys of the YAML that matter for drawing."""
+
+    image: str
+    resolution: float
+    origin: tuple[float, float, float]
+    negate: bool = False
+
+
+def load_floor(file: Path) -> Floor:
+    """Read a floor plan and draw it in the console's colours.
+
+    Args:
+        file: The YAML file of a map, as map_server takes it.
+
+    Raises:
+        ConfigError: If the file or its image cannot be read or makes no sense.
+
+    """
+    from PIL import ImageOps
+
+    plan = read_yaml(file)
+    grey = read_image(_image_file(file, plan.image))
+    if plan.negate:
+        grey = ImageOps.invert(grey)
+    folder = tempfile.TemporaryDirectory(prefix="webmap-floor-")
+    images = {}
+    for name, (wall, unknown, free) in COLOURS.items():
+        images[name] = Path(folder.name) / f"{name}.png"
+        paint(grey, wall, unknown, free).save(images[name], optimize=True)
+    x, y, yaw = plan.origin
+    width, height = (pixels * plan.resolution for pixels in grey.size)
+    bounds = known_part(grey, plan)
+    return Floor(
+        images["day"], images["night"], x, y, width, height, yaw, bounds, folder
+    )
+
+
+def read_yaml(file: Path) -> FloorFile:
+    """Read the YAML file of a map.
+
+    Raises:
+        ConfigError: If it cannot be read or makes no sense.
+
+    """
+    try:
+        with file.open("rb") as stream:
+            text = stream.read(MAX_YAML + 1)
+        if len(text) > MAX_YAML:
+            raise ConfigError(f"floor {file}: more than 1 MiB is no map's YAML")
+        plan = msgspec.convert(_plain(yaml.safe_load(text)), FloorFile)
+    except (OSError, ValueError, yaml.YAMLError, msgspec.ValidationError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(f"floor {file}: {error}") from error
+    numbers = (plan.resolution, *plan.origin)
+    if not (all(map(math.isfinite, numbers)) and plan.resolution > 0):
+        raise ConfigError(
+            f"floor {file}: resolution must be metres above 0 and origin three finite "
+            f"numbers, got {plan.resolution} and {list(plan.origin)}"
+        )
+    return plan
+
+
+def read_image(file: Path) -> "Image":
+    """Read the image of a map, in grey.
+
+    Raises:
+        ConfigError: If it is no image, or too large.
+
+    """
+    from PIL import Image
+
+    try:
+        with Image.open(file) as image:
+            if image.width * image.height > MAX_PIXELS:
+                raise ConfigError(
+                    f"floor image {file}: {image.width} x {image.height} pixels are "
+                    f"too many; {MAX_PIXELS} in all are the limit"
+                )
+            if "A" not in image.getbands() and "transparency" not in image.info:
+                return image.convert("L")
+            clear = Image.new("LA", image.size, (UNKNOWN, 255))
+            return Image.alpha_composite(
+                clear.convert("RGBA"), image.convert("RGBA")
+            ).convert("L")
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(f"floor image {file}: {error}") from error
+
+
+def paint(grey: "Image", wall: str, unknown: str, free: str) -> "Image":
+    """Return a grey image in other colours, exactly one for each grey level."""
+    from PIL import Image, ImageOps
+
+    ramp = Image.frombytes("L", (256, 1), bytes(range(256)))
+    colours = ImageOps.colorize(ramp, wall, free, unknown, 0, 254, UNKNOWN)
+    painted = Image.frombytes("P", grey.size, grey.tobytes())
+    painted.putpalette(colours.tobytes())
+    return painted
+
+
+def known_part(grey: "Image", plan: FloorFile) -> tuple[float, float, float, float]:
+    """Return the rectangle of the world in which the map knows anything.
+
+    Returns:
+        Left, bottom, width and height in metres, of the whole image if it is turned
+        or knows nothing.
+
+    """
+    box = grey.point([0 if level == UNKNOWN else 255 for level in range(256)]).getbbox()
+    x, y, yaw = plan.origin
+    if box is None or yaw:
+        box = (0, 0, *grey.size)
+    left, top, right, bottom = (pixels * plan.resolution for pixels in box)
+    height = grey.height * plan.resolution
+    corners = [
+        geometry.Affine.rotation(yaw, x, y).apply(x + u, y + height - v)
+        for u in (left, right)
+        for v in (top, bottom)
+    ]
+    xs, ys = zip(*corners, strict=True)
+    return (min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys))
+
+
+def _plain(data: Any) -> Any:
+    """Take the numbers 0 and 1 for ``negate``, as map_saver writes it."""
+    if isinstance(data, dict) and data.get("negate") in (0, 1):
+        return {**data, "negate": bool(data["negate"])}
+    return data
+
+
+def _image_file(file: Path, name: str) -> Path:
+    folder = file.resolve().parent
+    image = (folder / name).resolve()
+    if Path(name).is_absolute() or not image.is_relative_to(folder):
+        raise ConfigError(
+            f"floor {file}: the image {name!r} is not in the folder of the YAML file; "
+            "put it there and write its bare name"
+        )
+    if not image.is_file():
+        raise ConfigError(f"floor {file}: there is no image {image}")
+    return image

@@ -1,0 +1,103 @@
+"""The page itself: a map with everything around it, for each viewer that opens it."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import webmap
+from webmap.console.bridge_list import BridgeList
+from webmap.console.fleet import RobotDescription, make_robot
+from webmap.console.floor import Floor, load_floor
+from webmap.console.frame import Frame
+from webmap.console.robot_card import RobotCard
+from webmap.console.robot_list import RobotList
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Map, Page, Robot
+
+log = logging.getLogger("webmap.console")
+
+SPEED = 1.0
+ROTATION_SPEED = 1.5
+"""What the keys ask for at most, in m/s and rad/s; each robot's own limits hold too."""
+
+PERIOD = 0.25
+"""Seconds between two looks at what no trigger tells: ages and links."""
+
+
+def open_console(
+    bridges: Sequence["Bridge"],
+    robots: Sequence[RobotDescription],
+    *,
+    floor: Path | None = None,
+    title: str = "WebMap",
+) -> None:
+    """Make the console the page at ``/``.
+
+    Args:
+        bridges: The links whose state is shown.
+        robots: What is shown on the map and in the list, in that order.
+        floor: The YAML file of a floor plan, as map_server takes it.
+        title: What this installation is called.
+
+    Raises:
+        ConfigError: If the floor plan cannot be read.
+
+    """
+    plan = None if floor is None else load_floor(floor)
+    fleet = [make_robot(about) for about in robots]
+
+    @webmap.page("/", html="console.html", title=title)
+    def console(page: "Page") -> None:
+        build(page, bridges, fleet, plan, title)
+
+
+def build(
+    page: "Page",
+    bridges: Sequence["Bridge"],
+    robots: Sequence["Robot"],
+    floor: Floor | None,
+    title: str,
+) -> None:
+    """Fill one viewer's page."""
+    page.element("title").text = title
+    map = webmap.Map(page.element("map"))
+    if floor is not None:
+        show_floor(map, floor)
+    for robot in robots:
+        map.add_robot(robot)
+    map.add_module("MouseViewControl")
+    map.add_module("Teleop", SPEED, ROTATION_SPEED)
+    goals = map.add_module("GoalTool")
+    map.add_module("StopButton")
+    map.add_module("ScaleBar")
+    map.add_module("PointerReadout")
+    frame = map.add_module(Frame, title, floor)
+    listed = map.add_module(RobotList, page.element("robots"))
+    card = map.add_module(RobotCard, page.element("card"), goals)
+    links = BridgeList(page.element("bridges"), bridges)
+    task = asyncio.get_running_loop().create_task(
+        poll_on([frame.place, listed.poll, card.poll, links.poll])
+    )
+    page.on_close(task.cancel)
+
+
+def show_floor(map: "Map", floor: Floor) -> None:
+    """Place a floor plan for the day and one for the night; map.css shows one."""
+    for name, file in (("day", floor.day), ("night", floor.night)):
+        image = map.add_image(str(file), floor.x, floor.y, floor.width, floor.height)
+        image.set_matrix(floor.matrix)
+        image.classes.add("floor", name)
+
+
+async def poll_on(polls: Sequence[Callable[[], None]]) -> None:
+    """Look again at what no trigger tells, until cancelled."""
+    while True:
+        for poll in polls:
+            try:
+                poll()
+            except Exception:
+                log.exception("a part of the console failed")
+        await asyncio.sleep(PERIOD)

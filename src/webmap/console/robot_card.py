@@ -1,0 +1,202 @@
+"""The card of the selected robot: where it is, how it moves, what can be done."""
+
+import math
+from typing import TYPE_CHECKING, Any, Protocol
+
+from webmap import html, svg
+from webmap.console.robot_list import AGE_LIMIT, StateShape
+from webmap.console.speeds import SpeedTable
+from webmap.console.words import UNKNOWN, describe, heading, number
+
+if TYPE_CHECKING:
+    from webmap import Element, Map, Robot
+
+ACTIONS = (
+    ("follow", "icon-follow", "Follow"),
+    ("send", "icon-send", "Send to…"),
+    ("cancel", "icon-cancel", "Cancel goal"),
+    ("release", "icon-release", "Hand back"),
+)
+"""What ``data-act`` says, the symbol and the words.
+
+console.js follows, cancels and hands back, since that must work over a bad link too.
+"""
+
+
+class Goals(Protocol):
+    """What the card asks of the module that sends robots somewhere."""
+
+    def aim(self) -> None:
+        """Let the viewer's next press on the map be the goal."""
+
+    def forget(self, robot: "Robot") -> None:
+        """Take a goal's arrow away."""
+
+
+class RobotCard:
+    """Shows the robot that is selected on a map; a module of maps.
+
+    Args:
+        map: The map.
+        element: The page's element to fill; it is hidden while nothing is selected.
+        goals: What sends robots somewhere.
+
+    """
+
+    def __init__(self, map: "Map", element: "Element", goals: Goals) -> None:
+        self.map = map
+        self.element = element
+        self._goals = goals
+        self._robot: Robot | None = None
+        self._feed: Feed | None = None
+        self._shape = StateShape()
+        self._name = html.h2()
+        self._state = html.span(class_="holder")
+        self._mine = html.span(class_="you")
+        self._reason = html.p(class_="reason")
+        self._x, self._y, self._heading = html.span(), html.span(), html.span()
+        self._age = html.dd(class_="age")
+        self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
+        self._battery = html.dd()
+        self._speeds = SpeedTable()
+        element.append(*self._parts())
+        self.on_select()
+
+    def destroy(self) -> None:
+        """Let go of the robot and empty the card."""
+        self._let_go()
+        self.element.clear()
+
+    def on_select(self) -> None:
+        """Show the robot that is selected now."""
+        self._let_go()
+        robot = self._robot = self.map.selected
+        self.element.set(hidden=robot is None)
+        if robot is None:
+            self.element.unset("data-robot")
+            return
+        self.element.set("data-robot", robot.id)
+        self._name.text = robot.name
+        self._battery.text = "unknown"
+        self._age.set_age(math.inf)
+        self._feed = robot.add_module(lambda owner: Feed(owner, self))
+        for module in robot.modules:
+            if hasattr(module, "charge"):
+                self.show_battery(module)
+        self.show_pose()
+        self.show_state()
+
+    def poll(self) -> None:
+        """Look again at what no trigger tells."""
+        if self._robot is not None:
+            self.show_state()
+            age = self._robot.pose_age
+            if age is not None:
+                self._age.set_age(age)
+
+    def show_pose(self) -> None:
+        """Show where the robot is."""
+        robot = self._robot
+        assert robot is not None
+        known = robot.valid
+        self._x.text = number(robot.position.x) if known else UNKNOWN
+        self._y.text = number(robot.position.y) if known else UNKNOWN
+        self._heading.text = heading(robot.yaw) if known else UNKNOWN
+        self._speeds.show(robot)
+
+    def show_state(self) -> None:
+        """Show who drives, how fast that may be, and how fast it is."""
+        robot = self._robot
+        assert robot is not None
+        words = describe(robot)
+        report = robot.report
+        self._shape.show(words.shape)
+        self._state.text = words.text
+        self._mine.text = words.mine or words.text
+        self._reason.text = (report.reason if report is not None else None) or ""
+        self.element.set("data-tone", words.tone or None)
+        self._speeds.show(robot)
+
+    def show_battery(self, battery: Any) -> None:
+        """Show charge and voltage, as far as they are known."""
+        parts = []
+        if battery.charge is not None:
+            parts.append(f"{round(100 * battery.charge)} %")
+        if battery.voltage is not None:
+            parts.append(f"{number(battery.voltage, 1)} V")
+        self._battery.text = ", ".join(parts) or "unknown"
+
+    def _let_go(self) -> None:
+        if self._robot is not None and self._feed is not None:
+            self._robot.remove_module(self._feed)
+        self._robot = self._feed = None
+
+    def _parts(self) -> "list[Element]":
+        close = html.button(
+            icon("icon-close"), type="button", class_="button square quiet"
+        )
+        close.set("aria-label", "Select no robot")
+        close.on("click", lambda event: self.map.set_selected(None))
+        facts = html.dl(
+            fact("x", self._x, " m"),
+            fact("y", self._y, " m"),
+            fact("Heading", self._heading, "°"),
+            html.div(html.dt(text="Pose age"), self._age, class_="wide"),
+            html.div(html.dt(text="Battery"), self._battery, class_="wide"),
+            class_="facts",
+        )
+        head = html.div(*self._shape.elements, self._name, close, class_="card-head")
+        state = html.p(
+            self._state,
+            self._mine,
+            html.span(text="Old data", class_="old"),
+            class_="state",
+        )
+        state.set("role", "status")
+        buttons = {about[0]: action(*about) for about in ACTIONS}
+        buttons["send"].on("click", lambda event: self._goals.aim())
+        buttons["cancel"].on("click", lambda event: self._forget_goal())
+        actions = html.div(*buttons.values(), class_="actions")
+        return [head, state, self._reason, facts, *self._speeds.elements, actions]
+
+    def _forget_goal(self) -> None:
+        if self._robot is not None:
+            self._goals.forget(self._robot)
+
+
+class Feed:
+    """Tells a card what its robot's triggers tell; a module of robots."""
+
+    def __init__(self, robot: "Robot", card: RobotCard) -> None:
+        self.robot = robot
+        self._card = card
+
+    def on_odometry_update(self) -> None:
+        """Show the pose."""
+        self._card.show_pose()
+
+    def on_report(self, report: object) -> None:
+        """Show the drive state."""
+        self._card.show_state()
+
+    def on_battery_update(self, battery: object) -> None:
+        """Show the battery."""
+        self._card.show_battery(battery)
+
+
+def icon(symbol: str) -> "Element":
+    """Return a symbol of console.html as a picture that says nothing by itself."""
+    return svg.svg(svg.use(href=f"#{symbol}"), class_="icon").set("aria-hidden", "true")
+
+
+def fact(name: str, value: "Element", unit: str) -> "Element":
+    """Return a value with its name above it and its unit after it."""
+    return html.div(
+        html.dt(text=name), html.dd(value, html.span(text=unit, class_="unit"))
+    )
+
+
+def action(act: str, symbol: str, words: str) -> "Element":
+    """Return a button on which console.js acts."""
+    element = html.button(icon(symbol), words, type="button", class_="button")
+    return element.set("data-act", act)

@@ -1,0 +1,135 @@
+"""The list of robots: who each is, how old its pose, its battery, who drives."""
+
+import math
+from typing import TYPE_CHECKING
+
+from webmap import html, svg
+from webmap.console.battery import BatteryMark, Charge
+from webmap.console.words import describe
+
+if TYPE_CHECKING:
+    from webmap import Element, Map, Robot
+
+AGE_LIMIT = 1.0
+"""Seconds after which a pose looks old."""
+
+
+class RobotList:
+    """A line for each robot of a map, to see it and to select it; a module of maps.
+
+    Args:
+        map: The map.
+        element: The page's ``ul``.
+
+    """
+
+    def __init__(self, map: "Map", element: "Element") -> None:
+        self.map = map
+        self.element = element
+        self._rows: dict[int, Row] = {}
+        for robot in map.robots:
+            self.on_add_robot(robot)
+
+    def destroy(self) -> None:
+        """Take every line away."""
+        for row in tuple(self._rows.values()):
+            self.on_remove_robot(row.robot)
+
+    def on_add_robot(self, robot: "Robot") -> None:
+        """Add a line."""
+        row = robot.add_module(Row, self.map)
+        self._rows[id(robot)] = row
+        self.element.append(row.element)
+        row.on_report()
+
+    def on_remove_robot(self, robot: "Robot") -> None:
+        """Take a line away."""
+        row = self._rows.pop(id(robot), None)
+        if row is not None:
+            robot.remove_module(row)
+
+    def on_select(self) -> None:
+        """Mark the line of the robot that is selected now."""
+        for row in self._rows.values():
+            row.show_selected(self.map.selected is row.robot)
+
+    def poll(self) -> None:
+        """Look again at what no trigger tells: ages, and links that were lost."""
+        for row in self._rows.values():
+            row.poll()
+
+
+class Row:
+    """One robot's line in the list on one viewer's page; a module of robots."""
+
+    def __init__(self, robot: "Robot", map: "Map") -> None:
+        self.robot = robot
+        self._shape = StateShape()
+        self._state = html.span(class_="holder")
+        self._mine = html.span(class_="you")
+        self._battery = BatteryMark()
+        self._age = html.span(class_="age")
+        self._button = html.button(
+            *self._shape.elements,
+            html.span(text=robot.name, class_="name"),
+            html.span(
+                self._state,
+                self._mine,
+                html.span(text="Old data", class_="old"),
+                class_="state",
+            ),
+            self._battery.element,
+            self._age,
+            type="button",
+        )
+        self._button.set("aria-pressed", "false")
+        self._button.on("click", lambda event: map.set_selected(robot))
+        self.element = html.li(self._button, class_="row")
+        self.element.set("data-robot", robot.id)
+        self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
+        for module in robot.modules:
+            if hasattr(module, "charge"):
+                self._battery.show(module)
+
+    def destroy(self) -> None:
+        """Take the line away."""
+        self.element.remove()
+
+    def on_report(self, report: object = None) -> None:
+        """Say who drives."""
+        words = describe(self.robot)
+        self._shape.show(words.shape)
+        self._state.text = words.text
+        self._mine.text = words.mine or words.text
+        self.element.set("data-tone", words.tone or None)
+
+    def on_battery_update(self, battery: Charge) -> None:
+        """Show the charge."""
+        self._battery.show(battery)
+
+    def show_selected(self, selected: bool) -> None:
+        """Mark the line if its robot is selected."""
+        self._button.set("aria-pressed", "true" if selected else "false")
+
+    def poll(self) -> None:
+        """Look again at the age of the pose, and at the link."""
+        age = self.robot.pose_age
+        if age is not None:
+            self._age.set_age(age)
+        self.on_report()
+
+
+class StateShape:
+    """The shape of a robot's state; the page puts a clock in its place if it is old."""
+
+    def __init__(self) -> None:
+        self._use = svg.use(href="#state-waiting")
+        now = svg.svg(self._use, class_="shape now")
+        old = svg.svg(svg.use(href="#state-old"), class_="shape old")
+        self.elements = (now, old)
+        for element in self.elements:
+            element.set("aria-hidden", "true")
+
+    def show(self, shape: str) -> None:
+        """Show a symbol of console.html."""
+        self._use.set(href=f"#{shape}")

@@ -1,0 +1,104 @@
+"""What was sent, what the robot's ROS said back, what was measured, and the cap."""
+
+import math
+from typing import TYPE_CHECKING
+
+from webmap import html
+from webmap.console.words import UNKNOWN, number
+
+if TYPE_CHECKING:
+    from webmap import Element, Robot
+
+Velocity = tuple[float, float, float]
+"""Forward, left, counter-clockwise."""
+
+COLUMNS = ("Sent", "Echoed", "Measured")
+
+
+class SpeedTable:
+    """Three views of one motion, which agree as long as all is well."""
+
+    def __init__(self) -> None:
+        self._linear = [html.td() for _ in COLUMNS]
+        self._turn = [html.td() for _ in COLUMNS]
+        self._cap = html.span()
+        self._why = html.div(class_="why")
+        self._reasons: tuple[str, ...] = ()
+        self.elements: list[Element] = [self._table(), self._limits()]
+
+    def show(self, robot: "Robot") -> None:
+        """Show what is known of a robot's motion."""
+        report = robot.report
+        sent = echoed = measured = None
+        if report is not None:
+            sent, echoed, measured = report.sent, report.echoed, report.measured
+        if measured is None and robot.measured_twist is not None:
+            twist = robot.measured_twist
+            measured = (twist.vx, twist.vy, twist.wz)
+        for index, velocity in enumerate((sent, echoed, measured)):
+            self._linear[index].text = linear(velocity)
+            self._turn[index].text = (
+                UNKNOWN if velocity is None else number(velocity[2])
+            )
+        self.elements[1].set(hidden=report is None)
+        if report is not None:
+            self._cap.text = cap(report.v, report.w)
+            self._show_reasons(tuple(report.why))
+
+    def _show_reasons(self, reasons: tuple[str, ...]) -> None:
+        if reasons == self._reasons:
+            return
+        self._reasons = reasons
+        self._why.clear()
+        for reason in reasons:
+            badge = html.span(text=reason, class_="badge")
+            if "unverified" in reason:
+                badge.set("data-tone", "warn")
+            self._why.append(badge)
+
+    def _table(self) -> "Element":
+        head = html.tr(
+            html.td(), *(html.th(text=name, scope="col") for name in COLUMNS)
+        )
+        rows = [
+            html.tr(
+                html.th(f"{name} ", html.span(text=unit, class_="unit"), scope="row"),
+                *cells,
+            )
+            for name, unit, cells in (
+                ("Speed", "m/s", self._linear),
+                ("Turn", "rad/s", self._turn),
+            )
+        ]
+        return html.table(html.thead(head), html.tbody(*rows), class_="speeds")
+
+    def _limits(self) -> "Element":
+        return html.dl(
+            html.div(
+                html.dt(text="Speed cap"), html.dd(self._cap, self._why), class_="wide"
+            ),
+            class_="facts",
+        )
+
+
+def linear(velocity: Velocity | None) -> str:
+    """Return the speed along the ground; backwards is below zero."""
+    if velocity is None:
+        return UNKNOWN
+    x, y, _ = velocity
+    return number(math.copysign(math.hypot(x, y), x))
+
+
+def turn(velocity: Velocity | None) -> str:
+    """Return the rate of turn, counter-clockwise."""
+    return UNKNOWN if velocity is None else number(velocity[2])
+
+
+def cap(v: float, w: float) -> str:
+    """Return the speeds in force as people read them."""
+    parts = [
+        f"{number(value)} {unit}"
+        for value, unit in ((v, "m/s"), (w, "rad/s"))
+        if math.isfinite(value)
+    ]
+    return ", ".join(parts) or "none"

@@ -1,0 +1,77 @@
+"""What is said of a robot: a word, a shape and a tone that always go together."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap import Robot
+
+UNKNOWN = "\N{EN DASH}"
+"""What stands where a number would."""
+
+LOW, EMPTY = 0.2, 0.1
+"""Charges below which a battery is low, and as good as empty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """How a state reads and looks."""
+
+    text: str
+    shape: str
+    """A symbol of console.html."""
+    tone: str = ""
+    """``active``, ``warn``, ``bad`` or nothing."""
+    mine: str = ""
+    """The text where it is the reader who drives, if that differs."""
+
+
+def describe(robot: "Robot") -> Words:
+    """Return what there is to say of a robot, the most pressing first.
+
+    That its data is old is not said here: the page sees that by itself, also when it
+    cannot reach this process.
+    """
+    bridge = robot.feed.bridge if robot.feed is not None else None
+    if bridge is not None and bridge.state != "open":
+        if bridge.state == "closed":
+            return Words("Bridge closed", "state-down", "bad")
+        return Words("Connecting", "state-waiting")
+    report = robot.report
+    if report is None:
+        return Words("Watched only", "state-watched")
+    who = report.holder.name if report.holder is not None else "Somebody"
+    if report.state == "stopped":
+        return Words("Stopped", "state-stopped", "bad")
+    if report.link == "down":
+        return Words("No way to drive it", "state-down", "bad")
+    if report.state == "stopping":
+        return Words("Stopping", "state-stopping", "warn")
+    if report.state == "driving":
+        return Words(f"{who} drives", "state-driving", "active", "You drive")
+    if report.state == "held":
+        return Words(f"{who} holds it", "state-held", "active", "You hold it")
+    return Words("Free", "state-free")
+
+
+def battery_tone(charge: float) -> str:
+    """Return how a charge between 0 and 1 is to be shown."""
+    if charge < EMPTY:
+        return "bad"
+    return "warn" if charge < LOW else ""
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Return a number as people read it: a real minus sign, and never minus zero."""
+    if not math.isfinite(value):
+        return UNKNOWN
+    text = f"{value:.{digits}f}"
+    if float(text) == 0:
+        text = text.removeprefix("-")
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def heading(yaw: float) -> str:
+    """Return a yaw in radians as whole degrees in 0 to 359."""
+    return str(round(math.degrees(yaw)) % 360)

@@ -1,0 +1,29 @@
+"""The view goes with a robot."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class Follow:
+    """A button that keeps the selected robot where it is on the screen.
+
+    It ends when the viewer moves the view by hand.
+
+    Args:
+        map: The map.
+
+    """
+
+    def __init__(self, map: "Map") -> None:
+        self.map = map
+        self.half = map.add_browser_half(
+            self, "modules/follow.js", {}, "modules/follow.css"
+        )
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Follow the robot that the page names, or none."""
+        wanted = message.get("follow")
+        robots = (robot for robot in self.map.robots if robot.id == wanted)
+        self.map.follow(next(robots, None))

@@ -1,0 +1,67 @@
+"""The selected robot is sent to a place on the map."""
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+    from webmap.core.robot import Robot
+
+log = logging.getLogger("webmap.modules.goal_tool")
+
+
+class GoalTool:
+    """A press on the map is where the selected robot goes, a drag how it stands there.
+
+    It begins by its button, by its key or by :meth:`aim`; nothing is sent before the
+    viewer presses on the map, and then the page sends it to the gate by itself.
+
+    Fires ``on_goal_sent(robot, x, y, yaw)`` on the map's modules when the gate has
+    accepted a goal, and ``on_goal_canceled(robot)``.
+
+    Args:
+        map: The map.
+        button: Whether there is a button for it on the map.
+        key: The key that begins.
+
+    Raises:
+        ValueError: If ``key`` is not one character.
+
+    """
+
+    def __init__(self, map: "Map", *, button: bool = True, key: str = "g") -> None:
+        if len(key) != 1:
+            raise ValueError(f"GoalTool: key must be one character, got {key!r}")
+        self.map = map
+        self.half = map.add_browser_half(
+            self,
+            "modules/goal_tool.js",
+            {"button": button, "key": key},
+            "modules/goal_tool.css",
+        )
+
+    def aim(self) -> None:
+        """Let the viewer's next press on the map be the goal."""
+        self.half.send({"active": True})
+
+    def forget(self, robot: "Robot") -> None:
+        """Take the arrow of a robot's goal away: it got there, or does not go."""
+        self.half.send({"reached": robot.id})
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Take what the page says that it sent."""
+        goal, canceled = message.get("goal"), message.get("cancel")
+        if isinstance(goal, dict):
+            robot = self._robot(goal.get("robot"))
+            pose = [goal.get(name) for name in ("x", "y", "yaw")]
+            if robot is not None and all(isinstance(n, int | float) for n in pose):
+                self.map.notify_modules("on_goal_sent", robot, *pose)
+        elif isinstance(canceled, str):
+            robot = self._robot(canceled)
+            if robot is not None:
+                self.map.notify_modules("on_goal_canceled", robot)
+        else:
+            log.warning("%r: an unknown message of the page was ignored", self.map)
+
+    def _robot(self, id: object) -> "Robot | None":
+        return next((robot for robot in self.map.robots if robot.id == id), None)

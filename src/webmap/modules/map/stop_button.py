@@ -1,0 +1,23 @@
+"""STOP, always in sight."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class StopButton:
+    """A large red button that stops robots, whoever drives them.
+
+    It needs no lease, and the page sends it to the gate by itself.
+
+    Args:
+        map: The map.
+
+    """
+
+    def __init__(self, map: "Map") -> None:
+        self.map = map
+        self.half = map.add_browser_half(
+            self, "modules/stop.js", {}, "modules/stop.css"
+        )
