@@ -22,7 +22,7 @@ import {
  * @typedef {object} Surroundings
  * @property {(report: object) => void} send Tells the server.
  * @property {(id: number) => Element | null} find The element of a mounted fragment.
- * @property {() => any} drive The page's one line to the gate.
+ * @property {() => import('./drive.js').Drive} drive The page's one line to the gate.
  */
 
 const SVG = "http://www.w3.org/2000/svg";

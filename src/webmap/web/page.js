@@ -7,6 +7,8 @@ import { Notices } from "./notices.js";
 import { Reports } from "./reports.js";
 import { Scene } from "./scene.js";
 
+/** @typedef {import('./drive.js').Drive} Drive */
+
 /** Milliseconds without a word from the server until the page says so, and acts. */
 const SILENT = 3000;
 const DEAD = 10_000;
@@ -39,9 +41,9 @@ export class Page {
       (message) => this.send(message),
       (node) => this.scene.mapOf(node),
     );
-    /** @type {any} The page's one line to the gate, made when it is first asked for. */
+    /** @type {Drive | null} */
     this._drive = null;
-    /** @type {(new (base: string, options: object) => any) | null} */
+    /** @type {(typeof import('./drive.js').Drive) | null} */
     this._Drive = null;
     /** @type {Array<{data: ArrayBuffer, received: number}>} */
     this._frames = [];
@@ -58,12 +60,15 @@ export class Page {
     setInterval(() => this._look(), LOOK_PERIOD);
   }
 
-  /** The page's one line to the gate; null until the first module has come. */
+  /**
+   * The page's one line to the gate, made when a module first asks for it.
+   *
+   * @returns {Drive}
+   */
   get drive() {
-    if (!this._drive && this._Drive) {
-      this._drive = new this._Drive(BASE.href, { page: this.id });
-    }
-    return this._drive;
+    if (this._drive) return this._drive;
+    if (!this._Drive) throw new Error("drive.js has not been loaded");
+    return (this._drive = new this._Drive(BASE, { id: this.id }));
   }
 
   async _loadDrive() {

@@ -22,7 +22,7 @@ import { readFrame } from "./wire.js";
  * @property {(text: string) => void} error Shows what the server says.
  * @property {(mount: number, item: Item, kind: string, event: Event) => void} hear
  *     Takes an event.
- * @property {() => any} drive The page's one line to the gate.
+ * @property {() => import('./drive.js').Drive} drive The page's one line to the gate.
  * @property {import('./halves.js').Halves} halves
  */
 

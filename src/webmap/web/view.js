@@ -128,27 +128,6 @@ export function rotate(view, degrees, x, y) {
 }
 
 /**
- * Two fingers moved: what lay under each lies under it again.
- *
- * @param {Matrix} view
- * @param {[Point, Point]} from Where the fingers were, in the map's pixels.
- * @param {[Point, Point]} to Where they are.
- * @returns {Matrix} The same view if the fingers are too close to tell.
- */
-export function pinch(view, from, to) {
-  const [fx, fy] = [from[1].x - from[0].x, from[1].y - from[0].y];
-  const [tx, ty] = [to[1].x - to[0].x, to[1].y - to[0].y];
-  const length = fx * fx + fy * fy;
-  if (length < 1 || tx * tx + ty * ty < 1) return view;
-  // The complex quotient of the two differences turns and scales at once.
-  const [a, b] = [(tx * fx + ty * fy) / length, (ty * fx - tx * fy) / length];
-  const e = to[0].x - a * from[0].x + b * from[0].y;
-  const f = to[0].y - b * from[0].x - a * from[0].y;
-  const pinched = multiply({ a, b, c: -b, d: a, e, f }, view);
-  return isView(pinched) ? pinched : view;
-}
-
-/**
  * Show a rectangle of the world as large as it can be, turned as it is.
  *
  * @param {Matrix} view
