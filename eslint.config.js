@@ -63,10 +63,10 @@ export default [
   },
   {
     files: ["tests/**/*.js", "tests/**/*.mjs", "*.config.js"],
-    // Some stand in for the document that they test without.
+    // Some run in Node, some in a browser, and some stand in for its document.
     languageOptions: {
       ecmaVersion: 2022,
-      globals: { ...globals.nodeBuiltin, document: "writable", window: "writable" },
+      globals: { ...globals.browser, ...globals.nodeBuiltin, document: "writable" },
     },
   },
 ];
