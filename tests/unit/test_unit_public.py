@@ -5,9 +5,11 @@ import tomllib
 from importlib.metadata import version
 from pathlib import Path
 
+import click
 import pytest
 
 import webmap
+from webmap.cli import cli
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "docs" / "reference").glob("*.md")
@@ -34,3 +36,13 @@ def test_every_place_says_the_same_version() -> None:
     newest = re.search(r"^## (\S+?),", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
     assert newest is not None
     assert {webmap.__version__, version("webmap"), newest[1]} == {project["version"]}
+
+
+@pytest.mark.parametrize("command", ["demo", "run", "sim", "view"])
+def test_every_option_stands_in_the_reference(command: str) -> None:
+    context = click.Context(cli)
+    found = cli.get_command(context, command)
+    assert found is not None
+    options = [o for parameter in found.params for o in parameter.opts if "--" in o]
+    assert options
+    assert not [option for option in options if f"`{option}" not in REFERENCE]
