@@ -33,6 +33,7 @@ class FakeDrive:
         self.port = 0
         self._epoch = 40
         self._open: list[ServerConnection] = []
+        self._states: list[dict] = []
         self._ended = asyncio.Event()
         self._started = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
@@ -59,6 +60,15 @@ class FakeDrive:
         """Cut every connection."""
         for socket in list(self._open):
             self._loop.call_soon_threadsafe(socket.transport.abort)
+
+    def greet(self) -> None:
+        """Say what a gate says that was started anew: nobody holds anything."""
+        self.robots = {id: self._robot(id) for id in self.robots}
+        hello = {"op": "hello", "connection": "c1"}
+        for message in (hello, *self.robots.values()):
+            self._loop.call_soon_threadsafe(self._tell_all, dict(message))
+        for state in self._states:
+            state["ack"] = -1
 
     def of(self, op: str, since: float = 0.0) -> list[dict]:
         """Return what was said of one kind, after a moment."""
@@ -105,6 +115,7 @@ class FakeDrive:
     async def _serve(self, socket: ServerConnection) -> None:
         self._open.append(socket)
         state = {"ack": -1, "neutral": 0}
+        self._states.append(state)
         ticker = asyncio.create_task(self._tick(socket, state))
         try:
             await self._say(socket, {"op": "hello", "connection": "c1"})

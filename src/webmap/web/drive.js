@@ -257,10 +257,20 @@ export class Drive {
 
   _lost() {
     this.connection = null;
-    this._pilot.doubt(performance.now());
-    this._pilot.disconnect();
+    this._forget(performance.now());
     this._setState("lost");
     for (const report of this.robots.values()) this._tell("robot", report);
+  }
+
+  /**
+   * Forget leases, numbers and ticks: they belong to one connection to one gate.
+   *
+   * @param {number} now
+   */
+  _forget(now) {
+    this._pilot.doubt(now);
+    this._pilot.disconnect();
+    this._loop.open(now);
   }
 
   /** @param {any} message */
@@ -269,6 +279,8 @@ export class Drive {
     if (message.op === "tick") {
       this._loop.receive(message.tick, message.ack, now);
     } else if (message.op === "hello") {
+      // A second one on a connection: the gate was started anew.
+      if (this.connection !== null) this._forget(now);
       this.connection = message.connection;
       this._line.trust();
       for (const robot of this._unsent) this._line.send({ op: "stop", robot });

@@ -30,7 +30,11 @@ export default function attach(map, _options, send) {
   /** @type {import('../drive.js').Drive} */
   const drive = map.drive;
   // The view does not tell when it begins to follow; it is looked at instead.
-  const offs = [lay(map, toggle), map.onSelect(show), drive.on("step", show)];
+  const offs = [
+    lay(map, toggle, "bottom-right"),
+    map.onSelect(show),
+    drive.on("step", show),
+  ];
   show();
   return {
     destroy() {

@@ -84,7 +84,7 @@ class GoalTool {
     this._listen();
     this._offs = [
       lay(map, this._drawing),
-      ...(buttons ? [lay(map, this._panel)] : []),
+      ...(buttons ? [lay(map, this._panel, "top-left")] : []),
       deskOf(this._drive).claimEscape(() => this._leave()),
       map.onSelect(() => this._selected()),
       map.onView(() => this._draw()),

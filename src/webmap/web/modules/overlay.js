@@ -5,20 +5,26 @@ import { html } from "./elements.js";
 /** @type {WeakMap<MapCanvas, Overlay>} */
 const overlays = new WeakMap();
 
+/** @typedef {'top-left' | 'top-right' | 'bottom-left' | 'bottom-right'} Corner */
+
+/** @type {readonly Corner[]} In the order in which keys go through them. */
+const CORNERS = ["top-left", "top-right", "bottom-left", "bottom-right"];
+
 /**
- * Put a panel over a map.
+ * Put something over a map.
  *
  * @param {MapCanvas} map
  * @param {Element} panel
+ * @param {Corner} [corner] Where panels share the room; without one it covers the map.
  * @returns {() => void} Takes it away.
  */
-export function lay(map, panel) {
+export function lay(map, panel, corner) {
   const overlay = overlays.get(map) ?? new Overlay(map);
   overlays.set(map, overlay);
-  overlay.element.append(panel);
+  overlay.add(panel, corner);
   return () => {
     panel.remove();
-    if (overlay.element.childElementCount > 0) return;
+    if (!overlay.empty) return;
     overlay.destroy();
     overlays.delete(map);
   };
@@ -34,21 +40,46 @@ export function overlayOf(map) {
 
 /**
  * An element of HTML that covers a map, wherever the page puts the map: what is in the
- * `<svg>` is zoomed and cannot hold buttons. Itself it lets every pointer through.
+ * `<svg>` cannot be laid out. Itself it lets every pointer through.
  */
 class Overlay {
   /** @param {MapCanvas} map */
   constructor({ svg }) {
     this._svg = svg;
-    this.element = html("div", "webmap-overlay");
+    const corners = CORNERS.map((name) => html("div", `webmap-corner ${name}`));
+    this._corners = new Map(CORNERS.map((name, i) => [name, corners[i]]));
+    this._frame = html("div", "webmap-frame", {}, ...corners);
+    this.element = html("div", "webmap-overlay", {}, this._frame);
+    // Said here, as the style sheet may come later than this is measured.
+    Object.assign(this.element.style, { position: "absolute", left: "0", top: "0" });
+    const host = svg.parentElement;
+    if (host && getComputedStyle(host).position === "static") {
+      // So that the overlay goes along, wherever that is moved.
+      host.style.position = "relative";
+    }
     svg.after(this.element);
-    // Said here as well as in the style sheet, which may come later than this.
-    this.element.style.position = "absolute";
     this._observer = new ResizeObserver(() => this._place());
     this._observer.observe(svg);
-    const host = svg.parentElement;
-    if (host) this._hold(host);
+    if (host) this._observer.observe(host);
     this._place();
+  }
+
+  /** Whether nothing lies over the map any more. */
+  get empty() {
+    return (
+      this.element.childElementCount === 1 &&
+      [...this._corners.values()].every((corner) => corner.childElementCount === 0)
+    );
+  }
+
+  /**
+   * @param {Element} panel
+   * @param {Corner} [corner]
+   */
+  add(panel, corner) {
+    const place = corner === undefined ? undefined : this._corners.get(corner);
+    if (place) place.append(panel);
+    else this._frame.before(panel);
   }
 
   destroy() {
@@ -56,28 +87,13 @@ class Overlay {
     this.element.remove();
   }
 
-  /**
-   * What the map was put into shall carry the overlay along, wherever it moves.
-   *
-   * @param {HTMLElement} host
-   */
-  _hold(host) {
-    this._observer.observe(host);
-    if (getComputedStyle(host).position === "static") host.classList.add("webmap-host");
-  }
-
   _place() {
     const { style } = this.element;
     const map = this._svg.getBoundingClientRect();
     const now = this.element.getBoundingClientRect();
-    style.left = `${this._number(style.left) + map.left - now.left}px`;
-    style.top = `${this._number(style.top) + map.top - now.top}px`;
+    style.left = `${Number.parseFloat(style.left) + map.left - now.left}px`;
+    style.top = `${Number.parseFloat(style.top) + map.top - now.top}px`;
     style.width = `${map.width}px`;
     style.height = `${map.height}px`;
-  }
-
-  /** @param {string} pixels */
-  _number(pixels) {
-    return Number.parseFloat(pixels) || 0;
   }
 }

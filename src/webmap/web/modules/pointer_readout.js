@@ -18,7 +18,7 @@ export default function attach(map, { digits = 2 }) {
     "aria-label": "Pointer position in metres",
   });
   output.hidden = true;
-  const take = lay(map, output);
+  const take = lay(map, output, "bottom-right");
 
   /** @type {{x: number, y: number} | null} */
   let pointer = null;

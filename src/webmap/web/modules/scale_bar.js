@@ -48,7 +48,7 @@ export default function attach(map, { width = 120 }) {
     line,
   );
   const element = html("div", "webmap-panel webmap-scale-bar", {}, text, drawing);
-  const take = lay(map, element);
+  const take = lay(map, element, "bottom-right");
 
   let shown = NaN;
   const show = () => {

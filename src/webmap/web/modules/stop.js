@@ -49,7 +49,7 @@ class Stop {
     this._shown = "";
     const drive = this._drive;
     this._offs = [
-      lay(map, panel),
+      lay(map, panel, "top-right"),
       deskOf(drive).open(),
       drive.on("stop", (robot) => this._stopped(robot)),
       drive.on("robot", (report) => this._report(report)),

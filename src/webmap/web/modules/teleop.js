@@ -41,7 +41,7 @@ class Teleop {
       stop: () => this._stop(),
       lease: () => this._lease(),
     });
-    const take = lay(map, this._panel.element);
+    const take = lay(map, this._panel.element, "bottom-left");
     this._desk = deskOf(this._drive);
     this._seat = {
       map,
