@@ -16,6 +16,7 @@ from websockets.asyncio.client import connect
 
 from webmap.errors import ConfigError
 from webmap.sim import run_simulator
+from webmap.sim.recording import load_recording
 from webmap.sim.rosbridge.dialect import Dialect
 from webmap.sim.rosbridge.encode import Encoder
 from webmap.sim.rosbridge.graph import Graph
@@ -239,6 +240,15 @@ def test_the_player_answers_what_rosapi_was_asked():
 
     with running(str(CAPTURED / "ros1"), module="webmap.sim.player") as url:
         asyncio.run(scenario(url))
+
+
+def test_what_lies_beside_the_frames_is_passed_over(tmp_path):
+    (tmp_path / "INDEX.json").write_text('[{"file": "x"}]')
+    (tmp_path / "broken.json").write_text("")
+    (tmp_path / "nothing_came.bin").write_bytes(b"")
+    text = (CAPTURED / "ros1" / "publish_odom.json").read_text()
+    (tmp_path / "publish_odom.json").write_text(text)
+    assert load_recording(tmp_path).texts == {"/robot_0/odom": text}
 
 
 def test_the_player_needs_frames(tmp_path):

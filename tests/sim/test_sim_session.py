@@ -229,6 +229,13 @@ class TestGarbage:
         assert status["id"] == "x"
         assert status["msg"]
 
+    def test_an_id_that_is_no_text_is_refused(self, bench):
+        client = bench.client()
+        client.send(op="subscribe", topic=ODOM, id={"not": "hashable"})
+        bench.run(0.1)
+        (status,) = client.operations()
+        assert status["op"] == "status"
+
     @pytest.mark.parametrize(
         "data", ["this is not json", "", "[1, 2]", "null", b"\xff\xfe\x00", "{}" * 3]
     )

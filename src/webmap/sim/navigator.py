@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
+from random import Random
 
 from webmap.geometry import Pose, Twist, normalize_angle
 from webmap.sim.planner import Planner, Point
@@ -13,7 +14,8 @@ _CORNER = 0.15
 _ARRIVED = 0.12
 _TURNED = 0.08
 _CRUISE = 0.7
-_PATIENCE = 2.5
+_PATIENCE = (1.0, 4.0)
+_PROGRESS = 1.0
 _MOST_PLANS = 6
 _KEEP_OFF = 0.15
 _TURN_FIRST = 0.5
@@ -68,6 +70,9 @@ class Navigator:
         self._plans = 0
         self._next = 0
         self._stuck_for = 0.0
+        self._planned_at = 0.0
+        self._random = Random(robot.name)  # noqa: S311 - reproducible by design
+        self._patience = self._random.uniform(*_PATIENCE)
 
     def send(self, goal: Goal) -> None:
         """Drive to a goal, instead of what it drove to before."""
@@ -90,18 +95,25 @@ class Navigator:
         points = [(self.robot.pose.x, self.robot.pose.y), *self.path[self._next :]]
         return sum(math.dist(a, b) for a, b in itertools.pairwise(points))
 
-    def step(self, dt: float, discs: Discs) -> None:
+    @property
+    def must_plan(self) -> bool:
+        """Whether it has a goal and looks for a way to it."""
+        return self.goal is not None and not self.path
+
+    def step(self, dt: float, discs: Discs, *, may_plan: bool = True) -> None:
         """Go on with the goal.
 
         Args:
             dt: Seconds since the last step.
             discs: The other robots, as x, y and radius.
+            may_plan: Whether a slice of the search for a path may be done.
 
         """
         if self.goal is None:
             return
-        if not self.path:
-            self._plan(discs)
+        if self.must_plan:
+            if may_plan:
+                self._plan(discs)
             return
         self._watch_progress(dt)
         if self.goal is not None and self.path:
@@ -140,11 +152,16 @@ class Navigator:
         self.path_changes += 1
         self._next = 1
         self._stuck_for = 0.0
+        self._planned_at = self.robot.travelled
 
     def _watch_progress(self, dt: float) -> None:
         moving = abs(self.robot.twist.vx) > 0.03 or abs(self.robot.twist.wz) > 0.1
         self._stuck_for = 0.0 if moving else self._stuck_for + dt
-        if self._stuck_for > _PATIENCE:
+        if self.robot.travelled - self._planned_at > _PROGRESS:
+            self._plans = 0
+        if self._stuck_for > self._patience:
+            # Two that meet must not step aside, and aside again, like mirrors.
+            self._patience = self._random.uniform(*_PATIENCE)
             self._set_path([])
 
     def _follow(self, discs: Discs) -> None:

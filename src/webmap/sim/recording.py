@@ -50,15 +50,26 @@ def load_recording(folder: Path) -> Recording:
 
 
 def _add_text(recording: Recording, text: str) -> None:
-    # Not msgspec: a real server writes the bare token NaN.
-    operation = json.loads(text)
-    if operation["op"] == "publish":
+    operation = _operation(text)
+    if operation.get("op") == "publish":
         recording.texts.setdefault(operation["topic"], text)
-    elif operation["op"] == "service_response" and operation["result"] is True:
+    elif operation.get("op") == "service_response" and operation["result"] is True:
         recording.answers.setdefault(operation["service"], operation["values"])
 
 
+def _operation(text: str) -> dict[str, Any]:
+    """Return what a file holds; nothing if it is no frame but notes beside them."""
+    try:
+        # Not msgspec: a real server writes the bare token NaN.
+        operation = json.loads(text)
+    except ValueError:
+        return {}
+    return operation if isinstance(operation, dict) else {}
+
+
 def _add_binary(recording: Recording, frame: bytes) -> None:
+    if not frame:
+        return  # nothing came, and that was what had to be recorded
     operation = cbor2.loads(frame)
     is_raw = set(operation["msg"]) == {"secs", "nsecs", "bytes"}
     key = (operation["topic"], "cbor-raw" if is_raw else "cbor")

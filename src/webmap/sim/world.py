@@ -64,13 +64,15 @@ class World:
             for i, pose in enumerate(poses)
         ]
         self.navigators = [Navigator(robot, self.planner) for robot in self.robots]
+        self._planning = 0
         self._idle_since = [0.0 for _ in self.robots]
 
     def step(self, dt: float) -> None:
         """Let ``dt`` seconds go by."""
         self.now += dt
+        planning = self._next_to_plan()
         for i, robot in enumerate(self.robots):
-            self.navigators[i].step(dt, self.others(i))
+            self.navigators[i].step(dt, self.others(i), may_plan=i == planning)
             robot.step(dt, self.now, self._blocked_for(i))
         if self.options.wander:
             self._wander()
@@ -119,6 +121,14 @@ class World:
             for i, pose in zip(indices, poses, strict=True)
         ]
         return self.scanner.sweep(poses, discs)
+
+    def _next_to_plan(self) -> int:
+        """Return whose search goes on: one at a time, to its end, then the next's."""
+        waiting = [i for i, n in enumerate(self.navigators) if n.must_plan]
+        if waiting and self._planning not in waiting:
+            later = [i for i in waiting if i > self._planning]
+            self._planning = (later or waiting)[0]
+        return self._planning
 
     def _blocked_for(self, index: int) -> Callable[[float, float], bool]:
         robot = self.robots[index]

@@ -149,6 +149,8 @@ class Session:
             self._complain(operation.get("id"), "internal error")
 
     def _dispatch(self, operation: Operation) -> None:
+        if not isinstance(operation.get("id"), str | int | float | None):
+            raise GraphError("id must be a text or a number")
         name = operation.get("op")
         handle = self._handlers.get(name) if isinstance(name, str) else None
         if handle is None:
