@@ -70,9 +70,11 @@ test-web: $(NODE)
 	node --test $$(find tests/web -name '*.test.js' | sort)
 
 ## test-python: pytest; what measures time runs alone at the end
-.PHONY: test-python
-test-python: $(DEV) $(NODE)
+.PHONY: test-python test-parallel test-serial
+test-python: test-parallel test-serial
+test-parallel: $(DEV) $(NODE)
 	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not serial"
+test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial
 
 ## docs: the documentation, in docs/_build/html
@@ -102,11 +104,13 @@ $(MADE): tools/make_venv.sh
 	touch $@
 
 $(INSTALLED): pyproject.toml $(MADE)
+	@echo "webmap: installing WebMap and what it needs into .venv"
 	$(PY) -m pip install --quiet --editable .
 	touch $@
 
 # Dependency groups came to pip with 25.1.
 $(DEV): pyproject.toml $(INSTALLED)
+	@echo "webmap: installing what the checks and tests need into .venv"
 	$(PY) -m pip install --quiet --upgrade "pip>=25.1"
 	$(PY) -m pip install --quiet --group dev --group docs
 	touch $@
