@@ -1,0 +1,111 @@
+"""Processes of ours, and what a page shows of them."""
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+expect.set_options(timeout=10_000)
+
+
+class Process:
+    """A command of ours that runs until the test has seen enough."""
+
+    def __init__(self, *command: object, cwd: Path | None = None) -> None:
+        self.popen = subprocess.Popen(
+            [sys.executable, "-m", "webmap", *map(str, command)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            cwd=cwd,
+            start_new_session=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        os.set_blocking(self.popen.stderr.fileno(), False)
+        self._log = b""
+
+    def ready(self, pattern: str, within: float = 30.0) -> str:
+        """Wait for the line that says it is ready; return the URL in it."""
+        stdout = self.popen.stdout
+        deadline = time.monotonic() + within
+        said = b""
+        while time.monotonic() < deadline:
+            if not select.select([stdout], [], [], 0.1)[0]:
+                continue
+            chunk = os.read(stdout.fileno(), 4096)
+            said += chunk
+            match = re.search(pattern, said.decode())
+            if match:
+                return match[1]
+            if not chunk:
+                break
+        raise AssertionError(f"not ready: {said!r}\n{self.log}")
+
+    @property
+    def log(self) -> str:
+        """What it wrote to standard error so far."""
+        while not self.popen.stderr.closed and (chunk := self.popen.stderr.read()):
+            self._log += chunk
+        return self._log.decode(errors="replace")
+
+    def end(self, sig: int = signal.SIGINT) -> int:
+        """End it as a person would; return its exit code."""
+        if self.popen.poll() is None:
+            self.popen.send_signal(sig)
+        try:
+            code = self.popen.wait(10)
+        except subprocess.TimeoutExpired:
+            self.popen.kill()
+            self.popen.wait()
+            raise
+        finally:
+            self.log  # noqa: B018 - what was left in the pipe
+            self.popen.stdout.close()
+            self.popen.stderr.close()
+        return code
+
+
+@contextmanager
+def running(*command: object, pattern: str, cwd: Path | None = None) -> Iterator:
+    process = Process(*command, cwd=cwd)
+    try:
+        process.url = process.ready(pattern)
+        yield process
+    finally:
+        if process.popen.stdout.closed is False:
+            process.end()
+        print(process.log)
+
+
+WEB = r"WebMap is ready at (\S+)\n"
+BRIDGE = r"rosbridge is ready at (\S+)\n"
+
+
+def matrix(tab: Page, selector: str) -> list[float]:
+    """Return the matrix of an element's own place, as the browser draws it."""
+    return tab.locator(selector).first.evaluate(
+        # Not consolidate(), which would replace the objects that the client keeps.
+        "e => { let m = new DOMMatrix();"
+        " for (const t of e.transform.baseVal) m.multiplySelf(t.matrix);"
+        " return [m.a, m.b, m.c, m.d, m.e, m.f]; }"
+    )
+
+
+def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
+    """Poll a condition until it holds."""
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.05)
+    raise AssertionError(f"{what} did not happen within {within} s")
