@@ -93,9 +93,10 @@ def make_robot(about: RobotDescription) -> "Robot":
             cancel_topic=about.cancel or None,
         )
     if about.scan:
-        robot.add_module(
+        scanner = robot.add_module(
             "LaserScanner", bridge, about.scan, max_dots=None, throttle=100
         )
+        robot.svg.insert(1, scanner.svg)  # after the title, under the body
     if about.battery:
         robot.add_module("Battery", bridge, about.battery)
     robot.add_module(NameLabel)

@@ -5,7 +5,6 @@ the night, since a page can show either without asking.
 """
 
 import math
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,8 +49,6 @@ class Floor:
     """How far it is turned about its lower left corner, in radians."""
     bounds: tuple[float, float, float, float]
     """What is known of it: left, bottom, width and height in metres."""
-    folder: "tempfile.TemporaryDirectory[str]"
-    """Where the drawn images lie, for as long as this lives."""
 
     @property
     def matrix(self) -> geometry.Affine:
@@ -69,11 +66,12 @@ class FloorFile(msgspec.Struct):
     negate: bool = False
 
 
-def load_floor(file: Path) -> Floor:
+def load_floor(file: Path, folder: Path) -> Floor:
     """Read a floor plan and draw it in the console's colours.
 
     Args:
         file: The YAML file of a map, as map_server takes it.
+        folder: Where the drawn images go.
 
     Raises:
         ConfigError: If the file or its image cannot be read or makes no sense.
@@ -85,17 +83,14 @@ def load_floor(file: Path) -> Floor:
     grey = read_image(_image_file(file, plan.image))
     if plan.negate:
         grey = ImageOps.invert(grey)
-    folder = tempfile.TemporaryDirectory(prefix="webmap-floor-")
     images = {}
     for name, (wall, unknown, free) in COLOURS.items():
-        images[name] = Path(folder.name) / f"{name}.png"
+        images[name] = folder / f"{name}.png"
         paint(grey, wall, unknown, free).save(images[name], optimize=True)
     x, y, yaw = plan.origin
     width, height = (pixels * plan.resolution for pixels in grey.size)
     bounds = known_part(grey, plan)
-    return Floor(
-        images["day"], images["night"], x, y, width, height, yaw, bounds, folder
-    )
+    return Floor(images["day"], images["night"], x, y, width, height, yaw, bounds)
 
 
 def read_yaml(file: Path) -> FloorFile:

@@ -14,6 +14,18 @@ MARGIN = 4.0
 DOT_PIXELS = 3.0
 """How large the dots of a scan are on the screen."""
 
+PARTS = (
+    "card_actions.js",
+    "connection.js",
+    "dom.js",
+    "help.js",
+    "names.js",
+    "search.js",
+    "sheet.js",
+    "view_tools.js",
+)
+"""What console.js imports; a browser can load what was published."""
+
 PATIENCE = 12
 """Looks after which robots whose pose is unknown are waited for no longer."""
 
@@ -40,9 +52,12 @@ class Frame:
         self._looks = 0
         self._placed = False
         self._dot_size = 0.0
+        folder = Path(__file__).parent
+        for name in PARTS:
+            map.page.asset(folder / name)
         self.half = map.add_browser_half(
             self,
-            Path(__file__).with_name("console.js"),
+            folder / "console.js",
             {"title": title, "bounds": self._bounds},
         )
 

@@ -1,7 +1,9 @@
 """The page itself: a map with everything around it, for each viewer that opens it."""
 
 import asyncio
+import atexit
 import logging
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,7 +48,7 @@ def open_console(
         ConfigError: If the floor plan cannot be read.
 
     """
-    plan = None if floor is None else load_floor(floor)
+    plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(about) for about in robots]
 
     @webmap.page("/", html="console.html", title=title)
@@ -82,6 +84,12 @@ def build(
         poll_on([frame.place, listed.poll, card.poll, links.poll])
     )
     page.on_close(task.cancel)
+
+
+def _folder_for_this_process() -> Path:
+    folder = tempfile.TemporaryDirectory(prefix="webmap-")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
 
 
 def show_floor(map: "Map", floor: Floor) -> None:

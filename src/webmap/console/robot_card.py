@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from webmap import html, svg
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.speeds import SpeedTable
-from webmap.console.words import UNKNOWN, describe, heading, number
+from webmap.console.words import UNKNOWN, describe, heading, number, sentence
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
@@ -113,7 +113,7 @@ class RobotCard:
         self._shape.show(words.shape)
         self._state.text = words.text
         self._mine.text = words.mine or words.text
-        self._reason.text = (report.reason if report is not None else None) or ""
+        self._reason.text = sentence((report and report.reason) or "")
         self.element.set("data-tone", words.tone or None)
         self._speeds.show(robot)
 

@@ -75,3 +75,8 @@ def number(value: float, digits: int = 2) -> str:
 def heading(yaw: float) -> str:
     """Return a yaw in radians as whole degrees in 0 to 359."""
     return str(round(math.degrees(yaw)) % 360)
+
+
+def sentence(text: str) -> str:
+    """Return words of the gate as a sentence."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}." if text else ""

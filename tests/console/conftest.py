@@ -1,0 +1,104 @@
+"""The console in a real browser, on the real demo."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+ARGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+SIZES = {
+    "desk": {"viewport": {"width": 1280, "height": 800}},
+    "phone": {"viewport": {"width": 390, "height": 844}, "has_touch": True},
+}
+
+
+@dataclass
+class Demo:
+    """A demo that runs, and the address of its page."""
+
+    url: str
+    process: subprocess.Popen
+
+
+@pytest.fixture(scope="module")
+def demo() -> Iterator[Demo]:
+    """Run ``webmap demo`` with ten robots, so that there is a search."""
+    command = [sys.executable, "-m", "webmap", "demo", "--robots", "10", "--port", "0"]
+    with subprocess.Popen(
+        [*command, "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    ) as process:
+        watchdog = threading.Timer(60, process.kill)
+        watchdog.start()
+        line = process.stdout.readline()
+        watchdog.cancel()
+        try:
+            found = re.search(r"ready at (\S+)", line)
+            assert found, line
+            yield Demo(found[1], process)
+        finally:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    expect.set_options(timeout=10_000)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=ARGS
+        )
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def open_console(chromium: Browser, demo: Demo):
+    """Open the console, and fail on anything that the browser complains about."""
+    contexts, said = [], []
+
+    def open_(size: str = "desk", scheme: str = "light") -> Page:
+        context = chromium.new_context(color_scheme=scheme, **SIZES[size])
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: said.append(f"exception: {error}"))
+        page.on(
+            "console",
+            lambda message: (
+                message.type in {"error", "warning"} and said.append(message.text)
+            ),
+        )
+        page.goto(demo.url)
+        # A phone has the list in the sheet, which is closed at first.
+        expect(page.locator("#robots .row")).to_have_count(10)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(10)
+        expect(page.locator("#link")).to_have_attribute("data-link", "open")
+        return page
+
+    yield open_
+    for context in contexts:
+        context.close()
+    assert said == []

@@ -1,0 +1,215 @@
+"""What an operator sees of the console and does with it."""
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+pytestmark = pytest.mark.browser
+
+
+def row(page: Page, name: str):
+    return page.get_by_role("button", name=re.compile(rf"^{name}\b"))
+
+
+def test_a_robot_that_is_selected_in_the_list_is_selected_on_the_map(open_console):
+    page = open_console()
+    row(page, "Robot 3").click()
+    expect(page.locator(".robot.selected")).to_have_attribute("data-name", "Robot 3")
+    expect(page.get_by_role("heading", name="Robot 3")).to_be_visible()
+    expect(row(page, "Robot 3")).to_have_attribute("aria-pressed", "true")
+
+
+def test_a_robot_that_is_clicked_on_the_map_has_its_card(open_console):
+    page = open_console()
+    page.locator('.robot[data-name="Robot 1"] .hit').click()
+    expect(page.locator("#card h2")).to_have_text("Robot 1")
+    expect(page.locator("#card .age")).not_to_have_class(re.compile("stale"))
+    page.get_by_role("button", name="Select no robot").click()
+    expect(page.locator("#card")).to_be_hidden()
+
+
+def test_the_list_says_age_battery_and_who_drives(open_console):
+    page = open_console()
+    first = page.locator("#robots .row").first
+    expect(first.locator(".state .holder")).to_have_text("Free")
+    expect(first.locator(".battery")).to_have_text(re.compile(r"^\d+ %$"))
+    expect(first.locator(".age")).to_have_text(re.compile(r"^0\.\d s$"))
+
+
+def test_who_drives_reads_you_and_others_read_that_somebody_does(open_console):
+    mine, theirs = open_console(), open_console()
+    row(mine, "Robot 2").click()
+    mine.bring_to_front()
+    mine.keyboard.down("s")
+    expect(mine.locator("#card .state .you")).to_be_visible()
+    expect(mine.locator("#card .state")).to_contain_text("You")
+    other = theirs.locator('#robots [aria-pressed]:has-text("Robot 2") .holder')
+    expect(other).to_contain_text(re.compile("drives|holds it"))
+    expect(other).to_be_visible()
+    mine.keyboard.up("s")
+    mine.get_by_role("button", name="Hand back", exact=True).click()
+    expect(mine.locator("#card .state .holder")).to_have_text("Free")
+
+
+@pytest.mark.parametrize("size", ["desk", "phone"])
+def test_stop_is_in_sight_and_large(open_console, size):
+    page = open_console(size)
+    stop = page.get_by_role("button", name="Stop all")
+    expect(stop).to_be_in_viewport(ratio=1)
+    assert stop.bounding_box()["height"] >= 56
+    row_ = page.locator("#sheet")
+    if size == "phone":
+        row_.click()
+        expect(page.locator("#robots")).to_be_in_viewport()
+        expect(stop).to_be_in_viewport(ratio=1)
+        assert stop.bounding_box()["width"] > 300
+    stop.click()
+    expect(page.locator(".webmap-stop-verdict").first).to_be_visible()
+
+
+@pytest.mark.parametrize("size", ["desk", "phone"])
+def test_nothing_to_press_is_smaller_than_a_finger(open_console, size):
+    page = open_console(size)
+    if size == "phone":
+        page.locator("#sheet").click()
+    row(page, "Robot 0").click()
+    expect(page.locator("#card")).to_be_visible()
+    small = page.evaluate(
+        """() => [...document.querySelectorAll('button, input, summary')]
+            .map(e => [e.innerText || e.getAttribute('aria-label') || e.id,
+                       e.getBoundingClientRect()])
+            .filter(([, r]) => r.width > 0 && (r.width < 43.9 || r.height < 43.9))
+            .map(([name, r]) => `${name} ${r.width}x${r.height}`)"""
+    )
+    assert small == []
+
+
+def test_the_sheet_opens_over_the_map_and_closes(open_console):
+    page = open_console("phone")
+    before = page.locator("svg.webmap").bounding_box()
+    handle = page.locator("#sheet")
+    expect(page.locator("#robots")).to_be_hidden()
+    handle.click()
+    expect(handle).to_have_attribute("aria-expanded", "true")
+    expect(page.locator("#robots")).to_be_visible()
+    assert page.locator("svg.webmap").bounding_box() == before
+    handle.click()
+    expect(page.locator("#robots")).to_be_hidden()
+
+
+def test_nothing_is_wider_than_a_phone(open_console):
+    page = open_console("phone")
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert width == 390
+
+
+def test_help_opens_by_its_key_and_closes(open_console):
+    page = open_console()
+    help_ = page.get_by_role("dialog", name="Keys and gestures")
+    page.keyboard.press("?")
+    expect(help_).to_be_visible()
+    page.keyboard.press("?")
+    expect(help_).to_be_hidden()
+    page.get_by_role("button", name="Help: keys and gestures").click()
+    expect(help_).to_be_visible()
+    page.get_by_role("button", name="Close help").click()
+    expect(help_).to_be_hidden()
+
+
+def test_the_search_leaves_the_robots_whose_name_has_it(open_console):
+    page = open_console()
+    page.keyboard.press("/")
+    page.keyboard.type("robot 7")
+    expect(page.locator("#robots .row:visible")).to_have_count(1)
+    expect(row(page, "Robot 7")).to_be_visible()
+
+
+def scale_of(page: Page) -> float:
+    return page.locator("g.world").evaluate(
+        "g => Math.hypot(g.getCTM().a, g.getCTM().b)"
+    )
+
+
+def test_the_view_s_buttons_zoom_and_show_everything(open_console):
+    page = open_console()
+    whole = scale_of(page)
+    page.get_by_role("button", name="Zoom in").click()
+    assert scale_of(page) == pytest.approx(1.5 * whole)
+    page.get_by_role("button", name="Show everything").click()
+    assert scale_of(page) == pytest.approx(whole, rel=0.02)
+
+
+def test_follow_keeps_the_robot_in_its_place_until_pressed_again(open_console):
+    page = open_console()
+    row(page, "Robot 4").click()
+    follow = page.get_by_role("button", name="Follow")
+    follow.click()
+    expect(follow).to_have_attribute("aria-pressed", "true")
+    follow.click()
+    expect(follow).to_have_attribute("aria-pressed", "false")
+
+
+def test_send_to_begins_with_a_word_of_what_to_do(open_console):
+    page = open_console()
+    row(page, "Robot 5").click()
+    page.get_by_role("button", name="Send to").click()
+    expect(page.locator(".webmap-goal-word")).to_have_text(
+        re.compile("Press on the map")
+    )
+    page.keyboard.press("Escape")
+    expect(page.locator(".webmap-goal-word")).to_be_hidden()
+
+
+def test_every_part_is_reached_by_the_tab_key(open_console):
+    page = open_console()
+    row(page, "Robot 0").click()
+    expect(page.locator("#card")).to_be_visible()
+    reached = set()
+    page.evaluate("document.activeElement.blur()")
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate(FOCUSED))
+    wanted = {"help-open", "zoom-in", "show-all", "search", "follow", "send", "cancel"}
+    assert wanted <= reached
+    assert any("webmap-stop-all" in name for name in reached)
+
+
+FOCUSED = """() => {
+  const e = document.activeElement;
+  return e.id || e.dataset.act || e.getAttribute("class") || e.tagName;
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_has_contrast_enough_on_its_surfaces(open_console, scheme):
+    page = open_console(scheme=scheme)
+    row(page, "Robot 0").click()
+    expect(page.locator("#card")).to_be_visible()
+    low = page.evaluate(CONTRAST)
+    assert low == []
+
+
+CONTRAST = """() => {
+  const rgb = c => c.match(/[\\d.]+/g).map(Number);
+  const lum = ([r, g, b]) => [r, g, b].map(v => v / 255)
+    .map(v => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const surface = e => {
+    for (; e; e = e.parentElement) {
+      const c = rgb(getComputedStyle(e).backgroundColor);
+      if (c.length < 4 || c[3] > 0.9) return c;
+    }
+    return [255, 255, 255];
+  };
+  const low = [];
+  for (const e of document.querySelectorAll('header *, aside *')) {
+    if (!e.checkVisibility() || e.disabled || e.namespaceURI.includes('svg')) continue;
+    const own = [...e.childNodes].some(n => n.nodeType === 3 && n.data.trim());
+    if (!own) continue;
+    const a = lum(rgb(getComputedStyle(e).color)), b = lum(surface(e));
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (ratio < 4.5) low.push(`${e.textContent} ${ratio.toFixed(1)}`);
+  }
+  return low;
+}"""

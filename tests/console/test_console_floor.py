@@ -1,0 +1,133 @@
+"""Floor plans in map_server's form."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from webmap import console
+from webmap.console.floor import COLOURS, load_floor
+from webmap.errors import ConfigError
+
+WALL, UNKNOWN, FREE = 0, 205, 254
+
+
+def write(folder: Path, image: str = "floor.png", **changes: object) -> Path:
+    keys = {"resolution": 0.5, "origin": [-2.0, -1.0, 0.0], "negate": 0, **changes}
+    lines = [f"image: {image}", *(f"{key}: {value}" for key, value in keys.items())]
+    file = folder / "floor.yaml"
+    file.write_text("\n".join(lines))
+    return file
+
+
+def draw(folder: Path, name: str = "floor.png", mode: str = "L") -> None:
+    image = Image.new("L", (8, 4), UNKNOWN)
+    image.paste(FREE, (2, 1, 6, 3))
+    image.putpixel((2, 1), WALL)
+    image.convert(mode).save(folder / name)
+
+
+def test_a_floor_knows_its_place_and_what_is_known_of_it(tmp_path):
+    draw(tmp_path)
+    floor = load_floor(write(tmp_path), tmp_path)
+    assert (floor.x, floor.y, floor.width, floor.height) == (-2.0, -1.0, 4.0, 2.0)
+    assert floor.bounds == (-1.0, -0.5, 2.0, 1.0)
+
+
+def test_the_image_s_upper_left_pixel_is_at_the_upper_left_in_the_world(tmp_path):
+    draw(tmp_path)
+    floor = load_floor(write(tmp_path), tmp_path)
+    # add_image places the image's box at x, y; the matrix turns it upright there.
+    assert floor.matrix.apply(floor.x, floor.y) == pytest.approx((-2.0, 1.0))
+
+
+def test_a_turned_map_is_turned_about_its_origin(tmp_path):
+    draw(tmp_path)
+    yaw = math.pi / 2
+    floor = load_floor(write(tmp_path, origin=[-2.0, -1.0, yaw]), tmp_path)
+    lower_left = floor.matrix.apply(floor.x, floor.y + floor.height)
+    lower_right = floor.matrix.apply(floor.x + floor.width, floor.y + floor.height)
+    assert lower_left == pytest.approx((-2.0, -1.0))
+    assert lower_right == pytest.approx((-2.0, 3.0))
+    assert floor.bounds == pytest.approx((-4.0, -1.0, 2.0, 4.0))
+
+
+def colour(image: Image.Image, at: tuple[int, int]) -> str:
+    return "#" + bytes(image.getpixel(at)).hex()
+
+
+@pytest.mark.parametrize("name", ["day", "night"])
+def test_wall_unknown_and_free_have_exactly_their_colours(tmp_path, name):
+    draw(tmp_path)
+    floor = load_floor(write(tmp_path), tmp_path)
+    painted = Image.open(getattr(floor, name)).convert("RGB")
+    seen = [colour(painted, at) for at in ((2, 1), (0, 0), (4, 2))]
+    assert seen == list(COLOURS[name])
+
+
+def test_the_floor_s_colours_are_those_of_the_style_sheet():
+    text = (Path(console.__file__).parent / "tokens.css").read_text("utf-8")
+    for token, index in (("--map-void", 1), ("--map-floor", 2)):
+        values = re.findall(rf"{token}: (#\w+);", text)
+        assert values == [COLOURS["day"][index], COLOURS["night"][index]]
+
+
+def test_a_negated_image_is_drawn_the_other_way_round(tmp_path):
+    Image.new("L", (4, 4), 255).save(tmp_path / "floor.png")
+    floor = load_floor(write(tmp_path, negate=1), tmp_path)
+    painted = Image.open(floor.day).convert("RGB")
+    assert colour(painted, (0, 0)) == COLOURS["day"][0]
+
+
+@pytest.mark.parametrize(("name", "mode"), [("a.pgm", "L"), ("a.png", "RGBA")])
+def test_the_formats_of_map_saver_are_read(tmp_path, name, mode):
+    draw(tmp_path, name, mode)
+    assert load_floor(write(tmp_path, name), tmp_path).width == 4.0
+
+
+def test_what_is_clear_in_an_image_is_unknown(tmp_path):
+    Image.new("RGBA", (4, 4), (0, 0, 0, 0)).save(tmp_path / "floor.png")
+    painted = Image.open(load_floor(write(tmp_path), tmp_path).day).convert("RGB")
+    assert colour(painted, (0, 0)) == COLOURS["day"][1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"resolution": 0}, "resolution"),
+        ({"resolution": ".nan"}, "resolution"),
+        ({"resolution": "wide"}, "resolution"),
+        ({"origin": [0.0, 0.0]}, "origin"),
+        ({"origin": [0.0, 0.0, ".inf"]}, "origin"),
+        ({"image": "../floor.png"}, "folder of the YAML"),
+        ({"image": "/etc/passwd"}, "folder of the YAML"),
+        ({"image": "."}, "no image"),
+        ({"image": "gone.png"}, "no image"),
+        ({"negate": "maybe"}, "negate"),
+    ],
+)
+def test_a_map_that_makes_no_sense_is_refused_in_words(tmp_path, changes, said):
+    draw(tmp_path)
+    with pytest.raises(ConfigError, match=said):
+        load_floor(write(tmp_path, **changes), tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "- a\n- b", "{", "\x00", "a: &a [*a]"])
+def test_a_yaml_that_is_none_is_refused(tmp_path, text):
+    file = tmp_path / "floor.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=r"floor\.yaml"):
+        load_floor(file, tmp_path)
+
+
+def test_an_image_that_is_none_is_refused(tmp_path):
+    (tmp_path / "floor.png").write_bytes(b"\x89PNG\r\n\x1a\n nothing")
+    with pytest.raises(ConfigError, match=r"floor\.png"):
+        load_floor(write(tmp_path), tmp_path)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"none\.yaml"):
+        load_floor(tmp_path / "none.yaml", tmp_path)

@@ -1,0 +1,152 @@
+"""The console's page, without a browser."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from webmap import Bridge
+from webmap.console import RobotDescription, open_console
+from webmap.console.fleet import make_robot
+from webmap.console.page import build
+from webmap.core.page import Page, PageEntry, site
+from webmap.errors import ConfigError
+from webmap.server.viewer import Viewer
+from webmap.wire.session import SceneSession
+
+
+class Publisher:
+    def publish_file(self, path: Path) -> str:
+        assert path.is_file()
+        return f"/_webmap/files/{path.name}"
+
+    def publish_image(self, image: Path) -> str:
+        return f"/_webmap/images/{image.name}"
+
+    def withdraw_image(self, url: str) -> None:
+        pass
+
+
+@pytest.fixture
+def bridge() -> Bridge:
+    return Bridge("ws://localhost:9090")
+
+
+@pytest.fixture
+def robots(bridge):
+    names = ("Bob", "Ann")
+    made = [
+        make_robot(
+            RobotDescription(
+                name=name, bridge=bridge, odometry="/odom", scan="/scan", battery="/b"
+            )
+        )
+        for name in names
+    ]
+    yield made
+    for robot in made:
+        robot.destroy()
+
+
+def open_page() -> Page:
+    entry = PageEntry("/", lambda page: None, None, Path(), "test")
+    viewer = Viewer("v1", "Ann")
+    return Page(entry, SceneSession(), viewer, Publisher(), {"map": (800.0, 600.0)})
+
+
+def on_a_page(scenario, bridge, robots):
+    """Build the console on a page, run a scenario with it, and close it."""
+
+    async def run() -> None:
+        page = open_page()
+        with page.scope.active():
+            build(page, [bridge], robots, None, "test")
+        await asyncio.sleep(0)
+        try:
+            scenario(page)
+        finally:
+            page.close()
+
+    asyncio.run(run())
+
+
+def lines(page: Page) -> list[str]:
+    return [
+        button.children[2].text
+        for item in page.element("robots").children
+        for button in item.children
+    ]
+
+
+def test_every_robot_has_a_line_and_its_place_on_the_map(bridge, robots):
+    def scenario(page: Page) -> None:
+        assert lines(page) == ["Bob", "Ann"]
+        assert page.maps[0].robots == robots
+
+    on_a_page(scenario, bridge, robots)
+
+
+def test_a_closed_page_leaves_nothing_on_the_robots(bridge, robots):
+    before = [list(robot.modules) for robot in robots]
+
+    def scenario(page: Page) -> None:
+        page.maps[0].set_selected(robots[0])
+        assert len(robots[0].modules) > len(before[0])
+
+    on_a_page(scenario, bridge, robots)
+    assert [list(robot.modules) for robot in robots] == before
+    assert all(robot.maps == [] for robot in robots)
+
+
+def test_the_card_follows_the_selection_and_lets_go_of_the_one_before(bridge, robots):
+    def scenario(page: Page) -> None:
+        card, map = page.element("card"), page.maps[0]
+        assert card.get("hidden") is not None
+        for robot in robots:
+            map.set_selected(robot)
+            assert card.get("data-robot") == robot.id
+        assert len(robots[0].modules) < len(robots[1].modules)
+        map.set_selected(None)
+        assert card.get("hidden") is not None
+
+    on_a_page(scenario, bridge, robots)
+
+
+def test_a_battery_is_shown_in_the_line_and_on_the_card(bridge, robots):
+    def scenario(page: Page) -> None:
+        page.maps[0].set_selected(robots[0])
+        battery = next(m for m in robots[0].modules if hasattr(m, "charge"))
+        battery.charge, battery.voltage = 0.5, 24.0
+        robots[0].notify_modules("on_battery_update", battery)
+        assert "50 %" in page.element("robots").text
+        assert "50 %, 24.0 V" in page.element("card").text
+
+    on_a_page(scenario, bridge, robots)
+
+
+def test_without_a_floor_the_view_waits_for_the_robots(bridge, robots):
+    def scenario(page: Page) -> None:
+        map = page.maps[0]
+        frame = next(m for m in map.modules if type(m).__name__ == "Frame")
+        before = map.world.tf
+        frame.place()
+        assert map.world.tf == before
+        for robot in robots:
+            robot.valid = True
+        frame.place()
+        assert map.world.tf != before
+
+    on_a_page(scenario, bridge, robots)
+
+
+def test_the_console_becomes_the_page_at_the_root(bridge, monkeypatch):
+    monkeypatch.setattr(site, "pages", {})
+    open_console([bridge], [], title="Hall 3")
+    entry = site.pages["/"]
+    assert entry.html is not None
+    assert entry.html.name == "console.html"
+
+
+def test_a_floor_that_is_not_there_is_said_before_anything_is_served(bridge, tmp_path):
+    with pytest.raises(ConfigError, match=r"none\.yaml"):
+        open_console([bridge], [], floor=tmp_path / "none.yaml")
