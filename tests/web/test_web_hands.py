@@ -96,11 +96,11 @@ class Bench:
         assert self.gate.moves(since) == []
 
     def neutral_within(self, ms: float) -> None:
-        """Check that the last thing said was neutral, and soon enough."""
-        self.page.wait_for_timeout(ms)
-        drives = self.gate.of("drive")
-        assert drives
-        assert (drives[-1]["x"], drives[-1]["turn"]) == (0, 0)
+        """Check that after the last key, or mark, neutral left the page in time."""
+        self.until(lambda: self.page.evaluate("bench.neutralDelay()"))
+        delay, jitter = self.page.evaluate("bench.neutralDelay()")
+        # The bound, and what a timer was late in the same moment on this machine.
+        assert delay <= ms + jitter
 
 
 @pytest.fixture
@@ -175,9 +175,10 @@ def test_doubt_is_neutral_within_50_ms_and_nothing_resumes(
     bench: Bench, doubt: str
 ) -> None:
     bench.drive()
-    bench.page.evaluate(f"() => {{ {DOUBTS[doubt]} }}")
+    bench.page.evaluate(f"bench.mark(() => {{ {DOUBTS[doubt]} }})")
     bench.neutral_within(50)
-    # The keyboard repeats a key that is held.
+    bench.page.wait_for_timeout(250)
+    # The keyboard repeats a key that is held, also after the hands had their rest.
     bench.page.keyboard.down("w")
     bench.still()
 

@@ -10,6 +10,37 @@ const modules = (query.get("modules") ?? "teleop,mouse_view_control").split(",")
 const releaseAfter = Number(query.get("release") ?? 30_000);
 const drive = new Drive(new URL("/_webmap/", location.href), { id: "page1", releaseAfter });
 
+/** What left this page and when; what made it doubtful and when; late timers. */
+const log = { sent: [], from: 0, to: 0, late: 0 };
+const send = WebSocket.prototype.send;
+WebSocket.prototype.send = function (text) {
+  log.sent.push({ at: performance.now(), ...JSON.parse(text) });
+  send.call(this, text);
+};
+let then = performance.now();
+setInterval(() => {
+  const now = performance.now();
+  if (log.to) log.late = Math.max(log.late, now - Math.max(then, log.to) - 10);
+  then = now;
+}, 10);
+for (const kind of ["keydown", "keyup"]) {
+  addEventListener(kind, (event) => event.repeat || mark(), { capture: true });
+}
+
+function mark(happen = () => {}) {
+  Object.assign(log, { from: performance.now(), to: 0, late: 0 });
+  happen();
+  log.to = performance.now();
+}
+
+/** How long after the last mark a neutral command left, and how late timers were. */
+function neutralDelay() {
+  const first = log.sent.find(
+    ({ op, at, x, turn }) => op === "drive" && at >= log.from && x === 0 && turn === 0,
+  );
+  return first ? [Math.max(0, first.at - log.to), log.late] : null;
+}
+
 function robot(id, x, y) {
   const g = document.createElementNS(SVG, "g");
   const circle = document.createElementNS(SVG, "circle");
@@ -59,5 +90,5 @@ async function makeMap(number) {
 
 const maps = [await makeMap(1)];
 if (query.has("two")) maps.push(await makeMap(2));
-window.bench = { drive, maps };
+window.bench = { drive, maps, mark, neutralDelay };
 document.body.dataset.ready = "yes";

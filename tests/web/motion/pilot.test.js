@@ -333,6 +333,13 @@ describe("another choice", () => {
     assert.deepEqual(bench.run(500), []);
   });
 
+  test("is not driven by what was pressed while none was chosen", () => {
+    bench.keep(bench.pilot.choose(null, bench.now));
+    bench.press();
+    bench.keep(bench.pilot.choose("r2", bench.now));
+    assert.deepEqual(bench.run(500), []);
+  });
+
   test("of nothing leaves nothing to drive", () => {
     bench.drive();
     bench.keep(bench.pilot.choose(null, bench.now));
