@@ -7,6 +7,10 @@ missing=()
 command -v chromium >/dev/null || missing+=(chromium)
 command -v node >/dev/null || missing+=(nodejs)
 command -v npm >/dev/null || missing+=(npm)
+# Playwright's driver, which steers Chromium, links to it.
+if [ "$(uname -s)" = Linux ] && ! /sbin/ldconfig -p | grep -q 'libatomic\.so\.1'; then
+  missing+=(libatomic1)
+fi
 if [ "${#missing[@]}" -gt 0 ]; then
   "$here/install_debian.sh" "${missing[@]}"
 fi

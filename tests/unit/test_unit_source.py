@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -17,10 +18,16 @@ MACHINE_PATH = re.compile(
 
 def project_files() -> list[Path]:
     """Return what git knows of, or everything where there is no git (an sdist)."""
-    done = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    names = done.stdout.split("\0")[:-1] if done.returncode == 0 else []
+    names: list[str] = []
+    if (ROOT / ".git").exists() and (git := shutil.which("git")):
+        done = subprocess.run(
+            [git, "ls-files", "-z"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        names = done.stdout.split("\0")[:-1]
     files = [ROOT / name for name in names] or list((ROOT / "src").rglob("*"))
     return [path for path in files if path.is_file()]
 
