@@ -130,15 +130,15 @@ class Playground:
         one.classes.toggle(f"c{int(number) % 5}")
 
     def pose(self, fragment, one, other, number, text):
-        if one.namespace == "svg":
+        if one.tag in ("g", "path", "svg"):
             one.set_pose(number, -number, number / 3)
 
     def matrix(self, fragment, one, other, number, text):
-        if one.namespace == "svg":
+        if one.tag in ("g", "path", "svg"):
             one.set_matrix(Affine(1, 2, 3, 4, number, 6))
 
     def transform(self, fragment, one, other, number, text):
-        if one.namespace == "svg":
+        if one.tag in ("g", "path", "svg"):
             one.set(transform="scale(2)")
 
     def dots(self, fragment, one, other, number, text):

@@ -52,6 +52,14 @@ export class Link {
     socket.close();
   }
 
+  /** Give the link up for good. */
+  end() {
+    const socket = this._socket;
+    this._socket = null;
+    socket?.close();
+    this._events.closed("", true);
+  }
+
   _open() {
     this._timer = undefined;
     const socket = new WebSocket(this._address());

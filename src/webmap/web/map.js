@@ -254,6 +254,7 @@ export class MapCanvas {
   operate(number, operation, args) {
     if (number <= this._applied) return;
     this._applied = number;
+    this._changed = true;
     this._whenSized(() => this._operate(operation, args));
   }
 

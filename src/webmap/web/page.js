@@ -6,6 +6,7 @@ import { contentSize } from "./map.js";
 import { Notices } from "./notices.js";
 import { Reports } from "./reports.js";
 import { Scene } from "./scene.js";
+import { VersionError } from "./wire.js";
 
 /** @typedef {import('./drive.js').Drive} Drive */
 
@@ -181,8 +182,9 @@ export class Page {
     this._frames = [];
     this._failures += 1;
     this.trouble(`This page did not understand the server: ${error}`);
-    if (this._failures < FAILURES) this.send({ op: "resync" });
-    else this.notices.error("Reload the page: it may be older than the server.");
+    const hopeless = error instanceof VersionError || this._failures >= FAILURES;
+    if (hopeless) this._link.end();
+    else this.send({ op: "resync" });
   }
 }
 

@@ -72,6 +72,9 @@ import {
 /** Bytes that are no frame, or one of another version. */
 export class WireError extends Error {}
 
+/** A frame of another version: this page is older than the server, or newer. */
+export class VersionError extends WireError {}
+
 const decoder = new TextDecoder();
 
 /** Reads one frame from its bytes. */
@@ -269,7 +272,7 @@ export function readFrame(buffer, begin) {
   try {
     const version = reader.u16();
     if (version !== VERSION) {
-      throw new WireError(`the server speaks version ${version}, this page ${VERSION}`);
+      throw new VersionError(`version ${version} instead of ${VERSION}`);
     }
     const reset = (reader.u8() & FLAG.RESET) > 0;
     const header = { reset, frame: reader.u32(), now: reader.f64() };

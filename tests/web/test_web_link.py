@@ -1,0 +1,174 @@
+"""The link of a page to its display, in a real Chromium."""
+
+import pytest
+from scene_host import wait
+
+from webmap.wire import SceneSession, Trouble, ViewReport
+from webmap.wire.opcodes import VERSION
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def opened(host, tab):
+    """A page with a map and a robot that has been drawn."""
+
+    def build(shown):
+        shown.root, shown.world, shown.mount = shown.add_map()
+        shown.robot, shown.inner = shown.add_robot(shown.world, shown.mount)
+        shown.session.view(shown.root.id, "scale", 10)
+        shown.document.bind("label").text = "there"
+
+    host.build = build
+    tab.goto(host.url + "?x=1")
+    tab.wait_for_selector(".robot circle")
+    return host.one
+
+
+def view(tab):
+    return tab.evaluate(
+        """async () => {
+          const { page } = await import("/_webmap/page.js");
+          return Object.values(page.scene.maps[0].view);
+        }"""
+    )
+
+
+def drag(tab, x):
+    tab.evaluate(
+        """async (x) => {
+          const [map] = (await import("/_webmap/page.js")).page.scene.maps;
+          map.setView({ ...map.view, e: map.view.e + x });
+        }""",
+        x,
+    )
+
+
+def test_a_page_says_what_it_is(host, tab, opened):
+    (hello,) = opened.hellos
+    assert hello.url == "/?x=1"
+    assert (hello.width, hello.height, hello.dpr) == (800, 600, 1)
+    assert hello.containers["map"] == (700, 500)
+    assert hello.theme == "light"
+
+
+def test_a_page_under_a_prefix_says_its_own_path(host, tab):
+    tab.goto(f"{host.url}under/prefix/")
+    host.until(lambda: host.shown and host.one.hellos, tab=tab)
+    assert host.one.hellos[0].url == "/"
+
+
+def test_a_lost_link_is_said_and_comes_back(host, tab, opened):
+    host.drop()
+    tab.wait_for_selector("html.disconnected [role=status]", state="attached")
+    assert "restarting" in tab.inner_text("[role=status]")
+    wait(tab, "!document.documentElement.classList.contains('disconnected')")
+    tab.wait_for_selector("[role=status]", state="detached")
+    assert len(host.shown) == 1
+    assert len(opened.hellos) == 2
+    assert tab.locator(".robot").count() == 1
+    host.call(opened.robot.set_pose, 1, 2, 0)
+    wait(tab, "document.querySelector('.robot').transform.baseVal.length")
+
+
+def test_the_view_outlives_a_lost_link(host, tab, opened):
+    drag(tab, 33)
+    before = view(tab)
+    host.drop()
+    host.until(lambda: len(opened.hellos) == 2, tab=tab)
+    tab.wait_for_selector(".robot circle")
+    wait(tab, "!document.documentElement.classList.contains('disconnected')")
+    assert view(tab) == before
+    # What a program does is applied once, however often it is told.
+    host.call(opened.session.view, opened.root.id, "translate", 0, 5)
+    host.until(lambda: host.events(ViewReport)[-1].applied == 2, tab=tab)
+    assert view(tab)[5] == pytest.approx(before[5] + 5)
+
+
+def test_the_view_and_the_map_outlive_a_reload(host, tab, opened):
+    drag(tab, 33)
+    before = view(tab)
+    host.until(lambda: host.events(ViewReport)[-1].e == before[4], tab=tab)
+    host.call(opened.session.set_class, opened.inner, "selected", True)
+    tab.reload()
+    tab.wait_for_selector(".robot.selected circle")
+    assert len(host.shown) == 1
+    assert view(tab) == pytest.approx(before)
+    assert tab.inner_text("#label") == "there"
+
+
+def test_another_tab_is_another_page(host, tab, opened):
+    other = tab.context.new_page()
+    other.goto(host.url)
+    other.wait_for_selector(".robot circle")
+    assert len(host.shown) == 2
+
+
+def test_a_tab_that_a_page_opens_is_another_page(host, tab, opened):
+    # A duplicated tab has a copy of the session's storage, as this one has.
+    with tab.expect_popup() as popup:
+        tab.evaluate("void window.open(location.href)")
+    popup.value.wait_for_selector(".robot circle")
+    assert len(host.shown) == 2
+
+
+def test_a_display_that_hangs_is_noticed(host, tab, opened):
+    host.silent = True
+    tab.wait_for_selector("html.disconnected", state="attached", timeout=6000)
+    assert "says nothing" in tab.inner_text("[role=status]")
+    host.silent = False
+    wait(tab, "!document.documentElement.classList.contains('disconnected')")
+    assert len(opened.hellos) == 1
+
+
+def test_a_page_that_is_not_welcome_does_not_come_again(host, tab):
+    host.refuse = (1008, "there is no page at this address")
+    tab.goto(host.url)
+    tab.wait_for_selector("[role=status]:has-text('no page at this address')")
+    assert "Reload" in tab.inner_text("[role=status]")
+
+
+def frame_of(record: bytes) -> bytes:
+    return VERSION.to_bytes(2, "little") + bytes(13) + record
+
+
+def test_a_record_that_is_not_known_is_said_and_all_is_told_again(host, tab, opened):
+    frames = opened.frames
+    host.send(frame_of(b"\xfa"))
+    tab.wait_for_selector("[role=alert]:has-text('did not understand')")
+    host.until(lambda: "250" in str(host.events(Trouble)), tab=tab)
+    host.until(lambda: opened.frames > frames, tab=tab)
+    host.call(opened.robot.set_pose, 1, 2, 0)
+    wait(tab, "document.querySelector('.robot').transform.baseVal.length")
+
+
+def test_a_page_of_another_version_asks_for_a_reload(host, tab, opened):
+    host.send(b"\0\0" + bytes(13))
+    tab.wait_for_selector("[role=alert]:has-text('version')")
+    tab.wait_for_selector("[role=status]:has-text('Reload')")
+    hellos = len(opened.hellos)
+    tab.wait_for_timeout(600)
+    assert len(opened.hellos) == hellos
+
+
+@pytest.mark.parametrize("garbage", [b"", b"\1", frame_of(b"\x25\1\xff")])
+def test_garbage_does_not_break_the_page(host, tab, opened, garbage):
+    host.send(garbage)
+    tab.wait_for_selector("[role=alert]")
+    host.call(opened.robot.set_pose, 1, 2, 0)
+    wait(tab, "document.querySelector('.robot')?.transform.baseVal.length")
+
+
+def test_no_more_than_two_frames_are_on_the_way(host, tab, opened):
+    tab.evaluate(
+        """async () => {
+          const { page } = await import("/_webmap/page.js");
+          page.send = () => {};
+        }"""
+    )
+    tab.wait_for_timeout(100)
+    before = opened.frames
+    for x in range(10):
+        host.call(opened.robot.set_pose, x, 0, 0)
+        tab.wait_for_timeout(40)
+    assert opened.frames - before <= SceneSession.WINDOW

@@ -1,0 +1,115 @@
+"""What Python holds and what a real document holds are the same tree."""
+
+import base64
+import math
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "wire"))
+
+from wire_picture import f32, histories, play
+
+from webmap.geometry import Affine
+from webmap.scene import Text
+from webmap.wire import SceneSession
+
+pytestmark = pytest.mark.browser
+
+SHOW = """
+async (frames) => {
+  const { Scene } = await import("/_webmap/scene.js");
+  const said = [];
+  const scene = new Scene({
+    send() {},
+    notice: (text) => said.push(text),
+    error: (text) => said.push(text),
+    hear() {},
+    drive() {},
+    halves: { detachFrom() {} },
+  });
+  for (const frame of frames) {
+    const bytes = Uint8Array.from(atob(frame), (c) => c.charCodeAt(0));
+    scene.apply(bytes.buffer, performance.now() / 1000);
+  }
+  const plain = (node) => {
+    if (node.nodeType === Node.TEXT_NODE) return node.data;
+    const attributes = Object.fromEntries(
+      Array.from(node.attributes, ({ name, value }) => [name, value]),
+    );
+    const { class: classes = "", style, d, transform, ...rest } = attributes;
+    delete rest["data-age"];
+    const list = Array.from(node.transform?.baseVal ?? [], (t) => t.matrix);
+    const m = list.reduce((all, one) => all.multiply(one), new DOMMatrix());
+    return {
+      tag: node.localName,
+      svg: node.namespaceURI.endsWith("svg"),
+      attributes: rest,
+      classes: classes.split(" ").filter((name) => name && name !== "stale").sort(),
+      size: node.style.getPropertyValue("--dot-size"),
+      matrix: [m.a, m.b, m.c, m.d, m.e, m.f],
+      dots: (d ?? "").split("z").length - 1,
+      children: Array.from(node.childNodes, plain),
+    };
+  };
+  const roots = [...scene._mounts.values()].map(({ root }) => plain(root.element));
+  scene._ages.stop();
+  return { roots, said };
+}
+"""
+
+
+def expected(node, mount=None):
+    if isinstance(node, Text):
+        return node.data
+    transform = node._transform
+    matrix = [1, 0, 0, 1, 0, 0]
+    if isinstance(transform, Affine):
+        matrix = list(transform.values)
+    elif isinstance(transform, tuple):
+        x, y, yaw = transform
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        near = max(abs(x), abs(y)) < 4096
+        matrix = [cos, sin, -sin, cos, f32(x) if near else x, f32(y) if near else y]
+    elif transform == "scale(2)":
+        matrix = [2, 0, 0, 2, 0, 0]
+    if node._dots is not None:
+        matrix[:4] = [number * f32(node._dots.unit) for number in matrix[:4]]
+    return {
+        "tag": node.tag,
+        "svg": node.namespace == "svg",
+        "attributes": dict(node._attributes),
+        "classes": sorted({*node.classes, *(mount.classes if mount else ())}),
+        "size": node._styles.get("--dot-size", ""),
+        "matrix": pytest.approx(matrix, rel=1e-5, abs=1e-5),
+        "dots": len(node._dots.points) // 4 if node._dots else 0,
+        "children": [expected(child) for child in node.children],
+    }
+
+
+@pytest.fixture(scope="module")
+def blank(chromium, request):
+    from scene_host import SceneHost
+
+    with SceneHost() as host:
+        page = chromium.new_page()
+        page.goto(host.url)
+        yield page
+        page.close()
+
+
+@given(histories)
+@settings(
+    max_examples=60,
+    suppress_health_check=list(HealthCheck),
+    phases=[Phase.explicit, Phase.generate],
+)
+def test_any_history_of_a_scene_gives_the_same_document(blank, history):
+    session = SceneSession()
+    frames = [base64.b64encode(f).decode() for f in play(history, session)]
+    shown = blank.evaluate(SHOW, frames)
+    assert shown["said"] == []
+    mounts = list(session._mounts.values())
+    assert shown["roots"] == [expected(m.fragment.root, m) for m in mounts]

@@ -1,0 +1,387 @@
+"""The scene on a page, in a real Chromium."""
+
+import math
+import struct
+
+import pytest
+from scene_host import wait
+
+from webmap.geometry import Affine
+from webmap.scene import Fragment, html, svg
+from webmap.wire import ElementEvent, Trouble
+
+pytestmark = pytest.mark.browser
+
+
+def matrix(tab, selector):
+    """Return the matrix that an element has in its parent."""
+    return tab.evaluate(
+        """(selector) => {
+          const element = document.querySelector(selector);
+          const matrices = Array.from(element.transform.baseVal, (t) => t.matrix);
+          const start = new DOMMatrix();
+          const m = matrices.reduce((all, one) => all.multiply(one), start);
+          return [m.a, m.b, m.c, m.d, m.e, m.f];
+        }""",
+        selector,
+    )
+
+
+def test_a_robot_is_where_python_puts_it(host, tab):
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, _ = shown.add_robot(world, mount)
+        shown.robot.set_pose(1.5, -2, math.pi / 2)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector("#map > svg.webmap > g.world > g.robot > circle")
+    assert matrix(tab, ".robot") == pytest.approx([0, 1, -1, 0, 1.5, -2], abs=1e-6)
+    host.call(host.one.robot.set_pose, 500_000.125, 7, 0)
+    wait(tab, "document.querySelector('.robot').transform.baseVal[0].matrix.f === 7")
+    assert matrix(tab, ".robot") == pytest.approx([1, 0, 0, 1, 500_000.125, 7])
+    host.call(host.one.robot.set_matrix, Affine(2, 0, 0, 2, 3, 4))
+    wait(tab, "document.querySelector('.robot').transform.baseVal[0].matrix.f === 4")
+    host.call(host.one.robot.set, transform="translate(8 9)")
+    tab.wait_for_selector("[transform='translate(8 9)']")
+    host.call(host.one.robot.set_pose, 1, 2, 0)
+    wait(tab, "document.querySelector('.robot').transform.baseVal[0].matrix.f === 2")
+    assert (
+        tab.evaluate("document.querySelector('.robot').transform.baseVal.length") == 1
+    )
+
+
+def test_text_is_only_ever_text(host, tab):
+    evil = "<img src=x onerror=alert(1)>"
+
+    def build(shown):
+        shown.document.bind("label").text = evil
+        shown.document.bind("log").append(html.p(evil, title=evil))
+        root, _, _ = shown.add_map()
+        root.append(svg.title(evil))
+
+    host.build = build
+    tab.goto(host.url)
+    wait(tab, "document.querySelector('#label').textContent.startsWith('<')")
+    assert tab.inner_text("#label") == evil
+    assert tab.inner_text("#log > p") == evil
+    assert tab.locator("img").count() == 0
+
+
+def test_the_users_own_elements_are_filled_and_put_back(host, tab):
+    def build(shown):
+        label = shown.document.bind("label")
+        label.set(title="hello").classes.add("on")
+        shown.document.bind("log").append(html.strong("one"))
+        shown.document.bind("log").prepend("two ")
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector("#label.on.own[title=hello]")
+    assert tab.inner_text("#label") == "old"
+    assert tab.inner_text("#log") == "own texttwo one"
+    host.call(lambda: setattr(host.one.document.bind("log"), "text", "new"))
+    wait(tab, "document.querySelector('#log').textContent === 'new'")
+    host.call(lambda: host.one.document.bind("label").remove())
+    tab.wait_for_selector("#label:not(.on):not([title])")
+    host.call(lambda: host.one.session.unmount(host.one.page))
+    wait(tab, "document.querySelector('#log').textContent === ''")
+
+
+def test_an_id_that_the_page_lacks_is_said(host, tab):
+    def build(shown):
+        shown.document.bind("nowhere").text = "lost"
+        shown.document.bind("label").text = "found"
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector("#label:text('found')")
+    assert "nowhere" in tab.inner_text("[role=alert]")
+    (trouble,) = host.until(lambda: host.events(Trouble), tab=tab)
+    assert "nowhere" in trouble.text
+
+
+def test_addresses_lead_to_this_server_only(host, tab):
+    def build(shown):
+        shown.root, _, _ = shown.add_map()
+        shown.image = svg.image(href="/_webmap/images/x.png")
+        shown.root.append(shown.image)
+        # What the allow-list in Python would never let through.
+        shown.bad = svg.image()
+        shown.bad._attributes["href"] = "https://evil.example/x.png"
+        shown.root.append(shown.bad)
+
+    host.build = build
+    tab.goto(f"{host.url}under/prefix/")
+    tab.wait_for_selector("image[href]", state="attached")
+    prefix = f"{host.url}under/prefix/_webmap/"
+    assert tab.get_attribute("image[href]", "href") == f"{prefix}images/x.png"
+    assert tab.locator("image:not([href])").count() == 1
+    host.until(lambda: "evil" in str(host.events(Trouble)), tab=tab)
+
+
+def test_dots_are_squares_as_large_as_the_style_says(host, tab):
+    points = struct.pack("<4h", 1000, 2000, -1000, 0)
+
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, _ = shown.add_robot(world, mount)
+        shown.dots = svg.path(class_="dot")
+        shown.dots.set_dots(points, 0.001)
+        shown.robot.append(svg.g(shown.dots, class_="laserscan"))
+
+    host.build = build
+    tab.goto(host.url)
+    square = "h60v60h-60z"
+    tab.wait_for_selector(
+        f"path[d='M970 1970{square}M-1030 -30{square}']", state="attached"
+    )
+    assert matrix(tab, ".dot") == pytest.approx([0.001, 0, 0, 0.001, 0, 0])
+    style = "getComputedStyle(document.querySelector('.dot')).shapeRendering"
+    assert tab.evaluate(style) == "crispedges"
+    # The size follows the style, without new points.
+    host.call(host.one.robot.classes.add, "thick")
+    tab.wait_for_selector("path[d^='M900 1900h200v200h-200z']", state="attached")
+    # The unit and a pose of its own go together.
+    host.call(host.one.dots.set_pose, 3, 4, 0)
+    host.call(host.one.dots.set_dots, points, 0.01)
+    tab.wait_for_selector("path[d^='M990 1990h20v20h-20z']", state="attached")
+    assert matrix(tab, ".dot") == pytest.approx([0.01, 0, 0, 0.01, 3, 4])
+
+
+def test_ages_go_on_by_themselves(host, tab):
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, _ = shown.add_robot(world, mount)
+        shown.robot.set_age(0.2, limit=0.5)
+        shown.document.bind("label").append(html.span(class_="age"))
+        shown.span = shown.document.bind("label").children[0]
+        shown.span.set_age(math.inf, age_text=True)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".robot:not(.stale)")
+    tab.wait_for_selector(".age.stale:text('no data')")
+    tab.wait_for_selector(".robot.stale", timeout=5000)
+    assert float(tab.get_attribute(".robot", "data-age")) >= 0.5
+    host.call(host.one.robot.set_age, 0)
+    tab.wait_for_selector(".robot:not(.stale)")
+    host.call(host.one.span.set_age, 75)
+    tab.wait_for_selector(".age.stale:text('75 s')")
+    tab.wait_for_selector(".age.stale:text('76 s')", timeout=5000)
+
+
+def test_ages_go_on_while_the_server_is_gone(host, tab):
+    tab.allowed = ["ERR_CONNECTION_REFUSED", "WebSocket connection"]
+
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, _ = shown.add_robot(world, mount)
+        shown.robot.set_age(0, limit=0.6)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".robot:not(.stale)")
+    host.__exit__()
+    tab.wait_for_selector("html.disconnected .robot.stale", timeout=8000)
+    assert "No connection" in tab.inner_text("[role=status]")
+    before = float(tab.get_attribute(".robot", "data-age"))
+    wait(
+        tab,
+        f"document.querySelector('.robot').dataset.age > {before} + 0.4",
+    )
+
+
+def test_a_class_of_a_mount_is_of_this_page_only(host, tab):
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, shown.robot_mount = shown.add_robot(world, mount)
+        shown.session.set_class(shown.robot_mount, "selected", True)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".robot.selected")
+    host.call(host.one.robot.classes.add, "fast")
+    tab.wait_for_selector(".robot.selected.fast")
+    assert "selected" not in host.one.robot.classes
+    host.call(host.one.session.set_class, host.one.robot_mount, "selected", False)
+    tab.wait_for_selector(".robot.fast:not(.selected)")
+
+
+def test_mounts_lie_in_their_order_around_own_children(host, tab):
+    def build(shown):
+        _, world, mount = shown.add_map()
+        world.append(svg.g(id="own"))
+        for order in (2, -1, 1, -2, 1):
+            shown.add_robot(world, mount, name=f"o{order}", order=order)
+        world.append(svg.g(id="own2"))
+        world.prepend(svg.g(id="own0"))
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector("[data-robot=o2]")
+    order = """[...document.querySelectorAll('.world > g')].map(
+      (g) => g.dataset.robot ?? g.id)"""
+    own = ["own0", "own", "own2"]
+    assert tab.evaluate(order) == ["o-2", "o-1", *own, "o1", "o1", "o2"]
+    shown = host.one
+    world = shown.session._mounts[2].fragment.root.children[0]
+    host.call(lambda: world.insert(1, svg.g(id="later")))
+    tab.wait_for_selector("#later", state="attached")
+    own.insert(1, "later")
+    assert tab.evaluate(order) == ["o-2", "o-1", *own, "o1", "o1", "o2"]
+
+
+def test_one_fragment_is_shown_on_two_maps(host, tab):
+    def build(shown):
+        shown.robot = svg.g(class_="robot")
+        fragment = Fragment(shown.robot)
+        for container in ("map", "log"):
+            _, world, mount = shown.add_map(300, 200, container)
+            shown.session.mount(fragment, under=world.id, within=mount)
+
+    host.build = build
+    tab.goto(host.url)
+    wait(tab, "document.querySelectorAll('.robot').length === 2")
+    host.call(lambda: host.one.robot.append(svg.circle(r=1)))
+    host.call(host.one.robot.set_pose, 5, 6, 0)
+    wait(tab, "document.querySelectorAll('.robot circle').length === 2")
+    wait(tab, "document.querySelector('.robot').transform.baseVal.length")
+    for place in ("#map", "#log"):
+        assert matrix(tab, f"{place} .robot") == [1, 0, 0, 1, 5, 6]
+
+
+def test_a_click_tells_where_in_the_world_it_was(host, tab):
+    def build(shown):
+        shown.root, world, mount = shown.add_map()
+        shown.robot, inner = shown.add_robot(world, mount)
+        shown.session.view(shown.root.id, "scale", 10)
+        shown.root.on("click", print)
+        shown.session.listen(inner, shown.robot.id, "click", stop=True)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".robot circle")
+    tab.mouse.click(10 + 350 + 20, 5 + 250 - 10)
+    (event,) = host.until(lambda: host.events(ElementEvent), tab=tab)
+    assert event.element == host.one.robot.id
+    assert (event.x, event.y) == pytest.approx((370, 240))
+    assert (event.world_x, event.world_y) == pytest.approx((2, 1))
+    tab.mouse.click(10 + 350 + 200, 5 + 250 - 100, button="left")
+    host.until(lambda: len(host.events(ElementEvent)) == 2, tab=tab)
+    missed = host.events(ElementEvent)[1]
+    assert missed.element == host.one.root.id
+    assert (missed.world_x, missed.world_y) == pytest.approx((20, 10))
+
+
+def test_a_framed_map_is_measured_within_its_frame(host, tab):
+    def build(shown):
+        shown.root, _, _ = shown.add_map(400, 300)
+        shown.root.classes.add("framed")
+        shown.root.on("click", print)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".framed")
+    tab.mouse.click(10 + 5 + 100, 5 + 5 + 50)
+    (event,) = host.until(lambda: host.events(ElementEvent), tab=tab)
+    assert (event.x, event.y) == pytest.approx((100, 50))
+    assert (event.world_x, event.world_y) == pytest.approx((-100, 100))
+
+
+def test_inputs_and_keys_tell_what_they_hold(host, tab):
+    def build(shown):
+        shown.box = html.input(type="checkbox", id="box")
+        shown.field = html.input(type="text", id="field", value="a")
+        shown.document.bind("label").append(shown.box, shown.field)
+        shown.box.on("change", print)
+        shown.field.on("input", print)
+        shown.field.on("keydown", print, prevent=True)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.check("#box")
+    tab.focus("#field")
+    tab.keyboard.press("Shift+X")
+    tab.fill("#field", "typed")
+    host.until(lambda: len(host.events(ElementEvent)) == 4, tab=tab)
+    change, shift, key, typed = host.events(ElementEvent)
+    assert (change.event, change.checked) == ("change", True)
+    assert (shift.key, key.key, key.shift) == ("Shift", "X", True)
+    # The key itself was prevented.
+    assert (typed.event, typed.value) == ("input", "typed")
+    # A hand unticked what Python has ticked: Python can tick it again.
+    host.call(host.one.box.set, checked=True)
+    tab.wait_for_timeout(100)
+    tab.uncheck("#box")
+    host.call(host.one.box.set, checked=True)
+    wait(tab, "document.querySelector('#box').checked")
+    host.call(host.one.field.set, value="python")
+    wait(tab, "document.querySelector('#field').value === 'python'")
+
+
+def test_nobody_hears_any_more_after_the_removal(host, tab):
+    def build(shown):
+        shown.button = html.button("Go", id="go")
+        shown.removal = shown.button.on("click", print)
+        shown.document.bind("label").append(shown.button)
+
+    host.build = build
+    tab.goto(host.url)
+    tab.click("#go")
+    host.until(lambda: host.events(ElementEvent), tab=tab)
+    frames = host.one.frames
+    host.call(host.one.removal.remove)
+    host.until(lambda: host.one.frames > frames, tab=tab)
+    tab.evaluate(
+        """async () => {
+          const { page } = await import("/_webmap/page.js");
+          const send = page.send.bind(page);
+          window.sent = [];
+          page.send = (message) => { window.sent.push(message.op); send(message); };
+        }"""
+    )
+    tab.wait_for_timeout(50)
+    tab.click("#go")
+    tab.wait_for_timeout(100)
+    sent = tab.evaluate("window.sent")
+    assert "event" not in sent
+
+
+def test_a_thousand_elements_come_and_go_and_leave_nothing(host, tab):
+    def build(shown):
+        shown.root, shown.world, shown.mount = shown.add_map()
+
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".world", state="attached")
+    shown = host.one
+
+    def come_and_go():
+        for _ in range(50):
+            robot, mount = shown.add_robot(shown.world, shown.mount)
+            robot.set_age(0)
+            robot.append(svg.path(class_="dot"))
+            robot.children[1].set_dots(bytes(4), 0.001)
+            robot.on("click", print)
+            shown.coming.append(mount)
+
+    def go():
+        for mount in shown.coming:
+            shown.session.unmount(mount)
+        shown.coming = []
+
+    shown.coming = []
+    for _ in range(20):
+        host.call(come_and_go)
+        wait(tab, "document.querySelectorAll('.robot').length === 50")
+        host.call(go)
+        wait(tab, "document.querySelectorAll('.robot').length === 0")
+    left = tab.evaluate(
+        """async () => {
+          const { scene } = (await import("/_webmap/page.js")).page;
+          return [scene._mounts.size, scene._fragments.size, scene._ages._ages.size,
+            scene._dots._all.size, document.querySelectorAll("svg *").length];
+        }"""
+    )
+    assert left == [2, 2, 0, 0, 1]
