@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from webmap.core.motion import MotionRoad, roads
 from webmap.core.robot import robots
 from webmap.core.tasks import spawn
-from webmap.gate.messages import RobotReport, SentGoal, SentTwist
+from webmap.gate.messages import Report, RobotReport, SentGoal, SentTwist
 from webmap.geometry import Quaternion
 from webmap.lifecycle import lifecycle
 from webmap.scope import Removal
@@ -123,7 +123,11 @@ class Runtime:
 
         loop = self._loop = asyncio.get_running_loop()
         gate = self.gate = GateClient()
-        gate.on_report(lambda report: loop.call_soon_threadsafe(self._heard, report))
+
+        def hop(report: Report) -> None:
+            loop.call_soon_threadsafe(self._heard, report)
+
+        gate.on_report(hop)
         gate.start()
         try:
             lifecycle.begin(loop)
@@ -156,7 +160,7 @@ class Runtime:
                     log.exception("a frame for %r failed", watcher)
             await asyncio.sleep(max(0.0, due - loop.time()))
 
-    def _heard(self, report: object) -> None:
+    def _heard(self, report: Report) -> None:
         name = getattr(report, "robot", None)
         robot = None if name is None else robots.get(name)
         if robot is None:

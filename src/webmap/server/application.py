@@ -12,6 +12,7 @@ from webmap.errors import WebMapError
 
 if TYPE_CHECKING:
     from webmap.gate.client import DriveConnection
+    from webmap.gate.messages import Role
     from webmap.server.app import WebApp
     from webmap.server.settings import Authenticate
 
@@ -118,8 +119,9 @@ def run(
     """
     global has_run
     has_run = True
-    options = {"host": host, "port": port, "open_browser": open_browser}
-    options |= {"insecure_lan": insecure_lan} | command_line
+    options: dict[str, Any] = {"host": host, "port": port}
+    options |= {"open_browser": open_browser, "insecure_lan": insecure_lan}
+    options |= command_line
     _serve(token=token, **options)
 
 
@@ -188,7 +190,7 @@ class _Gate:
     def connect(
         self,
         name: str,
-        role: str,
+        role: "Role",
         send: Callable[[str], None],
         close: Callable[[str], None],
     ) -> "DriveConnection":
