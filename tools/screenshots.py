@@ -110,7 +110,8 @@ def drive(page: Page) -> None:
             return
         page.keyboard.up("w")
         page.wait_for_timeout(500)
-    raise SystemExit("the robot could not be driven; what the demo said is above")
+    said = page.locator(".webmap-teleop-state").inner_text()
+    raise SystemExit(f"the robot could not be driven: {said}")
 
 
 def main(names: list[str]) -> None:

@@ -37,17 +37,15 @@ def test_the_list_says_age_battery_and_who_drives(open_console):
     expect(first.locator(".age")).to_have_text(re.compile(r"^0\.\d s$"))
 
 
-def test_who_drives_reads_you_and_others_read_that_somebody_does(open_console):
+def test_who_holds_a_robot_reads_you_and_others_read_a_name(open_console):
     mine, theirs = open_console(), open_console()
     row(mine, "Robot 2").click()
-    mine.bring_to_front()
-    mine.keyboard.down("s")
+    mine.get_by_role("button", name="Take Robot 2").click()
     expect(mine.locator("#card .state .you")).to_be_visible()
-    expect(mine.locator("#card .state")).to_contain_text("You")
+    expect(mine.locator("#card .state .you")).to_have_text("You hold it")
     other = theirs.locator('#robots [aria-pressed]:has-text("Robot 2") .holder')
-    expect(other).to_contain_text(re.compile("drives|holds it"))
+    expect(other).to_contain_text("holds it")
     expect(other).to_be_visible()
-    mine.keyboard.up("s")
     mine.get_by_role("button", name="Hand back", exact=True).click()
     expect(mine.locator("#card .state .holder")).to_have_text("Free")
 
@@ -140,12 +138,26 @@ def test_the_view_s_buttons_zoom_and_show_everything(open_console):
     assert scale_of(page) == pytest.approx(whole, rel=0.02)
 
 
-def test_follow_keeps_the_robot_in_its_place_until_pressed_again(open_console):
+def assert_in_the_middle(page: Page) -> None:
+    off = page.evaluate(
+        """() => {
+          const map = document.querySelector("svg.webmap").getBoundingClientRect();
+          const { e, f } = document.querySelector(".robot.selected").getCTM();
+          return [e - map.width / 2, f - map.height / 2];
+        }"""
+    )
+    assert off == pytest.approx([0, 0], abs=3)
+
+
+def test_follow_keeps_the_robot_in_the_middle_until_pressed_again(open_console):
     page = open_console()
     row(page, "Robot 4").click()
     follow = page.get_by_role("button", name="Follow")
     follow.click()
     expect(follow).to_have_attribute("aria-pressed", "true")
+    for _ in range(2):
+        page.get_by_role("button", name="Zoom in").click()
+        assert_in_the_middle(page)
     follow.click()
     expect(follow).to_have_attribute("aria-pressed", "false")
 

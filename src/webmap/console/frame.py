@@ -78,9 +78,15 @@ class Frame:
             self.map.root.set_style("--dot-size", round(size, 3))
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Follow the selected robot, which the page asks for."""
-        if message.get("op") == "follow":
-            self.map.follow(self.map.selected)
+        """Follow the selected robot, from the middle, which the page asks for."""
+        robot = self.map.selected
+        if message.get("op") != "follow" or robot is None:
+            return
+        x, y = self.map.world.tf.apply(robot.position.x, robot.position.y)
+        self.map.translate(
+            self.map.canvas_width / 2 - x, self.map.canvas_height / 2 - y
+        )
+        self.map.follow(robot)
 
     def _around_robots(self) -> Bounds | None:
         places = [robot.position for robot in self.map.robots if robot.valid]

@@ -53,10 +53,14 @@ export function listenToTools(map, options, signal) {
 /**
  * @param {MapCanvas} map
  * @param {number} factor
- * @returns {Matrix} The view, zoomed about its middle.
+ * @returns {Matrix} The view, zoomed about the robot that is followed, or its middle.
  */
-function zoom({ view, width, height }, factor) {
-  const [x, y] = [width / 2, height / 2];
+function zoom(map, factor) {
+  const { view } = map;
+  const [x, y] = (map.following && placeOfSelected(map)) || [
+    map.width / 2,
+    map.height / 2,
+  ];
   return {
     a: view.a * factor,
     b: view.b * factor,
@@ -82,4 +86,15 @@ function showAll({ world, width, height }, bounds) {
   const e = width / 2 - scale * (x + across / 2);
   const f = height / 2 + scale * (y + up / 2);
   return { a: scale, b: 0, c: 0, d: -scale, e, f };
+}
+
+/**
+ * @param {MapCanvas} map
+ * @returns {[number, number] | null} Where the selected robot is, in the map's pixels.
+ */
+function placeOfSelected({ world }) {
+  const robot = world.querySelector(".robot.selected");
+  if (!(robot instanceof SVGGraphicsElement)) return null;
+  const matrix = robot.getCTM();
+  return matrix && [matrix.e, matrix.f];
 }
