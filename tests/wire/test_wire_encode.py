@@ -32,6 +32,19 @@ def test_text_comes_after_its_length(text):
     assert (len(data), data.decode()) == (length, text)
 
 
+def records_since(fragment, revision):
+    """Return the records of what changed, without the head of their section."""
+    head = bytes([Op.DELTA]) + varint(fragment.id)
+    data = encode_changes(fragment, revision)
+    assert data.startswith(head)
+    return data[len(head) :]
+
+
+def test_nothing_changed_is_nothing_to_say():
+    fragment = Fragment(svg.g())
+    assert encode_changes(fragment, fragment.revision) == b""
+
+
 def test_half_a_character_becomes_a_mark():
     assert string("a\ud800") == b"\x02a?"
 
@@ -40,7 +53,7 @@ def test_a_pose_is_at_most_18_bytes():
     root = svg.g()
     fragment = Fragment(root)
     root.set_pose(1.5, -2, 0.25)
-    data = encode_changes(fragment, 0)
+    data = records_since(fragment, 0)
     assert data == bytes([Op.POSE]) + varint(root.id) + struct.pack(
         "<fff", 1.5, -2, 0.25
     )
@@ -52,7 +65,7 @@ def test_a_dot_is_two_bytes_a_coordinate():
     path = svg.path()
     fragment = Fragment(path)
     path.set_dots(bytes(4 * 360), 0.001)
-    data = encode_changes(fragment, 0)
+    data = records_since(fragment, 0)
     assert len(data) - 4 * 360 <= 1 + len(varint(path.id)) + 4 + 2
 
 
@@ -60,7 +73,7 @@ def test_far_poses_keep_millimetres():
     root = svg.g()
     fragment = Fragment(root)
     root.set_pose(500_000.123, 5_000_000.456, 7)
-    data = encode_changes(fragment, 0)
+    data = records_since(fragment, 0)
     assert data[0] == Op.FAR_POSE
     x, y, yaw = struct.unpack("<ddf", data[-20:])
     assert (x, y) == (500_000.123, 5_000_000.456)
@@ -110,6 +123,6 @@ def test_an_unset_attribute_is_sent_as_such():
     fragment = Fragment(root)
     root.set(fill=None, data_name="Bob")
     root.unset("data-name")
-    ops = encode_changes(fragment, 0)
+    ops = records_since(fragment, 0)
     assert ops[0] == Op.UNSET
     assert ops.endswith(b"\x09data-name")

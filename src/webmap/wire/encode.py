@@ -71,7 +71,8 @@ def encode_changes(fragment: Fragment, since: int) -> bytes | None:
         since: The revision that the page has.
 
     Returns:
-        Records without their section's head, or None if only a snapshot will do.
+        The section of the fragment, empty if nothing changed after all, or None if
+        only a snapshot will do.
 
     """
     memo = _memo(fragment)
@@ -95,9 +96,9 @@ def encode_snapshot(fragment: Fragment) -> bytes:
 
 def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
     changes = fragment.changes_since(since)
-    if changes is None:
-        return None
-    out = bytearray()
+    if not changes:
+        return None if changes is None else b""
+    out = bytearray([Op.DELTA]) + varint(fragment.id)
     for change in changes:
         match change:
             case Changed(node, slot):

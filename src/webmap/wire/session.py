@@ -29,7 +29,6 @@ from webmap.wire.mounts import Mount, flags
 from webmap.wire.opcodes import RESET, VERSION, Op
 
 _HEADER = struct.Struct("<HBId").pack
-_DELTA = bytes((Op.DELTA,))
 
 
 class SceneSession:
@@ -339,15 +338,16 @@ class SceneSession:
     def _changes(self) -> bytes | None:
         """Return what is new since the last frame; None if it was forgotten."""
         parts: list[bytes | bytearray] = [self._gone]
-        for fragment, known in self._fragments.items():
-            if known is not None and known != fragment.revision:
+        fragments = self._fragments
+        for fragment, known in fragments.items():
+            revision = fragment.revision
+            if known != revision and known is not None:
                 changes = encode_changes(fragment, known)
                 if changes is None:
                     self._tell_all = True
                     return None
-                if changes:
-                    parts += (_DELTA, varint(fragment.id), changes)
-                self._fragments[fragment] = fragment.revision
+                parts.append(changes)
+                fragments[fragment] = revision
         parts += [self._place(self._mounts[number]) for number in self._new]
         return b"".join((*parts, self._records, *self._messages))
 
