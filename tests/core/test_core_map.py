@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from webmap import Map, Robot, svg
 from webmap.core.view import Rect, apply_operation, initial_view
 from webmap.errors import ConfigError
+from webmap.geometry import Vector3
 
 POINTS = st.floats(-2000, 2000)
 
@@ -66,6 +67,21 @@ def test_operations_go_to_the_browser_in_order(container, channel):
     map.scale(2)
     map.translate(1, 2)
     assert channel.calls == [("scale", 2, 100, 100), ("translate", 1, 2)]
+
+
+def test_a_robot_in_sight_is_followed_where_it_is(container, channel):
+    map, robot = Map(container, 200, 100), Robot("Bob")
+    map.follow(robot)
+    assert channel.calls == [("follow", robot.svg.id)]
+
+
+def test_a_robot_out_of_sight_is_followed_in_the_middle(container, channel):
+    map, robot = Map(container, 200, 100), Robot("Bob")
+    robot.position = Vector3(150.0, 20.0)
+    map.follow(robot)
+    assert channel.calls == [("translate", -150, 20), ("follow", robot.svg.id)]
+    map.follow(None)
+    assert channel.calls[-1] == ("follow", 0)
 
 
 class Witness:

@@ -308,7 +308,12 @@ class Map(Extendable):
         self._operate("fit", x, y, x + width, y + height)
 
     def follow(self, robot: Robot | None) -> None:
-        """Keep a robot where it is on the screen, until the viewer moves the view."""
+        """Keep a robot where it is on the screen, until the viewer moves the view.
+
+        A robot that is out of sight is brought to the middle first.
+        """
+        if robot is not None:
+            self._bring_into_sight(robot)
         self._operate("follow", 0 if robot is None else robot.svg.id)
 
     def on_view_report(self, tf: Affine, rect: Rect) -> None:
@@ -360,6 +365,12 @@ class Map(Extendable):
     def _operate(self, operation: str, *args: float) -> None:
         self.world.tf = apply_operation(self.world.tf, self._rect, operation, args)
         self.page.channel.view(self.root.id, operation, *args)
+
+    def _bring_into_sight(self, robot: Robot) -> None:
+        x, y = self.world.tf.apply(robot.position.x, robot.position.y)
+        width, height = self.canvas_width, self.canvas_height
+        if not (0 <= x <= width and 0 <= y <= height):
+            self.translate(width / 2 - x, height / 2 - y)
 
     def _point(self, x: float | None, y: float | None) -> tuple[float, float]:
         return (
