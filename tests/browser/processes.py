@@ -3,6 +3,7 @@
 import os
 import re
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,9 +22,11 @@ expect.set_options(timeout=10_000)
 class Process:
     """A command of ours that runs until the test has seen enough."""
 
-    def __init__(self, *command: object, cwd: Path | None = None) -> None:
+    def __init__(
+        self, *command: object, cwd: Path | None = None, module: str = "webmap"
+    ) -> None:
         self.popen = subprocess.Popen(
-            [sys.executable, "-m", "webmap", *map(str, command)],
+            [sys.executable, "-m", module, *map(str, command)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             cwd=cwd,
@@ -75,8 +78,13 @@ class Process:
 
 
 @contextmanager
-def running(*command: object, pattern: str, cwd: Path | None = None) -> Iterator:
-    process = Process(*command, cwd=cwd)
+def running(
+    *command: object,
+    pattern: str,
+    cwd: Path | None = None,
+    module: str = "webmap",
+) -> Iterator:
+    process = Process(*command, cwd=cwd, module=module)
     try:
         process.url = process.ready(pattern)
         yield process
@@ -90,6 +98,25 @@ WEB = r"WebMap is ready at (\S+)\n"
 BRIDGE = r"rosbridge is ready at (\S+)\n"
 
 
+@contextmanager
+def serving(script: str, bridge: str, folder: Path) -> Iterator:
+    """Run an example as it stands, but for the address of the rosbridge.
+
+    Args:
+        script: Its path below the examples.
+        bridge: The rosbridge's URL.
+        folder: Where its copy goes.
+
+    """
+    shutil.copytree((EXAMPLES / script).parent, folder, dirs_exist_ok=True)
+    copy = folder / Path(script).name
+    text = copy.read_text()
+    assert text.count("ws://localhost:9090") == 1
+    copy.write_text(text.replace("ws://localhost:9090", bridge))
+    with running("run", copy, "--port", 0, "--no-browser", pattern=WEB) as process:
+        yield process
+
+
 def matrix(tab: Page, selector: str) -> list[float]:
     """Return the matrix of an element's own place, as the browser draws it."""
     return tab.locator(selector).first.evaluate(
@@ -98,6 +125,14 @@ def matrix(tab: Page, selector: str) -> list[float]:
         " for (const t of e.transform.baseVal) m.multiplySelf(t.matrix);"
         " return [m.a, m.b, m.c, m.d, m.e, m.f]; }"
     )
+
+
+def place_on_screen(tab: Page, selector: str) -> tuple[float, float]:
+    """Return where an SVG element's origin is in the window, in pixels."""
+    x, y = tab.locator(selector).evaluate(
+        "e => { const m = e.getScreenCTM(); return [m.e, m.f]; }"
+    )
+    return x, y
 
 
 def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
@@ -109,3 +144,22 @@ def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
             return value
         time.sleep(0.05)
     raise AssertionError(f"{what} did not happen within {within} s")
+
+
+def hold(keyboard, key: str, condition, within: float = 30.0) -> None:
+    """Hold a key until it has its effect, and keep holding it.
+
+    On a machine that is too busy to run the page at its pace a press does nothing,
+    since nothing may move by a late command. Like a person, this presses again.
+    """
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
+        time.sleep(0.5)
+        keyboard.down(key)
+        patience = time.monotonic() + 3.0
+        while time.monotonic() < patience:
+            if condition():
+                return
+            time.sleep(0.02)
+        keyboard.up(key)
+    raise AssertionError(f"{key} had no effect within {within} s")
