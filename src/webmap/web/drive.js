@@ -172,14 +172,20 @@ export class Drive {
     if (![x, y, yaw].every(Number.isFinite)) {
       throw new Error(`A goal needs finite numbers, got ${x}, ${y}, ${yaw}.`);
     }
-    if (this._pilot.epoch(robot) === null) {
+    const taken = this._pilot.epoch(robot) === null;
+    if (taken) {
       this._send([{ op: "take", robot }]);
       await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
     }
     const goal = this._pilot.goal(robot, { x, y, yaw }, performance.now());
     this._send([goal]);
     this._tell("goal", robot);
-    await this._until(robot, "goal", () => this._loop.acknowledged(goal.seq));
+    try {
+      await this._until(robot, "goal", () => this._loop.acknowledged(goal.seq));
+    } catch (error) {
+      if (taken) this.release(robot);
+      throw error;
+    }
   }
 
   /**
@@ -204,8 +210,7 @@ export class Drive {
     const left = this._line.open;
     if (left) this._line.send({ op: "stop", robot });
     else this._unsent.add(robot);
-    this._pilot.doubt(performance.now());
-    this._step();
+    this._pilot.stopped(robot, performance.now());
     this._tell("stop", robot);
     return left;
   }

@@ -391,6 +391,22 @@ describe("leases", () => {
     assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);
   });
 
+  test("end with a STOP, at once and without a word", () => {
+    const epoch = bench.drive();
+    bench.pilot.stopped("r1", bench.now);
+    bench.grant("r1", epoch);
+    assert.deepEqual(bench.run(500), []);
+    bench.pilot.refuse("r1", "drive", "nobody has taken it", bench.now);
+    assert.equal(bench.pilot.status.refusal, null);
+  });
+
+  test("on other robots do not end with the STOP of one", () => {
+    bench.drive();
+    bench.pilot.stopped("r2", bench.now);
+    assert.equal(bench.pilot.driven, "r1");
+    assert.deepEqual(moves(bench.run(500)), [], "but the hands are dead");
+  });
+
   test("end with the connection", () => {
     bench.drive();
     bench.pilot.disconnect();

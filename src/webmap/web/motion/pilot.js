@@ -219,6 +219,25 @@ export class Pilot {
     this._unsettle();
   }
 
+  /**
+   * STOP was said: the leases of that robot, or of all, are over by that.
+   *
+   * @param {string} robot Or "*".
+   * @param {number} now
+   */
+  stopped(robot, now) {
+    this.hands.kill(now);
+    this._unsettle();
+    if (robot === "*") this._parked.clear();
+    this._parked.delete(robot);
+    if (robot !== "*" && robot !== this._lease?.robot && robot !== this._asked?.robot) {
+      return;
+    }
+    if (this._lease) this._given.set(this._lease.robot, this._lease.epoch);
+    this._asked = null;
+    this._drop();
+  }
+
   /** Forget all leases: they ended with the connection. */
   disconnect() {
     this._asked = null;
@@ -282,6 +301,8 @@ export class Pilot {
    */
   refuse(robot, what, why, now) {
     if (robot !== this.choice) return;
+    // A command that met the end of its lease on the way is no news.
+    if (what === "drive" && !this._lease) return;
     this.refusal = why;
     if (what === "take" && this._asked?.robot === robot) this._giveUp(now);
     if (what === "drive") this.doubt(now);
