@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.console")
 
+PRODUCT = "WebMap"
+"""What the bar says in any case."""
+
 SPEED = 1.0
 ROTATION_SPEED = 1.5
 """What the keys ask for at most, in m/s and rad/s; each robot's own limits hold too."""
@@ -34,7 +37,7 @@ def open_console(
     robots: Sequence[RobotDescription],
     *,
     floor: Path | None = None,
-    title: str = "WebMap",
+    title: str = PRODUCT,
 ) -> None:
     """Make the console the page at ``/``.
 
@@ -64,7 +67,7 @@ def build(
     title: str,
 ) -> None:
     """Fill one viewer's page."""
-    page.element("title").text = title
+    page.element("title").text = "" if title == PRODUCT else title
     map = webmap.Map(page.element("map"))
     if floor is not None:
         show_floor(map, floor)

@@ -1,0 +1,108 @@
+"""The modules of maps that the console brings, without their browser halves."""
+
+from pathlib import Path
+
+import pytest
+
+from webmap import Map, Robot
+from webmap.core.page import Page, PageEntry
+from webmap.modules.map.follow import Follow
+from webmap.modules.map.goal_tool import GoalTool
+from webmap.modules.map.pointer_readout import PointerReadout
+from webmap.modules.map.scale_bar import ScaleBar
+from webmap.modules.map.stop_button import StopButton
+from webmap.server.viewer import Viewer
+from webmap.wire.session import SceneSession
+
+WEB = Path(__file__).parents[2] / "src" / "webmap" / "web"
+
+
+class Hearing:
+    """Writes down what the goal tool's triggers tell."""
+
+    def __init__(self, map: Map) -> None:
+        self.heard: list[tuple] = []
+
+    def on_goal_sent(self, *told) -> None:
+        self.heard.append(("sent", *told))
+
+    def on_goal_canceled(self, *told) -> None:
+        self.heard.append(("canceled", *told))
+
+
+@pytest.fixture
+def map():
+    entry = PageEntry("/", lambda page: None, None, Path(), "test")
+    session = SceneSession()
+    session.attached = []
+    attach = session.attach
+    session.attach = lambda *args, **kw: (session.attached.append(args), attach(*args))
+    page = Page(entry, session, Viewer("v1", "Ann"), None, {"map": (800.0, 600.0)})
+    with page.scope.active():
+        yield Map(page.element("map"))
+    page.close()
+
+
+@pytest.mark.parametrize(
+    "factory", [Follow, GoalTool, PointerReadout, ScaleBar, StopButton]
+)
+def test_a_module_names_files_that_are_there(map, factory):
+    map.add_module(factory)
+    _, _, script, _, style = map.page.channel.attached[0]
+    assert (WEB / script).is_file()
+    assert (WEB / style).is_file()
+
+
+@pytest.mark.parametrize(
+    ("factory", "options"),
+    [
+        (ScaleBar, {"width": 5}),
+        (PointerReadout, {"digits": -1}),
+        (PointerReadout, {"digits": 9}),
+        (GoalTool, {"key": "gg"}),
+        (GoalTool, {"key": ""}),
+    ],
+)
+def test_an_option_that_makes_no_sense_is_refused(map, factory, options):
+    with pytest.raises(ValueError, match=factory.__name__):
+        map.add_module(factory, **options)
+
+
+def test_a_goal_that_the_page_sent_fires_a_trigger(map):
+    robot = Robot("Bob")
+    map.add_robot(robot)
+    tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
+    tool.on_message({"goal": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
+    tool.on_message({"cancel": robot.id})
+    assert hearing.heard == [("sent", robot, 1, 2.0, 0.5), ("canceled", robot)]
+    robot.destroy()
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {},
+        {"goal": None},
+        {"goal": {"robot": "r999", "x": 1, "y": 2, "yaw": 0}},
+        {"goal": {"robot": "r999"}},
+        {"cancel": 5},
+        {"cancel": "r999"},
+    ],
+)
+def test_nonsense_of_a_page_fires_nothing(map, message):
+    tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
+    tool.on_message(message)
+    assert hearing.heard == []
+
+
+def test_a_view_follows_only_a_robot_of_its_map(map):
+    robot, stranger = Robot("Bob"), Robot("Ann")
+    map.add_robot(robot)
+    followed = []
+    map.follow = followed.append
+    follow = map.add_module(Follow)
+    for id in (robot.id, stranger.id, None):
+        follow.on_message({"follow": id})
+    assert followed == [robot, None, None]
+    for one in (robot, stranger):
+        one.destroy()
