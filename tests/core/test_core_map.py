@@ -241,3 +241,16 @@ def test_teleop_refuses_speeds_that_are_none(container):
     for speed in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(ValueError, match="speed"):
             map.add_module("Teleop", speed, 1.0)
+
+
+def test_the_speeds_of_a_page_are_those_of_the_map_that_the_hands_are_at(page):
+    slow = Map(page.element("a"), 10, 10).add_module("Teleop", 0.2, 0.4)
+    fast = Map(page.element("b"), 10, 10).add_module("Teleop", 1.0, 1.5)
+    assert page.speeds == (0.2, 0.4), "nobody knows yet, so the least"
+    fast.on_message({"active": True})
+    assert page.speeds == (1.0, 1.5)
+    slow.on_message({"active": True})
+    fast.on_message({"active": False})
+    assert page.speeds == (0.2, 0.4)
+    fast.map.remove_module(fast)
+    assert page.speeds == (0.2, 0.4)

@@ -194,6 +194,7 @@ class Page:
         _pages[self.fragment.id] = self
         self.on_speeds: Callable[[float, float], None] | None = None
         self._speeds: dict[int, tuple[float, float]] = {}
+        self._driving: int | None = None
         self._listening: dict[tuple[int, int, str], list[Listener]] = {}
 
     def element(self, id: str) -> Element:
@@ -250,10 +251,13 @@ class Page:
     def speeds(self) -> tuple[float, float]:
         """What this page's hands may ask for at most, in m/s and rad/s.
 
-        The least of its modules that drive; zero if there is none.
+        Those of the module that the hands are at; the least of all while they are at
+        none; zero if there is no module that drives.
         """
         if not self._speeds:
             return (0.0, 0.0)
+        if self._driving in self._speeds:
+            return self._speeds[self._driving]
         linear, angular = zip(*self._speeds.values(), strict=True)
         return (min(linear), min(angular))
 
@@ -262,9 +266,18 @@ class Page:
         self._speeds[id(module)] = (speed, rotation_speed)
         self._tell_speeds()
 
+    def set_driving(self, module: object, on: bool) -> None:
+        """Note that the page's hands are at a module that drives, or left it."""
+        if on:
+            self._driving = id(module)
+        elif self._driving == id(module):
+            self._driving = None
+        self._tell_speeds()
+
     def clear_speeds(self, module: object) -> None:
         """Note that a module drives no more."""
         self._speeds.pop(id(module), None)
+        self.set_driving(module, False)
         self._tell_speeds()
 
     def _tell_speeds(self) -> None:

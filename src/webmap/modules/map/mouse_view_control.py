@@ -19,4 +19,8 @@ class MouseViewControl:
 
     def __init__(self, map: "Map") -> None:
         self.map = map
-        self.half = map.add_browser_half(self, "modules/mouse_view_control.js")
+        self.half = map.add_browser_half(
+            self,
+            "modules/mouse_view_control.js",
+            style="modules/mouse_view_control.css",
+        )

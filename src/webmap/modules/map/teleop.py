@@ -1,7 +1,7 @@
 """The keys drive the selected robot."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -18,13 +18,21 @@ class Teleop:
         map: The map.
         speed: Metres per second at most, forward and back.
         rotation_speed: Radians per second at most.
+        holonomic: Whether Q and E move sideways, for a base that can.
 
     Raises:
         ValueError: If a speed is not a number above 0.
 
     """
 
-    def __init__(self, map: "Map", speed: float, rotation_speed: float) -> None:
+    def __init__(
+        self,
+        map: "Map",
+        speed: float,
+        rotation_speed: float,
+        *,
+        holonomic: bool = False,
+    ) -> None:
         for name, value in (("speed", speed), ("rotation_speed", rotation_speed)):
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"Teleop: {name} must be above 0, got {value}")
@@ -35,9 +43,13 @@ class Teleop:
         self.half = map.add_browser_half(
             self,
             "modules/teleop.js",
-            {"speed": speed, "rotation_speed": rotation_speed},
+            {"holonomic": holonomic},
             "modules/teleop.css",
         )
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Note whether the page's keys belong to this map now."""
+        self.map.page.set_driving(self, message.get("active") is True)
 
     def destroy(self) -> None:
         """Drive no more from this map."""
