@@ -25,7 +25,7 @@ from hypothesis.stateful import (
 )
 
 from gate_harness import URL, Bench, spec
-from webmap.gate import events, messages
+from webmap.gate import actions, events, messages
 from webmap.gate.messages import PROGRAM
 from webmap.geometry import Twist
 
@@ -93,6 +93,47 @@ class Motion(RuleBasedStateMachine):
     def hold_keys(self, who, x, seconds):
         self._run(seconds, lambda: self._command(who, x))
 
+    @rule(
+        who=st.sampled_from(PEOPLE),
+        x=st.sampled_from([0.5, 1.0, 3.0]),
+        neutral=st.sampled_from([0.3, 0.3, 0.15]),
+        then=st.sampled_from(
+            ["tick", "epoch", "seq", "link", "bridge", "display", "hands", "leave"]
+        ),
+    )
+    def drives_off(self, who, x, neutral, then):
+        """The usual beginning, and then something that must not move the robot."""
+
+        def press():
+            self._command(who, x)
+
+        self.take(who)
+        self._run(neutral, lambda: self._command(who, 0.0))
+        self._run(0.1, press)
+        match then:
+            case "tick" | "epoch" | "seq":
+                self._run(0.03)
+                old = {f"old_{then}": 8 if then == "tick" else 1}
+                self._command(who, 0.7, **old)
+            case "link":
+                self.link_breaks()
+                self.bench.connect_links()
+            case "bridge":
+                self.bridge_answers(False)
+                self._run(0.4, press)
+                self.bridge_answers(True)
+            case "display":
+                self.display_beats(False)
+                self._run(0.4, press)
+                self.display_beats(True)
+            case "hands":
+                self._run(0.25)
+            case "leave":
+                press()  # which may still wait to be written
+                self.page_is_reloaded(who)
+                return
+        self._run(0.3, press)
+
     def _command(self, who, x, old_tick=0, old_epoch=0, old_seq=0):
         bench, report = self.bench, self.bench.report()
         mine = report.holder is not None and report.holder.connection == who
@@ -113,9 +154,11 @@ class Motion(RuleBasedStateMachine):
 
     @rule(who=st.sampled_from(PEOPLE))
     def goal(self, who):
+        before = len(self.bench.did(actions.SendGoal))
         self.bench.goal(who)
-        self.last_seq[who] = self.bench.seq
-        self._doubt()
+        if len(self.bench.did(actions.SendGoal)) > before:
+            self.last_seq[who] = self.bench.seq
+            self._doubt()
 
     @rule(who=st.sampled_from(PEOPLE), robot=st.sampled_from(["r1", "*"]))
     def stop(self, who, robot):
@@ -201,6 +244,7 @@ class Motion(RuleBasedStateMachine):
         self.bench.now += seconds
         if seconds > 0.32:
             self._doubt()
+        self._run(0.01)
 
     @rule()
     def everybody_rests(self):
@@ -336,6 +380,6 @@ class Motion(RuleBasedStateMachine):
 
 full = os.environ.get("WEBMAP_FULL") == "1"
 Motion.TestCase.settings = settings(
-    max_examples=10_000 if full else 150, stateful_step_count=50, deadline=None
+    max_examples=10_000 if full else 120, stateful_step_count=50, deadline=None
 )
 TestMotion = Motion.TestCase

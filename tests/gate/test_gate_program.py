@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gate_harness import ZERO, Bench
+from gate_harness import ZERO, Bench, spec
 from webmap.gate import actions, messages
 from webmap.gate.messages import PROGRAM
 from webmap.geometry import Twist
@@ -94,28 +94,66 @@ def test_without_a_lease_nothing_moves(bench):
     assert not bench.did(actions.SendGoal)
 
 
-def test_doubt_ends_its_lease(bench):
+def test_doubt_while_it_drives_ends_its_lease(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
     bench.break_links()
     assert bench.report().holder is None
     lost = bench.refusals(PROGRAM)[-1]
     assert (lost.what, "no link" in lost.why) == ("lease", True)
-    bench.connect_links()
-    take(bench)
-    bench.answering = False
-    bench.run(0.4)
-    twist(bench, 0.5, 0.0, 0.0)
-    assert bench.report().holder is None
 
 
 def test_doubt_that_a_command_meets_first_ends_its_lease_too(bench):
     take(bench)
+    bench.run(0.04)
+    twist(bench, 0.5, 0.0, 0.0)
     bench.beating = False
     bench.now += 0.251  # the loop was late
     twist(bench, 0.5, 0.0, 0.0)
-    assert bench.written == []
+    assert bench.written[-1].twist == ZERO
     assert bench.report().holder is None
+
+
+def test_doubt_while_nothing_moves_only_refuses(bench):
+    take(bench)
+    bench.answering = False
+    bench.run(0.4)
+    twist(bench, 0.5, 0.0, 0.0)
+    assert bench.written == []
+    assert "does not answer" in bench.refusals(PROGRAM)[-1].why
+    assert bench.report().holder is not None
+
+
+class TestTheAnswerToATake:
+    def ask(self, bench):
+        bench.answering = False
+        bench.run(0.4)
+        bench.tell(messages.ProgramTake(7, "r1"))
+        assert not bench.of(messages.TakeReply)
+
+    def test_comes_once_the_robot_would_move(self, bench):
+        self.ask(bench)
+        bench.answering = True
+        bench.run(0.02)
+        assert bench.of(messages.TakeReply)[-1].epoch
+
+    def test_comes_in_any_case_after_a_while(self):
+        bench = Bench().begin(spec(odometry_topic="/odom"))
+        bench.tell(messages.ProgramTake(7, "r1"))
+        bench.run(1.4)
+        assert not bench.of(messages.TakeReply)
+        bench.run(0.2)
+        assert bench.of(messages.TakeReply)[-1].epoch
+
+    def test_is_a_refusal_if_somebody_else_was_quicker(self, bench):
+        self.ask(bench)
+        bench.say("a", op="take", robot="r1")
+        bench.run(0.02)
+        assert bench.of(messages.TakeReply)[-1].why == "A drives it"
+
+    def test_comes_at_once_for_a_robot_that_takes_goals_only(self):
+        bench = Bench().begin(spec(twist_topic=None))
+        assert take(bench).epoch
 
 
 def test_it_gives_the_lease_back(bench):

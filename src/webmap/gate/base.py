@@ -91,6 +91,11 @@ class Base:
         return Bounds(self.speed, a_max, holonomic)
 
     @property
+    def drivable(self) -> bool:
+        """Whether velocity can be sent to it at all, not goals only."""
+        return self.spec.twist_topic is not None
+
+    @property
     def silent(self) -> bool:
         """Whether nothing is written now and nothing will be by itself."""
         return self.motion.silent
@@ -138,7 +143,7 @@ class Base:
             return self._lock.why
         if doubt := self._pulse.doubt(now):
             return doubt
-        if self.spec.twist_topic is not None:
+        if self.drivable:
             return None if self.control.up else f"no link to {self.key.url}"
         goals = self.goals[self.spec.id]
         if not goals.can_send:
@@ -149,7 +154,7 @@ class Base:
         """Return why the machine must not be driven now, in words."""
         if reason := self.unarmable(now):
             return reason
-        if self.spec.twist_topic is None:
+        if not self.drivable:
             return "it has no velocity topic"
         if not self.control.fresh(now):
             return f"{self.key.url} does not answer"
@@ -246,7 +251,7 @@ class Base:
     def stop(self, why: str, now: float) -> None:
         """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
         self.end_lease(why, now)
-        if self.spec.twist_topic is not None:
+        if self.drivable:
             self.motion.zero(now)
         for goals in self.goals.values():
             goals.stop()
@@ -269,9 +274,10 @@ class Base:
 
     def _fault(self, reason: str, now: float) -> None:
         """Stop and disarm, because something may not be as it should."""
+        driving = self.motion.driving
         self._lapse(now)
         # A program is not seen to let go of anything, so it has to take it again.
-        if self.lease is not None and self.lease.program:
+        if driving and self.lease is not None and self.lease.program:
             self.end_lease(reason, now)
 
     # What is heard of it.

@@ -50,6 +50,8 @@ class DriveConnection:
         close: Callable[[str], None],
     ) -> None:
         self.id = hello.connection
+        self.greeted = False
+        """Whether the gate that runs now has said hello; it is the first word."""
         self._client = client
         self._hello = hello
         self._speeds: messages.Speeds | None = None
@@ -78,8 +80,9 @@ class DriveConnection:
         return [self._hello] if self._speeds is None else [self._hello, self._speeds]
 
     def say(self, text: str) -> None:
-        """Send a text to the page."""
-        self._guard(self._send, text)
+        """Send a text to the page, unless it has not been greeted yet."""
+        if self.greeted:
+            self._guard(self._send, text)
 
     def end(self, why: str) -> None:
         """Ask for the page's socket to be closed."""
@@ -356,10 +359,15 @@ class GateClient:
             future.set_result(reply.epoch)
 
     def _greet(self, id: str, hello: messages.Hello) -> None:
-        self._say_to(id, reports.hello_text(hello))
+        with self._lock:
+            connection = self._connections.get(id)
+        if connection is None:
+            return
+        connection.greeted = True
+        connection.say(reports.hello_text(hello))
         for report in list(self._latest.values()):
             mine = report.holder is not None and report.holder.connection == id
-            self._say_to(id, reports.robot_text(report, mine=mine))
+            connection.say(reports.robot_text(report, mine=mine))
 
     def _say_to(self, id: str, text: str) -> None:
         connection = self._connections.get(id)
@@ -434,6 +442,8 @@ class GateClient:
             self._ready, self._tick = False, None
             self._epochs.clear()
             self._latest.clear()
+            for connection in self._connections.values():
+                connection.greeted = False
         for future in takes.values():
             future.set_exception(NoLease(why))
         self._report(messages.GateDown(why))

@@ -34,6 +34,9 @@ from webmap.geometry import Twist
 
 log = logging.getLogger("webmap.gate")
 
+SETTLE = 1.5
+"""Seconds for which a program waits at most until a robot that it took would move."""
+
 
 class Gate:
     """Decides over every machine of one display.
@@ -54,6 +57,7 @@ class Gate:
         self._people = People(self._out.append)
         self._fleet = Fleet(self._pulse, self._out.append, self._people.refuse)
         self._display_there = False
+        self._takes: list[tuple[messages.ProgramTake, int, float]] = []
         self._handlers: dict[type, Callable[[Any, float], None]] = {
             **self._fleet.handlers,
             messages.Connect: self._connect,
@@ -81,6 +85,7 @@ class Gate:
             self._display_there = False
             self._goals_lost()
         self._fleet.step(now)
+        self._answer_takes(now)
         tick = self._ticks.issue(now)
         if tick is not None:
             self._out.append(Say(messages.Tick(tick, self._people.acks)))
@@ -260,12 +265,37 @@ class Gate:
         )
 
     def _program_take(self, message: messages.ProgramTake, now: float) -> None:
-        robot, epoch, why = message.robot, None, None
         try:
-            epoch = self._take(self._people.program, robot, now)
+            epoch = self._take(self._people.program, message.robot, now)
         except Refusal as refusal:
-            why = refusal.why
-        self._out.append(Say(messages.TakeReply(message.request, robot, epoch, why)))
+            self._reply(message, None, refusal.why)
+        else:
+            self._takes.append((message, epoch, now + SETTLE))
+            self._answer_takes(now)
+
+    def _answer_takes(self, now: float) -> None:
+        """Answer the program once its robot would move, not before.
+
+        A page waits for its hands to be seen; a program that drives at once would
+        lose its first words to a link that has not been asked yet whether it lives.
+        """
+        waiting, self._takes = self._takes, []
+        for take, epoch, until in waiting:
+            try:
+                base = self._fleet.find(take.robot)
+                check_lease(base.lease, PROGRAM, epoch)
+            except Refusal as refusal:
+                self._reply(take, None, refusal.why)
+                continue
+            if now < until and base.drivable and base.doubt(now):
+                self._takes.append((take, epoch, until))
+            else:
+                self._reply(take, epoch, None)
+
+    def _reply(
+        self, take: messages.ProgramTake, epoch: int | None, why: str | None
+    ) -> None:
+        self._out.append(Say(messages.TakeReply(take.request, take.robot, epoch, why)))
 
     def _program_release(self, message: messages.ProgramRelease, now: float) -> None:
         program, robot = self._people.program, message.robot
@@ -295,7 +325,9 @@ class Gate:
 
     def _program_cancel(self, message: messages.ProgramCancel, now: float) -> None:
         program, robot = self._people.program, message.robot
-        self._attempt(program, robot, "cancel", lambda: self._cancel(program, robot), now)
+        self._attempt(
+            program, robot, "cancel", lambda: self._cancel(program, robot), now
+        )
 
 
 def _finite(numbers: messages.Velocity) -> messages.Velocity:

@@ -1,0 +1,57 @@
+"""A robot's side, and a running gate in front of it."""
+
+import pytest
+
+from gate_page import Page
+from gate_robot import FakeRobot
+from webmap.gate.client import GateClient
+from webmap.gate.messages import RobotSpec
+
+
+@pytest.fixture(autouse=True)
+def state_folder(tmp_path, monkeypatch):
+    """Keep locks of tests out of everybody's way."""
+    folder = tmp_path / "state"
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(folder))
+    return folder
+
+
+@pytest.fixture
+def fake():
+    with FakeRobot() as robot:
+        yield robot
+
+
+@pytest.fixture
+def robot_spec(fake):
+    return RobotSpec(
+        id="r1",
+        name="Bob",
+        bridge_url=fake.url,
+        twist_topic="/cmd_vel",
+        stops_within=0.25,
+        v_max=1.0,
+        w_max=1.5,
+        odometry_topic="/odom",
+        odometry_type="nav_msgs/Odometry",
+        goal_topic="/goal",
+        cancel_topic="/cancel",
+    )
+
+
+@pytest.fixture
+def client():
+    """A gate that runs."""
+    gate = GateClient()
+    gate.start()
+    yield gate
+    gate.stop()
+
+
+@pytest.fixture
+def page(client, robot_spec):
+    """A page at a gate that knows the robot."""
+    client.declare(robot_spec)
+    made = Page(client)
+    yield made
+    made.end()

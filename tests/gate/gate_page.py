@@ -1,0 +1,97 @@
+"""A page with a hand on the keys: drives a robot through a GateClient."""
+
+import json
+import threading
+
+from gate_robot import eventually
+
+
+class Page:
+    """Speaks the pages' side of ``/drive`` at 20 Hz, as long as it is told to."""
+
+    def __init__(self, client, name="Ann", role="operator"):
+        self.heard = []
+        self.closed = []
+        self.robots = {}
+        self.tick = self.ack = None
+        self.x = None
+        """What the hand asks for; ``None`` sends nothing."""
+        self._seq = 0
+        self._end = threading.Event()
+        self.connection = client.connect(name, role, self._hear, self.closed.append)
+        self._thread = threading.Thread(target=self._stream, daemon=True)
+        self._thread.start()
+
+    def _hear(self, text):
+        message = json.loads(text)
+        match message["op"]:
+            case "tick":
+                self.tick, self.ack = message["tick"], message["ack"]
+            case "robot":
+                self.robots[message["robot"]] = message
+                self.heard.append(message)
+            case _:
+                self.heard.append(message)
+
+    def say(self, **command):
+        self.connection.receive(json.dumps(command))
+
+    def drive(self, x, robot="r1"):
+        self._seq += 1
+        self.say(
+            op="drive",
+            robot=robot,
+            epoch=self.robots[robot]["epoch"] or 0,
+            seq=self._seq,
+            tick=self.tick,
+            x=x,
+            y=0.0,
+            turn=0.0,
+        )
+
+    def goal(self, robot="r1"):
+        self._seq += 1
+        self.say(
+            op="goal",
+            robot=robot,
+            epoch=self.robots[robot]["epoch"] or 0,
+            seq=self._seq,
+            tick=self.tick,
+            x=1.0,
+            y=2.0,
+            yaw=0.0,
+        )
+
+    def _stream(self):
+        while not self._end.wait(0.05):
+            if self.x is not None and self.tick is not None and "r1" in self.robots:
+                self.drive(self.x)
+
+    def of(self, op):
+        return [message for message in self.heard if message["op"] == op]
+
+    def robot(self, robot="r1"):
+        return self.robots.get(robot, {})
+
+    def take(self, robot="r1"):
+        eventually(lambda: self.robot(robot).get("armable"), "a robot to be had")
+        self.say(op="take", robot=robot)
+        eventually(lambda: self.robot(robot).get("mine"), "the lease")
+
+    def drive_off(self, fake):
+        """Take the robot, show that the keys are released, press, be under way."""
+        self.take()
+        moves = len(fake.moving)
+
+        def under_way():
+            # A busy machine may hold this thread up for longer than the dead-man
+            # waits; then the keys must be seen released again.
+            self.x = 1.0 if self.robot()["armed"] else 0.0
+            return len(fake.moving) > moves
+
+        eventually(under_way, "a robot that moves")
+
+    def end(self):
+        self._end.set()
+        self._thread.join(5)
+        self.connection.close()

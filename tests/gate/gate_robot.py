@@ -1,0 +1,178 @@
+"""A robot's side of a rosbridge that notes everything it is told, and when."""
+
+import asyncio
+import json
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from websockets.asyncio.server import serve
+
+
+@dataclass
+class Told:
+    at: float
+    link: int
+    message: dict[str, Any]
+
+    @property
+    def op(self):
+        return self.message["op"]
+
+    @property
+    def topic(self):
+        return self.message.get("topic")
+
+
+class FakeRobot:
+    """Serves in a thread, so that a test may block; used as a context manager.
+
+    It echoes what is published on a topic to whoever subscribes to it, and sends
+    odometry at 20 Hz to whoever subscribes to ``/odom``.
+    """
+
+    def __init__(self, *, answers_services=True):
+        self.told: list[Told] = []
+        self.answers_services = answers_services
+        self.sends_odometry = True
+        self.deaf = threading.Event()
+        """While set, the robot reads nothing from any link."""
+        self._links = 0
+        self._sockets = {}
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
+
+    def __enter__(self):
+        self._thread.start()
+        assert self._ready.wait(10)
+        return self
+
+    def __exit__(self, *_):
+        self.deaf.clear()
+        self._loop.call_soon_threadsafe(self._end.set)
+        self._thread.join(10)
+
+    @property
+    def url(self):
+        return f"ws://127.0.0.1:{self._port}"
+
+    async def _run(self):
+        self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
+        server = await serve(
+            self._serve, "127.0.0.1", 0, compression=None, ping_interval=None
+        )
+        self._port = server.sockets[0].getsockname()[1]
+        beating = asyncio.create_task(self._odometry())
+        self._ready.set()
+        await self._end.wait()
+        beating.cancel()
+        server.close()
+        await server.wait_closed()
+
+    async def _serve(self, socket):
+        self._links += 1
+        link, topics = self._links, set()
+        self._sockets[link] = (socket, topics)
+        try:
+            async for frame in socket:
+                message = json.loads(frame)
+                self.told.append(Told(time.monotonic(), link, message))
+                await self._answer(socket, topics, message)
+        except Exception:  # noqa: S110 - a link that broke is what tests do
+            pass
+        finally:
+            del self._sockets[link]
+
+    async def _answer(self, socket, topics, message):
+        match message["op"]:
+            case "subscribe":
+                topics.add(message["topic"])
+            case "unsubscribe":
+                topics.discard(message["topic"])
+            case "publish":
+                frame = json.dumps(message)
+                for other, wanted in list(self._sockets.values()):
+                    if message["topic"] in wanted:
+                        await other.send(frame)
+            case "call_service" if self.answers_services:
+                answer = {"op": "service_response", "id": message["id"]}
+                await socket.send(json.dumps({**answer, "values": {}, "result": True}))
+
+    async def _odometry(self):
+        twist = {"linear": {"x": 0.125, "y": 0.0}, "angular": {"z": None}}
+        good = {"linear": {"x": 0.125, "y": 0.0}, "angular": {"z": -0.5}}
+        for n in range(10**9):
+            await asyncio.sleep(0.05)
+            velocity = twist if n == 0 else good
+            message = {"header": {}, "twist": {"twist": velocity, "covariance": []}}
+            text = json.dumps({"op": "publish", "topic": "/odom", "msg": message})
+            for socket, topics in list(self._sockets.values()):
+                if "/odom" in topics and self.sends_odometry:
+                    await socket.send(text)
+
+    # What a test asks for.
+
+    def send(self, link, message):
+        """Send something to one link of the gate."""
+        text = message if isinstance(message, str) else json.dumps(message)
+        socket, _ = self._sockets[link]
+        asyncio.run_coroutine_threadsafe(socket.send(text), self._loop).result(5)
+
+    def cut_all(self):
+        """Drop every link without a word."""
+
+        def cut():
+            for socket, _ in list(self._sockets.values()):
+                socket.transport.abort()
+
+        self._loop.call_soon_threadsafe(cut)
+
+    def hold(self):
+        """Stop reading, as a robot behind a stalled network."""
+        self._each(lambda transport: transport.pause_reading())
+
+    def go_on(self):
+        """Read again."""
+        self._each(lambda transport: transport.resume_reading())
+
+    def _each(self, do):
+        def work():
+            for socket, _ in list(self._sockets.values()):
+                do(socket.transport)
+
+        self._loop.call_soon_threadsafe(work)
+
+    def of(self, op, topic=None):
+        return [
+            t for t in self.told if t.op == op and (topic is None or t.topic == topic)
+        ]
+
+    @property
+    def velocities(self):
+        """What was published on ``/cmd_vel``: (time, forward speed)."""
+        found = []
+        for told in self.of("publish", "/cmd_vel"):
+            message = told.message["msg"]
+            twist = message.get("twist", message)
+            found.append((told.at, twist["linear"]["x"]))
+        return found
+
+    @property
+    def moving(self):
+        return [(at, vx) for at, vx in self.velocities if vx]
+
+    @property
+    def last_speed(self):
+        return self.velocities[-1][1] if self.velocities else None
+
+
+def eventually(check, what, seconds=10.0):
+    """Wait until ``check`` gives something true, and return that."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        found = check()
+        if found:
+            return found
+        time.sleep(0.005)
+    raise AssertionError(f"never came: {what}")

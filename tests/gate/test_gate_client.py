@@ -1,0 +1,437 @@
+"""The gate as the display has it: a process of its own, robots and pages real enough."""
+
+import os
+import signal
+import time
+
+import pytest
+
+from gate_page import Page
+from gate_robot import FakeRobot, eventually
+from webmap.errors import ConfigError, MotionError, NoLease
+from webmap.gate import messages
+from webmap.gate.client import GateClient
+from webmap.geometry import Twist
+
+JITTER = 0.15
+"""What the machine that runs the tests may add to a bound, in seconds."""
+
+
+@pytest.fixture
+def reports(client):
+    heard = []
+    removal = client.on_report(heard.append)
+    yield heard
+    removal.remove()
+
+
+def of(reports, type):
+    return [report for report in reports if isinstance(report, type)]
+
+
+def first_zero_after(fake, at):
+    return next((t for t, vx in fake.velocities if t > at and not vx), None)
+
+
+class TestPages:
+    def test_a_page_takes_and_drives_and_sees_what_comes_of_it(self, page, fake):
+        page.drive_off(fake)
+        assert page.of("hello")[0]["connection"] == page.connection.id
+        eventually(lambda: page.robot()["echoed"] == [1.0, 0, 0], "the echo")
+        eventually(lambda: page.robot()["measured"] == [0.125, 0, -0.5], "odometry")
+        report = page.robot()
+        assert report["state"] == "driving"
+        assert report["sent"] == [1.0, 0.0, 0.0]
+        assert (report["v"], report["w"], report["link"]) == (1.0, 1.5, "up")
+        assert report["why"] == ["limit of the robot"]
+
+    def test_the_robot_is_told_in_the_right_order_and_form(self, page, fake):
+        page.drive_off(fake)
+        page.x = 0.0
+        eventually(lambda: page.robot()["state"] == "held", "standstill")
+        told = [t for t in fake.told if t.topic == "/cmd_vel"]
+        assert [t.op for t in told[:2]] == ["advertise", "subscribe"]
+        advertised = told[0].message
+        assert (advertised["queue_size"], advertised["latch"]) == (1, False)
+        assert len({t.link for t in told}) == 1
+        velocity_link = told[0].link
+        others = {t.topic for t in fake.told if t.link == velocity_link}
+        assert others == {"/cmd_vel"}, "velocity shares its socket with nothing"
+
+    def test_release_is_zeros_and_then_silence(self, page, fake):
+        page.drive_off(fake)
+        page.x = 0.0
+        eventually(lambda: fake.last_speed == 0, "a zero")
+        eventually(lambda: page.robot()["state"] == "held", "standstill")
+        last_move = fake.moving[-1][0]
+        zeros = [at for at, vx in fake.velocities if at > last_move]
+        assert len(zeros) in range(8, 12)
+        assert zeros[-1] - zeros[0] < 0.5 + JITTER
+        time.sleep(0.3)
+        assert fake.velocities[-1][0] == zeros[-1]
+
+    def test_a_hand_that_vanishes_is_zero_within_250_ms(self, page, fake):
+        page.drive_off(fake)
+        page.x = None
+        at = time.monotonic()
+        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert zero - fake.moving[-1][0] <= 0.25 + JITTER
+
+    def test_a_page_that_closes_is_a_zero_at_once(self, page, fake):
+        page.drive_off(fake)
+        at = time.monotonic()
+        page.connection.close()
+        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert zero - at <= 0.1 + JITTER
+
+    def test_stop_by_a_viewer_is_a_zero_at_once(self, page, client, fake):
+        viewer = Page(client, "Vic", "viewer")
+        page.drive_off(fake)
+        at = time.monotonic()
+        viewer.say(op="stop", robot="*")
+        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert zero - at <= 0.05 + JITTER
+        eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
+        eventually(lambda: page.robot()["state"] == "free", "the end of the lease")
+        moves = len(fake.moving)
+        page.x = 1.0
+        eventually(lambda: page.of("refused"), "a refusal")
+        assert len(fake.moving) == moves
+        viewer.end()
+
+    def test_of_two_pages_one_drives_and_both_see_who(self, page, client, fake):
+        other = Page(client, "Ben")
+        page.drive_off(fake)
+        eventually(lambda: other.robot().get("state") == "driving", "the report")
+        assert other.robot()["holder"]["name"] == "Ann"
+        assert not other.robot()["mine"]
+        other.say(op="take", robot="r1")
+        refused = eventually(lambda: other.of("refused"), "a refusal")
+        assert refused[0]["why"] == "Ann drives it"
+        other.end()
+
+    def test_garbage_moves_nothing_and_much_of_it_ends_the_connection(self, page, fake):
+        page.take()
+        for rubbish in ("", "{", "\ud800", "x" * 5000, '{"op":NaN}', b"\xff\x00"):
+            page.connection.receive(rubbish)
+        eventually(lambda: page.of("refused"), "a refusal")
+        for _ in range(30):
+            page.connection.receive("rubbish")
+        eventually(lambda: page.closed, "the wish to close the page")
+        assert fake.velocities == []
+
+    def test_the_pages_speeds_count(self, page, fake):
+        page.connection.set_speeds(0.25, 0.5)
+        page.drive_off(fake)
+        assert fake.last_speed == 0.25
+
+    def test_a_page_that_comes_later_hears_of_every_robot(self, page, client):
+        eventually(lambda: page.robot(), "the first report")
+        late = Page(client, "Late")
+        eventually(lambda: late.robot(), "the report")
+        assert [m["op"] for m in late.heard[:2]] == ["hello", "robot"]
+        client.forget("r1")
+        eventually(lambda: late.of("gone"), "the end of the robot")
+        client.forget("r1")
+        late.end()
+
+    def test_a_role_that_is_not_there_is_refused(self, client):
+        with pytest.raises(ConfigError, match="boss"):
+            client.connect("Ann", "boss", print, print)
+
+    def test_a_callback_that_fails_harms_nobody(self, page, client, fake, caplog):
+        def fail(text):
+            raise RuntimeError("broken page")
+
+        removal = client.on_report(fail)
+        client.connect("Broken", "operator", fail, fail)
+        page.drive_off(fake)
+        assert "a callback failed" in caplog.text
+        assert "a listener to the gate failed" in caplog.text
+        removal.remove()
+
+
+class TestGoals:
+    def test_a_goal_goes_to_its_topic_and_is_told(self, page, fake, reports):
+        page.take()
+        eventually(lambda: self._goes(page, fake, 1), "the goal")
+        pose = fake.of("publish", "/goal")[0].message["msg"]
+        assert pose["header"] == {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "map"}
+        assert pose["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
+        eventually(lambda: of(reports, messages.SentGoal), "the report of it")
+        page.say(op="cancel", robot="r1")
+        eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
+        assert fake.of("publish", "/cancel")[0].message["msg"] == {}
+
+    def test_an_actions_goals_hang_and_can_be_cancelled_all_the_same(
+        self, client, robot_spec
+    ):
+        with FakeRobot(answers_services=False) as fake:
+            client.declare(
+                messages.msgspec.structs.replace(
+                    robot_spec,
+                    bridge_url=fake.url,
+                    goal_topic=None,
+                    cancel_topic=None,
+                    action="/navigate_to_pose",
+                )
+            )
+            page = Page(client)
+            page.take()
+            eventually(lambda: self._goes(page, fake, 1), "the goal")
+            first = fake.of("send_action_goal")[0]
+            assert first.message["args"]["pose"]["header"]["stamp"] == {
+                "sec": 0,
+                "nanosec": 0,
+            }
+            # The first may hang in its socket; the second has one of its own.
+            eventually(lambda: self._goes(page, fake, 2), "a second goal")
+            second = fake.of("send_action_goal")[1]
+            assert second.link != first.link
+            page.say(op="stop", robot="r1")
+            call = eventually(lambda: fake.of("call_service"), "the cancel")[0]
+            assert call.message["service"] == "/navigate_to_pose/_action/cancel_goal"
+            assert call.link not in (first.link, second.link)
+            result = {"op": "action_result", "id": second.message["id"]}
+            fake.send(second.link, result)
+            eventually(lambda: second.link not in fake._sockets, "its socket's end")
+            page.end()
+
+    def _goes(self, page, fake, number):
+        """Ask again until the link is there: a goal never waits for one."""
+
+        def goals():
+            return len(fake.of("send_action_goal") + fake.of("publish", "/goal"))
+
+        if goals() < number:
+            page.goal()
+            time.sleep(0.05)
+        return goals() >= number
+
+
+class TestProgram:
+    def take(self, client):
+        def attempt():
+            try:
+                return client.take("r1").result(5)
+            except NoLease:
+                return None
+
+        return eventually(attempt, "the lease")
+
+    def test_python_drives_within_the_limits_and_is_told(
+        self, client, robot_spec, fake, reports
+    ):
+        client.declare(robot_spec)
+        self.take(client)
+
+        def drive():
+            client.twist("r1", Twist(9.0, 0.0, 0.5))
+            return fake.moving
+
+        eventually(drive, "motion")
+        assert fake.last_speed in (1.0, 0.0)
+        eventually(lambda: of(reports, messages.SentTwist), "the report of it")
+        sent = of(reports, messages.SentTwist)[0]
+        assert (sent.vx, sent.wz, sent.by) == (1.0, 0.5, "program")
+        at = fake.moving[-1][0]
+        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert zero - fake.moving[-1][0] <= 0.25 + JITTER
+
+    def test_python_sends_goals_and_cancels_them(self, client, robot_spec, fake):
+        client.declare(robot_spec)
+        self.take(client)
+
+        def move():
+            client.move("r1", 1.0, 2.0, 0.5)
+            time.sleep(0.05)
+            return fake.of("publish", "/goal")
+
+        eventually(move, "the goal")
+        client.cancel("r1")
+        eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
+        client.release("r1")
+        with pytest.raises(NoLease):
+            client.move("r1", 1.0, 2.0, 0.5)
+
+    def test_without_the_lease_python_is_refused_at_once(self, client, robot_spec):
+        client.declare(robot_spec)
+        with pytest.raises(NoLease, match="'r1'"):
+            client.twist("r1", Twist(0.1))
+
+    def test_numbers_that_are_none_are_refused_at_once(self, client):
+        with pytest.raises(MotionError):
+            client.twist("r1", Twist(float("nan")))
+        with pytest.raises(MotionError):
+            client.move("r1", 0.0, float("inf"), 0.0)
+
+    def test_a_robot_that_is_driven_is_not_to_be_had(self, client, page, fake):
+        page.drive_off(fake)
+        with pytest.raises(NoLease, match="Ann drives it"):
+            client.take("r1").result(5)
+
+    def test_an_operator_takes_over_and_python_is_refused_from_then_on(
+        self, client, page, fake
+    ):
+        self.take(client)
+        page.take()
+
+        def refused():
+            try:
+                client.twist("r1", Twist(0.1))
+            except NoLease:
+                return True
+            return False
+
+        eventually(refused, "a refusal")
+        assert fake.moving == []
+
+    def test_stop_from_python_stops_a_page(self, client, page, fake):
+        page.drive_off(fake)
+        at = time.monotonic()
+        client.stop_robot(None)
+        assert eventually(lambda: first_zero_after(fake, at), "a zero")
+
+    def test_a_gate_that_does_not_run_gives_no_lease(self):
+        client = GateClient()
+        with pytest.raises(NoLease, match="does not run"):
+            client.take("r1").result(1)
+        client.stop_robot("r1")
+        client.stop()
+
+
+class TestLinks:
+    def test_after_a_broken_link_zero_comes_first_and_the_key_must_be_released(
+        self, page, fake
+    ):
+        page.drive_off(fake)
+        links = {t.link for t in fake.told}
+        fake.cut_all()
+
+        def again():
+            return [t for t in fake.of("publish", "/cmd_vel") if t.link not in links]
+
+        after = eventually(again, "a velocity on the new link")
+        assert after[0].message["msg"]["linear"]["x"] == 0
+        eventually(lambda: page.robot()["link"] == "up", "the report of it")
+        moves = len(fake.moving)
+        time.sleep(0.5)
+        assert len(fake.moving) == moves
+        page.x = 0.0
+        eventually(lambda: page.robot()["armed"], "an armed driver")
+        page.x = 1.0
+        eventually(lambda: len(fake.moving) > moves, "motion")
+
+    def test_after_a_stall_what_comes_late_is_little_and_ends_with_zero(
+        self, page, fake
+    ):
+        page.drive_off(fake)
+        before = len(fake.velocities)
+        fake.hold()
+        eventually(lambda: not page.robot()["armed"], "a gate that noticed")
+        eventually(lambda: page.robot()["link"] == "down", "a link that is cut")
+        fake.go_on()
+        eventually(lambda: page.robot()["link"] == "up", "another link")
+        eventually(lambda: fake.last_speed == 0, "a zero")
+        late = [vx for _, vx in fake.velocities[before:]]
+        assert len([vx for vx in late if vx]) <= 9
+        assert late[-1] == 0
+
+    def test_a_robot_that_falls_silent_is_stopped(self, page, fake):
+        page.drive_off(fake)
+        fake.sends_odometry = False
+        eventually(lambda: fake.last_speed == 0, "a zero", 3.0)
+        eventually(
+            lambda: page.robot()["reason"] == "no odometry for 1 s", "the reason"
+        )
+
+
+class TestLife:
+    def test_a_gate_that_dies_is_started_anew_and_knows_everything_but_leases(
+        self, client, page, fake, reports
+    ):
+        page.drive_off(fake)
+        page.x = None
+        pid = client.pid
+        os.kill(pid, signal.SIGKILL)
+        eventually(lambda: of(reports, messages.GateDown), "the report of it")
+        eventually(lambda: len(page.of("hello")) == 2, "a new greeting")
+        eventually(lambda: page.robot().get("link") == "up", "a new link")
+        assert client.pid != pid
+        assert page.robot()["holder"] is None
+        # It was driven, so the new gate's first word is zero.
+        eventually(lambda: fake.last_speed == 0, "a zero")
+        page.drive_off(fake)
+
+    def test_a_request_to_a_gate_that_dies_is_answered(self, client, robot_spec):
+        client.declare(robot_spec)
+        eventually(lambda: client._ready, "a gate")
+        os.kill(client.pid, signal.SIGSTOP)
+        future = client.take("r1")
+        os.kill(client.pid, signal.SIGKILL)
+        with pytest.raises(NoLease, match="the gate has ended"):
+            future.result(10)
+
+    def test_its_end_stops_robots_within_half_a_second(self, client, page, fake):
+        page.drive_off(fake)
+        at = time.monotonic()
+        client.stop()
+        assert time.monotonic() - at < 1.5
+        zero = first_zero_after(fake, at)
+        assert zero is not None
+        assert zero - at < 0.1 + JITTER
+        assert fake.moving[-1][0] < zero
+
+    def test_a_display_whose_heart_stops_is_a_zero(self, client, page, fake):
+        page.drive_off(fake)
+        client._ending.set()  # the heartbeat's thread ends, and nothing else
+        client._supervisor.join()
+        at = time.monotonic()
+        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert zero - at <= 0.3 + JITTER
+        moves = len(fake.moving)
+        time.sleep(0.3)
+        assert len(fake.moving) == moves
+
+    @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+    def test_a_signal_is_zero_and_then_the_end(
+        self, client, page, fake, number, reports
+    ):
+        page.drive_off(fake)
+        at = time.monotonic()
+        os.kill(client.pid, number)
+        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert zero - at < 0.05 + JITTER
+        eventually(lambda: of(reports, messages.GateDown), "its end")
+
+    def test_a_second_gate_on_this_computer_shows_but_does_not_drive(
+        self, client, page, robot_spec
+    ):
+        page.take()
+        second = GateClient()
+        second.start()
+        second.declare(robot_spec)
+        other = Page(second)
+        eventually(lambda: other.robot().get("reason"), "a reason")
+        assert not other.robot()["armable"]
+        eventually(lambda: "another WebMap" in other.robot()["reason"], "the reason")
+        client.forget("r1")
+        eventually(lambda: other.robot()["armable"], "the lock", 5.0)
+        other.end()
+        second.stop()
+
+    def test_what_cannot_be_meant_is_refused_before_the_gate_hears_of_it(self, client):
+        spec = messages.RobotSpec(id="r1", name="Bob", bridge_url="ws://x", v_max=-1.0)
+        with pytest.raises(ConfigError):
+            client.declare(spec)
+
+    def test_starting_twice_is_one_gate(self, client):
+        eventually(lambda: client._ready, "a gate")
+        pid = client.pid
+        client.start()
+        assert client.pid == pid
+        client.stop()
+        client.stop()
+        assert client.pid is None
+        client.start()
+        eventually(lambda: client._ready, "a gate")
