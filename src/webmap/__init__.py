@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from webmap.identifiers import generate_id
     from webmap.ros.bridge import Bridge
     from webmap.scene import html, svg
+    from webmap.scene.element import Element
     from webmap.scene.svg import namespace as svg_ns
     from webmap.scene.svg import xlink_namespace as xlink_ns
     from webmap.server.application import asgi_app, call, page, run, start, stop
@@ -39,6 +40,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Bridge",
+    "Element",
     "Extendable",
     "Layer",
     "Map",
@@ -63,6 +65,7 @@ __all__ = [
 
 _HOMES = {
     "Bridge": "webmap.ros.bridge:Bridge",
+    "Element": "webmap.scene.element:Element",
     "Extendable": "webmap.core.extendable:Extendable",
     "Layer": "webmap.core.layer:Layer",
     "Map": "webmap.core.map:Map",

@@ -1,9 +1,9 @@
 """A robot's side, and a running gate in front of it."""
 
 import pytest
-
 from gate_page import Page
 from gate_robot import FakeRobot
+
 from webmap.gate.client import GateClient
 from webmap.gate.messages import RobotSpec
 

@@ -1,13 +1,13 @@
-"""The gate as the display has it: a process of its own, robots and pages real enough."""
+"""The gate as the display has it: a process of its own, real peers around it."""
 
 import os
 import signal
 import time
 
 import pytest
-
 from gate_page import Page
 from gate_robot import FakeRobot, eventually
+
 from webmap.errors import ConfigError, MotionError, NoLease
 from webmap.gate import messages
 from webmap.gate.client import GateClient

@@ -3,8 +3,8 @@
 import json
 
 import pytest
-
 from gate_harness import KEY, URL, ZERO, Bench, spec
+
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key
 from webmap.gate.messages import PROGRAM

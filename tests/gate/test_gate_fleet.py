@@ -3,8 +3,8 @@
 import math
 
 import pytest
-
 from gate_harness import KEY, URL, ZERO, Bench, spec
+
 from webmap.errors import ConfigError
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key

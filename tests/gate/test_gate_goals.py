@@ -1,8 +1,8 @@
 """Goals: who may send them, and when they are cancelled."""
 
 import pytest
-
 from gate_harness import URL, ZERO, Bench, spec
+
 from webmap.gate import actions, events, messages
 from webmap.geometry import Twist
 

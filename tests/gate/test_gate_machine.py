@@ -14,6 +14,7 @@ And, of hands: after any doubt nothing moves before they were seen to be off.
 import os
 from dataclasses import dataclass
 
+from gate_harness import URL, Bench, spec
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -24,7 +25,6 @@ from hypothesis.stateful import (
     rule,
 )
 
-from gate_harness import URL, Bench, spec
 from webmap.gate import actions, events, messages
 from webmap.gate.messages import PROGRAM
 from webmap.geometry import Twist
@@ -375,7 +375,7 @@ class Motion(RuleBasedStateMachine):
         assert report.v <= self.v_max
         if report.state == "driving":
             assert report.holder is not None
-            assert URL == self.bench_key.url
+            assert self.bench_key.url == URL
 
 
 full = os.environ.get("WEBMAP_FULL") == "1"

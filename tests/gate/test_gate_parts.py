@@ -3,10 +3,10 @@
 import math
 
 import pytest
+from gate_harness import spec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gate_harness import spec
 from webmap.gate.burst import Burst
 from webmap.gate.connection import Connection, Rate
 from webmap.gate.deadman import DEADMAN, NEUTRAL, DeadMan

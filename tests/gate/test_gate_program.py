@@ -3,8 +3,8 @@
 import math
 
 import pytest
-
 from gate_harness import ZERO, Bench, spec
+
 from webmap.gate import actions, messages
 from webmap.gate.messages import PROGRAM
 from webmap.geometry import Twist

@@ -210,7 +210,7 @@ class Bridge:
         args: Mapping[str, Any] | Sequence[Any] | None = None,
         *,
         type: str | None = None,
-        timeout: float = 5.0,  # noqa: ASYNC109 - how callers of services know it
+        timeout: float = 5.0,
     ) -> Any:
         """Call a ROS service; calls share no socket with data.
 

@@ -1,0 +1,201 @@
+"""Frames of real rosbridge servers, played back, in the console of ``webmap view``."""
+
+import array
+import json
+import math
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cbor2
+import pytest
+from playwright.sync_api import expect
+from processes import BRIDGE, WEB, Process, matrix, running
+
+pytestmark = pytest.mark.browser
+
+CAPTURED = Path(__file__).parents[1] / "sim" / "captured"
+ROBOT = "/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"
+
+
+@pytest.fixture(scope="module")
+def ros1():
+    with playing("ros1") as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def ros2():
+    with playing("ros2") as url:
+        yield url
+
+
+@contextmanager
+def playing(dialect: str) -> Iterator[str]:
+    command = (CAPTURED / dialect, "--port", 0)
+    with running(*command, pattern=BRIDGE, module="webmap.sim.player") as process:
+        yield process.url
+
+
+@contextmanager
+def viewing(*urls: str, robots: list[str]) -> Iterator:
+    options = [part for robot in robots for part in ("--robot", robot)]
+    command = ("view", *urls, *options, "--port", 0, "--no-browser")
+    with running(*command, pattern=WEB) as process:
+        yield process
+
+
+def recorded_pose(dialect: str) -> tuple[float, float, float]:
+    """Where the captured odometry has the robot: x, y, yaw."""
+    frame = json.loads((CAPTURED / dialect / "publish_odom.json").read_text())
+    pose = frame["msg"]["pose"]["pose"]
+    q = pose["orientation"]
+    assert (q["x"], q["y"]) == (0, 0)
+    return pose["position"]["x"], pose["position"]["y"], 2 * math.atan2(q["z"], q["w"])
+
+
+def recorded_dots(dialect: str) -> list[tuple[float, float]]:
+    """Where the rays of the captured scan end, in the robot's frame, in metres."""
+    frame = (CAPTURED / dialect / "cbor_scan_inf_nan.bin").read_bytes()
+    scan = cbor2.loads(frame)["msg"]
+    little_endian_floats = 85
+    assert scan["ranges"].tag == little_endian_floats
+    ranges = array.array("f", scan["ranges"].value)
+    assert any(map(math.isnan, ranges))
+    assert any(map(math.isinf, ranges))
+    dots = []
+    for ray, reach in enumerate(ranges):
+        if scan["range_min"] <= reach <= scan["range_max"]:
+            bearing = scan["angle_min"] + ray * scan["angle_increment"]
+            dots.append((reach * math.cos(bearing), reach * math.sin(bearing)))
+    return dots
+
+
+def dots_in_world(tab, selector: str) -> list[list[float]]:
+    """The middle of each dot that the browser draws, in metres of the world."""
+    return tab.locator(f"{selector} > .laserscan > .dot").evaluate(
+        """dot => {
+            const world = dot.closest(".world");
+            const tf = world.getCTM().inverse().multiply(dot.getCTM());
+            const square = /M(-?\\d+) (-?\\d+)h(\\d+)v(\\d+)h-\\d+z/y;
+            const d = dot.getAttribute("d"), places = [];
+            while (square.lastIndex < d.length) {
+                const [, x, y, w, h] = square.exec(d).map(Number);
+                const p = new DOMPoint(x + w / 2, y + h / 2).matrixTransform(tf);
+                places.push([p.x, p.y]);
+            }
+            return places;
+        }"""
+    )
+
+
+def robot(name: str) -> str:
+    return f'.robot[data-name="{name}"]'
+
+
+def row(tab, name: str):
+    return tab.locator("#robots > li").filter(has_text=name)
+
+
+def expect_recorded(tab, name: str, dialect: str) -> None:
+    """Check that a robot is drawn where it was recorded, with what it scanned."""
+    x, y, yaw = recorded_pose(dialect)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    drawn = matrix(tab, robot(name))
+    assert drawn == pytest.approx([cos, sin, -sin, cos, x, y], abs=1e-5)
+    expected = [
+        (x + cos * u - sin * v, y + sin * u + cos * v)
+        for u, v in recorded_dots(dialect)
+    ]
+    dots = dots_in_world(tab, robot(name))
+    assert len(dots) == len(expected) > 500
+    for dot, place in zip(dots, expected, strict=True):
+        assert dot == pytest.approx(place, abs=0.003)
+
+
+def test_robots_of_both_kinds_of_ros_are_on_one_map_where_they_were_recorded(
+    tab, ros1, ros2
+):
+    robots = [f"1@Old:{ROBOT}", f"2@New:{ROBOT}"]
+    with viewing(ros1, ros2, robots=robots) as server:
+        tab.goto(server.url)
+        for name, dialect in (("Old", "ros1"), ("New", "ros2")):
+            tab.locator(f"{robot(name)}:not(.unplaced)").wait_for(state="attached")
+            dot = tab.locator(f"{robot(name)} > .laserscan > .dot[d]")
+            dot.wait_for(state="attached")
+            expect_recorded(tab, name, dialect)
+            box = tab.locator(f"{robot(name)} .model").bounding_box()
+            assert 0 < box["x"] < 1200, "out of sight"
+            assert 0 < box["y"] < 800, "out of sight"
+            expect(row(tab, name)).to_contain_text("Free")
+        expect(tab.locator("#bridges summary")).to_have_text("2 bridges open")
+        expect(tab.locator(".robot.stale")).to_have_count(0)
+        expect(tab.locator(".laserscan.stale")).to_have_count(0)
+        assert tab.locator(".webmap-notice").count() == 0
+        tab.goto("about:blank")
+
+
+def closed_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return listener.getsockname()[1]
+
+
+def expect_going_on(tab, name: str, dialect: str) -> None:
+    """Check that new data of a robot comes and is shown."""
+    expect(tab.locator(f"{robot(name)}:not(.unplaced):not(.stale)")).to_be_attached()
+    tab.wait_for_timeout(1500)
+    expect(tab.locator(f"{robot(name)}.stale")).to_have_count(0)
+    expect_recorded(tab, name, dialect)
+
+
+def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros1):
+    gone = f"ws://127.0.0.1:{closed_port()}"
+    with viewing(ros1, gone, robots=[f"1@Old:{ROBOT}", f"2@Gone:{ROBOT}"]) as server:
+        tab.goto(server.url)
+        expect_going_on(tab, "Old", "ros1")
+        expect(tab.locator(f"{robot('Gone')}.unplaced")).to_be_attached()
+        bridges = tab.locator("#bridges")
+        expect(bridges.locator("summary")).to_have_text("1 of 2 bridges open")
+        bridges.locator("summary").click()
+        line = bridges.locator("li").filter(has_text=gone)
+        expect(line).to_contain_text("cannot be reached")
+        expect(line).to_contain_text("refused")
+        expect(row(tab, "Gone")).to_contain_text("No bridge")
+        expect(row(tab, "Old")).to_contain_text("Free")
+        assert re.search(f"cannot reach the rosbridge at {gone}", server.log)
+        tab.goto("about:blank")
+
+
+@pytest.mark.parametrize(
+    ("topics", "sentence"),
+    [
+        ("/map::", r"Odd: topic '/map': '.+Grid' does not say where a robot is"),
+        ("/robot_1/odom::/map", r"/map: expected sensor_msgs/LaserScan, .+Grid"),
+    ],
+    ids=["odometry", "scan"],
+)
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_a_topic_of_another_type_is_said_and_the_other_robot_goes_on(
+    tab, request, dialect, topics, sentence
+):
+    url = request.getfixturevalue(dialect)
+    with viewing(url, robots=[f"Good:{ROBOT}", f"Odd:{topics}"]) as server:
+        for _ in range(2):  # the second viewer comes when it was said long ago
+            tab.goto(server.url)
+            notice = tab.locator(".webmap-notice.alert")
+            expect(notice.filter(has_text=re.compile(sentence))).to_be_visible()
+            expect_going_on(tab, "Good", dialect)
+        assert re.search(sentence, server.log)
+        tab.goto("about:blank")
+
+
+@pytest.mark.parametrize("url", ["http://robot:9090", "robot:9090", "ws://robot:x"])
+def test_a_wrong_url_is_refused_in_one_sentence(url):
+    # Nothing is served, so that there is no page to say it on.
+    process = Process("view", url, "--port", 0, "--no-browser")
+    assert process.popen.wait(30) == 2
+    assert process.log.count("\n") == 1
+    assert "is not the address of a rosbridge" in process.log
+    process.end()
