@@ -28,6 +28,9 @@ class BridgeError(WebMapError):
 class BridgeClosed(BridgeError):
     """The link to the ROS system is not open now, and nothing is queued."""
 
+    why = ""
+    """How the attempt to open it failed, without the address, if that is known."""
+
 
 class ProtocolError(BridgeError):
     """Bytes came in that are not rosbridge messages."""

@@ -41,10 +41,20 @@ class Removal:
 
 
 class Scope:
-    """The things that one owner made, in the order in which they were made."""
+    """The things that one owner made, in the order in which they were made.
 
-    def __init__(self, name: str = "") -> None:
+    Args:
+        name: The owner's name, for the log.
+        report: Shows people that something made here failed: a sentence, and whether
+            it goes on failing until the owner ends.
+
+    """
+
+    def __init__(
+        self, name: str = "", report: Callable[[str, bool], object] | None = None
+    ) -> None:
         self.name = name
+        self.report = report
         self._things: dict[int, Removable] = {}
         self.closed = False
 

@@ -1,42 +1,14 @@
-"""Real Chromium."""
+"""Real Chromium, as large as an operator's window."""
 
-import re
-import shutil
 from collections.abc import Iterator
 
 import pytest
-from devtools import CHROMIUM_ARGS
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
-
-@pytest.fixture(scope="session")
-def chromium() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=CHROMIUM_ARGS
-        )
-        yield browser
-        browser.close()
+from real_browser import watched_tab
 
 
 @pytest.fixture
 def tab(chromium: Browser) -> Iterator[Page]:
-    """A page that fails the test on any error, warning or violation in it."""
-    context = chromium.new_context(viewport={"width": 1200, "height": 800})
-    page = context.new_page()
-    said: list[str] = []
-    page.on("pageerror", lambda error: said.append(f"exception: {error}"))
-    page.on(
-        "console",
-        lambda message: (
-            message.type in {"error", "warning"}
-            and said.append(f"{message.type}: {message.text}")
-        ),
-    )
-    page.allowed = []
-    yield page
-    context.close()
-    unexpected = [
-        line for line in said if not any(re.search(ok, line) for ok in page.allowed)
-    ]
-    assert unexpected == []
+    with watched_tab(chromium, 1200, 800) as page:
+        yield page

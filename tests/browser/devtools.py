@@ -18,15 +18,7 @@ from typing import Any
 
 from websockets.sync.client import connect
 
-CHROMIUM_ARGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+from real_browser import CHROMIUM_ARGS
 
 
 class Tab:

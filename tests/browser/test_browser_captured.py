@@ -118,10 +118,10 @@ def expect_recorded(tab, name: str, dialect: str) -> None:
 def test_robots_of_both_kinds_of_ros_are_on_one_map_where_they_were_recorded(
     tab, ros1, ros2
 ):
-    robots = [f"1@Old:{ROBOT}", f"2@New:{ROBOT}"]
+    robots = [f"1@Anna:{ROBOT}", f"2@Berta:{ROBOT}"]
     with viewing(ros1, ros2, robots=robots) as server:
         tab.goto(server.url)
-        for name, dialect in (("Old", "ros1"), ("New", "ros2")):
+        for name, dialect in (("Anna", "ros1"), ("Berta", "ros2")):
             tab.locator(f"{robot(name)}:not(.unplaced)").wait_for(state="attached")
             dot = tab.locator(f"{robot(name)} > .laserscan > .dot[d]")
             dot.wait_for(state="attached")
@@ -152,9 +152,9 @@ def expect_going_on(tab, name: str, dialect: str) -> None:
 
 def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros1):
     gone = f"ws://127.0.0.1:{closed_port()}"
-    with viewing(ros1, gone, robots=[f"1@Old:{ROBOT}", f"2@Gone:{ROBOT}"]) as server:
+    with viewing(ros1, gone, robots=[f"1@Anna:{ROBOT}", f"2@Gone:{ROBOT}"]) as server:
         tab.goto(server.url)
-        expect_going_on(tab, "Old", "ros1")
+        expect_going_on(tab, "Anna", "ros1")
         expect(tab.locator(f"{robot('Gone')}.unplaced")).to_be_attached()
         bridges = tab.locator("#bridges")
         expect(bridges.locator("summary")).to_have_text("1 of 2 bridges open")
@@ -163,7 +163,7 @@ def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros
         expect(line).to_contain_text("cannot be reached")
         expect(line).to_contain_text("refused")
         expect(row(tab, "Gone")).to_contain_text("No bridge")
-        expect(row(tab, "Old")).to_contain_text("Free")
+        expect(row(tab, "Anna")).to_contain_text("Free")
         assert re.search(f"cannot reach the rosbridge at {gone}", server.log)
         tab.goto("about:blank")
 
@@ -182,7 +182,7 @@ def test_a_topic_of_another_type_is_said_and_the_other_robot_goes_on(
 ):
     url = request.getfixturevalue(dialect)
     with viewing(url, robots=[f"Good:{ROBOT}", f"Odd:{topics}"]) as server:
-        for _ in range(2):  # the second viewer comes when it was said long ago
+        for _ in range(2):  # a page that is loaded again says it again
             tab.goto(server.url)
             notice = tab.locator(".webmap-notice.alert")
             expect(notice.filter(has_text=re.compile(sentence))).to_be_visible()

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -11,17 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
-ARGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+from real_browser import Complaints
+
+expect.set_options(timeout=10_000)
 
 SIZES = {
     "desk": {"viewport": {"width": 1280, "height": 800}},
@@ -64,33 +57,16 @@ def demo() -> Iterator[Demo]:
                 process.kill()
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    expect.set_options(timeout=10_000)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=ARGS
-        )
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
 def open_console(chromium: Browser, demo: Demo):
     """Open the console, and fail on anything that the browser complains about."""
-    contexts, said = [], []
+    contexts, complaints = [], Complaints()
 
     def open_(size: str = "desk", scheme: str = "light") -> Page:
         context = chromium.new_context(color_scheme=scheme, **SIZES[size])
         contexts.append(context)
         page = context.new_page()
-        page.on("pageerror", lambda error: said.append(f"exception: {error}"))
-        page.on(
-            "console",
-            lambda message: (
-                message.type in {"error", "warning"} and said.append(message.text)
-            ),
-        )
+        complaints.listen(page)
         page.goto(demo.url)
         # A phone has the list in the sheet, which is closed at first.
         expect(page.locator("#robots .row")).to_have_count(10)
@@ -101,4 +77,4 @@ def open_console(chromium: Browser, demo: Demo):
     yield open_
     for context in contexts:
         context.close()
-    assert said == []
+    assert complaints.unexpected == []

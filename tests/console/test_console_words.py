@@ -45,9 +45,17 @@ def test_a_robot_that_the_gate_does_not_know_is_only_watched():
 
 def test_a_closed_bridge_is_said_before_anything_else():
     one = robot("driving", holder="Ann")
-    one.feed = SimpleNamespace(bridge=SimpleNamespace(state="closed"))
-    assert describe(one).text == "Bridge closed"
+    one.feed = SimpleNamespace(bridge=SimpleNamespace(state="closed", trouble=None))
+    assert describe(one).text == "No bridge"
     assert describe(one).tone == "bad"
+
+
+def test_a_bridge_that_is_tried_again_in_vain_is_not_merely_connecting():
+    one = robot("free")
+    one.feed = SimpleNamespace(bridge=SimpleNamespace(state="connecting", trouble=None))
+    assert describe(one).text == "Connecting"
+    one.feed.bridge.trouble = "the connection was refused"
+    assert describe(one).text == "No bridge"
 
 
 def test_a_robot_that_cannot_be_reached_by_the_gate_is_said():
@@ -116,7 +124,7 @@ def test_a_charge_that_is_not_known_is_not_shown():
     ("links", "text"),
     [
         (["open"], "Bridge open"),
-        (["lost"], "Bridge closed"),
+        (["lost"], "No bridge"),
         (["connecting"], "Bridge connecting"),
         (["open", "open"], "2 bridges open"),
         (["open", "lost"], "1 of 2 bridges open"),

@@ -4,7 +4,7 @@ import pytest
 
 from webmap import Extendable, Namespace, Robot
 from webmap.errors import ModuleNotFound
-from webmap.scope import Removal, keep
+from webmap.scope import Removal, current_scope, keep
 
 
 @pytest.fixture
@@ -105,6 +105,21 @@ def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
     owner.notify_modules("on_silence")
     assert heard == [3]
     assert reported == ["Bad.on_ring failed: RuntimeError: flat battery"]
+
+
+def test_what_a_module_made_reports_to_its_owner_until_the_module_goes(namespace):
+    class Sensor:
+        def __init__(self, robot) -> None:
+            self.report = current_scope().report
+
+    robot = Robot("Bob")
+    sensor = robot.add_module(Sensor)
+    sensor.report("/scan: a callback raised", False)
+    assert not robot.problems
+    sensor.report("/scan: expected a scan, got a map", True)
+    assert list(robot.problems.values()) == ["/scan: expected a scan, got a map"]
+    robot.remove_module(sensor)
+    assert not robot.problems
 
 
 def test_modules_may_fire_triggers_of_their_own():

@@ -119,8 +119,8 @@ def test_a_topic_of_another_type_is_a_clear_error():
         robot = Robot("Bob")
         robot.set_odometry_topic(link, "/odom")
         await settle()
-        assert "std_msgs/String" in robot.error
-        assert "these do: nav_msgs/Odometry" in robot.error
+        assert "std_msgs/String" in robot.problems["odometry"]
+        assert "these do: nav_msgs/Odometry" in robot.problems["odometry"]
         assert link.subscribed == []
 
     asyncio.run(scenario())
@@ -133,7 +133,7 @@ def test_a_message_of_another_shape_is_a_clear_error():
         robot.set_odometry_topic(link, "/odom")
         await settle()
         link.say("/odom", {"data": "hello"})
-        assert "with the fields data says nowhere" in robot.error
+        assert "with the fields data says nowhere" in robot.problems["odometry"]
         assert not robot.valid
 
     asyncio.run(scenario())
@@ -174,7 +174,9 @@ def test_a_pose_that_is_no_pose_is_ignored_and_said(bad):
     zeros = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
     link.say("/odom", {**pose(), "orientation": zeros})
     assert (robot.position.x, robot.position.y) == (1.0, 2.0)
-    assert "ignored" in robot.error
+    assert "ignored" in robot.problems["odometry"]
+    link.say("/odom", pose(x=3.0))
+    assert not robot.problems
 
 
 def test_a_robot_that_was_never_placed_is_marked_so():

@@ -6,29 +6,9 @@ from contextlib import suppress
 
 import pytest
 from fake_drive import FakeDrive
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 pytestmark = pytest.mark.browser
-
-ARGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path="/usr/bin/chromium", args=ARGS
-        )
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
@@ -104,11 +84,11 @@ class Bench:
 
 
 @pytest.fixture
-def open_bench(browser: Browser, gate: FakeDrive) -> Iterator[Callable[..., Bench]]:
+def open_bench(chromium: Browser, gate: FakeDrive) -> Iterator[Callable[..., Bench]]:
     benches: list[Bench] = []
 
     def open_bench(query: str = "", **kw) -> Bench:
-        benches.append(Bench(browser, gate, query, **kw))
+        benches.append(Bench(chromium, gate, query, **kw))
         return benches[-1]
 
     yield open_bench

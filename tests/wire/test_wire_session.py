@@ -333,3 +333,16 @@ def test_a_page_opened_a_thousand_times_leaves_nothing():
         next_frame(session)
     left = (session._mounts, session._fragments, session._canvases, session._attached)
     assert left == ({}, {}, {}, {})
+
+
+def test_a_page_that_was_loaded_again_is_told_the_newest_notices_again():
+    session = SceneSession()
+    for number in range(7):
+        session.error(f"number {number}")
+    session.error("number 3")
+    session.frame(0.0)
+    session.restart()
+    again = session.frame(0.0)
+    told = [number for number in range(7) if b"number %d" % number in again]
+    assert told == [2, 3, 4, 5, 6]
+    assert again.count(b"number 3") == 1

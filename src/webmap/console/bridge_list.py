@@ -5,17 +5,10 @@ from typing import TYPE_CHECKING
 
 from webmap import html
 from webmap.console.robot_card import icon
+from webmap.console.words import is_lost
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element
-
-WORDS = {
-    "new": ("connecting", "not started"),
-    "connecting": ("connecting", "connecting"),
-    "open": ("open", "open"),
-    "closed": ("lost", "closed, trying again"),
-}
-"""What the page calls a bridge's state, and the words for it."""
 
 
 class BridgeList:
@@ -51,7 +44,7 @@ class BridgeList:
 
     def poll(self) -> None:
         """Look at the bridges again."""
-        states = [WORDS[bridge.state] for bridge in self._bridges]
+        states = [describe_link(bridge) for bridge in self._bridges]
         for line, word, (link, text) in zip(
             self._lines, self._words, states, strict=True
         ):
@@ -63,11 +56,21 @@ class BridgeList:
         self._text.text = summary([link for link, _ in states])
 
 
+def describe_link(bridge: "Bridge") -> tuple[str, str]:
+    """Return what the page calls a bridge's state, and a sentence for it."""
+    if bridge.state == "open":
+        return "open", "open"
+    if is_lost(bridge):
+        why = f": {bridge.trouble}" if bridge.trouble else ""
+        return "lost", f"cannot be reached{why}; trying again"
+    return "connecting", "connecting"
+
+
 def summary(links: Sequence[str]) -> str:
     """Return a few words for the states of all bridges."""
     total, open_ = len(links), sum(link == "open" for link in links)
     if total == 1:
-        return {"open": "Bridge open", "lost": "Bridge closed"}.get(
+        return {"open": "Bridge open", "lost": "No bridge"}.get(
             links[0], "Bridge connecting"
         )
     if open_ == total:

@@ -54,6 +54,8 @@ class RobotCard:
         self._state = html.span(class_="holder")
         self._mine = html.span(class_="you")
         self._reason = html.p(class_="reason")
+        self._problems = html.p(class_="problems")
+        self._problems.set("role", "alert")
         self._x, self._y, self._heading = html.span(), html.span(), html.span()
         self._age = html.dd(class_="age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
@@ -114,6 +116,7 @@ class RobotCard:
         self._state.text = words.text
         self._mine.text = words.mine or words.text
         self._reason.text = sentence((report and report.reason) or "")
+        self._problems.text = " ".join(map(sentence, robot.problems.values()))
         self.element.set("data-tone", words.tone or None)
         self._speeds.show(robot)
 
@@ -157,7 +160,15 @@ class RobotCard:
         buttons["send"].on("click", lambda event: self._goals.aim())
         buttons["cancel"].on("click", lambda event: self._forget_goal())
         actions = html.div(*buttons.values(), class_="actions")
-        return [head, state, self._reason, facts, *self._speeds.elements, actions]
+        return [
+            head,
+            state,
+            self._reason,
+            self._problems,
+            facts,
+            *self._speeds.elements,
+            actions,
+        ]
 
     def _forget_goal(self) -> None:
         if self._robot is not None:

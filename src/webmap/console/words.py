@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from webmap import Robot
+    from webmap import Bridge, Robot
 
 UNKNOWN = "\N{EN DASH}"
 """What stands where a number would."""
@@ -35,8 +35,8 @@ def describe(robot: "Robot") -> Words:
     """
     bridge = robot.feed.bridge if robot.feed is not None else None
     if bridge is not None and bridge.state != "open":
-        if bridge.state == "closed":
-            return Words("Bridge closed", "state-down", "bad")
+        if is_lost(bridge):
+            return Words("No bridge", "state-down", "bad")
         return Words("Connecting", "state-waiting")
     report = robot.report
     if report is None:
@@ -53,6 +53,11 @@ def describe(robot: "Robot") -> Words:
     if report.state == "held":
         return Words(f"{who} holds it", "state-held", "active", "You hold it")
     return Words("Free", "state-free")
+
+
+def is_lost(bridge: "Bridge") -> bool:
+    """Return whether a bridge is away, and not merely not reached yet."""
+    return bridge.state == "closed" or bridge.trouble is not None
 
 
 def battery_tone(charge: float) -> str:

@@ -43,6 +43,7 @@ class Extendable:
         """
         factory = self.namespace[name] if isinstance(name, str) else name
         scope = Scope(f"{factory}")
+        scope.report = lambda text, lasting: self._failed(scope, text, lasting)
         try:
             with scope.active():
                 module = factory(self, *args, **kwargs)
@@ -74,6 +75,7 @@ class Extendable:
         else:
             raise ValueError(f"{module!r} is not a module of {self!r}")
         scope = self._scopes.pop(id(module))
+        self.clear_problem(scope)
         self._made.pop(id(module), None)
         try:
             self._call(module, "destroy", ())
@@ -95,6 +97,19 @@ class Extendable:
 
     def report_error(self, text: str) -> None:
         """Show people that something of this owner's failed; the log has it."""
+
+    def set_problem(self, about: object, text: str) -> None:
+        """Show people what goes on failing until :meth:`clear_problem`."""
+        self.report_error(text)
+
+    def clear_problem(self, about: object) -> None:
+        """Note that what was said of ``about`` is true no more."""
+
+    def _failed(self, scope: Scope, text: str, lasting: bool) -> None:
+        if lasting:
+            self.set_problem(scope, text)
+        else:
+            self.report_error(text)
 
     def _call(self, module: Any, name: str, args: tuple[Any, ...]) -> None:
         method = getattr(module, name, None)

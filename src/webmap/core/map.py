@@ -347,6 +347,10 @@ class Map(Extendable):
     def report_error(self, text: str) -> None:
         """Log a failure and show it on this map's page."""
         log.warning("%s", text)
+        self.show_error(text)
+
+    def show_error(self, text: str) -> None:
+        """Show on this map's page what the log has already."""
         if not self.page.closed:
             self.page.notice(text)
 

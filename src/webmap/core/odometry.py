@@ -65,7 +65,8 @@ class OdometryFeed:
         type: The message type; asked of rosapi, or told from the first message's
             shape, if not given.
         listener: Called with each pose, in the model's thread.
-        complain: Called with a sentence for people when the topic cannot be used.
+        complain: Called with a sentence for people when the topic cannot be used,
+            and with None when it can be used again.
 
     Raises:
         ConfigError: If ``type`` is given and has no pose in it.
@@ -79,7 +80,7 @@ class OdometryFeed:
         throttle: int,
         type: str | None,
         listener: PoseListener,
-        complain: Callable[[str], None],
+        complain: Callable[[str | None], None],
     ) -> None:
         self.bridge = bridge
         self.topic = topic
@@ -144,7 +145,7 @@ class OdometryFeed:
     def _hear(self, message: OdometryView) -> None:
         reading = PoseReading.of(message)
         if reading.is_finite:
-            self._complaint = None
+            self._say(None)
             self._listener(reading)
         else:
             self._say(
@@ -152,7 +153,7 @@ class OdometryFeed:
                 "zeros was ignored"
             )
 
-    def _say(self, text: str) -> None:
+    def _say(self, text: str | None) -> None:
         if text != self._complaint:
             self._complaint = text
             self._complain(text)

@@ -184,7 +184,7 @@ class Page:
         self.channel = channel
         self.viewer = viewer
         self.maps: list[Map] = []
-        self.scope = Scope(f"page {entry.path}")
+        self.scope = Scope(f"page {entry.path}", lambda text, _: self.notice(text))
         self.closed = False
         self._publisher = publisher
         self._sizes = dict(sizes)

@@ -99,7 +99,8 @@ class Robot(Extendable):
         self.measured_twist: Twist | None = None
         self.valid = False
         self.pose_stamp: float | None = None
-        self.error: str | None = None
+        self.problems: dict[object, str] = {}
+        """What fails for now, in sentences, by what they are about."""
         self.report: RobotReport | None = None
         self._destroyed = False
         self._feed: OdometryFeed | None = None
@@ -181,7 +182,7 @@ class Robot(Extendable):
         self.unsubscribe_odometry_topic()
         with no_scope():
             self._feed = OdometryFeed(
-                bridge, topic, throttle, type, self._on_pose, self.report_error
+                bridge, topic, throttle, type, self._on_pose, self._on_odometry_problem
             )
 
     def unsubscribe_odometry_topic(self) -> None:
@@ -189,6 +190,7 @@ class Robot(Extendable):
         if self._feed is not None:
             self._feed.remove()
             self._feed = None
+            self.clear_problem("odometry")
             self.motion.clear_odometry()
 
     # How it is moved.
@@ -388,17 +390,34 @@ class Robot(Extendable):
     # What others tell it.
 
     def report_error(self, text: str) -> None:
-        """Log a failure, keep it in :attr:`error` and show it on every map."""
+        """Log a failure and show it on every page that has the robot."""
         message = f"{self.name}: {text}"
         log.warning("%s", message)
-        self.error = text
         for map in self.maps:
-            map.report_error(message)
+            map.show_error(message)
+
+    def set_problem(self, about: object, text: str) -> None:
+        """Note what fails until :meth:`clear_problem`; later viewers see it too.
+
+        Args:
+            about: What the sentence is about; a new one takes its place.
+            text: A sentence for people.
+
+        """
+        if self.problems.get(about) != text:
+            self.problems[about] = text
+            self.report_error(text)
+
+    def clear_problem(self, about: object) -> None:
+        """Note that what was said of ``about`` is true no more."""
+        self.problems.pop(about, None)
 
     def on_map(self, map: "Map", shown: bool) -> None:
         """Note that a map shows this robot, or does so no more."""
         if shown:
             self.maps.append(map)
+            for text in self.problems.values():
+                map.show_error(f"{self.name}: {text}")
         else:
             self.maps.remove(map)
         self.update_selected()
@@ -418,6 +437,12 @@ class Robot(Extendable):
     def on_written(self, kind: str, message: dict[str, Any]) -> None:
         """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote."""
         self.notify_modules(f"on_send_{kind}", message)
+
+    def _on_odometry_problem(self, text: str | None) -> None:
+        if text is None:
+            self.clear_problem("odometry")
+        else:
+            self.set_problem("odometry", text)
 
     def _on_pose(self, reading: PoseReading) -> None:
         self.pose_stamp = time.monotonic()

@@ -62,6 +62,8 @@ class Bridge:
         """The one spelling of the address."""
         self.name = name or self.url
         self.stats = BridgeStats()
+        self.trouble: str | None = None
+        """Why the link is not open: how the last attempt failed or the link ended."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._lane: Lane | None = None
         self._topics: dict[str, Topic] = {}
@@ -300,6 +302,7 @@ class Bridge:
         self.stats.links += 1
         self._protocol = Protocol()
         self._complained = False
+        self.trouble = None
         self._graph.forget()
         log.info("%s: the link is open", self.name)
         for frame in self._publications.again():
@@ -312,15 +315,17 @@ class Bridge:
     def _link_lost(self, reason: str) -> None:
         level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
         log.log(level, "%s: the link ended: %s", self.name, reason)
+        self.trouble = reason
         self._doubts.forget()
         for topic in self._topics.values():
             topic.link_lost()
         self._on_close.call(reason)
 
-    def _not_opened(self, error: Exception) -> None:
+    def _not_opened(self, error: BridgeClosed) -> None:
         # One line in the log for a bridge that is away, however long.
         level = logging.DEBUG if self._complained else logging.WARNING
         self._complained = True
+        self.trouble = error.why
         log.log(level, "%s", error)
         self._on_error.call(error)
 

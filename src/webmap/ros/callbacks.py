@@ -57,6 +57,9 @@ class Callback:
     def _failed(self, error: Exception) -> None:
         log.error("%s: a callback raised", self.what, exc_info=error)
         self._report(error)
+        if self._scope is not None and self._scope.report is not None:
+            what = f"{self.what}: {type(error).__name__}: {error}"
+            self._scope.report(what, False)
 
 
 class Callbacks:

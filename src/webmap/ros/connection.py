@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import socket
 import time
 from collections import deque
 from collections.abc import Callable
@@ -49,7 +50,7 @@ class Lane:
         opened: Callable[[], None],
         received: Callable[[bytes], None],
         closed: Callable[[str], None],
-        failed: Callable[[Exception], None],
+        failed: Callable[[BridgeClosed], None],
         again: bool = True,
     ) -> None:
         self.url = url
@@ -119,19 +120,19 @@ class Lane:
     async def _one_link(self) -> float:
         """Connect, serve the link until it ends, and return how long it was open."""
         try:
-            self._socket = socket = await _connect(self.url)
+            self._socket = link = await _connect(self.url)
         except Exception as error:  # name lookup, TCP, TLS, handshake: all the same
             self._failed(_not_reached(self.url, error))
             return 0.0
         began = time.monotonic()
         reason = CLOSED_HERE
         try:
-            reason = await self._serve(socket)
+            reason = await self._serve(link)
         except asyncio.CancelledError:
-            await _say_farewell(socket)
+            await _say_farewell(link)
             raise
         finally:
-            self._forget_link(socket)
+            self._forget_link(link)
             self._closed(reason)
         return time.monotonic() - began
 
@@ -241,9 +242,14 @@ async def _say_farewell(socket: "ClientConnection") -> None:
 def _not_reached(url: str, error: Exception) -> BridgeClosed:
     if isinstance(error, TimeoutError):
         why = f"no answer within {CONNECT_TIMEOUT:g} s"
+    elif isinstance(error, ConnectionRefusedError):
+        why = "the connection was refused, nothing listens there"
+    elif isinstance(error, socket.gaierror):
+        why = f"the host's name is not known ({error.strerror})"
     else:
         why = str(error) or type(error).__name__
     closed = BridgeClosed(f"cannot reach the rosbridge at {url}: {why}")
+    closed.why = why
     closed.__cause__ = error
     return closed
 

@@ -41,7 +41,7 @@ class Doubts:
 
     def message_failed(self, topic: Topic, expected: str, error: ProtocolError) -> None:
         """Report a message that does not decode, with the type that it really has."""
-        self._ask(self._explain(topic.name, expected, error))
+        self._ask(self._explain(topic, expected, error))
 
     def watch(self, topic: Topic) -> None:
         """Report a topic that stays silent because its type was stated wrongly."""
@@ -60,12 +60,13 @@ class Doubts:
         for task in self._tasks:
             task.cancel()
 
-    async def _explain(self, topic: str, expected: str, error: ProtocolError) -> None:
-        got = await self._graph.topic_type(topic)
+    async def _explain(self, topic: Topic, expected: str, error: ProtocolError) -> None:
+        got = await self._graph.topic_type(topic.name)
         said = f"the bridge says it is {got}" if got else "its type is not known"
-        full = ProtocolError(f"{topic}: expected {expected}, {said}: {error}")
+        full = ProtocolError(f"{topic.name}: expected {expected}, {said}: {error}")
         log.warning("%s: %s", self._name, full)
         self._report(full)
+        topic.failed(full)
 
     async def _explain_silence(self, topic: Topic) -> None:
         await asyncio.sleep(SILENCE)

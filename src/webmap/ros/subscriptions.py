@@ -77,6 +77,11 @@ class Subscription:
             return
         self._callback(value)
 
+    def report(self, fault: ProtocolError) -> None:
+        """Show whoever subscribed that the messages cannot be used."""
+        if self._scope is not None and self._scope.report is not None:
+            self._scope.report(str(fault), True)
+
     def hold(self, loop: AbstractEventLoop, release: Callable[[], None]) -> None:
         """Come back for what the throttle holds."""
         due = self.throttle.due
@@ -122,6 +127,7 @@ class Topic:
         self._complain = complain
         self._emptied = emptied
         self._complained = False
+        self._fault: ProtocolError | None = None
         self._latest: Publish | None = None
         self._asked: Wish | None = None
         self._id = ""
@@ -150,6 +156,8 @@ class Topic:
     def add(self, listener: Subscription) -> None:
         """Let ``listener`` join, and ask the bridge for more if it wants more."""
         self.listeners[listener] = None
+        if self._fault is not None:
+            listener.report(self._fault)
         self.update()
 
     def remove(self, listener: Subscription) -> None:
@@ -193,6 +201,7 @@ class Topic:
     def again(self) -> None:
         """Ask the bridge on a new link, which knows nothing of the old one."""
         self.count = 0
+        self._complained, self._fault = False, None
         self._ask(self.wish())
 
     def link_lost(self) -> None:
@@ -233,11 +242,17 @@ class Topic:
     def complain(
         self, error: ProtocolError, decode: type[msgspec.Struct] | None
     ) -> None:
-        """Report a message that does not decode, once for this topic."""
+        """Report a message that does not decode, once for each link."""
         if not self._complained:
             self._complained = True
             expected = self.message_type or (decode.__name__ if decode else "a message")
             self._complain(self, expected, error)
+
+    def failed(self, fault: ProtocolError) -> None:
+        """Show everybody who listens why the messages cannot be used."""
+        self._fault = fault
+        for listener in tuple(self.listeners):
+            listener.report(fault)
 
 
 def checked(

@@ -1,3 +1,6 @@
+/** How long a failure that was dismissed is not shown again, in milliseconds. */
+const SILENCE = 60_000;
+
 /** Sentences for the viewer, in a corner of the page; text, whatever is in it. */
 export class Notices {
   constructor() {
@@ -5,14 +8,20 @@ export class Notices {
     this._box = null;
     /** @type {Map<string, HTMLElement>} */
     this._shown = new Map();
+    /** When each failure was dismissed. @type {Map<string, number>} */
+    this._dismissed = new Map();
   }
 
   /**
-   * Show a failure until it is dismissed; the same one is shown once.
+   * Show a failure until it is dismissed; the same one is shown once, and not again
+   * in the minute after it was dismissed.
    *
    * @param {string} text
    */
   error(text) {
+    const since = performance.now() - (this._dismissed.get(text) ?? -Infinity);
+    if (since < SILENCE) return;
+    this._dismissed.delete(text);
     this.show(text, text, "alert");
   }
 
@@ -54,7 +63,10 @@ export class Notices {
     button.type = "button";
     button.textContent = "×";
     button.setAttribute("aria-label", "Dismiss");
-    button.addEventListener("click", () => this.hide(key));
+    button.addEventListener("click", () => {
+      this._dismissed.set(key, performance.now());
+      this.hide(key);
+    });
     return button;
   }
 

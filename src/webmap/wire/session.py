@@ -44,6 +44,7 @@ class SceneSession:
     HEARTBEAT = 1.0
     MESSAGES_KEPT = 1000
     BYTES_KEPT = 256 * 1024
+    NOTICES_KEPT = 5
 
     def __init__(self) -> None:
         self._key = secrets.randbits(31)
@@ -63,6 +64,8 @@ class SceneSession:
         self._new: list[int] = []
         self._records = bytearray()
         self._messages: list[bytes] = []
+        # The newest notices, which a page that was loaded again is told again.
+        self._notices: dict[bytes, None] = {}
 
     # Fragments ------------------------------------------------------------------
 
@@ -251,8 +254,13 @@ class SceneSession:
             self._say(bytes((Op.MESSAGE, *varint(instance))) + string(text))
 
     def error(self, text: str) -> None:
-        """Show a notice on the page."""
-        self._say(bytes((Op.ERROR,)) + string(text))
+        """Show a notice on the page, and again after it was loaded again."""
+        record = bytes((Op.ERROR,)) + string(text)
+        self._notices.pop(record, None)
+        self._notices[record] = None
+        if len(self._notices) > self.NOTICES_KEPT:
+            del self._notices[next(iter(self._notices))]
+        self._say(record)
 
     def _say(self, record: bytes) -> None:
         if len(self._messages) >= self.MESSAGES_KEPT:
@@ -361,4 +369,5 @@ class SceneSession:
         for canvas in self._canvases.values():
             parts += (canvas.state(self._key), canvas.unreported)
         parts += [record for _, record in self._attached.values()]
+        parts += [record for record in self._notices if record not in self._messages]
         return b"".join((*parts, *self._messages))

@@ -1,0 +1,72 @@
+"""Debian's Chromium, and what it complains about."""
+
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+
+CHROMIUM_ARGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+@contextmanager
+def launched() -> Iterator[Browser]:
+    """Run a browser.
+
+    Playwright keeps an event loop running in the thread, in which no other test may
+    use asyncio until this ends.
+    """
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=CHROMIUM_ARGS
+        )
+        yield browser
+        browser.close()
+
+
+class Complaints:
+    """Errors, warnings and violations that pages report."""
+
+    def __init__(self) -> None:
+        self.allowed: list[str] = []
+        self._said: list[str] = []
+
+    def listen(self, page: Page) -> None:
+        """Hear what a page reports from now on."""
+        page.on("pageerror", lambda error: self._said.append(f"exception: {error}"))
+        page.on("console", self._console)
+
+    def _console(self, message: ConsoleMessage) -> None:
+        if message.type in {"error", "warning"}:
+            self._said.append(f"{message.type}: {message.text}")
+
+    @property
+    def unexpected(self) -> list[str]:
+        """What no pattern in ``allowed`` is found in."""
+        return [
+            line
+            for line in self._said
+            if not any(re.search(pattern, line) for pattern in self.allowed)
+        ]
+
+
+@contextmanager
+def watched_tab(browser: Browser, width: int, height: int) -> Iterator[Page]:
+    """Open a page that fails the test on any complaint not in ``page.allowed``."""
+    context = browser.new_context(viewport={"width": width, "height": height})
+    page = context.new_page()
+    complaints = Complaints()
+    complaints.listen(page)
+    page.allowed = complaints.allowed
+    yield page
+    context.close()
+    assert complaints.unexpected == []
