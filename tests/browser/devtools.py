@@ -82,6 +82,14 @@ class Tab:
             **({"text": key} if kind == "keyDown" else {}),
         )
 
+    def down(self, key: str) -> None:
+        """Press a letter's key."""
+        self.key("keyDown", key)
+
+    def up(self, key: str) -> None:
+        """Let go of a letter's key."""
+        self.key("keyUp", key)
+
     def click(self, x: float, y: float) -> None:
         """Click at a place of the window, in pixels."""
         for kind in ("mousePressed", "mouseReleased"):

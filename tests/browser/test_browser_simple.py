@@ -213,8 +213,7 @@ def test_a_hidden_tab_stops_the_robot_and_coming_back_does_not_start_it(
         tab.go(server.url)
         tab.click(*tab.wait(ROBOT))
         tab.wait("document.querySelector('.robot.selected') !== null")
-        tab.key("keyDown", "w")
-        wait_until(lambda: witness.speed(ODOM)[0] > 0.2, what="driving")
+        hold(tab, "w", lambda: witness.speed(ODOM)[0] > 0.2)
         other = browser.new_tab()
         wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
         assert tab.evaluate("document.visibilityState") == "hidden"

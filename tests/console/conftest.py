@@ -77,4 +77,4 @@ def open_console(chromium: Browser, demo: Demo):
     yield open_
     for context in contexts:
         context.close()
-    assert complaints.unexpected == []
+    assert not complaints.unexpected, complaints.unexpected

@@ -142,8 +142,11 @@ export class Item {
   /** @param {string | null} value */
   _setTransform(value) {
     this._transform = null;
-    if (value === null) this.element.removeAttribute("transform");
-    else this.element.setAttribute("transform", value);
+    const { element } = this;
+    // Chromium does not remove an attribute that was only ever set through its list.
+    if (element instanceof SVGGraphicsElement) element.transform.baseVal.clear();
+    if (value === null) element.removeAttribute("transform");
+    else element.setAttribute("transform", value);
     this._scaleDots();
   }
 
