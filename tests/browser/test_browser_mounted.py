@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from processes import BRIDGE, running, wait_until
+from processes import BRIDGE, hold, running, wait_until
 from robots import Witness
 
 pytestmark = pytest.mark.browser
@@ -89,8 +89,7 @@ def test_a_page_under_a_prefix_shows_and_drives_a_robot(host, simulator, tab):
     assert cookie["sameSite"] == "Strict"
     tab.locator(".robot .model").click()
     tab.locator(".robot.selected").wait_for()
-    tab.keyboard.down("w")
-    wait_until(lambda: witness.speed("/odom")[0] > 0.2, what="driving")
+    hold(tab.keyboard, "w", lambda: witness.speed("/odom")[0] > 0.2)
     tab.keyboard.up("w")
     wait_until(lambda: witness.speed("/odom") == (0.0, 0.0), what="standing still")
     witness.close()

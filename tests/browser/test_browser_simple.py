@@ -4,7 +4,7 @@ import math
 
 import pytest
 from devtools import Chromium
-from processes import BRIDGE, EXAMPLES, WEB, matrix, running, wait_until
+from processes import BRIDGE, EXAMPLES, WEB, hold, matrix, running, wait_until
 from robots import Witness
 
 pytestmark = pytest.mark.browser
@@ -172,7 +172,6 @@ def test_each_key_drives_the_selected_robot_while_it_is_held(
 ):
     select(opened)
     before = robot_place(opened)
-    opened.keyboard.down(key)
 
     def moving():
         v, w = witness.speed(ODOM)
@@ -180,7 +179,7 @@ def test_each_key_drives_the_selected_robot_while_it_is_held(
             return v * forward > 0.2 and math.dist(before, robot_place(opened)) > 0.1
         return w * turn > 0.3
 
-    wait_until(moving, what=f"moving by {key}")
+    hold(opened.keyboard, key, moving)
     opened.keyboard.up(key)
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
     wait_until(
@@ -236,16 +235,14 @@ def test_a_closed_tab_stops_the_robot(opened, witness, chromium, server):
     other.goto(server.url)
     other.locator(".robot:not(.unplaced)").wait_for(state="attached")
     select(other)
-    other.keyboard.down("s")
-    wait_until(lambda: witness.speed(ODOM)[0] < -0.2, what="driving")
+    hold(other.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     context.close()
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
 
 
 def test_stop_ends_the_drive_until_the_key_is_pressed_again(opened, witness):
     select(opened)
-    opened.keyboard.down("s")
-    wait_until(lambda: witness.speed(ODOM)[0] < -0.2, what="driving")
+    hold(opened.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     opened.keyboard.press("Space")
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
     opened.wait_for_timeout(700)

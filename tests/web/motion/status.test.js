@@ -53,6 +53,7 @@ const cases = [
     {},
     { ...REPORT, holder: { connection: "c2", name: "Ann" }, state: "driving" },
   ],
+  ["hands-off", { pressed: true, dead: true }, REPORT],
   ["taking", { taking: true }, REPORT],
   ["taking", { driven: "r1" }, { ...REPORT, ...ME }],
   ["ready", { driven: "r1", settled: true }, { ...REPORT, ...ME }],

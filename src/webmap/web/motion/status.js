@@ -99,13 +99,7 @@ function ofOther(report) {
 function ofMine(status, report) {
   if (report.state === "driving") return say("driving", "Driving", speedOf(report));
   if (report.reason) return say("fixed", "Cannot move", sentence(report.reason));
-  if (status.pressed && status.dead) {
-    return say(
-      "hands-off",
-      "Let go, then press again",
-      "What is held now does nothing.",
-    );
-  }
+  if (status.pressed && status.dead) return handsOff();
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
   if (!status.settled) return say("taking", "Getting ready", "");
   return say("ready", "Ready", "Hold W A S D or the arrows. Space stops.");
@@ -126,7 +120,12 @@ function ofFree(status, report) {
   }
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
   if (status.refusal) return say("free", "Free", sentence(status.refusal));
+  if (status.pressed && status.dead) return handsOff();
   return say("free", "Free", "Hold W A S D or the arrows to drive.");
+}
+
+function handsOff() {
+  return say("hands-off", "Let go, then press again", "What is held now does nothing.");
 }
 
 /**
