@@ -1,0 +1,95 @@
+"""Several people, one robot, and what happens when the display dies."""
+
+import os
+import signal
+
+import pytest
+from playwright.sync_api import expect
+from processes import BRIDGE, WEB, hold, running, wait_until
+from robots import Witness
+
+pytestmark = pytest.mark.browser
+
+ODOM = "/robot_0/odom"
+
+
+@pytest.fixture
+def simulator():
+    """One robot in a long corridor, whose base does not stop by itself."""
+    command = ("sim", "--robots", 1, "--seed", 7, "--port", 0, "--robot-timeout", 0)
+    with running(*command, pattern=BRIDGE) as process:
+        yield process.url
+
+
+@pytest.fixture
+def witness(simulator):
+    witness = Witness(simulator)
+    witness.follow(ODOM, "nav_msgs/Odometry")
+    yield witness
+    witness.close()
+
+
+@pytest.fixture
+def server(simulator):
+    robot = "Bob:/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"
+    command = ("view", simulator, "--robot", robot, "--port", 0, "--no-browser")
+    with running(*command, pattern=WEB) as process:
+        yield process
+
+
+def open_and_drive(tab, server, witness):
+    """Select the only robot in the list and hold S until it moves back."""
+    tab.goto(server.url)
+    tab.locator("#robots .row button").click()
+    expect(tab.locator("#card h2")).to_have_text("Bob")
+    tab.locator("svg.webmap").focus()
+    hold(tab.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.1)
+
+
+def standing(witness):
+    return witness.speed(ODOM) == (0.0, 0.0)
+
+
+def test_anybody_stops_a_robot_that_somebody_else_drives(
+    server, witness, tab, chromium
+):
+    open_and_drive(tab, server, witness)
+    context = chromium.new_context()
+    other = context.new_page()
+    other.goto(server.url)
+    row = other.locator("#robots .row")
+    expect(row).to_contain_text("drives")
+    other.get_by_role("button", name="Stop all").click()
+    wait_until(lambda: standing(witness), what="standing still")
+    expect(row).not_to_contain_text("drives")
+    tab.wait_for_timeout(700)
+    assert standing(witness), "the key that is still held drives on"
+    tab.keyboard.up("s")
+    context.close()
+
+
+def test_only_one_of_two_viewers_drives(server, witness, tab, chromium):
+    open_and_drive(tab, server, witness)
+    context = chromium.new_context()
+    other = context.new_page()
+    other.goto(server.url)
+    other.locator("#robots .row button").click()
+    expect(other.locator(".webmap-teleop")).to_have_attribute("data-state", "held")
+    other.locator("svg.webmap").focus()
+    other.keyboard.down("w")
+    other.wait_for_timeout(600)
+    assert witness.speed(ODOM)[0] < -0.1, "the other's key had an effect"
+    other.keyboard.up("w")
+    context.close()
+    tab.keyboard.up("s")
+    wait_until(lambda: standing(witness), what="standing still")
+
+
+def test_a_display_that_is_killed_stops_the_robot(server, witness, tab):
+    open_and_drive(tab, server, witness)
+    tab.allowed = ["WebSocket", "ERR_CONNECTION"]
+    os.kill(server.popen.pid, signal.SIGKILL)
+    wait_until(lambda: standing(witness), what="standing still")
+    expect(tab.locator("html")).to_have_class("disconnected")
+    expect(tab.locator(".webmap-teleop")).to_have_attribute("data-state", "lost")
+    server.popen.wait()
