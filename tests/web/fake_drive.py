@@ -30,6 +30,10 @@ class FakeDrive:
         self.robots = {id: self._robot(id) for id in ("r1", "r2")}
         self.ticking = True
         self.acking = True
+        self.latching = False
+        """Whether STOP latches, as it does at a gate that is not of the first kind."""
+        self.deaf = False
+        """Whether what is said is noted and not obeyed."""
         self.port = 0
         self._epoch = 40
         self._open: list[ServerConnection] = []
@@ -125,7 +129,8 @@ class FakeDrive:
             async for text in socket:
                 said = json.loads(text)
                 self.said.append((time.monotonic(), said))
-                await self._obey(socket, said, state)
+                if not self.deaf:
+                    await self._obey(socket, said, state)
         except ConnectionClosed:
             pass
         finally:
@@ -153,6 +158,12 @@ class FakeDrive:
             case "release" | "stop":
                 for one in [robot] if robot else self.robots.values():
                     one |= self._free()
+                    if self.latching and said["op"] == "stop":
+                        one |= self._stopped()
+            case "reset":
+                for one in [robot] if robot else self.robots.values():
+                    one |= {"state": "free", "latched": False, "stop": None}
+                    one |= {"armable": True, "reason": None}
             case "drive":
                 await self._drive(socket, robot, said, state)
             case "goal":
@@ -178,6 +189,12 @@ class FakeDrive:
     def _free() -> dict:
         nobody = {"holder": None, "mine": False, "epoch": None}
         return nobody | {"armed": False, "state": "free"}
+
+    @staticmethod
+    def _stopped() -> dict:
+        stop = {"by": "me", "confirmed": None, "why": ""}
+        words = {"armable": False, "reason": "stopped by me"}
+        return words | {"state": "stopped", "latched": True, "stop": stop}
 
     def _tell_all(self, message: dict) -> None:
         for socket in self._open:

@@ -444,6 +444,100 @@ def test_stop_all_says_what_became_of_it(open_bench) -> None:
     assert verdicts.nth(0).inner_text().endswith("stopped, confirmed by odometry")
 
 
+CONFIRMED = {"by": "Ann", "confirmed": True, "why": ""}
+UNCONFIRMED = {"by": "Ann", "confirmed": False, "why": "no link to ws://bob"}
+
+
+def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.latching = True
+    bench.drive()
+    bench.page.keyboard.press("Space")
+    bench.until(lambda: bench.shown() == "stopped")
+    bench.gate.change("r1", stop=CONFIRMED)
+    words = bench.page.locator(".webmap-teleop-state")
+    bench.until(lambda: "Stopped By Ann, confirmed by" in words.inner_text())
+    bench.page.keyboard.up("w")
+    bench.page.wait_for_timeout(300)
+    bench.page.keyboard.down("w")
+    bench.still()
+    assert len(bench.gate.of("take")) == 1
+    reset = bench.page.locator(".webmap-teleop .webmap-reset")
+    reset.dblclick()
+    bench.page.wait_for_timeout(450)
+    assert bench.gate.of("reset") == []
+    assert reset.inner_text() == "Press again to reset"
+    reset.press("Enter")
+    bench.until(lambda: bench.gate.of("reset") == [{"op": "reset", "robot": "r1"}])
+    bench.still()
+    bench.page.keyboard.up("w")
+    bench.page.wait_for_timeout(300)
+    since = time.monotonic()
+    bench.page.keyboard.down("w")
+    bench.until(lambda: bench.gate.moves(since))
+
+
+def test_space_on_the_reset_button_is_stop(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.select("r1")
+    bench.gate.change("r1", latched=True, state="stopped", stop=CONFIRMED)
+    reset = bench.page.locator(".webmap-teleop .webmap-reset")
+    for _ in range(2):
+        reset.press("Space")
+        bench.page.wait_for_timeout(450)
+    assert bench.gate.of("reset") == []
+    assert len(bench.gate.of("stop")) == 2
+
+
+def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.select("r1")
+    bench.gate.change("r1", latched=True, state="stopped", stop=UNCONFIRMED)
+    bench.gate.change("r2", latched=True, state="stopped", stop=CONFIRMED)
+    standing = bench.page.locator(".webmap-stop-standing")
+    words = "2 robots stay stopped, 1 of them NOT CONFIRMED."
+    bench.until(lambda: standing.inner_text() == words)
+    assert bench.shown() == "unconfirmed"
+    said = bench.page.inner_text(".webmap-teleop-state")
+    assert said == "STOP By Ann, NOT CONFIRMED: no link to ws://bob."
+    reset = bench.page.get_by_role("button", name="Reset all")
+    reset.click()
+    bench.page.wait_for_timeout(450)
+    bench.page.get_by_role("button", name="Press again to reset").click()
+    bench.until(lambda: bench.gate.of("reset") == [{"op": "reset", "robot": "*"}])
+    bench.until(lambda: not bench.page.locator(".webmap-stop-list").is_visible())
+
+
+def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.latching = True
+    bench.page.get_by_role("button", name="Stop all").click()
+    verdicts = bench.page.locator(".webmap-stop-verdict")
+    bench.until(lambda: verdicts.count() == 2)
+    bench.gate.change("r1", stop=CONFIRMED)
+    bench.gate.change("r2", stop=UNCONFIRMED)
+    bench.until(lambda: verdicts.nth(0).get_attribute("data-state") == "confirmed")
+    bench.until(
+        lambda: verdicts.nth(1).inner_text().endswith("CONFIRMED: no link to ws://bob")
+    )
+    bench.page.get_by_role("button", name="Stop all").click()
+    bench.until(lambda: len(bench.gate.of("stop")) == 2)
+
+
+def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.change("r1", latched=False, stop=None)
+    bench.select("r1")
+    bench.until(lambda: bench.shown() == "free")
+    bench.gate.deaf = True
+    bench.page.keyboard.press("Space")
+    bench.until(lambda: bench.shown() == "unconfirmed", patience=1.0)
+    words = bench.page.inner_text(".webmap-teleop-state")
+    assert words == "STOP NOT CONFIRMED The gate has not answered."
+    listed = bench.page.inner_text(".webmap-stop-verdict")
+    assert "Robot r1: STOP NOT CONFIRMED" in listed
+
+
 def test_a_robot_that_does_not_obey_covers_the_page(open_bench) -> None:
     bench = open_bench("?modules=stop,teleop")
     bench.gate.change("r1", sent=[0.3, 0, 0], measured=[0.3, 0, 0], state="driving")

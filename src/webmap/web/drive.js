@@ -3,10 +3,12 @@ import { Hands } from "./motion/hands.js";
 import { Line } from "./motion/line.js";
 import { Loop } from "./motion/loop.js";
 import { Pilot, TAKE_PATIENCE } from "./motion/pilot.js";
+import { Stopping } from "./motion/stopping.js";
 
 /** @typedef {import('./motion/axes.js').Axes} Axes */
 /** @typedef {import('./motion/pilot.js').Command} Command */
 /** @typedef {import('./motion/report.js').RobotReport} RobotReport */
+/** @typedef {import('./motion/stopping.js').Verdict} Verdict */
 /** @typedef {'connecting' | 'open' | 'late' | 'lost'} LinkState */
 
 /**
@@ -53,6 +55,7 @@ export class Drive {
     this._hands = new Hands(now);
     this._loop = new Loop();
     this._pilot = new Pilot(this._hands, this._loop, now, options);
+    this._stopping = new Stopping();
     this._line = new Line(socketUrl(baseUrl, options.id), {
       open: () => this._loop.open(performance.now()),
       receive: (message) => this._receive(message),
@@ -210,9 +213,36 @@ export class Drive {
     const left = this._line.open;
     if (left) this._line.send({ op: "stop", robot });
     else this._unsent.add(robot);
-    this._pilot.stopped(robot, performance.now());
+    const now = performance.now();
+    this._pilot.stopped(robot, now);
+    this._stopping.start(robot, this.robots, now);
     this._tell("stop", robot);
     return left;
+  }
+
+  /**
+   * End the STOP of a robot, or all: "*". Moves nothing, and gives nobody the robot.
+   *
+   * @param {string} robot
+   */
+  reset(robot) {
+    this._pilot.reset(robot, performance.now());
+    this._send([{ op: "reset", robot }]);
+  }
+
+  /**
+   * What became of the STOPs of this page.
+   *
+   * @returns {Verdict[]}
+   */
+  get verdicts() {
+    const connected = this._state === "open" || this._state === "late";
+    return this._stopping.verdicts(this.robots, connected, performance.now());
+  }
+
+  /** Show no more what became of the STOPs until now. */
+  dismissVerdicts() {
+    this._stopping.dismiss();
   }
 
   /** End for good: neutral, leases back, connection closed. */
@@ -293,9 +323,11 @@ export class Drive {
       this._setState("open");
     } else if (message.op === "robot") {
       this._pilot.report(message, now);
+      this._stopping.report(message, now);
       this._tell("robot", message);
     } else if (message.op === "gone") {
       this._pilot.gone(message.robot, now);
+      this._stopping.gone(message.robot);
       this._tell("gone", message.robot);
     } else if (message.op === "refused") {
       this._pilot.refuse(message.robot, message.what, message.why, now);

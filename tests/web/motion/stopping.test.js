@@ -6,6 +6,8 @@ import {
   Obedience,
   STAND_PATIENCE,
   Stopping,
+  standingStops,
+  stopWords,
 } from "../../../src/webmap/web/motion/stopping.js";
 
 const STILL = [0, 0, 0];
@@ -36,7 +38,7 @@ function report(fields = {}) {
 /** Stop r1 at time 0, hear one report at `at`, and return the verdict at `now`. */
 function verdict(heard, at, now, connected = true) {
   const stopping = new Stopping();
-  stopping.start("r1", [], 0);
+  stopping.start("r1", new Map(), 0);
   if (heard) stopping.report(heard, at);
   const robots = new Map(heard ? [["r1", heard]] : []);
   return stopping.verdicts(robots, connected, now)[0];
@@ -74,19 +76,77 @@ describe("a STOP", () => {
 
   test("of all watches every robot", () => {
     const stopping = new Stopping();
-    stopping.start("*", ["r1", "r2"], 0);
+    stopping.start("*", new Map([["r1", report()], ["r2", report()]]), 0);
     const names = stopping.verdicts(new Map(), true, 1).map(({ robot }) => robot);
     assert.deepEqual(names, ["r1", "r2"]);
   });
 
   test("is shown for some seconds once it is confirmed, and until then for ever", () => {
     const stopping = new Stopping();
-    stopping.start("r1", [], 0);
+    stopping.start("r1", new Map(), 0);
     const robots = new Map([["r1", report()]]);
     assert.equal(stopping.verdicts(robots, true, 60_000).length, 1);
     stopping.report(report(), 60_000);
     assert.equal(stopping.verdicts(robots, true, 61_000).length, 1);
     assert.equal(stopping.verdicts(robots, true, 66_000).length, 0);
+  });
+});
+
+describe("a STOP that latches", () => {
+  const word = (confirmed, why = "") => ({ by: "Ann", confirmed, why });
+  const latched = (fields) => report({ state: "stopped", latched: true, ...fields });
+
+  test("is confirmed when the gate says so", () => {
+    const said = latched({ measured: null, stop: word(true) });
+    assert.equal(verdict(said, 100, 200).state, "confirmed");
+  });
+
+  test("is not confirmed while the gate still looks, though odometry stands", () => {
+    assert.equal(verdict(latched({ stop: word(null) }), 100, 200).state, "stopping");
+  });
+
+  test("is not confirmed for the reason that the gate gives", () => {
+    const said = latched({ stop: word(false, "no link to ws://bob") });
+    assert.equal(verdict(said, 100, 200).text, "NOT CONFIRMED: no link to ws://bob");
+  });
+
+  test("is not answered by a report without the latch", () => {
+    const free = report({ state: "free", latched: false });
+    assert.match(verdict(free, 100, ANSWER_PATIENCE + 1).text, /^STOP NOT CONFIRMED/);
+  });
+
+  test("said again needs no answer", () => {
+    const stopping = new Stopping();
+    const robots = new Map([["r1", latched({ stop: word(true) })]]);
+    stopping.start("r1", robots, 0);
+    assert.equal(stopping.verdicts(robots, true, 400)[0].state, "confirmed");
+  });
+
+  test("is forgotten when it is reset", () => {
+    const stopping = new Stopping();
+    stopping.start("r1", new Map(), 0);
+    stopping.report(latched({ stop: word(false, "no odometry") }), 50);
+    stopping.report(report({ state: "free", latched: false, stop: null }), 100);
+    assert.deepEqual(stopping.verdicts(new Map(), true, 5000), []);
+  });
+
+  test("is told with who said it and what became of it", () => {
+    const text = (stop) => stopWords(latched({ stop })).text;
+    assert.equal(text(word(true)), "By Ann, confirmed by odometry.");
+    assert.equal(text(word(null)), "By Ann, looking whether it stands.");
+    assert.equal(text(word(false, "no odometry")), "By Ann, NOT CONFIRMED: no odometry.");
+    assert.equal(text({ ...word(true), by: "" }), "Confirmed by odometry.");
+    assert.equal(text(null), "");
+  });
+
+  test("stands where STOP ALL is", () => {
+    const one = latched({ stop: word(true) });
+    const doubtful = latched({ stop: word(false, "no odometry") });
+    assert.equal(standingStops([report()]), "");
+    assert.equal(standingStops([one, report()]), "Bob stays stopped.");
+    assert.equal(standingStops([doubtful]), "Bob stays stopped, NOT CONFIRMED.");
+    const words = "2 robots stay stopped, 1 of them NOT CONFIRMED.";
+    assert.equal(standingStops([one, doubtful]), words);
   });
 });
 

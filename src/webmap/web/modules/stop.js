@@ -1,7 +1,9 @@
 import { deskOf } from "../inputs/desk.js";
-import { Obedience, Stopping } from "../motion/stopping.js";
+import { isLatched } from "../motion/report.js";
+import { Obedience, standingStops } from "../motion/stopping.js";
 import { button, html, say } from "./elements.js";
 import { lay } from "./overlay.js";
+import { ResetButton } from "./reset_button.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -28,16 +30,26 @@ class Stop {
   constructor(map) {
     /** @type {Drive} */
     this._drive = map.drive;
-    this._stopping = new Stopping();
     this._obedience = new Obedience();
     this._alarm = new Alarm(() => this._drive.stop("*"));
     this._verdicts = html("ul", "webmap-stop-verdicts", { role: "status" });
-    this._close = button("webmap-stop-close", "Close", () => this._stopping.dismiss());
+    this._close = button("webmap-stop-close", "Close", () => {
+      this._drive.dismissVerdicts();
+      this._show();
+    });
+    this._standing = html("p", "webmap-stop-standing", { role: "status" });
+    this._reset = new ResetButton(() => this._drive.reset("*"));
     const all = button("webmap-stop-button webmap-stop-all", "Stop all", () => {
       this._drive.stop("*");
     });
     all.title = "Key Shift and Escape";
-    this._list = html("div", "webmap-stop-list", {}, this._verdicts, this._close);
+    this._list = html(
+      "div",
+      "webmap-stop-list",
+      { role: "group", "aria-label": "What became of STOP" },
+      this._verdicts,
+      html("div", "webmap-stop-row", {}, this._standing, this._reset.element, this._close),
+    );
     this._list.hidden = true;
     const panel = html(
       "section",
@@ -51,7 +63,7 @@ class Stop {
     this._offs = [
       lay(map, panel, "top-right"),
       deskOf(drive).open(),
-      drive.on("stop", (robot) => this._stopped(robot)),
+      drive.on("stop", () => this._show()),
       drive.on("robot", (report) => this._report(report)),
       drive.on("goal", (robot) => this._obedience.excuse(robot)),
       drive.on("gone", (robot) => this._gone(robot)),
@@ -64,31 +76,41 @@ class Stop {
     this._alarm.destroy();
   }
 
-  /** @param {string} robot */
-  _stopped(robot) {
-    this._stopping.start(robot, this._drive.robots.keys(), performance.now());
-    this._show();
-  }
-
   /** @param {import('../motion/report.js').RobotReport} report */
   _report(report) {
-    const now = performance.now();
-    this._stopping.report(report, now);
-    this._obedience.report(report, now);
+    this._obedience.report(report, performance.now());
   }
 
   /** @param {string} robot */
   _gone(robot) {
-    this._stopping.gone(robot);
     this._obedience.excuse(robot);
   }
 
   _show() {
-    const now = performance.now();
-    const { robots, state } = this._drive;
-    const connected = state === "open" || state === "late";
-    this._alarm.show(this._obedience.disobeying(now).map(({ name }) => name));
-    this._showVerdicts(this._stopping.verdicts(robots, connected, now));
+    this._alarm.show(this._alarms());
+    const { robots, verdicts } = this._drive;
+    const standing = standingStops(robots.values());
+    say(this._standing, standing);
+    const latched = [...robots.values()].filter(isLatched).length;
+    this._reset.show(latched > 1 ? "Reset all" : "Reset", latched > 0);
+    this._close.hidden = verdicts.length === 0;
+    this._list.hidden = verdicts.length === 0 && standing === "";
+    this._showVerdicts(verdicts);
+  }
+
+  /**
+   * The gate's own alarms, and what is seen here where the gate raises none.
+   *
+   * @returns {string[]}
+   */
+  _alarms() {
+    const seen = new Set(this._obedience.disobeying(performance.now()).map(idOf));
+    const words = [];
+    for (const report of this._drive.robots.values()) {
+      if (report.alarm) words.push(`${report.name}: ${report.alarm}`);
+      else if (report.alarm === undefined && seen.has(report.robot)) words.push(report.name);
+    }
+    return words;
   }
 
   /** @param {Verdict[]} verdicts */
@@ -96,7 +118,6 @@ class Stop {
     const shown = JSON.stringify(verdicts);
     if (shown === this._shown) return;
     this._shown = shown;
-    this._list.hidden = verdicts.length === 0;
     this._verdicts.replaceChildren(
       ...verdicts.map(({ name, state, text }) => {
         const item = html("li", "webmap-stop-verdict", {}, `${name}: ${text}`);
@@ -105,6 +126,11 @@ class Stop {
       }),
     );
   }
+}
+
+/** @param {import('../motion/report.js').RobotReport} report */
+function idOf({ robot }) {
+  return robot;
 }
 
 /** Covers the page: a robot does not do what it is told. */

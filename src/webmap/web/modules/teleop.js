@@ -1,7 +1,9 @@
 import { deskOf } from "../inputs/desk.js";
+import { isLatched } from "../motion/report.js";
 import { capOf, describe } from "../motion/status.js";
 import { button, html, say } from "./elements.js";
 import { lay, overlayOf } from "./overlay.js";
+import { ResetButton } from "./reset_button.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
@@ -40,6 +42,7 @@ class Teleop {
     this._panel = new Panel({
       stop: () => this._stop(),
       lease: () => this._lease(),
+      reset: () => this._reset(),
     });
     const take = lay(map, this._panel.element, "bottom-left");
     this._desk = deskOf(this._drive);
@@ -91,6 +94,11 @@ class Teleop {
     if (robot !== null) this._drive.stop(robot);
   }
 
+  _reset() {
+    const robot = this._map.selected;
+    if (robot !== null) this._drive.reset(robot);
+  }
+
   _lease() {
     const robot = this._map.selected;
     if (robot === null) return;
@@ -102,8 +110,10 @@ class Teleop {
     const active = this._desk.active === this._seat;
     const status = this._drive.status;
     const report = this._report;
+    const robot = this._map.selected;
+    const verdict = this._drive.verdicts.find((one) => one.robot === robot);
     this._panel.show(
-      describe(status, this._map.selected, report, active),
+      describe(status, robot, report, active, verdict),
       report,
       status.delay,
     );
@@ -112,7 +122,7 @@ class Teleop {
 
 /** The words, the shape and the buttons in the corner of the map. */
 class Panel {
-  /** @param {{stop: () => void, lease: () => void}} acts */
+  /** @param {{stop: () => void, lease: () => void, reset: () => void}} acts */
   constructor(acts) {
     this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
     this._title = html("strong", "webmap-teleop-title");
@@ -120,6 +130,7 @@ class Panel {
     this._cap = html("p", "webmap-teleop-cap");
     this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
+    this._reset = new ResetButton(acts.reset);
     const state = html(
       "p",
       "webmap-teleop-state",
@@ -134,7 +145,7 @@ class Panel {
       { "aria-label": "Driving" },
       this._mark,
       html("div", "webmap-teleop-words", {}, state, this._cap),
-      this._lease,
+      html("div", "webmap-teleop-acts", {}, this._lease, this._reset.element),
       this._stop,
     );
   }
@@ -157,7 +168,10 @@ class Panel {
     const name = report?.name ?? "";
     say(this._lease, report?.mine ? "Hand back" : "Take");
     label(this._lease, report?.mine ? `Hand back ${name}` : `Take ${name}`);
-    this._lease.hidden = !(report?.mine || (report?.armable && report.holder === null));
+    const latched = report !== null && isLatched(report);
+    const free = report?.armable && report.holder === null && !latched;
+    this._lease.hidden = !(report?.mine || free);
+    this._reset.show("Reset", latched);
     label(this._stop, name ? `Stop ${name}` : "Stop the selected robot");
     // Off only when there is nothing to stop, never because of doubt.
     this._stop.disabled = report === null;

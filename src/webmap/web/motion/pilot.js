@@ -238,6 +238,17 @@ export class Pilot {
     this._drop();
   }
 
+  /**
+   * A STOP is being ended by hand: what is held at this moment means nothing.
+   *
+   * @param {string} robot Or "*".
+   * @param {number} now
+   */
+  reset(robot, now) {
+    if (robot === "*" || robot === this.choice) this.refusal = null;
+    this.hands.kill(now);
+  }
+
   /** Forget all leases: they ended with the connection. */
   disconnect() {
     this._asked = null;

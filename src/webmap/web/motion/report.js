@@ -18,7 +18,40 @@
  * @property {number[] | null} measured
  * @property {boolean} armable
  * @property {string | null} reason Why it cannot be driven.
+ *
+ * What follows an older gate does not say.
+ *
+ * @property {boolean} [latched] Whether a STOP stands, until it is reset.
+ * @property {StopWord | null} [stop] What became of that STOP.
+ * @property {Asker | null} [asker] Who asks the holder for it.
+ * @property {boolean} [changing] Whether a hand-over waits until the robot stands.
+ * @property {string | null} [alarm] How the robot does not obey.
+ * @property {number | null} [stop_time] Within how many seconds it stops by itself.
+ * @property {'stated' | 'tested' | null} [stop_source] How that is known.
+ * @property {string | null} [stop_date] When it was tested, as in 2026-11-21.
+ * @property {number} [reaction] Seconds from a finger to the robot at worst.
+ * @property {number} [brake] How hard it brakes, in m/s², as far as is known.
+ * @property {number | null} [age] How old commands are when the gate gets them, in ms.
+ * @property {StopTest | null} [test] How the test of its own stopping goes.
  */
+
+/**
+ * @typedef {object} StopWord
+ * @property {string} by Who said STOP.
+ * @property {boolean | null} confirmed Whether odometry says that the robot stands; null
+ *     while that is looked for.
+ * @property {string} why Why it is not confirmed.
+ */
+
+/**
+ * @typedef {object} Asker
+ * @property {string} connection
+ * @property {string} name
+ * @property {number} left Seconds until the robot is handed over unless the holder
+ *     keeps it, counted from the report.
+ */
+
+/** @typedef {{state: 'creeping' | 'waiting' | 'done' | 'failed', text: string}} StopTest */
 
 /** @param {RobotReport} report */
 export function heldByAnother(report) {
@@ -30,10 +63,16 @@ export function heldByProgram(report) {
   return report.holder?.connection === "program" || report.holder?.name === "program";
 }
 
+/** @param {RobotReport} report */
+export function isLatched(report) {
+  return report.latched ?? report.state === "stopped";
+}
+
 /**
  * @param {RobotReport} report
  * @returns {boolean} Whether a press may ask for the lease without asking a person.
  */
 export function mayReach(report) {
+  if (isLatched(report)) return false;
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }

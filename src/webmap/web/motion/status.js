@@ -1,14 +1,17 @@
-import { heldByAnother } from "./report.js";
+import { heldByAnother, isLatched } from "./report.js";
+import { stopWords } from "./stopping.js";
 
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
+/** @typedef {import('./stopping.js').Verdict} Verdict */
 
 /**
  * How it stands with driving a robot from this page, to be shown as words, a shape and
  * a colour: the state names all three.
  *
  * @typedef {'none' | 'connecting' | 'lost' | 'late' | 'fixed' | 'held' | 'free' |
- *     'taking' | 'ready' | 'hands-off' | 'driving' | 'stopping' | 'stopped'} State
+ *     'taking' | 'ready' | 'hands-off' | 'driving' | 'stopping' | 'stopped' |
+ *     'unconfirmed'} State
  */
 
 /** @typedef {{state: State, title: string, detail: string}} Description */
@@ -22,16 +25,20 @@ import { heldByAnother } from "./report.js";
  * @param {string | null} robot The robot that is selected where this is shown.
  * @param {RobotReport | null} report The gate's word on it.
  * @param {boolean} active Whether the page's keys belong to that map.
+ * @param {Verdict} [verdict] What became of a STOP for it that was said here.
  * @returns {Description}
  */
-export function describe(status, robot, report, active) {
+export function describe(status, robot, report, active, verdict) {
   const link = ofLink(status);
   if (link) return link;
+  if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
+    return say("unconfirmed", "STOP NOT CONFIRMED", reasonOf(verdict));
+  }
   if (robot === null) {
     return say("none", "No robot selected", "Click on one to drive it.");
   }
   if (report === null) return say("fixed", "Not drivable", "It has no velocity topic.");
-  if (report.state === "stopped") return say("stopped", "Stopped", report.reason ?? "");
+  if (isLatched(report)) return ofStopped(status, report);
   if (heldByAnother(report)) return ofOther(report);
   if (!active) {
     return say("free", "Not driven here", "Click on this map to drive from it.");
@@ -80,6 +87,23 @@ function ofLink({ link }) {
     );
   }
   return null;
+}
+
+/**
+ * @param {Status} status
+ * @param {RobotReport} report
+ */
+function ofStopped(status, report) {
+  const { confirmed, text } = stopWords(report);
+  const detail = text || report.reason || "";
+  const refusal = status.refusal ? ` ${sentence(status.refusal)}` : "";
+  if (confirmed === false) return say("unconfirmed", "STOP", `${detail}${refusal}`);
+  return say("stopped", "Stopped", `${detail}${refusal}`);
+}
+
+/** @param {Verdict} verdict */
+function reasonOf({ text }) {
+  return sentence(text.replace(/^.*NOT CONFIRMED: /, ""));
 }
 
 /** @param {RobotReport} report */

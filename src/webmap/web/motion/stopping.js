@@ -1,3 +1,5 @@
+import { isLatched } from "./report.js";
+
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /** Slower than this a robot stands: m/s and rad/s. */
@@ -25,15 +27,18 @@ const SHOWN = 5000;
  * @property {string} text
  */
 
+/** @typedef {{since: number, answered: boolean, stoodAt: number | null}} Watch */
+
 /**
- * Watches what becomes of STOPs, by what odometry says and by nothing else.
+ * Watches what becomes of the STOPs of this page, by what odometry says and by nothing
+ * else: the gate says what it makes of that, and where it does not, the page looks.
  *
  * Times are in milliseconds of one clock.
  */
 export class Stopping {
   constructor() {
     /**
-     * @type {Map<string, {since: number, answered: boolean, stoodAt: number | null}>}
+     * @type {Map<string, Watch>}
      */
     this._watched = new Map();
   }
@@ -42,12 +47,16 @@ export class Stopping {
    * A STOP was sent.
    *
    * @param {string} robot Or "*" for all.
-   * @param {Iterable<string>} known The robots that there are.
+   * @param {ReadonlyMap<string, RobotReport>} known The robots that there are.
    * @param {number} now
    */
   start(robot, known, now) {
-    for (const id of robot === "*" ? known : [robot]) {
-      this._watched.set(id, { since: now, answered: false, stoodAt: null });
+    for (const id of robot === "*" ? known.keys() : [robot]) {
+      // Where a STOP stands already there may be no news to answer with.
+      const answered = known.get(id)?.latched === true;
+      this._watched.set(id, { since: now, answered, stoodAt: null });
+      const report = known.get(id);
+      if (answered && report) this.report(report, now);
     }
   }
 
@@ -60,13 +69,15 @@ export class Stopping {
   report(report, now) {
     const watch = this._watched.get(report.robot);
     if (!watch) return;
-    if (report.state === "driving" && watch.answered) {
-      // Somebody drives it again; that is another story.
+    const stopped = report.latched ?? report.state !== "driving";
+    if (!stopped && watch.answered) {
+      // It was reset, or somebody drives it again; that is another story.
       this._watched.delete(report.robot);
       return;
     }
-    if (report.state !== "driving") watch.answered = true;
-    if (watch.answered && stands(report)) watch.stoodAt ??= now;
+    if (stopped) watch.answered = true;
+    const stood = report.stop ? report.stop.confirmed === true : stands(report);
+    if (watch.answered && stood) watch.stoodAt ??= now;
     else watch.stoodAt = null;
   }
 
@@ -161,7 +172,7 @@ export class Obedience {
 /**
  * @param {string} robot
  * @param {RobotReport | undefined} report
- * @param {{since: number, answered: boolean, stoodAt: number | null}} watch
+ * @param {Watch} watch
  * @param {boolean} connected
  * @param {number} now
  * @returns {Verdict}
@@ -176,12 +187,14 @@ function judge(robot, report, watch, connected, now) {
   });
   const waited = now - watch.since;
   if (!connected) return unsure("no connection; STOP is sent again when there is one");
+  if (!watch.answered && waited > ANSWER_PATIENCE) {
+    const text = "STOP NOT CONFIRMED: the gate has not answered";
+    return { robot, name, state: "unconfirmed", text };
+  }
+  if (report?.stop?.confirmed === false) return unsure(report.stop.why);
   if (report?.link === "down") return unsure("no link to the robot");
   if (watch.stoodAt !== null) {
     return { robot, name, state: "confirmed", text: "stopped, confirmed by odometry" };
-  }
-  if (!watch.answered && waited > ANSWER_PATIENCE) {
-    return unsure("the gate has not answered");
   }
   if (waited <= STAND_PATIENCE) {
     return { robot, name, state: "stopping", text: "stopping" };
@@ -189,6 +202,41 @@ function judge(robot, report, watch, connected, now) {
   if (!report?.measured) return unsure("no odometry");
   const [x, y] = report.measured;
   return unsure(`still moving at ${Math.hypot(x, y).toFixed(2)} m/s`);
+}
+
+/**
+ * Say of a robot for which a STOP stands what became of that.
+ *
+ * @param {RobotReport} report
+ * @returns {{confirmed: boolean | null, text: string}} In words for a person; `confirmed`
+ *     is null while it is not known.
+ */
+export function stopWords({ stop }) {
+  if (!stop) return { confirmed: null, text: "" };
+  const by = stop.by ? `By ${stop.by}` : "";
+  const what = {
+    true: "confirmed by odometry",
+    false: `NOT CONFIRMED: ${stop.why}`,
+    null: "looking whether it stands",
+  }[`${stop.confirmed}`];
+  const text = [by, what].filter(Boolean).join(", ");
+  return { confirmed: stop.confirmed, text: `${text[0].toUpperCase()}${text.slice(1)}.` };
+}
+
+/**
+ * Say which STOPs stand.
+ *
+ * @param {Iterable<RobotReport>} reports
+ * @returns {string} "" when none does.
+ */
+export function standingStops(reports) {
+  const stopped = [...reports].filter(isLatched);
+  if (stopped.length === 0) return "";
+  const doubtful = stopped.filter(({ stop }) => stop?.confirmed === false).length;
+  const one = stopped.length === 1;
+  const who = one ? stopped[0].name : `${stopped.length} robots`;
+  const doubt = one ? "NOT CONFIRMED" : `${doubtful} of them NOT CONFIRMED`;
+  return `${who} ${one ? "stays" : "stay"} stopped${doubtful ? `, ${doubt}` : ""}.`;
 }
 
 /** @param {RobotReport} report */

@@ -1,0 +1,40 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { LATEST, SOONEST, Twice } from "../../../src/webmap/web/motion/twice.js";
+
+test("one press is not enough", () => {
+  const twice = new Twice();
+  assert.equal(twice.press(0), false);
+  assert.equal(twice.waiting(1), true);
+});
+
+test("a second press counts when it was neither too soon nor too late", () => {
+  for (const at of [SOONEST, LATEST]) {
+    const twice = new Twice();
+    twice.press(0);
+    assert.equal(twice.press(at), true);
+    assert.equal(twice.waiting(at), false);
+  }
+});
+
+test("a double click is one press, after which another still counts", () => {
+  const twice = new Twice();
+  twice.press(0);
+  assert.equal(twice.press(SOONEST - 1), false);
+  assert.equal(twice.press(SOONEST + 1), true);
+});
+
+test("a press after a long while is a first one again", () => {
+  const twice = new Twice();
+  twice.press(0);
+  assert.equal(twice.press(LATEST + 1), false);
+  assert.equal(twice.press(LATEST + 1 + SOONEST), true);
+});
+
+test("a first press can be forgotten", () => {
+  const twice = new Twice();
+  twice.press(0);
+  twice.forget();
+  assert.equal(twice.press(SOONEST), false);
+});
