@@ -1,4 +1,4 @@
-"""The command line: ``webmap demo``, ``sim``, ``view`` and ``run``."""
+"""The command line: ``webmap demo``, ``view``, ``discover``, ``run`` and ``sim``."""
 
 import sys
 
@@ -9,6 +9,7 @@ from webmap.errors import WebMapError
 
 COMMANDS = {
     "demo": "webmap.cli.demo:demo",
+    "discover": "webmap.cli.discover:discover",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
     "view": "webmap.cli.view:view",
@@ -44,6 +45,7 @@ def cli() -> None:
     \b
     webmap demo                    two simulated robots, to try everything
     webmap view ws://robot:9090    the robots behind a rosbridge
+    webmap discover ws://...       which robots are there, and why it thinks so
     webmap run FILE.py             your own page, in Python
     webmap sim                     the simulator and its rosbridge alone
 

@@ -1,0 +1,49 @@
+"""``webmap discover URL``: which robots are behind a rosbridge, and why."""
+
+import asyncio
+import sys
+
+import click
+
+from webmap.cli.options import verbose_option
+
+
+@click.command()
+@click.argument("url", nargs=-1, required=True)
+@click.option("--toml", is_flag=True, help="Print a fleet file, to be kept.")
+@click.option(
+    "--wait",
+    type=click.FloatRange(0.0),
+    default=5.0,
+    show_default=True,
+    help="Seconds to wait for a rosbridge that cannot be reached.",
+)
+@verbose_option
+def discover(url: tuple[str, ...], toml: bool, wait: float) -> None:
+    r"""Print which robots are behind rosbridges, their topics, and why.
+
+    Nothing is driven and nothing is changed. The exit code is 1 if no robot is found.
+
+    \b
+    webmap discover ws://robot:9090
+    webmap discover ws://robot:9090 --toml > fleet.toml
+    """
+    from webmap.cli.finding import find
+    from webmap.discovery.fleet_toml import fleet_toml
+    from webmap.discovery.words import report
+    from webmap.ros.names import normalise_url
+
+    found = asyncio.run(find([normalise_url(text) for text in url], wait=wait))
+    if toml:
+        click.echo(
+            fleet_toml([(one.label, one.url, one.findings) for one in found]), nl=False
+        )
+    for one in found:
+        if one.trouble is not None:
+            click.echo(one.why, err=True)
+        elif not toml:
+            click.echo(report(one.url, one.findings))
+        elif not one.findings.robots:
+            click.echo(report(one.url, one.findings), err=True)
+    if not any(one.findings.robots for one in found):
+        sys.exit(1)

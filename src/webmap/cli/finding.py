@@ -1,0 +1,95 @@
+"""What is behind several bridges, asked all at once."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import click
+
+from webmap.discovery import Findings, discover
+from webmap.discovery.asking import ask_topics
+from webmap.discovery.naming import unique_names
+from webmap.discovery.robots import host_name
+from webmap.errors import BridgeClosed, BridgeError
+
+TELL = (
+    "Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN, "
+    "as in --robot Bob:/odom:/cmd_vel:/scan"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What is behind one bridge, or why nobody knows."""
+
+    url: str
+    label: str
+    """A short name for the bridge, unlike all others."""
+
+    findings: Findings
+    trouble: BridgeError | None = None
+
+    @property
+    def why(self) -> str:
+        """Why no robot was found, and what to do, for people; empty if some were."""
+        if self.findings.robots:
+            return ""
+        if isinstance(self.trouble, BridgeClosed):
+            return f"{self.trouble}."
+        if self.trouble is not None:
+            reason = f"it has no rosapi that says its topics: {self.trouble}"
+        else:
+            reason = " ".join(self.findings.notes).rstrip(".")
+        return f"{self.url}: {reason}. {TELL}"
+
+
+async def find(urls: Sequence[str], *, wait: float) -> list[Found]:
+    """Return what is behind each bridge; no two robots have one name.
+
+    Says on standard error that a bridge is waited for.
+
+    Args:
+        urls: The bridges' addresses.
+        wait: How long to wait for one that cannot be reached, in seconds.
+
+    """
+    asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
+    named = unique_names(
+        [(host_name(url), one) for url, (one, _) in zip(urls, asked, strict=True)]
+    )
+    return [
+        Found(url, label, findings, trouble)
+        for url, label, findings, (_, trouble) in zip(
+            urls, labels(urls), named, asked, strict=True
+        )
+    ]
+
+
+def labels(urls: Sequence[str]) -> list[str]:
+    """Return a name for each bridge: its host, with a number where that is taken."""
+    found: list[str] = []
+    for url in urls:
+        host, number = host_name(url), 1
+        label = host
+        while label in found:
+            number += 1
+            label = f"{host}_{number}"
+        found.append(label)
+    return found
+
+
+async def _ask(url: str, wait: float) -> tuple[Findings, BridgeError | None]:
+    def waiting(why: str) -> None:
+        click.echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+
+    try:
+        topics = await ask_topics(url, wait=wait, waiting=waiting)
+    except BridgeError as error:
+        return Findings(), error
+    return discover(topics, host_name(url)), None
+
+
+def without_named(findings: Findings, names: set[str]) -> Findings:
+    """Return the findings without the robots that were told by hand."""
+    kept = tuple(one for one in findings.robots if one.name not in names)
+    return replace(findings, robots=kept)

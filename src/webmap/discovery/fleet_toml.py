@@ -1,0 +1,95 @@
+"""What was found, as a fleet file to keep and to correct."""
+
+from collections.abc import Sequence
+
+import msgspec
+
+from webmap.discovery.found import Findings, FoundRobot, Role
+
+HEAD = """\
+# A fleet file: webmap check FILE reads it, webmap run FILE shows it.
+# The words after each topic say why it was chosen; a wrong one is yours to change.
+"""
+
+UNSURE = """\
+# Say within how many seconds the base stops by itself when velocity ceases, if you
+# know it: without it the robot is driven at 0.3 m/s and 0.6 rad/s at the most.
+# twist.stops_within = 0.25
+"""
+
+ALSO: tuple[Role, ...] = ("pose", "plan", "map", "costmap", "camera", "cloud")
+"""Roles that a fleet file has no key for; modules show some of them."""
+
+
+def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
+    """Return a fleet file.
+
+    Args:
+        found: For each bridge its name, its address and what is behind it. The names
+            of all robots differ, as :func:`unique_names` makes them.
+
+    """
+    parts = [HEAD, "[bridges]"]
+    parts += [f"{_key(name)} = {_text(url)}" for name, url, _ in found]
+    for bridge, _, findings in found:
+        for robot in findings.robots:
+            parts += ["", *_robot(robot, bridge)]
+    return "\n".join(parts) + "\n"
+
+
+def _robot(robot: FoundRobot, bridge: str) -> list[str]:
+    lines = [
+        "[[robots]]",
+        f"name = {_text(robot.name)}",
+        f"bridge = {_text(bridge)}",
+    ]
+    where = robot.first("odometry") or robot.first("pose")
+    if where is not None:
+        lines.append(
+            f"odometry = {{ topic = {_text(where.topic)}, type = {_text(where.type)} }}"
+            f" # {where.rule}"
+        )
+    scans = robot.guesses.get("scan", ())
+    if scans:
+        listed = ", ".join(_text(guess.topic) for guess in scans)
+        why = "; ".join(guess.rule for guess in scans)
+        lines.append(f"scan = [{listed}] # {why}")
+    battery = robot.first("battery")
+    if battery is not None:
+        lines.append(f"battery = {_text(battery.topic)} # {battery.rule}")
+    lines += _motion(robot)
+    for role in ALSO:
+        if where in robot.guesses.get(role, ()):
+            continue
+        lines += [
+            f"# found too: {role} {guess.topic} ({guess.rule})"
+            for guess in robot.guesses.get(role, ())
+        ]
+    return lines + [f"# {note}" for note in robot.notes]
+
+
+def _motion(robot: FoundRobot) -> list[str]:
+    lines = []
+    velocity, goal = robot.first("velocity"), robot.first("goal")
+    if velocity is not None:
+        lines += [
+            f"twist.topic = {_text(velocity.topic)} # {velocity.rule}",
+            f"twist.type = {_text(velocity.type)}",
+            *UNSURE.splitlines(),
+        ]
+    if goal is not None:
+        lines.append(f"move.topic = {_text(goal.topic)} # {goal.rule}")
+        cancel = robot.first("cancel")
+        if cancel is not None:
+            lines.append(f"move.cancel_topic = {_text(cancel.topic)} # {cancel.rule}")
+    return lines
+
+
+def _text(value: str) -> str:
+    # A JSON text without characters outside ASCII is a TOML text too.
+    return msgspec.json.encode(value).decode()
+
+
+def _key(name: str) -> str:
+    plain = name.replace("-", "").replace("_", "")
+    return name if plain.isascii() and plain.isalnum() else _text(name)

@@ -1,0 +1,86 @@
+"""What discovery says: robots, their topics, and why it thinks so."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+Role: TypeAlias = Literal[
+    "odometry",
+    "pose",
+    "velocity",
+    "scan",
+    "battery",
+    "plan",
+    "goal",
+    "cancel",
+    "map",
+    "costmap",
+    "camera",
+    "cloud",
+]
+"""What a topic is to a robot."""
+
+ROLES: tuple[Role, ...] = (
+    "odometry",
+    "pose",
+    "velocity",
+    "scan",
+    "battery",
+    "plan",
+    "goal",
+    "cancel",
+    "map",
+    "costmap",
+    "camera",
+    "cloud",
+)
+"""Every role, in the order in which they are shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """One topic that fits a role, and the rule that says so."""
+
+    topic: str
+    type: str
+    """The type as the bridge spells it."""
+
+    rule: str
+    """The rule, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRobot:
+    """A robot and its topics."""
+
+    name: str
+    namespace: str
+    """Where its topics are: ``/robot_0``; empty for a robot without a prefix."""
+
+    guesses: Mapping[Role, tuple[Guess, ...]] = field(default_factory=dict)
+    """What fits each role, the best first."""
+
+    notes: tuple[str, ...] = ()
+    """What a person should know about these guesses, in sentences."""
+
+    def first(self, role: Role) -> Guess | None:
+        """Return the best guess for a role, None if nothing fits."""
+        found = self.guesses.get(role, ())
+        return found[0] if found else None
+
+    def topic(self, role: Role) -> str:
+        """Return the best topic for a role, empty if nothing fits."""
+        found = self.first(role)
+        return "" if found is None else found.topic
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What is behind one bridge."""
+
+    robots: tuple[FoundRobot, ...] = ()
+    dialect: Literal["ros1", "ros2"] | None = None
+    """Which ROS names its types so; None if there is no telling."""
+
+    notes: tuple[str, ...] = ()
+    """What holds for all of it, in sentences."""

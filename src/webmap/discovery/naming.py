@@ -1,0 +1,47 @@
+"""Names of robots behind several bridges, so that no two are the same."""
+
+import unicodedata
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+from webmap.discovery.found import Findings
+
+
+def same_name(name: str) -> str:
+    """Return what two names have in common that people would take for one."""
+    return unicodedata.normalize("NFKC", name).casefold().strip()
+
+
+def unique_names(
+    found: Sequence[tuple[str, Findings]],
+) -> list[Findings]:
+    """Return the findings with a bridge's name behind names that others have too.
+
+    Args:
+        found: For each bridge its name and what is behind it.
+
+    """
+    often = Counter(
+        same_name(robot.name) for _, findings in found for robot in findings.robots
+    )
+    taken: set[str] = set()
+    result = []
+    for bridge, findings in found:
+        robots = []
+        for robot in findings.robots:
+            name = robot.name
+            if often[same_name(name)] > 1:
+                name = f"{name} ({bridge})"
+            robots.append(replace(robot, name=_free(name, taken)))
+        result.append(replace(findings, robots=tuple(robots)))
+    return result
+
+
+def _free(name: str, taken: set[str]) -> str:
+    number, free = 1, name
+    while same_name(free) in taken:
+        number += 1
+        free = f"{name} {number}"
+    taken.add(same_name(free))
+    return free

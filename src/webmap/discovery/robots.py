@@ -1,0 +1,160 @@
+"""From topics with types to robots."""
+
+import ipaddress
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
+from urllib.parse import urlsplit
+
+from webmap.discovery.found import Findings, FoundRobot, Guess, Role
+from webmap.discovery.grouping import inside, nearest, robot_namespaces
+from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
+from webmap.ros.names import is_topic, is_type
+
+SHARED: tuple[Role, ...] = ("map",)
+"""Roles that a topic without a namespace has for every robot."""
+
+DIRECTION = (
+    "A list of topics does not say who publishes and who subscribes: a topic may be "
+    "there because another program listens to it, and carry nothing."
+)
+
+
+def discover(topics: Mapping[str, str], host: str = "robot") -> Findings:
+    """Return the robots whose topics these are.
+
+    Args:
+        topics: Types by topic, in either dialect, as ``Bridge.topics()`` gives them.
+            What is no name of a topic is left out.
+        host: What a robot without a namespace is called.
+
+    """
+    topics = {name: type.strip() for name, type in topics.items() if is_topic(name)}
+    found = (match(name, type) for name, type in sorted(topics.items()))
+    matches = [each for each in found if each is not None]
+    spaces = robot_namespaces(matches)
+    names = _names(spaces, host)
+    robots = tuple(
+        _robot(name, space, _of(space, spaces, matches), _twists(space, spaces, topics))
+        for name, space in zip(names, spaces, strict=True)
+    )
+    return Findings(robots, _dialect(topics.values()), _notes(topics, robots))
+
+
+def host_name(url: str) -> str:
+    """Return what a robot without a namespace behind a bridge is called.
+
+    The first part of the host's name; an address stays whole.
+    """
+    host = urlsplit(url).hostname or "robot"
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return host.partition(".")[0] or "robot"
+    return host
+
+
+def _of(space: str, spaces: Sequence[str], matches: Iterable[Match]) -> list[Match]:
+    """Return what belongs to one robot, the best first."""
+    mine = []
+    for each in matches:
+        owner = nearest(each.topic, spaces)
+        only = owner is None and len(spaces) == 1
+        shared = each.role in SHARED and each.namespace == ""
+        if owner == space or only or shared:
+            mine.append(each)
+    return sorted(mine, key=lambda each: _rank(each, space))
+
+
+def _rank(each: Match, space: str) -> tuple[int, int, int, str]:
+    place, parts, name = each.rank
+    # What is the robot's own comes before what is everybody's, or a part's of it.
+    strange = 0 if each.namespace == space else 1 if inside(each.topic, space) else 2
+    return (strange, place, parts, name)
+
+
+def _twists(space: str, spaces: Sequence[str], topics: Mapping[str, str]) -> list[str]:
+    """Return what in a robot may be a step of velocity on its way to the base."""
+    return [
+        name
+        for name, type in sorted(topics.items())
+        if is_type(type, *VELOCITY)
+        and INNER_VELOCITY.search(name)
+        and nearest(name, spaces) == space
+    ]
+
+
+def _robot(
+    name: str, space: str, matches: Sequence[Match], twists: Sequence[str]
+) -> FoundRobot:
+    guesses: dict[Role, tuple[Guess, ...]] = {}
+    for each in matches:
+        guess = Guess(each.topic, each.type, _words(each, space))
+        guesses[each.role] = (*guesses.get(each.role, ()), guess)
+    robot = FoundRobot(name, space, guesses)
+    return replace(robot, notes=_robot_notes(robot, twists))
+
+
+def _words(each: Match, space: str) -> str:
+    if each.namespace == space:
+        return each.words
+    where = "in a part of the robot" if inside(each.topic, space) else "shared by all"
+    return f"{each.words}, {where}"
+
+
+def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
+    notes = []
+    odometry, pose = robot.first("odometry"), robot.first("pose")
+    if odometry and pose:
+        notes.append(
+            f"{pose.topic} says where it is on the map, but mostly speaks only while "
+            f"the robot moves; {odometry.topic} is used, in its own frame."
+        )
+    elif pose:
+        notes.append(f"There is no odometry; {pose.topic} is used in its place.")
+    elif not odometry:
+        notes.append("Nothing says where it is, so it cannot be drawn or driven.")
+    for guess in robot.guesses.get("odometry", ())[1:]:
+        notes.append(f"{guess.topic} is odometry too ({guess.rule}).")
+    chosen = robot.first("velocity")
+    others = [name for name in twists if name != robot.topic("velocity")]
+    if chosen is None and others:
+        notes.append(
+            f"No topic is surely its velocity; {', '.join(others)} "
+            f"{'carries' if len(others) == 1 else 'carry'} twists too."
+        )
+    elif chosen is None:
+        notes.append("Nothing takes velocity, so it can be seen and not driven.")
+    elif others:
+        notes.append(f"Not used for driving, though of that type: {', '.join(others)}.")
+    return tuple(notes)
+
+
+def _names(spaces: Sequence[str], host: str) -> list[str]:
+    """Return a name for each namespace: its last part, where that is enough."""
+    last = [space.rpartition("/")[2] or host for space in spaces]
+    often = Counter(name.casefold() for name in last)
+    return [
+        name if often[name.casefold()] == 1 else space.strip("/") or f"{host} (no name)"
+        for name, space in zip(last, spaces, strict=True)
+    ]
+
+
+def _dialect(types: Iterable[str]) -> Literal["ros1", "ros2"] | None:
+    for type in types:
+        if "/msg/" in type:
+            return "ros2"
+    return "ros1" if any("/" in type for type in types) else None
+
+
+def _notes(topics: Mapping[str, str], robots: Sequence[FoundRobot]) -> tuple[str, ...]:
+    if robots:
+        return (DIRECTION,)
+    if not topics:
+        return ("There are no topics.",)
+    return (
+        f"There are {len(topics)} topics, and none says where a robot is "
+        f"(nav_msgs/Odometry, or a pose named amcl_pose) or takes its velocity "
+        f"(a Twist or TwistStamped named cmd_vel).",
+    )

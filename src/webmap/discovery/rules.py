@@ -1,0 +1,162 @@
+"""The rules: which types and names of topics fit which role.
+
+A rule holds a pattern for the end of a topic's name. What stands before the end is
+the robot's namespace. Between both may stand names of parts of a robot, such as a
+controller's, which are no robots of their own. Rules of one role are in order: the
+first that fits says how good the topic is.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from webmap.discovery.found import Role
+from webmap.errors import ConfigError
+from webmap.ros.names import split_type
+
+PARTS = (
+    r"[^/]*controller|controllers|mobile_base|base|platform|drive|navigation|nav|"
+    r"sensors?|sensing|perception|localization|amcl|move_base|planner_server|"
+    r"twist_mux|joy_teleop|teleop|keyboard|joystick|hardware|status|camera[^/]*|"
+    r"lidar[^/]*|laser[^/]*|front[^/]*|rear[^/]*|left[^/]*|right[^/]*|"
+    r"(?:global|local)_costmap|visual_slam|slam_toolbox|rtabmap|webmap|"
+    r"cmd_vel_mux|yocs_cmd_vel_mux|ekf[^/]*|odometry"
+)
+"""Names that are parts of a robot and never a robot, as a pattern."""
+
+ODOMETRY = ("nav_msgs/Odometry",)
+POSES = ("geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped")
+VELOCITY = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+GRID = ("nav_msgs/OccupancyGrid",)
+PATH = ("nav_msgs/Path",)
+CAMERA = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One rule."""
+
+    role: Role
+    types: tuple[str, ...]
+    """Names of types without a dialect."""
+
+    tail: str
+    """A pattern for the end of the name, without the slash before it."""
+
+    words: str
+    """Why such a topic fits, for people."""
+
+    unless: str = "\n"
+    """What a name must not hold anywhere."""
+
+
+RULES: tuple[Rule, ...] = (
+    Rule("odometry", ODOMETRY, r"odom(?:etry)?/filtered", "a filter's estimate"),
+    Rule("odometry", ODOMETRY, r"odometry/(?:global|local)", "a filter's estimate"),
+    Rule("odometry", ODOMETRY, r"odom", "the usual name"),
+    Rule("odometry", ODOMETRY, r"odometry", "the usual name, written out"),
+    Rule(
+        "odometry",
+        ODOMETRY,
+        r"(?:[^/]*ground_truth[^/]*)(?:/[^/]+)?",
+        "a simulator's truth, taken when there is nothing else",
+    ),
+    Rule("odometry", ODOMETRY, r"odom/sample", "a tracking camera's"),
+    Rule("odometry", ODOMETRY, r"[^/]+", "its type alone"),
+    Rule("pose", POSES[:1], r"amcl_pose", "where AMCL thinks that it is on the map"),
+    Rule("pose", POSES, r"(?:robot_pose|localization_pose)", "a localiser's pose"),
+    Rule("pose", POSES, r"pose", "the usual name of a localiser's pose"),
+    Rule(
+        "velocity",
+        VELOCITY,
+        r"webmap/cmd_vel",
+        "an input that was made for WebMap",
+    ),
+    Rule("velocity", VELOCITY, r"cmd_vel", "the usual name"),
+    Rule("velocity", VELOCITY, r"cmd_vel_unstamped", "a controller's plain input"),
+    Rule("velocity", VELOCITY, r"commands/velocity", "the base's own input"),
+    Rule("velocity", VELOCITY, r"cmd_vel_mux/input/teleop", "a mux's input for hands"),
+    Rule("velocity", VELOCITY, r"input/teleop", "a mux's input for hands"),
+    Rule("scan", ("sensor_msgs/LaserScan",), r"scan", "the usual name"),
+    Rule("scan", ("sensor_msgs/LaserScan",), r"base_scan", "the usual name of Stage"),
+    Rule("scan", ("sensor_msgs/LaserScan",), r"[^/]+", "its type alone"),
+    Rule(
+        "battery",
+        ("sensor_msgs/BatteryState",),
+        r"battery(?:_state)?",
+        "the usual name",
+    ),
+    Rule("battery", ("sensor_msgs/BatteryState",), r"[^/]+", "its type alone"),
+    Rule("plan", PATH, r"plan", "the usual name of Nav2"),
+    Rule("plan", PATH, r"[^/]*(?:global|Global|Navfn)[^/]*/[^/]*plan", "a global plan"),
+    Rule("plan", PATH, r"[^/]*plan[^/]*", "named a plan"),
+    Rule(
+        "goal",
+        ("geometry_msgs/PoseStamped",),
+        r"goal_pose",
+        "where Nav2 and RViz take goals",
+    ),
+    Rule(
+        "goal",
+        ("geometry_msgs/PoseStamped",),
+        r"move_base_simple/goal",
+        "where move_base and RViz take goals",
+    ),
+    Rule(
+        "cancel",
+        ("actionlib_msgs/GoalID",),
+        r"move_base/cancel",
+        "where move_base calls goals off",
+    ),
+    Rule("costmap", GRID, r"[^/]*costmap[^/]*(?:/[^/]+)?", "named a costmap"),
+    Rule("map", GRID, r"map", "the usual name"),
+    Rule("map", GRID, r"[^/]+", "its type alone"),
+    Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", "depth"),
+    Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not packed", "depth"),
+    Rule("cloud", ("sensor_msgs/PointCloud2",), r"[^/]+", "its type alone"),
+)
+
+INNER_VELOCITY = re.compile(r"cmd_vel|velocity|teleop")
+"""What is left of a Twist's name that may be a step on the way to the base."""
+
+
+class Match(NamedTuple):
+    """A topic that fits a role."""
+
+    role: Role
+    rank: tuple[int, int, str]
+    """The smaller, the better: the rule's place, parts before the name, the name."""
+
+    namespace: str
+    topic: str
+    type: str
+    words: str
+
+
+def match(topic: str, type: str) -> Match | None:
+    """Return which role a topic fits, None if none."""
+    try:
+        plain = str(split_type(type))
+    except ConfigError:
+        return None
+    for place, (rule, pattern) in enumerate(_COMPILED):
+        if plain not in rule.types or rule.unless in topic:
+            continue
+        found = pattern.match(topic)
+        if found is not None:
+            between = found["parts"].count("/")
+            rank = (place, between, topic)
+            return Match(rule.role, rank, found["ns"], topic, type, rule.words)
+    return None
+
+
+# The namespace is as short as can be, so that parts of a robot are not taken for it.
+_COMPILED = tuple(
+    (
+        rule,
+        re.compile(
+            rf"(?P<ns>(?:/[^/]+)*?)/(?P<parts>(?:(?:{PARTS})/)*)(?:{rule.tail})\Z"
+        ),
+    )
+    for rule in RULES
+)

@@ -1,0 +1,78 @@
+"""What was found, for people and as a file."""
+
+import tomllib
+
+from webmap.discovery import discover
+from webmap.discovery.fleet_toml import fleet_toml
+from webmap.discovery.naming import same_name, unique_names
+from webmap.discovery.words import in_one_line, report
+
+TOPICS = {
+    "/odom": "nav_msgs/Odometry",
+    "/cmd_vel": "geometry_msgs/Twist",
+    "/scan": "sensor_msgs/LaserScan",
+    "/rear/scan": "sensor_msgs/LaserScan",
+    "/move_base_simple/goal": "geometry_msgs/PoseStamped",
+    "/move_base/cancel": "actionlib_msgs/GoalID",
+    "/plan": "nav_msgs/Path",
+}
+
+
+def test_the_table_names_each_topic_with_its_rule():
+    text = report("ws://bob:9090", discover(TOPICS, "bob"))
+    assert text.startswith("ws://bob:9090: ROS 1, 1 robot\n\nbob (without a namespace)")
+    line = next(line for line in text.splitlines() if "/cmd_vel" in line)
+    assert line.split() == [
+        "velocity", "/cmd_vel", "geometry_msgs/Twist", "the", "usual", "name",
+    ]  # fmt: skip
+    assert "not found: pose, battery, map, costmap, camera, cloud" in text
+    assert "--robot NAME:ODOM:CMD_VEL:SCAN" in text
+
+
+def test_a_type_with_control_characters_does_not_reach_the_terminal():
+    odd = {"/odom": "nav_msgs/Odometry\n", "/scan": "sensor_msgs/Laser\x1b[2JScan"}
+    text = report("ws://bob:9090", discover(TOPICS | odd))
+    assert "\x1b" not in text
+
+
+def test_one_line_has_what_is_used():
+    (robot,) = discover(TOPICS, "bob").robots
+    assert in_one_line(robot) == (
+        "bob: odometry /odom, velocity /cmd_vel, scan /scan, "
+        "goal /move_base_simple/goal"
+    )
+
+
+def test_the_file_is_toml_with_every_topic_that_is_used():
+    text = fleet_toml([("bob", "ws://bob:9090", discover(TOPICS, "bob"))])
+    data = tomllib.loads(text)
+    assert data["bridges"] == {"bob": "ws://bob:9090"}
+    (robot,) = data["robots"]
+    assert robot["odometry"] == {"topic": "/odom", "type": "nav_msgs/Odometry"}
+    assert robot["twist"] == {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}
+    assert robot["scan"] == ["/scan", "/rear/scan"]
+    assert robot["move"]["cancel_topic"] == "/move_base/cancel"
+    assert "# found too: plan /plan" in text
+
+
+def test_an_address_as_a_name_is_a_quoted_key():
+    text = fleet_toml([("fe80::1", "ws://[fe80::1]:9090", discover(TOPICS, "é"))])
+    assert tomllib.loads(text)["bridges"] == {"fe80::1": "ws://[fe80::1]:9090"}
+
+
+def test_robots_of_one_name_behind_two_bridges_get_their_hosts_names():
+    found = discover(TOPICS, "Bob")
+    named = unique_names([("hall", found), ("yard", discover(TOPICS, "bob"))])
+    assert [one.robots[0].name for one in named] == ["Bob (hall)", "bob (yard)"]
+
+
+def test_one_bridge_twice_still_gives_two_names():
+    found = discover(TOPICS, "bob")
+    named = unique_names([("hall", found), ("hall", found)])
+    assert [one.robots[0].name for one in named] == ["bob (hall)", "bob (hall) 2"]
+
+
+def test_names_that_differ_in_case_or_unicode_form_alone_are_the_same():
+    assert same_name("BOB") == same_name("bob ")
+    assert same_name("é") == same_name("e\u0301")
+    assert same_name("bob") != same_name("rob")
