@@ -1,12 +1,18 @@
 """Layers: what is drawn from data once, however many maps show it."""
 
+import logging
 from collections.abc import Hashable
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.fragment import Fragment
-from webmap.scope import Scope, no_scope
+from webmap.scope import Removal, Scope, keep, no_scope
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+log = logging.getLogger("webmap.layer")
 
 L = TypeVar("L", bound="Layer")
 
@@ -26,7 +32,11 @@ class Layer:
         self.svg: Element = svg.g(class_="layer")
         self.fragment = Fragment(self.svg)
         self.users = 0
-        self.scope = Scope(type(self).__name__)
+        self.scope = Scope(type(self).__name__, self._failed)
+        self.maps: list[Map] = []
+        """Those that hear what fails: see :meth:`show_on`."""
+        self.problems: dict[object, str] = {}
+        """What fails for now, in sentences, by what they are about."""
         self._key: Hashable = None
 
     @classmethod
@@ -43,9 +53,13 @@ class Layer:
         if layer is None:
             layer = cls(*args, **options)
             layer._key = key
+            try:
+                with no_scope(), layer.scope.active():
+                    layer.start()
+            except BaseException:
+                layer.scope.close()
+                raise
             cls._shared[key] = layer
-            with no_scope(), layer.scope.active():
-                layer.start()
         layer.users += 1
         assert isinstance(layer, cls)
         return layer
@@ -53,9 +67,58 @@ class Layer:
     def start(self) -> None:
         """Subscribe to what the layer shows; called once, in the layer's scope."""
 
+    def show_on(self, map: "Map", *, order: float) -> Removal:
+        """Show the layer on a map, and tell the map's page what fails.
+
+        Args:
+            map: The map; one of the layer's users is its, and goes with it.
+            order: What lies over what: greater is nearer; robots have 100.
+
+        Returns:
+            What takes it off the map again; the end of the current scope does, too.
+
+        """
+        shown = map.add_layer(self, order=order)
+        self.maps.append(map)
+        for text in self.problems.values():
+            map.show_error(text)
+
+        def undo() -> None:
+            self.maps.remove(map)
+            shown.remove()
+
+        return keep(Removal(undo))
+
+    def set_problem(self, about: object, text: str) -> None:
+        """Note what fails until :meth:`clear_problem`; later viewers see it too.
+
+        Args:
+            about: What the sentence is about; a new one takes its place.
+            text: A sentence for people.
+
+        """
+        if self.problems.get(about) != text:
+            self.problems[about] = text
+            self._report(text)
+
+    def clear_problem(self, about: object) -> None:
+        """Note that what was said of ``about`` is true no more."""
+        self.problems.pop(about, None)
+
     def release(self) -> None:
         """Have one user less; with none left the layer ends."""
         self.users -= 1
         if self.users == 0:
             self._shared.pop(self._key, None)
             self.scope.close()
+
+    def _failed(self, text: str, lasting: bool) -> None:
+        if lasting:
+            self.set_problem(self.scope, text)
+        else:
+            self._report(text)
+
+    def _report(self, text: str) -> None:
+        log.warning("%s", text)
+        for map in self.maps:
+            map.show_error(text)

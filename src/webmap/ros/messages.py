@@ -5,6 +5,7 @@ type from another have no defaults, so a message of another type is an error and
 a robot at the origin. A number that was ``null`` is NaN.
 """
 
+import math
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -78,6 +79,24 @@ class PoseMsg(msgspec.Struct, frozen=True):
         return Pose(self.position.x, self.position.y, self.orientation.quaternion.yaw)
 
     @property
+    def usable(self) -> Pose:
+        """Place and heading in the plane, of a pose that has them.
+
+        Raises:
+            ProtocolError: If a number is NaN or infinite, or the quaternion is zero.
+
+        """
+        p, q = self.position, self.orientation
+        if not all(map(math.isfinite, (p.x, p.y, q.x, q.y, q.z, q.w))):
+            raise ProtocolError(
+                f"a pose must be of finite numbers, got ({p.x}, {p.y}) with the "
+                f"quaternion ({q.x}, {q.y}, {q.z}, {q.w})"
+            )
+        if q.quaternion.norm <= 1e-6:
+            raise ProtocolError("a pose has a quaternion of zeros, which turns nowhere")
+        return self.planar
+
+    @property
     def place(self) -> "PoseMsg":
         """The pose itself; every view of a pose has one of this name."""
         return self
@@ -93,7 +112,9 @@ class PoseMsg(msgspec.Struct, frozen=True):
         return 0.0
 
 
-class _Stamped(msgspec.Struct, frozen=True, kw_only=True):
+class Stamped(msgspec.Struct, frozen=True, kw_only=True):
+    """Every type that begins with a header."""
+
     header: Header = Header()
 
     @property
@@ -107,7 +128,7 @@ class _Stamped(msgspec.Struct, frozen=True, kw_only=True):
         return self.header.stamp.seconds
 
 
-class PoseStampedMsg(_Stamped, frozen=True, kw_only=True):
+class PoseStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/PoseStamped``."""
 
     pose: PoseMsg
@@ -124,7 +145,7 @@ class PoseWithCovarianceMsg(msgspec.Struct, frozen=True):
     pose: PoseMsg
 
 
-class PoseWithCovarianceStampedMsg(_Stamped, frozen=True, kw_only=True):
+class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/PoseWithCovarianceStamped``."""
 
     pose: PoseWithCovarianceMsg
@@ -176,7 +197,7 @@ class TwistMsg(msgspec.Struct, frozen=True):
         return Twist(self.linear.x, self.linear.y, angular.z)
 
 
-class TwistStampedMsg(_Stamped, frozen=True, kw_only=True):
+class TwistStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/TwistStamped``."""
 
     twist: TwistMsg
@@ -188,7 +209,7 @@ class TwistWithCovarianceMsg(msgspec.Struct, frozen=True):
     twist: TwistMsg
 
 
-class OdometryMsg(_Stamped, frozen=True, kw_only=True):
+class OdometryMsg(Stamped, frozen=True, kw_only=True):
     """``nav_msgs/Odometry``."""
 
     pose: PoseWithCovarianceMsg
@@ -206,7 +227,7 @@ class OdometryMsg(_Stamped, frozen=True, kw_only=True):
         return self.twist.twist.twist
 
 
-class LaserScanMsg(_Stamped, frozen=True, kw_only=True):
+class LaserScanMsg(Stamped, frozen=True, kw_only=True):
     """``sensor_msgs/LaserScan``."""
 
     angle_min: float
@@ -234,7 +255,7 @@ class LaserScanMsg(_Stamped, frozen=True, kw_only=True):
         return self.range_values.array()
 
 
-class BatteryStateMsg(_Stamped, frozen=True, kw_only=True):
+class BatteryStateMsg(Stamped, frozen=True, kw_only=True):
     """``sensor_msgs/BatteryState``."""
 
     percentage: float
@@ -263,7 +284,28 @@ class MapMetaDataMsg(msgspec.Struct, frozen=True):
     """Pose of the corner of cell (0, 0)."""
 
 
-class OccupancyGridMsg(_Stamped, frozen=True, kw_only=True):
+MAX_CELLS = 1 << 26
+"""The most cells that a grid may have."""
+
+
+def cells_of(data: Int8s, width: int, height: int) -> "NDArray[np.int8]":
+    """Return the cells of a grid, of shape (height, width), read-only.
+
+    Raises:
+        ProtocolError: If there are none, too many, or not as many as the size says.
+
+    """
+    size = f"a grid of {width} x {height} cells"
+    if width < 1 or height < 1:
+        raise ProtocolError(f"{size} has none")
+    if width * height > MAX_CELLS:
+        raise ProtocolError(f"{size} is too large: {MAX_CELLS} in all are the limit")
+    if width * height != len(data):
+        raise ProtocolError(f"{size} came with {len(data)} of them")
+    return data.array().reshape(height, width)
+
+
+class OccupancyGridMsg(Stamped, frozen=True, kw_only=True):
     """``nav_msgs/OccupancyGrid``."""
 
     info: MapMetaDataMsg
@@ -277,18 +319,10 @@ class OccupancyGridMsg(_Stamped, frozen=True, kw_only=True):
             ProtocolError: If there are more or fewer than the size says.
 
         """
-        info = self.info
-        if info.width < 0 or info.height < 0:
-            raise ProtocolError(f"a grid of {info.width} x {info.height} cells")
-        if info.width * info.height != len(self.data):
-            raise ProtocolError(
-                f"a grid of {info.width} x {info.height} cells came with "
-                f"{len(self.data)} of them"
-            )
-        return self.data.array().reshape(info.height, info.width)
+        return cells_of(self.data, self.info.width, self.info.height)
 
 
-class PathMsg(_Stamped, frozen=True, kw_only=True):
+class PathMsg(Stamped, frozen=True, kw_only=True):
     """``nav_msgs/Path``."""
 
     poses: list[PoseStampedMsg]
@@ -307,7 +341,7 @@ class TransformMsg(msgspec.Struct, frozen=True):
         return Pose(place.x, place.y, self.rotation.quaternion.yaw)
 
 
-class TransformStampedMsg(_Stamped, frozen=True, kw_only=True):
+class TransformStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/TransformStamped``."""
 
     child_frame_id: str

@@ -6,27 +6,22 @@ publishes in its own thread while the web thread serves, hence the lock.
 
 import hashlib
 import threading
-from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+from webmap.core import pictures as drawn
+from webmap.core.pictures import Pictures
 from webmap.errors import ConfigError
 from webmap.server.files import MEDIA_TYPES, File, NoSuchFile, media_type_of, read_file
 
 FILES = "/_webmap/files/"
-IMAGES = "/_webmap/images/"
+IMAGES = drawn.PREFIX
 
 _IMAGE_TYPES = {
     media_type.partition(";")[0]: media_type
     for media_type in MEDIA_TYPES.values()
     if media_type.startswith("image/")
 }
-
-
-@dataclass(slots=True)
-class _Image:
-    file: File
-    uses: int = 0
 
 
 class Published:
@@ -39,7 +34,7 @@ class Published:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._files: dict[str, Path] = {}
-        self._images: dict[str, _Image] = {}
+        self._images = Pictures()
 
     def publish_file(self, path: Path) -> str:
         """Let browsers load a file, and return its URL.
@@ -88,21 +83,11 @@ class Published:
                 f"an image is one of {', '.join(sorted(_IMAGE_TYPES))}, "
                 f"got {media_type!r}"
             )
-        tag = hashlib.sha256(known.encode() + b"\0" + data).hexdigest()[:32]
-        with self._lock:
-            entry = self._images.setdefault(tag, _Image(File(data, known, tag)))
-            entry.uses += 1
-        return IMAGES + tag
+        return self._images.publish(data, known)
 
     def withdraw_image(self, url: str) -> None:
         """Undo one :meth:`publish_image`; an unknown URL does nothing."""
-        tag = url.removeprefix(IMAGES)
-        with self._lock:
-            entry = self._images.get(tag)
-            if entry is not None:
-                entry.uses -= 1
-                if entry.uses == 0:
-                    del self._images[tag]
+        self._images.withdraw(url)
 
     def file(self, name: str) -> File:
         """Read a published file by its folder and name.
@@ -117,16 +102,16 @@ class Published:
         return read_file(path)
 
     def image(self, tag: str) -> File:
-        """Return a published image.
+        """Return a published image, or one that a layer of this process has drawn.
 
         Raises:
             NoSuchFile: If it was not published, or was withdrawn.
 
         """
-        entry = self._images.get(tag)
-        if entry is None:
+        image = self._images.get(tag) or drawn.pictures.get(tag)
+        if image is None:
             raise NoSuchFile
-        return entry.file
+        return File(image.data, image.media_type, tag)
 
 
 def _existing(path: Path) -> Path:

@@ -1,0 +1,102 @@
+"""Images that are drawn in this process and shown by URL, without any file.
+
+The model's thread publishes and the web thread serves, hence the lock.
+"""
+
+import hashlib
+import threading
+from collections import deque
+from typing import NamedTuple
+
+from webmap.geometry import Affine
+from webmap.scene import svg
+from webmap.scope import Removal, keep
+
+PREFIX = "/_webmap/images/"
+"""How the URL of every image begins that has no name of its own."""
+
+
+class Published(NamedTuple):
+    """An image as it is served."""
+
+    data: bytes
+    media_type: str
+
+
+class Pictures:
+    """Images by what is in them: the same content has the same URL."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._images: dict[str, Published] = {}
+        self._uses: dict[str, int] = {}
+
+    def __len__(self) -> int:
+        return len(self._images)
+
+    def publish(self, data: bytes, media_type: str = "image/png") -> str:
+        """Let pages load an image until it was withdrawn as often; return its URL."""
+        mixed = media_type.encode() + b"\0" + data
+        tag = hashlib.sha256(mixed).hexdigest()[:32]
+        with self._lock:
+            self._images.setdefault(tag, Published(data, media_type))
+            self._uses[tag] = self._uses.get(tag, 0) + 1
+        return PREFIX + tag
+
+    def withdraw(self, url: str) -> None:
+        """Undo one :meth:`publish`; an unknown URL does nothing."""
+        tag = url.removeprefix(PREFIX)
+        with self._lock:
+            uses = self._uses.pop(tag, 0) - 1
+            if uses > 0:
+                self._uses[tag] = uses
+            else:
+                self._images.pop(tag, None)
+
+    def get(self, tag: str) -> Published | None:
+        """Return the image whose URL ends in ``tag``, if it is published."""
+        with self._lock:
+            return self._images.get(tag)
+
+
+pictures = Pictures()
+"""What the layers of this process have drawn."""
+
+
+class Picture:
+    """An ``<image>`` in the world whose content is drawn here, again and again.
+
+    It ends with the scope that it was made in.
+    """
+
+    def __init__(self) -> None:
+        self.element = svg.image(preserveAspectRatio="none")
+        self._urls: deque[str] = deque()
+        keep(Removal(self._end))
+
+    def show(self, data: bytes, matrix: Affine, width: float, height: float) -> None:
+        """Show a PNG in place of the one before.
+
+        Args:
+            data: The PNG.
+            matrix: From the image, in metres with x right and y down from its top
+                left corner, to what the element is in.
+            width: In metres.
+            height: In metres.
+
+        """
+        self._urls.append(pictures.publish(data))
+        self.element.set(href=self._urls[-1], width=width, height=height)
+        self.element.set_matrix(matrix)
+        # A page that is a frame behind still asks for the one before.
+        while len(self._urls) > 2:
+            pictures.withdraw(self._urls.popleft())
+
+    def clear(self) -> None:
+        """Show nothing."""
+        self.element.unset("href")
+        self._end()
+
+    def _end(self) -> None:
+        while self._urls:
+            pictures.withdraw(self._urls.popleft())

@@ -1,0 +1,275 @@
+"""Maps and costmaps, as images."""
+
+import asyncio
+import io
+import math
+from typing import TYPE_CHECKING
+
+from webmap.core.layer import Layer
+from webmap.core.pictures import Picture
+from webmap.core.refusals import refusing
+from webmap.core.tasks import spawn
+from webmap.errors import ConfigError, ProtocolError
+from webmap.geometry import Affine
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages import MapMetaDataMsg, OccupancyGridMsg
+from webmap.ros.messages_grid import OccupancyGridUpdateMsg
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from webmap.core.map import Map
+
+SMALL = 1 << 18
+"""Cells up to which a grid is drawn at once; a larger one in a thread of its own."""
+
+NEVER = 1e9
+"""Seconds after which a grid without an age limit is drawn as old."""
+
+
+class OccupancyGrid:
+    """Draws a ``nav_msgs/OccupancyGrid`` and its ``map_msgs/OccupancyGridUpdate``.
+
+    All maps that show the same grid share one image, which is drawn once a message.
+    What is unknown is transparent. Cells must be -1 to 100; other values are refused,
+    unless the palette is ``"raw"``.
+
+    Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
+    ``.occupancy-grid.costmap { opacity: 0.4 }``.
+
+    Args:
+        map: The map. The grid's frame is taken for the map's.
+        bridge: The link to the ROS system that has the topic.
+        topic: The topic; its updates come on the same with ``_updates`` behind.
+        palette: ``"map"``: free is white and occupied black. ``"costmap"``: free is
+            transparent, then blue to red, inscribed cyan and lethal purple.
+            ``"raw"``: the 256 values of a byte from white to black.
+        throttle: The least time between two whole grids, in milliseconds.
+        age_limit: Seconds after which the grid is drawn as old; None for a map that
+            is sent but once.
+        order: What lies over what: greater is nearer; robots have 100.
+
+    Raises:
+        ConfigError: If there is no such palette.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        bridge: Bridge,
+        topic: str = "/map",
+        *,
+        palette: str = "map",
+        throttle: int = 0,
+        age_limit: float | None = None,
+        order: float | None = None,
+    ) -> None:
+        if palette not in PALETTES:
+            known = ", ".join(PALETTES)
+            raise ConfigError(f"a palette is one of {known}, got {palette!r}")
+        self.map = map
+        self.layer = Grid.shared(bridge, topic, palette, throttle, age_limit)
+        if order is None:
+            order = 20.0 if palette == "costmap" else 10.0
+        self.layer.show_on(map, order=order)
+
+
+class Grid(Layer):
+    """One grid, for all maps that show it."""
+
+    def __init__(
+        self,
+        bridge: Bridge,
+        topic: str,
+        palette: str,
+        throttle: int,
+        age_limit: float | None,
+    ) -> None:
+        super().__init__()
+        self.bridge = bridge
+        self.topic = topic
+        self.palette = palette
+        self.throttle = throttle
+        self.age_limit = NEVER if age_limit is None else age_limit
+        self.info: MapMetaDataMsg | None = None
+        """Size and place of what came last."""
+        self.cells: NDArray[np.int8] | None = None
+        """What came last, of shape (height, width), the lowest row first."""
+        self._drawing: asyncio.Task[None] | None = None
+        self._undrawn = False
+        self.svg.classes.add("occupancy-grid", palette)
+        self.svg.set(pointer_events="none")
+        if palette == "costmap":
+            self.svg.set(opacity=0.7)
+
+    def start(self) -> None:
+        """Subscribe to the grid and to its updates."""
+        self.picture = Picture()
+        self.picture.element.set(image_rendering="pixelated")
+        self.svg.append(self.picture.element)
+        self.bridge.subscribe(
+            self.topic,
+            refusing(self, self.topic, self.on_grid),
+            "nav_msgs/OccupancyGrid",
+            throttle=self.throttle,
+            decode=OccupancyGridMsg,
+        )
+        updates = self.topic.rstrip("/") + "_updates"
+        # Every update counts, so none may be held back or replaced by the next.
+        self.bridge.subscribe(
+            updates,
+            refusing(self, updates, self.on_update),
+            "map_msgs/OccupancyGridUpdate",
+            decode=OccupancyGridUpdateMsg,
+            compression="cbor",
+            queue_length=100,
+        )
+
+    def on_grid(self, grid: OccupancyGridMsg) -> None:
+        """Draw a grid in place of the one before.
+
+        Raises:
+            ProtocolError: If its size, its place or a cell makes no sense.
+
+        """
+        resolution = grid.info.resolution
+        if not (math.isfinite(resolution) and resolution > 0):
+            raise ProtocolError(
+                f"a cell must be a number of metres above 0, got {resolution}"
+            )
+        _ = grid.info.origin.usable
+        cells = grid.cells
+        check_values(cells, self.palette)
+        self.info, self.cells = grid.info, cells
+        self._draw()
+
+    def on_update(self, update: OccupancyGridUpdateMsg) -> None:
+        """Change a rectangle of the grid; without a grid there is nothing to change.
+
+        Raises:
+            ProtocolError: If it reaches out of the grid, or a cell makes no sense.
+
+        """
+        if self.cells is None:
+            return
+        x, y, patch = update.x, update.y, update.cells
+        height, width = self.cells.shape
+        if not (0 <= x <= width - update.width and 0 <= y <= height - update.height):
+            raise ProtocolError(
+                f"an update of {update.width} x {update.height} cells at column {x}, "
+                f"row {y} reaches out of a grid of {width} x {height}"
+            )
+        check_values(patch, self.palette)
+        if not self.cells.flags.writeable:
+            self.cells = self.cells.copy()
+        self.cells[y : y + update.height, x : x + update.width] = patch
+        self._draw()
+
+    def _draw(self) -> None:
+        self.svg.set_age(0.0, limit=self.age_limit)
+        if self.cells is not None and self.cells.size <= SMALL:
+            self._show(grid_png(self.cells, self.palette), self.info)
+            return
+        self._undrawn = True
+        if self._drawing is None:
+            self._drawing = spawn(self._draw_on())
+
+    async def _draw_on(self) -> None:
+        """Draw what is newest until that is drawn."""
+        try:
+            while self._undrawn and self.cells is not None and not self.scope.closed:
+                self._undrawn = False
+                cells, info = self.cells, self.info
+                # An update meanwhile may be half drawn; it has it drawn again.
+                png = await asyncio.to_thread(grid_png, cells, self.palette)
+                self._show(png, info)
+        finally:
+            self._drawing = None
+
+    def _show(self, png: bytes, info: MapMetaDataMsg | None) -> None:
+        if info is None or self.scope.closed:
+            return
+        width, height = info.width * info.resolution, info.height * info.resolution
+        at = info.origin.planar
+        cos, sin = math.cos(at.yaw), math.sin(at.yaw)
+        placed = Affine(cos, sin, -sin, cos, at.x, at.y)
+        upright = Affine(1, 0, 0, -1, 0, height)
+        self.picture.show(png, placed @ upright, width, height)
+
+
+def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
+    """Let cells pass that the palette has a colour for.
+
+    Raises:
+        ProtocolError: If there are others; one of them is named.
+
+    """
+    if palette == "raw":
+        return
+    low, high = int(cells.min()), int(cells.max())
+    if low < -1 or high > 100:
+        wrong = low if low < -1 else high
+        count = int(((cells < -1) | (cells > 100)).sum())
+        raise ProtocolError(
+            f"cells are -1 to 100, but {count} of {cells.size} are not: one is {wrong}"
+        )
+
+
+def grid_png(cells: "NDArray[np.int8]", palette: str) -> bytes:
+    """Return a grid as a PNG of one pixel a cell, its highest row at the top.
+
+    Args:
+        cells: Of shape (height, width), the lowest row first.
+        palette: The name of one of :data:`PALETTES`.
+
+    """
+    import numpy as np
+    from PIL import Image
+
+    height, width = cells.shape
+    pixels = np.ascontiguousarray(cells[::-1]).view(np.uint8)
+    image = Image.frombytes("P", (width, height), pixels.tobytes())
+    colours = PALETTES[palette]
+    image.putpalette([part for colour in colours for part in colour[:3]])
+    out = io.BytesIO()
+    alpha = bytes(colour[3] for colour in colours)
+    image.save(out, "PNG", transparency=alpha, compress_level=1)
+    return out.getvalue()
+
+
+Colour = tuple[int, int, int, int]
+
+CLEAR: Colour = (0, 0, 0, 0)
+
+
+def _map_colour(value: int) -> Colour:
+    if value > 100:
+        return CLEAR
+    grey = 255 - 255 * value // 100
+    return (grey, grey, grey, 255)
+
+
+def _costmap_colour(value: int) -> Colour:
+    if value == 0 or value > 100:
+        return CLEAR
+    if value == 100:
+        return (255, 0, 255, 255)
+    if value == 99:
+        return (0, 255, 255, 255)
+    red = 255 * value // 98
+    return (red, 0, 255 - red, 255)
+
+
+def _raw_colour(value: int) -> Colour:
+    return (255 - value, 255 - value, 255 - value, 255)
+
+
+# By the value of a cell as a byte: -1, which is unknown, is 255.
+PALETTES: dict[str, list[Colour]] = {
+    "map": [_map_colour(value) for value in range(256)],
+    "costmap": [_costmap_colour(value) for value in range(256)],
+    "raw": [_raw_colour(value) for value in range(256)],
+}
+"""The colours of each palette, as RViz has them where it has any."""

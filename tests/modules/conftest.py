@@ -1,0 +1,37 @@
+"""A link, a page and a map for modules."""
+
+from collections.abc import Iterator
+
+import pytest
+from module_fakes import Channel, Link, Someone
+
+from webmap import Map, Robot
+from webmap.core.page import Page, PageEntry
+
+
+@pytest.fixture
+def link() -> Link:
+    return Link()
+
+
+@pytest.fixture
+def channel() -> Channel:
+    return Channel()
+
+
+@pytest.fixture
+def page(channel, tmp_path) -> Iterator[Page]:
+    entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
+    page = Page(entry, channel, Someone(), None, {})
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def map(page) -> Map:
+    return Map(page.element("map"), 700, 500)
+
+
+@pytest.fixture
+def robot() -> Robot:
+    return Robot("Bob")
