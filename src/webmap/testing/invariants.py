@@ -1,0 +1,195 @@
+"""What must hold for all that a robot was told, whatever failed meanwhile. No I/O.
+
+Each rule reads the velocities that came, oldest first, and says in sentences where it
+was broken; times in them are seconds since the first velocity.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from webmap.testing.log import Told
+
+BREATH = 0.5
+"""Seconds without a velocity that part two activities."""
+
+RAMP_INTERVAL = 0.1
+"""The longest time that speeding up may count between two velocities, in seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """The limits that all velocities keep."""
+
+    v_max: float = math.inf
+    """Metres per second."""
+
+    w_max: float = math.inf
+    """Radians per second."""
+
+    a_max: float | None = None
+    """Metres per second squared when speeding up; None if that is not limited."""
+
+    zeros: float = 0.5
+    """Seconds for which zeros go on after a stop; then there is silence."""
+
+    slack: float = 0.1
+    """Seconds by which the machine may have been late in all of this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quiet:
+    """A stretch of time in which nothing may move the robot."""
+
+    begin: float
+    end: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """What was done to the robot while the velocities came.
+
+    Times are seconds of the monotonic clock.
+    """
+
+    quiet: Sequence[Quiet] = ()
+    handovers: Sequence[float] = ()
+    """When another driver got the robot."""
+
+    unreachable: Sequence[tuple[float, float]] = ()
+    """When nothing could be said to the robot, however much it was wanted."""
+
+    causes: Sequence[float] = ()
+    """When zeros may begin anew: a STOP, or a link that came back."""
+
+
+def check_invariants(
+    log: Sequence[Told],
+    bounds: Bounds | None = None,
+    *,
+    quiet: Sequence[Quiet] = (),
+    handovers: Sequence[float] = (),
+    unreachable: Sequence[tuple[float, float]] = (),
+    causes: Sequence[float] = (),
+) -> list[str]:
+    """Return what is wrong with the velocities that a robot was told, in sentences.
+
+    Args:
+        log: The velocities, oldest first. The last activity must be over.
+        bounds: The limits.
+        quiet: Stretches in which nothing may move the robot, as after a fault.
+        handovers: When another driver got the robot, in seconds of the monotonic clock.
+        unreachable: When nothing could be said to the robot.
+        causes: When zeros may begin anew: a STOP, or a link that came back.
+
+    """
+    told = list(log)
+    if not told:
+        return []
+    story = Story(quiet, handovers, unreachable, causes)
+    bounds = bounds or Bounds()
+    wrong = [found for rule in RULES for found in rule(told, bounds, story)]
+    begin = told[0].at
+    return [f"{at - begin:.3f} s: {words}" for at, words in sorted(wrong)]
+
+
+Finding = tuple[float, str]
+
+
+def _limits(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+    """Every velocity is finite and within the limits."""
+    for told in log:
+        if not told.twist.is_finite:
+            yield told.at, f"{told.twist} is not finite"
+        elif told.speed > bounds.v_max * (1 + 1e-9):
+            yield told.at, f"{told.speed:g} m/s is above the limit of {bounds.v_max:g}"
+        elif abs(told.twist.wz) > bounds.w_max * (1 + 1e-9):
+            yield (
+                told.at,
+                f"{told.twist.wz:g} rad/s is above the limit of {bounds.w_max:g}",
+            )
+
+
+def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+    """Nothing moves the robot while nothing may."""
+    for quiet in story.quiet:
+        moving = [t for t in log if quiet.begin < t.at < quiet.end and not t.is_zero]
+        if moving:
+            late = moving[-1].at - quiet.begin
+            yield (
+                moving[0].at,
+                f"{len(moving)} moving velocities came up to {late:.3f} s after "
+                f"the robot had to be quiet: {quiet.why}",
+            )
+
+
+def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+    """The last velocity of any activity is zero.
+
+    If the robot could not be reached then, the first one that reaches it is.
+    """
+    for told, following in itertools.zip_longest(log, log[1:]):
+        over = following is None or following.at - told.at > BREATH
+        if told.is_zero or not over:
+            continue
+        until = math.inf if following is None else following.at
+        cut = any(b < until and e > told.at for b, e in story.unreachable)
+        if not cut:
+            yield told.at, "an activity ended with a velocity that is not zero"
+        elif following is not None and not following.is_zero:
+            yield following.at, "the first velocity after a cut is not zero"
+
+
+def _handovers(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+    """Between two drivers there is a zero."""
+    for at in story.handovers:
+        before = [t for t in log if t.at <= at]
+        after = [t for t in log if t.at > at]
+        if not before or not after:
+            continue
+        if not before[-1].is_zero and not after[0].is_zero:
+            yield after[0].at, "another driver began without a zero in between"
+
+
+def _silence(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+    """Zeros end by themselves, so that other writers are left in peace."""
+    begun = -math.inf
+    was_moving = True
+    for told in log:
+        if not told.is_zero:
+            was_moving = True
+            continue
+        if was_moving:
+            begun, was_moving = told.at, False
+        cause = max((c for c in story.causes if c <= told.at), default=-math.inf)
+        lasted = told.at - max(begun, cause)
+        if lasted > bounds.zeros + bounds.slack:
+            yield told.at, f"zeros go on {lasted:.3f} s after the robot was stopped"
+            return
+
+
+def _ramp(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+    """Speeding up keeps to the acceleration; slowing down need not."""
+    if bounds.a_max is None:
+        return
+    before, at = 0.0, -math.inf
+    for told in log:
+        elapsed = min(told.at - at, RAMP_INTERVAL) + bounds.slack
+        if told.speed - before > bounds.a_max * elapsed + 1e-9:
+            yield (
+                told.at,
+                f"from {before:g} to {told.speed:g} m/s in {told.at - at:.3f} s",
+            )
+        before, at = told.speed, told.at
+
+
+RULES: tuple[Callable[[list[Told], Bounds, Story], Iterator[Finding]], ...] = (
+    _limits,
+    _quiet,
+    _last_is_zero,
+    _handovers,
+    _silence,
+    _ramp,
+)

@@ -1,0 +1,56 @@
+"""An event loop in a thread, so that a test that blocks can drive what runs in it."""
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+class LoopThread:
+    """Runs an event loop beside the thread of a test.
+
+    Args:
+        name: Of the thread.
+
+    """
+
+    def __init__(self, name: str) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def call(self, work: Coroutine[Any, Any, T], timeout: float = 10.0) -> T:
+        """Run a coroutine in the loop and return its result.
+
+        Raises:
+            TimeoutError: If it takes longer than ``timeout`` seconds.
+
+        """
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout)
+
+    def do(self, act: Callable[..., T], *arguments: Any) -> T:
+        """Call a function in the loop's thread and return its result."""
+
+        async def work() -> T:
+            return act(*arguments)
+
+        return self.call(work())
+
+    def end(self) -> None:
+        """Cancel what still runs, and end the loop and its thread."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(10)
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_forever()
+            left = asyncio.all_tasks(self._loop)
+            for task in left:
+                task.cancel()
+            self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+            self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+        finally:
+            self._loop.close()

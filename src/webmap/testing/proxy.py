@@ -1,0 +1,255 @@
+"""A TCP proxy on the loopback address that does to a link what networks do."""
+
+import asyncio
+import contextlib
+import socket
+import struct
+from collections import deque
+from typing import Literal
+
+from webmap.testing.loop_thread import LoopThread
+from webmap.testing.shaping import Shape, Shaper
+
+Way = Literal["up", "down", "both"]
+"""``up`` is from the client to the server behind the proxy, ``down`` the other way."""
+
+# The kernel's "linger 0": closing drops unsent bytes and resets the connection.
+_LINGER = struct.pack("ii", 1, 0)
+
+
+class Direction:
+    """What holds for one direction of all links."""
+
+    def __init__(self, seed: int) -> None:
+        self.shape = Shape()
+        self.seed = seed
+        self.flowing = asyncio.Event()
+        self.flowing.set()
+
+
+class FaultProxy:
+    """Passes bytes on until it is told to hold, delay, cut or reset them.
+
+    It runs in a thread of its own and is used as a context manager, so that a test may
+    block. A port that the kernel chooses is at ``proxy.port``.
+
+    Args:
+        port: The port of the server behind it, on the loopback address.
+
+    """
+
+    def __init__(self, port: int) -> None:
+        self.target = port
+        self._thread = LoopThread("fault-proxy")
+        self._links: set[_Link] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._refusing = False
+        self._ways, self._server, self.port = self._thread.call(self._listen())
+
+    def __enter__(self) -> "FaultProxy":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """Drop every link and listen no more."""
+
+        async def end() -> None:
+            self._server.close()
+            for link in list(self._links):
+                link.reset()
+
+        self._thread.call(end())
+        self._thread.end()
+
+    async def _listen(
+        self,
+    ) -> tuple[dict[str, Direction], asyncio.Server, int]:
+        ways = {"up": Direction(1), "down": Direction(2)}
+        server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
+        return ways, server, server.sockets[0].getsockname()[1]
+
+    def _choose(self, way: Way) -> list[Direction]:
+        return list(self._ways.values()) if way == "both" else [self._ways[way]]
+
+    # Faults; each takes effect before the call returns.
+
+    def shape(self, shape: Shape, way: Way = "both") -> None:
+        """Delay, slow down or cut up what comes from now on."""
+
+        def change() -> None:
+            for direction in self._choose(way):
+                direction.shape = shape
+
+        self._thread.do(change)
+
+    def hold(self, way: Way = "both") -> None:
+        """Let no byte through, and lose none: the link looks alive."""
+
+        def hold() -> None:
+            for direction in self._choose(way):
+                direction.flowing.clear()
+
+        self._thread.do(hold)
+
+    def release(self, way: Way = "both") -> None:
+        """Let what was held through, all at once, as TCP does after a stall."""
+
+        def release() -> None:
+            for direction in self._choose(way):
+                direction.flowing.set()
+
+        self._thread.do(release)
+
+    def reset(self) -> None:
+        """Reset every link (RST) to both of its ends; new ones are taken."""
+
+        def reset() -> None:
+            for link in list(self._links):
+                link.reset()
+
+        self._thread.do(reset)
+
+    def half_close(self, way: Literal["up", "down"]) -> None:
+        """End one direction of every link in good order; the other goes on."""
+
+        def close() -> None:
+            for link in list(self._links):
+                link.half_close(way)
+
+        self._thread.do(close)
+
+    def refuse(self, refusing: bool = True) -> None:
+        """Reset every link that is made from now on, or take them again."""
+        self._refusing = refusing
+
+    @property
+    def links(self) -> int:
+        """How many links go through the proxy now."""
+        return len(self._links)
+
+    def _accept(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        task = asyncio.get_running_loop().create_task(self._serve(reader, writer))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _serve(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        if self._refusing:
+            _reset(writer)
+            return
+        try:
+            far = await asyncio.open_connection("127.0.0.1", self.target)
+        except OSError:
+            _reset(writer)
+            return
+        link = _Link((reader, writer), far, self._ways)
+        self._links.add(link)
+        try:
+            await link.run()
+        finally:
+            self._links.discard(link)
+
+
+Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+class _Link:
+    """One connection through the proxy."""
+
+    def __init__(self, near: Stream, far: Stream, ways: dict[str, Direction]) -> None:
+        self._task = asyncio.current_task()
+        self._writers = [near[1], far[1]]
+        self._pumps = {
+            "up": _Pump(near[0], far[1], ways["up"]),
+            "down": _Pump(far[0], near[1], ways["down"]),
+        }
+
+    async def run(self) -> None:
+        """Pass bytes until both directions have ended, or one with an error."""
+        try:
+            async with asyncio.TaskGroup() as group:
+                for pump in self._pumps.values():
+                    group.create_task(pump.read())
+                    group.create_task(pump.write())
+        except* OSError:
+            for writer in self._writers:
+                _reset(writer)
+        finally:
+            for writer in self._writers:
+                writer.close()
+
+    def reset(self) -> None:
+        for writer in self._writers:
+            _reset(writer)
+        if self._task is not None:
+            self._task.cancel()  # it may wait for a link that is held
+
+    def half_close(self, way: str) -> None:
+        self._pumps[way].finish()
+
+
+class _Pump:
+    """One direction of one connection."""
+
+    def __init__(
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        direction: Direction,
+    ) -> None:
+        self._reader = reader
+        self._writer = writer
+        self._direction = direction
+        self._shaper = Shaper(seed=direction.seed)
+        self._waiting: deque[tuple[float, bytes]] = deque()
+        self._more = asyncio.Event()
+        self._ended = False
+
+    def finish(self) -> None:
+        """End this direction; what still comes for it is dropped."""
+        self._ended = True
+        self._waiting.clear()
+        self._more.set()
+
+    async def read(self) -> None:
+        loop = asyncio.get_running_loop()
+        while data := await self._reader.read(1 << 16):
+            if self._ended:
+                continue
+            self._shaper.shape = self._direction.shape
+            self._waiting.extend(self._shaper.take(data, loop.time()))
+            self._more.set()
+            # A held link takes no more either, so that the sender's buffers fill.
+            await self._direction.flowing.wait()
+        self._ended = True
+        self._more.set()
+
+    async def write(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            while not self._waiting:
+                if self._ended:
+                    with contextlib.suppress(OSError):
+                        self._writer.write_eof()
+                    return
+                self._more.clear()
+                await self._more.wait()
+            due, _ = self._waiting[0]
+            if (early := due - loop.time()) > 0:
+                await asyncio.sleep(early)
+            await self._direction.flowing.wait()
+            if self._waiting:  # not thrown away meanwhile
+                self._writer.write(self._waiting.popleft()[1])
+                await self._writer.drain()
+
+
+def _reset(writer: asyncio.StreamWriter) -> None:
+    raw = writer.get_extra_info("socket")
+    with contextlib.suppress(OSError):
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER)
+    writer.transport.abort()

@@ -1,0 +1,45 @@
+"""How late this machine runs a thread that wants to run, second by second."""
+
+import threading
+import time
+
+
+class Sentinel:
+    """Measures scheduler jitter while a test measures something else.
+
+    A bound on a busy machine is the promise plus what the machine itself was late in
+    the same seconds; this thread asks to be woken every 5 ms and notes when it was.
+    """
+
+    PERIOD = 0.005
+    """Seconds between two wakes."""
+
+    def __init__(self) -> None:
+        self._late: list[tuple[float, float]] = []
+        self._end = threading.Event()
+        self._thread = threading.Thread(
+            target=self._watch, name="sentinel", daemon=True
+        )
+
+    def __enter__(self) -> "Sentinel":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._end.set()
+        self._thread.join(5)
+
+    def worst(self, since: float, until: float | None = None) -> float:
+        """Return the longest delay in a stretch of the monotonic clock, in seconds."""
+        until = time.monotonic() if until is None else until
+        return max(
+            (late for at, late in list(self._late) if since <= at <= until + late),
+            default=0.0,
+        )
+
+    def _watch(self) -> None:
+        while not self._end.is_set():
+            due = time.monotonic() + self.PERIOD
+            time.sleep(self.PERIOD)
+            now = time.monotonic()
+            self._late.append((now, max(0.0, now - due)))

@@ -1,0 +1,176 @@
+"""A robot that notes what it is told, with a base that stops by itself, or does not."""
+
+import asyncio
+import math
+import time
+from typing import Any
+
+from webmap.geometry import Pose, Twist
+from webmap.sim.robot import BaseOptions, Robot
+from webmap.testing.log import Heard, Moved, Told, WitnessLog
+from webmap.testing.loop_thread import LoopThread
+from webmap.testing.rosbridge import WitnessBridge
+
+STEP = 0.01
+"""Seconds between two looks of the base at the clock."""
+
+ODOMETRY_EVERY = 5
+"""Steps between two odometry messages, which makes 20 a second."""
+
+
+class WitnessRobot:
+    """A differential base behind a rosbridge of its own, in a thread of its own.
+
+    Used as a context manager. What it is told stands in :attr:`log`, with the time of
+    the monotonic clock, which all processes of one machine share. Its brakes are good:
+    it follows a command within a few hundredths of a second, so that the times in the
+    log are those of what it was told.
+
+    Args:
+        timeout: Seconds without a command until the base stops by itself; None for a
+            bad one that never does.
+        obeys: Whether it does what it is told.
+        goals_block: Whether a goal runs on its socket's input thread.
+
+    """
+
+    TWIST_TOPIC = "/cmd_vel"
+    ODOMETRY_TOPIC = "/odom"
+
+    def __init__(
+        self,
+        *,
+        timeout: float | None = 0.5,
+        obeys: bool = True,
+        goals_block: bool = False,
+    ) -> None:
+        self.log = WitnessLog()
+        self.obeys = obeys
+        self.sends_telemetry = True
+        """Whether odometry is published."""
+        options = BaseOptions(
+            v_max=5.0,
+            w_max=10.0,
+            acceleration=50.0,
+            turn_acceleration=100.0,
+            timeout=timeout,
+        )
+        self._base = Robot("", Pose(), options)
+        self._thread = LoopThread("witness-robot")
+        self._bridge = self._thread.do(WitnessBridge, self._hear)
+        self._bridge.goals_block = goals_block
+        self._bridge.types = {
+            self.TWIST_TOPIC: "geometry_msgs/Twist",
+            self.ODOMETRY_TOPIC: "nav_msgs/Odometry",
+        }
+        self._thread.call(self._bridge.start())
+        self._life = self._thread.do(lambda: asyncio.ensure_future(self._live()))
+
+    def __enter__(self) -> "WitnessRobot":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """Stop everything."""
+        self._thread.call(self._bridge.stop())
+        self._thread.end()
+
+    @property
+    def port(self) -> int:
+        """Where its rosbridge listens, on the loopback address."""
+        return self._bridge.port
+
+    @property
+    def url(self) -> str:
+        """The address of its rosbridge."""
+        return f"ws://127.0.0.1:{self.port}"
+
+    @property
+    def velocity(self) -> Twist:
+        """How the wheels turn now."""
+        return self._base.twist
+
+    def kill_bridge(self) -> None:
+        """End its rosbridge without a word; the base lives on, on its own."""
+        self._thread.call(self._bridge.stop())
+
+    def restart_bridge(self) -> None:
+        """Start its rosbridge again, on the same port."""
+        self._thread.call(self._bridge.start())
+
+    def unblock(self) -> None:
+        """Let calls and goals that hang go on."""
+        self._thread.do(self._bridge.unblock)
+
+    def answers_services(self, answers: bool) -> None:
+        """Answer calls from now on, or let them hang."""
+        self._bridge.answers_services = answers
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        """Publish something to whoever subscribed to it."""
+        self._thread.call(self._bridge.publish(topic, message))
+
+    def _hear(self, link: int, message: dict[str, Any]) -> None:
+        now = time.monotonic()
+        self.log.heard.append(Heard(now, link, message))
+        if message.get("op") != "publish" or message.get("topic") != self.TWIST_TOPIC:
+            return
+        twist = _twist(message.get("msg"))
+        self.log.told.append(Told(now, twist, link))
+        if self.obeys:
+            self._base.command(twist, now)
+
+    async def _live(self) -> None:
+        steps = 0
+        before = time.monotonic()
+        while True:
+            await asyncio.sleep(STEP)
+            now = time.monotonic()
+            self._base.step(now - before, now, lambda x, y: False)
+            before = now
+            self.log.moved.append(Moved(now, self._base.twist))
+            steps += 1
+            if self.sends_telemetry and steps % ODOMETRY_EVERY == 0:
+                await self._bridge.publish(self.ODOMETRY_TOPIC, self._odometry())
+
+    def _odometry(self) -> dict[str, Any]:
+        pose, twist = self._base.pose, self._base.twist
+        half = pose.yaw / 2
+        return {
+            "header": {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "odom"},
+            "child_frame_id": "base_link",
+            "pose": {
+                "pose": {
+                    "position": {"x": pose.x, "y": pose.y, "z": 0.0},
+                    "orientation": {
+                        "x": 0.0,
+                        "y": 0.0,
+                        "z": math.sin(half),
+                        "w": math.cos(half),
+                    },
+                },
+                "covariance": [0.0] * 36,
+            },
+            "twist": {
+                "twist": {
+                    "linear": {"x": twist.vx, "y": 0.0, "z": 0.0},
+                    "angular": {"x": 0.0, "y": 0.0, "z": twist.wz},
+                },
+                "covariance": [0.0] * 36,
+            },
+        }
+
+
+def _twist(message: Any) -> Twist:
+    """Read a Twist or a TwistStamped; what is no number is NaN, so that it is seen."""
+    inner = message.get("twist", message) if isinstance(message, dict) else {}
+    linear, angular = inner.get("linear") or {}, inner.get("angular") or {}
+    return Twist(
+        _number(linear.get("x")), _number(linear.get("y")), _number(angular.get("z"))
+    )
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan

@@ -1,0 +1,135 @@
+"""The fault proxy, with real sockets at both of its ends."""
+
+import contextlib
+import socket
+import threading
+import time
+
+import pytest
+
+from webmap.testing import FaultProxy, Shape
+
+
+@pytest.fixture
+def ends():
+    """The proxy, a client's socket, and the server's socket behind the proxy."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    with listener, FaultProxy(listener.getsockname()[1]) as proxy:
+        client = socket.create_connection(("127.0.0.1", proxy.port), 5)
+        server, _ = listener.accept()
+        with client, server:
+            client.settimeout(5)
+            server.settimeout(5)
+            client.sendall(b"!")
+            assert server.recv(1) == b"!"
+            yield proxy, client, server
+
+
+def read(end, size):
+    data = b""
+    while len(data) < size and (more := end.recv(size - len(data))):
+        data += more
+    return data
+
+
+def nothing_comes(end, seconds):
+    end.settimeout(seconds)
+    try:
+        with pytest.raises(TimeoutError):
+            end.recv(1)
+    finally:
+        end.settimeout(5)
+
+
+def test_bytes_pass_both_ways(ends):
+    _, client, server = ends
+    client.sendall(b"hello")
+    assert read(server, 5) == b"hello"
+    server.sendall(b"there")
+    assert read(client, 5) == b"there"
+
+
+def test_much_passes_whole(ends):
+    _, client, server = ends
+    data = bytes(range(256)) * 20_000
+    sender = threading.Thread(target=client.sendall, args=(data,))
+    sender.start()
+    assert read(server, len(data)) == data
+    sender.join(5)
+
+
+def test_what_is_held_comes_when_it_is_released_and_not_before(ends):
+    proxy, client, server = ends
+    proxy.hold("up")
+    client.sendall(b"late")
+    nothing_comes(server, 0.2)
+    server.sendall(b"down")
+    assert read(client, 4) == b"down"
+    proxy.release("up")
+    assert read(server, 4) == b"late"
+
+
+def test_latency_holds_for_each_way(ends):
+    proxy, client, server = ends
+    proxy.shape(Shape(latency=0.15))
+    begin = time.monotonic()
+    client.sendall(b"x")
+    server.sendall(read(server, 1))
+    assert read(client, 1) == b"x"
+    assert time.monotonic() - begin >= 0.3
+
+
+def test_a_slice_cuts_what_was_written_at_once(ends):
+    proxy, client, server = ends
+    proxy.shape(Shape(slice_size=3, slice_gap=0.05), "up")
+    client.sendall(b"abcdef")
+    assert server.recv(100) == b"abc"
+    assert read(server, 3) == b"def"
+
+
+def test_a_reset_reaches_both_ends_and_new_links_are_taken(ends):
+    proxy, client, server = ends
+    proxy.reset()
+    for end in (client, server):
+        with pytest.raises(ConnectionResetError):
+            end.recv(1)
+    assert proxy.port != proxy.target
+    socket.create_connection(("127.0.0.1", proxy.port), 5).close()
+
+
+def test_a_half_that_is_closed_ends_while_the_other_goes_on(ends):
+    proxy, client, server = ends
+    proxy.half_close("up")
+    assert server.recv(1) == b""
+    client.sendall(b"lost")
+    server.sendall(b"still here")
+    assert read(client, 10) == b"still here"
+
+
+def test_an_end_of_the_bytes_is_passed_on(ends):
+    _, client, server = ends
+    client.sendall(b"bye")
+    client.shutdown(socket.SHUT_WR)
+    assert read(server, 4) == b"bye"
+
+
+def test_links_are_refused_while_that_is_asked(ends):
+    proxy, _, _ = ends
+    proxy.refuse()
+    with contextlib.closing(
+        socket.create_connection(("127.0.0.1", proxy.port), 5)
+    ) as link:
+        link.settimeout(5)
+        with pytest.raises(ConnectionResetError):
+            link.recv(1)
+
+
+def test_without_a_server_behind_it_links_are_reset():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    with (
+        FaultProxy(port) as proxy,
+        socket.create_connection(("127.0.0.1", proxy.port), 5) as link,
+        pytest.raises(ConnectionResetError),
+    ):
+        link.recv(1)

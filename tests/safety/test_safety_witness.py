@@ -1,0 +1,167 @@
+"""The witness robot: it notes what it is told, moves, and stops by itself."""
+
+import json
+import time
+
+import pytest
+from websockets.sync.client import connect
+
+from webmap.geometry import Twist
+from webmap.ros import ops
+from webmap.testing import Sentinel, WitnessRobot
+
+
+def eventually(check, what, seconds=10.0):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if found := check():
+            return found
+        time.sleep(0.005)
+    raise AssertionError(f"never came: {what}")
+
+
+def twist(vx, wz=0.0):
+    message = {
+        "linear": {"x": vx, "y": 0.0, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": wz},
+    }
+    return ops.publish("/cmd_vel", message).decode()
+
+
+@pytest.fixture
+def robot():
+    with WitnessRobot(timeout=0.2) as robot:
+        yield robot
+
+
+@pytest.fixture
+def link(robot):
+    with connect(robot.url) as link:
+        yield link
+
+
+def test_what_it_is_told_stands_in_its_log_with_the_time(robot, link):
+    before = time.monotonic()
+    link.send(twist(0.5, 0.25))
+    told = eventually(lambda: robot.log.told, "a velocity")[0]
+    assert told.twist == Twist(0.5, 0.0, 0.25)
+    assert before <= told.at <= time.monotonic()
+    assert robot.log.of("publish", "/cmd_vel")[0].link == 1
+
+
+def test_it_moves_and_stops_by_itself_after_its_timeout(robot, link):
+    link.send(twist(0.5))
+    eventually(lambda: robot.velocity.vx == 0.5, "moving")
+    told_at = robot.log.told[-1].at
+    rest = eventually(lambda: robot.log.standstill(told_at + 0.1), "standing still")
+    assert rest - told_at >= 0.2
+    assert robot.log.first_zero(0) is None
+
+
+def test_a_bad_one_never_stops_by_itself():
+    with WitnessRobot(timeout=None) as robot, connect(robot.url) as link:
+        link.send(twist(0.5))
+        eventually(lambda: robot.velocity.vx == 0.5, "moving")
+        told_at = robot.log.told[-1].at
+        eventually(lambda: robot.log.moved[-1].at > told_at + 0.7, "a while")
+        assert robot.velocity.vx == 0.5
+        link.send(twist(0.0))
+        eventually(lambda: robot.velocity.vx == 0.0, "obeying all the same")
+
+
+def test_one_that_does_not_obey_notes_and_stands(robot, link):
+    robot.obeys = False
+    link.send(twist(0.5))
+    eventually(lambda: robot.log.told, "a velocity")
+    assert robot.velocity.is_zero
+
+
+def test_odometry_comes_to_who_asks_and_says_how_it_moves(robot, link):
+    link.send(ops.subscribe("/odom", id="1").decode())
+    link.send(twist(0.5))
+    deadline = time.monotonic() + 5
+    while time.monotonic() < deadline:
+        message = json.loads(link.recv(timeout=5))["msg"]
+        if message["twist"]["twist"]["linear"]["x"] == 0.5:
+            return
+    raise AssertionError("odometry never said that it moves")
+
+
+def test_without_telemetry_nothing_comes(robot, link):
+    robot.sends_telemetry = False
+    link.send(ops.subscribe("/odom", id="1").decode())
+    with pytest.raises(TimeoutError):
+        link.recv(timeout=0.3)
+
+
+def test_what_is_published_is_echoed_to_who_subscribed(robot, link):
+    link.send(ops.subscribe("/cmd_vel", id="1").decode())
+    link.send(twist(0.5))
+    assert json.loads(link.recv(timeout=5))["msg"]["linear"]["x"] == 0.5
+
+
+def call(service):
+    return ops.call_service(service, {}, id="c").decode()
+
+
+def test_a_service_that_hangs_holds_up_what_comes_behind_it(robot, link):
+    robot.answers_services(False)
+    link.send(call("/e_stop"))
+    link.send(twist(0.5))
+    link.ping().wait(5)
+    assert robot.log.of("call_service")
+    assert robot.log.told == []
+    with connect(robot.url) as other:
+        other.send(twist(0.25))
+        eventually(lambda: robot.log.told, "another socket's velocity")
+    robot.unblock()
+    assert json.loads(link.recv(timeout=5))["result"] is True
+    eventually(lambda: len(robot.log.told) == 2, "what had to wait")
+
+
+def test_a_goal_can_run_on_the_input_thread():
+    with WitnessRobot(goals_block=True) as robot, connect(robot.url) as link:
+        link.send(json.dumps({"op": "send_action_goal", "action": "/go", "id": "g"}))
+        link.send(twist(0.5))
+        link.ping().wait(5)
+        assert robot.log.of("send_action_goal")
+        assert robot.log.told == []
+        robot.unblock()
+        eventually(lambda: robot.log.told, "what had to wait")
+
+
+def test_rosapi_tells_of_its_topics(robot, link):
+    link.send(call("/rosapi/topics"))
+    values = json.loads(link.recv(timeout=5))["values"]
+    assert dict(zip(values["topics"], values["types"], strict=True)) == {
+        "/cmd_vel": "geometry_msgs/Twist",
+        "/odom": "nav_msgs/Odometry",
+    }
+
+
+def test_its_bridge_can_be_killed_and_comes_back_on_the_same_port(robot, link):
+    port = robot.port
+    robot.kill_bridge()
+    with pytest.raises(OSError, match="refused"):
+        connect(robot.url).close()
+    robot.restart_bridge()
+    assert robot.port == port
+    with connect(robot.url) as again:
+        again.send(twist(0.5))
+        eventually(lambda: robot.log.told, "a velocity")
+
+
+def test_junk_is_passed_over(robot, link):
+    for junk in ("{", "[]", "7", '{"op": "publish", "topic": "/cmd_vel", "msg": 7}'):
+        link.send(junk)
+    link.send(twist(0.5))
+    told = eventually(lambda: robot.log.moving_since(0)[1:], "the good one")
+    assert told[-1].twist.vx == 0.5
+
+
+def test_the_sentinel_notes_how_late_the_machine_is():
+    with Sentinel() as sentinel:
+        begin = time.monotonic()
+        eventually(lambda: time.monotonic() > begin + 0.1, "a while")
+        assert 0 < sentinel.worst(begin) < 5
+        assert sentinel.worst(begin + 60) == 0
