@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 from benchmarks.frames import ODOM, SCAN
 from benchmarks.harness import Comparison, Contender, Figures, compare
+from benchmarks.listener import WARM
 
 COUNTS = {ODOM: 10_000, SCAN: 2_000}
 
@@ -50,7 +51,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
         (ODOM, "Odometry of 1.9 kB", ["webmap", "roslibpy"]),
         (SCAN, "LaserScan of 720 ranges", ["webmap", "roslibpy", "webmap-json"]),
     ):
-        count = COUNTS[topic] // (10 if quick else 1)
+        count = WARM + COUNTS[topic] // (10 if quick else 1)
         contenders = [Contender(c, listening(c, topic, count)) for c in clients]
         comparisons.append(compare(title, contenders, rounds))
     return comparisons
