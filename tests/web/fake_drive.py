@@ -164,6 +164,14 @@ class FakeDrive:
                 for one in [robot] if robot else self.robots.values():
                     one |= {"state": "free", "latched": False, "stop": None}
                     one |= {"armable": True, "reason": None}
+            case "ask":
+                asker = {"connection": "c1", "name": "me", "left": 8.0}
+                robot |= {"asker": asker}
+            case "grant":
+                robot |= self._free()
+                robot |= {"holder": robot["asker"], "asker": None, "state": "held"}
+            case "deny":
+                robot |= {"asker": None}
             case "drive":
                 await self._drive(socket, robot, said, state)
             case "goal":

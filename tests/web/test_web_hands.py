@@ -250,6 +250,53 @@ def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> Non
     assert "Held by Ann" in bench.page.inner_text(".webmap-teleop")
 
 
+def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
+    ann = {"connection": "c9", "name": "Ann"}
+    bench.gate.change("r1", holder=ann, epoch=7, state="held")
+    bench.select("r1")
+    bench.page.get_by_role("button", name="Ask for Robot r1").click()
+    bench.until(lambda: bench.gate.of("ask") == [{"op": "ask", "robot": "r1"}])
+    words = bench.page.locator(".webmap-teleop-state")
+    bench.until(lambda: "yours in 8 s, unless Ann keeps it" in words.inner_text())
+    bench.until(lambda: "yours in 7 s" in words.inner_text())
+    bench.page.keyboard.down("w")
+    me = {"connection": "c1", "name": "me"}
+    bench.gate.change("r1", asker=None, changing=True)
+    bench.until(lambda: "Handing over" in words.inner_text())
+    bench.gate.change("r1", changing=False, holder=me, mine=True, epoch=8)
+    bench.until(lambda: bench.gate.of("drive"))
+    bench.still()
+    bench.page.keyboard.up("w")
+    bench.page.wait_for_timeout(300)
+    bench.page.keyboard.down("w")
+    bench.until(bench.gate.moves)
+    assert bench.gate.of("take") == []
+
+
+@pytest.mark.parametrize("answer", ["Hand over", "Keep"])
+def test_the_holder_is_asked_and_answers(bench: Bench, answer: str) -> None:
+    bench.drive()
+    ann = {"connection": "c9", "name": "Ann", "left": 8.0}
+    bench.gate.change("r1", asker=ann)
+    request = bench.page.locator(".webmap-request")
+    bench.until(lambda: request.count() == 1)
+    assert "Ann asks for Robot r1 (8 s)" in request.inner_text()
+    bench.until(lambda: "(7 s)" in request.inner_text())
+    bench.page.get_by_role("button", name=f"{answer} Robot r1").click()
+    op = {"Hand over": "grant", "Keep": "deny"}[answer]
+    bench.until(lambda: bench.gate.of(op) == [{"op": op, "robot": "r1"}])
+    bench.until(lambda: not request.count())
+    if answer == "Keep":
+        since = time.monotonic()
+        bench.until(lambda: bench.gate.moves(since))
+        return
+    bench.still(tolerance=0.05)
+    bench.until(lambda: bench.shown() == "held")
+    said = [said for _, said in bench.gate.said]
+    before = said[said.index({"op": "grant", "robot": "r1"}) - 1]
+    assert (before["op"], before["x"], before["turn"]) == ("drive", 0, 0)
+
+
 @pytest.mark.parametrize("key", ["Space", "Escape"])
 def test_space_and_escape_stop_the_robot(bench: Bench, key: str) -> None:
     bench.drive()

@@ -1,3 +1,4 @@
+import { Asking } from "./motion/asking.js";
 import { attentive, watchAttention } from "./motion/attention.js";
 import { Hands } from "./motion/hands.js";
 import { Line } from "./motion/line.js";
@@ -56,6 +57,7 @@ export class Drive {
     this._loop = new Loop();
     this._pilot = new Pilot(this._hands, this._loop, now, options);
     this._stopping = new Stopping();
+    this._asking = new Asking();
     this._line = new Line(socketUrl(baseUrl, options.id), {
       open: () => this._loop.open(performance.now()),
       receive: (message) => this._receive(message),
@@ -98,7 +100,11 @@ export class Drive {
 
   /** What the operator should know of the chosen robot and of the hands. */
   get status() {
-    return { link: this._state, ...this._pilot.status };
+    return {
+      link: this._state,
+      connection: this.connection,
+      ...this._pilot.status,
+    };
   }
 
   /**
@@ -160,6 +166,42 @@ export class Drive {
    */
   release(robot) {
     this._send(this._pilot.release(robot, performance.now()));
+  }
+
+  /**
+   * Ask the holder of a robot for it. Whatever is pressed when it comes does not move it.
+   *
+   * @param {string} robot
+   */
+  ask(robot) {
+    this._send(this._pilot.ask(robot));
+  }
+
+  /**
+   * Hand a robot to the one who asks for it, neutral first.
+   *
+   * @param {string} robot
+   */
+  grant(robot) {
+    this._send(this._pilot.grant(robot, performance.now()));
+  }
+
+  /**
+   * Keep a robot that somebody asks for.
+   *
+   * @param {string} robot
+   */
+  deny(robot) {
+    this._send([{ op: "deny", robot }]);
+  }
+
+  /**
+   * Who asks for robots.
+   *
+   * @returns {import('./motion/asking.js').Request[]}
+   */
+  get requests() {
+    return this._asking.requests(performance.now());
   }
 
   /**
@@ -305,6 +347,7 @@ export class Drive {
   _forget(now) {
     this._pilot.doubt(now);
     this._pilot.disconnect();
+    this._asking.forget();
     this._loop.open(now);
   }
 
@@ -324,10 +367,12 @@ export class Drive {
     } else if (message.op === "robot") {
       this._pilot.report(message, now);
       this._stopping.report(message, now);
+      this._asking.report(message, now);
       this._tell("robot", message);
     } else if (message.op === "gone") {
       this._pilot.gone(message.robot, now);
       this._stopping.gone(message.robot);
+      this._asking.gone(message.robot);
       this._tell("gone", message.robot);
     } else if (message.op === "refused") {
       this._pilot.refuse(message.robot, message.what, message.why, now);

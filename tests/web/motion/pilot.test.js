@@ -414,3 +414,73 @@ describe("leases", () => {
     assert.equal(bench.pilot.epoch("r1"), null);
   });
 });
+
+describe("a robot that another holds", () => {
+  const holder = { connection: "c9", name: "Ann" };
+
+  test("that was asked for comes neutral, and not by what is held", () => {
+    bench.say("r1", { holder, epoch: 3, state: "held" });
+    bench.keep(bench.pilot.ask("r1"));
+    bench.press();
+    bench.grant("r1");
+    const messages = bench.run(600);
+    assert.ok(messages.length > 0);
+    assert.deepEqual(moves(messages), []);
+    bench.letGo();
+    bench.run(250);
+    bench.press();
+    assert.ok(moves(bench.run(100)).length > 0);
+  });
+
+  test("that comes when the operator has turned to another is given back in time", () => {
+    bench = new Bench({ releaseAfter: 5000 });
+    bench.say("r1", { holder, epoch: 3, state: "held" });
+    bench.keep(bench.pilot.ask("r1"));
+    bench.keep(bench.pilot.choose("r2", bench.now));
+    bench.grant("r1");
+    assert.deepEqual(bench.run(4900), []);
+    assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);
+  });
+
+  test("is not believed to be ours by an ask that was refused", () => {
+    bench.say("r1", { holder, epoch: 3, state: "held" });
+    bench.keep(bench.pilot.ask("r1"));
+    bench.pilot.refuse("r1", "ask", "Ann keeps it", bench.now);
+    assert.equal(bench.pilot.status.refusal, "Ann keeps it");
+    bench.grant("r1");
+    assert.deepEqual(bench.run(200), []);
+  });
+});
+
+describe("a robot that is handed over", () => {
+  test("is given neutral first, and what is held means nothing from then on", () => {
+    bench.drive();
+    const [neutral, grant] = bench.keep(bench.pilot.grant("r1", bench.now));
+    assert.deepEqual([neutral.x, neutral.turn], [0, 0]);
+    assert.deepEqual(grant, { op: "grant", robot: "r1" });
+    assert.deepEqual(moves(bench.run(600)), []);
+  });
+
+  test("stays ours, to be driven by a new press, while the gate does not say otherwise", () => {
+    bench.drive();
+    bench.keep(bench.pilot.grant("r1", bench.now));
+    bench.letGo();
+    bench.run(600);
+    bench.press();
+    assert.ok(moves(bench.run(100)).length > 0);
+  });
+});
+
+describe("a robot for which a STOP stands", () => {
+  test("is not taken by a press, nor by one that is held through its reset", () => {
+    bench.say("r1", { state: "stopped", latched: true });
+    bench.press();
+    bench.run(300);
+    bench.pilot.reset("r1", bench.now);
+    bench.say("r1", { latched: false });
+    assert.deepEqual(bench.run(500), []);
+    bench.letGo();
+    bench.run(250);
+    assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
+  });
+});

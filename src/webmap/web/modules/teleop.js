@@ -1,8 +1,9 @@
 import { deskOf } from "../inputs/desk.js";
-import { isLatched } from "../motion/report.js";
+import { heldByAnother, heldByProgram, isLatched } from "../motion/report.js";
 import { capOf, describe } from "../motion/status.js";
 import { button, html, say } from "./elements.js";
 import { lay, overlayOf } from "./overlay.js";
+import { Requests } from "./requests.js";
 import { ResetButton } from "./reset_button.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -44,7 +45,11 @@ class Teleop {
       lease: () => this._lease(),
       reset: () => this._reset(),
     });
-    const take = lay(map, this._panel.element, "bottom-left");
+    this._requests = new Requests(this._drive);
+    const takes = [
+      lay(map, this._requests.element, "bottom-left"),
+      lay(map, this._panel.element, "bottom-left"),
+    ];
     this._desk = deskOf(this._drive);
     this._seat = {
       map,
@@ -64,7 +69,7 @@ class Teleop {
     }
     const show = () => this._show();
     this._offs = [
-      take,
+      ...takes,
       this._desk.sit(this._seat),
       map.onSelect(() => this._select()),
       this._drive.on("step", show),
@@ -102,8 +107,11 @@ class Teleop {
   _lease() {
     const robot = this._map.selected;
     if (robot === null) return;
-    if (this._report?.mine) this._drive.release(robot);
+    const report = this._report;
+    if (report?.mine) this._drive.release(robot);
+    else if (report && heldByAnother(report)) this._drive.ask(robot);
     else this._drive.take(robot);
+    this._show();
   }
 
   _show() {
@@ -111,11 +119,15 @@ class Teleop {
     const status = this._drive.status;
     const report = this._report;
     const robot = this._map.selected;
+    const requests = this._drive.requests;
     const verdict = this._drive.verdicts.find((one) => one.robot === robot);
+    const request = requests.find((one) => one.robot === robot);
+    this._requests.show(requests);
     this._panel.show(
-      describe(status, robot, report, active, verdict),
+      describe(status, robot, report, active, { verdict, request }),
       report,
       status.delay,
+      actOf(report, request, status.connection),
     );
   }
 }
@@ -154,28 +166,49 @@ class Panel {
    * @param {import('../motion/status.js').Description} description
    * @param {import('../motion/report.js').RobotReport | null} report
    * @param {number | null} delay
+   * @param {string | null} act What can be done about the lease.
    */
-  show({ state, title, detail }, report, delay) {
+  show({ state, title, detail }, report, delay, act) {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
     say(this._title, title);
     say(this._detail, detail);
     say(this._cap, report ? capOf(report) + slowness(delay) : "");
-    this._showButtons(report);
+    this._showButtons(report, act);
   }
 
-  /** @param {import('../motion/report.js').RobotReport | null} report */
-  _showButtons(report) {
+  /**
+   * @param {import('../motion/report.js').RobotReport | null} report
+   * @param {string | null} act
+   */
+  _showButtons(report, act) {
     const name = report?.name ?? "";
-    say(this._lease, report?.mine ? "Hand back" : "Take");
-    label(this._lease, report?.mine ? `Hand back ${name}` : `Take ${name}`);
-    const latched = report !== null && isLatched(report);
-    const free = report?.armable && report.holder === null && !latched;
-    this._lease.hidden = !(report?.mine || free);
-    this._reset.show("Reset", latched);
+    this._lease.hidden = act === null;
+    if (act !== null) {
+      say(this._lease, act);
+      label(this._lease, act.endsWith(" it") ? act.replace(/it$/, name) : `${act} ${name}`);
+    }
+    this._reset.show("Reset", report !== null && isLatched(report));
     label(this._stop, name ? `Stop ${name}` : "Stop the selected robot");
     // Off only when there is nothing to stop, never because of doubt.
     this._stop.disabled = report === null;
   }
+}
+
+/**
+ * Return what the operator can do about a robot's lease.
+ *
+ * @param {import('../motion/report.js').RobotReport | null} report
+ * @param {import('../motion/asking.js').Request | undefined} request
+ * @param {string | null} connection This page's.
+ * @returns {'Hand back' | 'Take' | 'Ask for it' | null}
+ */
+function actOf(report, request, connection) {
+  if (report === null || report.changing) return null;
+  if (report.mine) return "Hand back";
+  if (!report.armable || isLatched(report)) return null;
+  if (report.holder === null) return "Take";
+  if (heldByProgram(report) || request?.by === connection) return null;
+  return "Ask for it";
 }
 
 /** @param {number | null} delay */

@@ -72,6 +72,11 @@ export class Pilot {
      */
     this._lease = null;
     /**
+     * Robots that another holds and that were asked for.
+     * @type {Set<string>}
+     */
+    this._begged = new Set();
+    /**
      * When leases that serve a goal were last used.
      * @type {Map<string, number>}
      */
@@ -155,6 +160,34 @@ export class Pilot {
       this.refusal = null;
     }
     return [{ op: "take", robot }];
+  }
+
+  /**
+   * Ask the holder for a robot.
+   *
+   * @param {string} robot
+   * @returns {Command[]}
+   */
+  ask(robot) {
+    this._begged.add(robot);
+    if (robot === this.choice) this.refusal = null;
+    return [{ op: "ask", robot }];
+  }
+
+  /**
+   * Hand a robot to the one who asks for it, neutral first.
+   *
+   * The lease is kept until the gate says that it is another's, as the one who asks may
+   * be gone by now.
+   *
+   * @param {string} robot
+   * @param {number} now
+   * @returns {Command[]}
+   */
+  grant(robot, now) {
+    if (robot !== this._lease?.robot) return [{ op: "grant", robot }];
+    this.doubt(now);
+    return [this._drive(NEUTRAL, now), { op: "grant", robot }];
   }
 
   /**
@@ -255,6 +288,7 @@ export class Pilot {
     this._drop();
     this._parked.clear();
     this._given.clear();
+    this._begged.clear();
     this._seq = 0;
     for (const [id, report] of this.robots) {
       this.robots.set(id, { ...report, mine: false });
@@ -282,6 +316,7 @@ export class Pilot {
       // The gate saw a reason to stop that we did not.
       this.doubt(now);
     }
+    if (epoch !== null && this._begged.delete(report.robot)) this._handed(report, now);
     if (this._asked?.robot !== report.robot) return;
     if (epoch !== null) this._granted(epoch, before, now);
     else if (heldByAnother(report) && this._asked.alive) this._giveUp(now);
@@ -295,6 +330,7 @@ export class Pilot {
    */
   gone(robot, now) {
     this.robots.delete(robot);
+    this._begged.delete(robot);
     this._parked.delete(robot);
     if (robot !== this._lease?.robot && robot !== this._asked?.robot) return;
     this._asked = null;
@@ -311,6 +347,7 @@ export class Pilot {
    * @param {number} now
    */
   refuse(robot, what, why, now) {
+    if (what === "ask" && robot !== null) this._begged.delete(robot);
     if (robot !== this.choice) return;
     // A command that met the end of its lease on the way is no news.
     if (what === "drive" && !this._lease) return;
@@ -417,6 +454,20 @@ export class Pilot {
       y,
       turn,
     };
+  }
+
+  /**
+   * A robot came that was asked for some time ago: what is held now was not meant for it.
+   *
+   * @param {RobotReport} report
+   * @param {number} now
+   */
+  _handed({ robot, epoch }, now) {
+    if (this._asked?.robot === robot) return;
+    if (this.hands.pressed) this.hands.kill(now);
+    if (robot === this.choice && epoch !== null) this._open(robot, epoch, now);
+    // The operator has turned to another one; it is given back unless they return.
+    else this._parked.set(robot, now);
   }
 
   /**

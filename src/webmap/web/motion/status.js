@@ -1,6 +1,7 @@
 import { heldByAnother, isLatched } from "./report.js";
 import { stopWords } from "./stopping.js";
 
+/** @typedef {import('./asking.js').Request} Request */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stopping.js').Verdict} Verdict */
@@ -25,10 +26,11 @@ import { stopWords } from "./stopping.js";
  * @param {string | null} robot The robot that is selected where this is shown.
  * @param {RobotReport | null} report The gate's word on it.
  * @param {boolean} active Whether the page's keys belong to that map.
- * @param {Verdict} [verdict] What became of a STOP for it that was said here.
+ * @param {{verdict?: Verdict, request?: Request}} [more] What became of a STOP for it
+ *     that was said here, and who asks for it.
  * @returns {Description}
  */
-export function describe(status, robot, report, active, verdict) {
+export function describe(status, robot, report, active, { verdict, request } = {}) {
   const link = ofLink(status);
   if (link) return link;
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
@@ -39,7 +41,10 @@ export function describe(status, robot, report, active, verdict) {
   }
   if (report === null) return say("fixed", "Not drivable", "It has no velocity topic.");
   if (isLatched(report)) return ofStopped(status, report);
-  if (heldByAnother(report)) return ofOther(report);
+  if (report.changing) {
+    return say("taking", "Handing over", "It is brought to a standstill first.");
+  }
+  if (heldByAnother(report)) return ofOther(status, report, request);
   if (!active) {
     return say("free", "Not driven here", "Click on this map to drive from it.");
   }
@@ -106,14 +111,20 @@ function reasonOf({ text }) {
   return sentence(text.replace(/^.*NOT CONFIRMED: /, ""));
 }
 
-/** @param {RobotReport} report */
-function ofOther(report) {
+/**
+ * @param {Status} status
+ * @param {RobotReport} report
+ * @param {Request} [request]
+ */
+function ofOther(status, report, request) {
   const who = report.holder?.name || report.holder?.connection || "somebody else";
-  return say(
-    "held",
-    `Held by ${who}`,
-    report.state === "driving" ? "It is being driven." : "",
-  );
+  const words = [];
+  if (report.state === "driving") words.push("It is being driven.");
+  if (request && request.by === status.connection) {
+    words.push(`You asked for it: yours in ${request.left} s, unless ${who} keeps it.`);
+  } else if (request) words.push(`${request.who} asks for it.`);
+  else if (status.refusal) words.push(sentence(status.refusal));
+  return say("held", `Held by ${who}`, words.join(" "));
 }
 
 /**

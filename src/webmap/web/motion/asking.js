@@ -1,0 +1,65 @@
+/** @typedef {import('./report.js').RobotReport} RobotReport */
+
+/**
+ * Somebody asks the holder of a robot for it.
+ *
+ * @typedef {object} Request
+ * @property {string} robot
+ * @property {string} name The robot's.
+ * @property {string} by The connection that asks.
+ * @property {string} who The name of who asks.
+ * @property {boolean} mine Whether this page's connection is the one that is asked.
+ * @property {number} left Whole seconds until the robot is handed over by itself.
+ */
+
+/**
+ * Counts down how long holders have to answer, from what the gate said last.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class Asking {
+  constructor() {
+    /** @type {Map<string, {report: RobotReport, ends: number}>} */
+    this._requests = new Map();
+  }
+
+  /**
+   * @param {RobotReport} report
+   * @param {number} now
+   */
+  report(report, now) {
+    if (!report.asker) this._requests.delete(report.robot);
+    else {
+      const ends = now + 1000 * report.asker.left;
+      this._requests.set(report.robot, { report, ends });
+    }
+  }
+
+  /** @param {string} robot */
+  gone(robot) {
+    this._requests.delete(robot);
+  }
+
+  /** Forget all: the gate will say anew who asks. */
+  forget() {
+    this._requests.clear();
+  }
+
+  /**
+   * @param {number} now
+   * @returns {Request[]}
+   */
+  requests(now) {
+    return [...this._requests.values()].map(({ report, ends }) => {
+      const asker = /** @type {import('./report.js').Asker} */ (report.asker);
+      return {
+        robot: report.robot,
+        name: report.name,
+        by: asker.connection,
+        who: asker.name || asker.connection,
+        mine: report.mine,
+        left: Math.max(0, Math.ceil((ends - now) / 1000)),
+      };
+    });
+  }
+}
