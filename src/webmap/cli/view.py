@@ -27,12 +27,28 @@ from webmap.cli.options import web_options
     type=click.Path(exists=True, dir_okay=False),
     help="A floor plan in map_server's form (YAML), to see the robots on.",
 )
+@click.option(
+    "--discover",
+    is_flag=True,
+    help="Look for robots too where --robot is given; without --robot it is always "
+    "done. A robot that is told takes the place of the one found.",
+)
+@click.option(
+    "--wait",
+    type=click.FloatRange(0.0),
+    default=10.0,
+    show_default=True,
+    help="Seconds to wait for a rosbridge that cannot be reached, before the page "
+    "opens without its robots. They are added when they come.",
+)
 @web_options
 def view(
     url: tuple[str, ...],
     robots: tuple[str, ...],
     stops_within: float | None,
     floor: str | None,
+    discover: bool,
+    wait: float,
     host: str,
     port: int,
     no_browser: bool,
@@ -40,21 +56,30 @@ def view(
 ) -> None:
     r"""See and drive the robots behind one rosbridge or several.
 
-    URL is a rosbridge's: ws://robot:9090
+    URL is a rosbridge's: ws://robot:9090. The robots behind it are found by their
+    topics, also those that appear later; say with --robot what is found wrongly.
 
     \b
+    webmap view ws://robot:9090
     webmap view ws://robot:9090 --robot Bob:/odom:/cmd_vel:/scan
     """
     from pathlib import Path
 
     import webmap
     from webmap import console
+    from webmap.cli.found_fleet import find_fleet
 
     bridges = [webmap.Bridge(text) for text in url]
-    described = [
+    told = [
         console.parse_robot(text, bridges, stops_within=stops_within) for text in robots
     ]
-    console.open_console(bridges, described, floor=Path(floor) if floor else None)
+    plan = Path(floor) if floor else None
+    if told and not discover:
+        console.open_console(bridges, told, floor=plan)
+    else:
+        fleet = find_fleet(bridges, told, wait=wait, stops_within=stops_within)
+        console.open_console(bridges, fleet.robots, floor=plan)
+        fleet.look_for_more()
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -1,0 +1,47 @@
+"""From what was found to what the console shows."""
+
+from typing import TYPE_CHECKING
+
+from webmap.console import RobotDescription
+from webmap.discovery import FoundRobot
+
+if TYPE_CHECKING:
+    from webmap import Bridge
+
+
+def describe(
+    robot: FoundRobot, bridge: "Bridge", *, stops_within: float | None = None
+) -> RobotDescription:
+    """Return a robot that was found as the console takes it.
+
+    Args:
+        robot: The robot.
+        bridge: The bridge that it is behind.
+        stops_within: Seconds within which the base stops by itself, if known.
+
+    """
+    return RobotDescription(
+        name=robot.name,
+        bridge=bridge,
+        odometry=robot.topic("odometry") or robot.topic("pose"),
+        twist=robot.topic("velocity"),
+        scan=robot.topic("scan"),
+        battery=robot.topic("battery"),
+        goal=robot.topic("goal"),
+        cancel=robot.topic("cancel"),
+        stops_within=stops_within,
+    )
+
+
+def overrules(told: RobotDescription, found: RobotDescription) -> bool:
+    """Tell whether a robot that was told by hand is the one that was found.
+
+    It is if they have a name, an odometry topic or a velocity topic in common.
+    """
+    if told.bridge is not found.bridge:
+        return False
+    return (
+        told.name == found.name
+        or (told.odometry != "" and told.odometry == found.odometry)
+        or (told.twist != "" and told.twist == found.twist)
+    )

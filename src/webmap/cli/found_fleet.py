@@ -1,0 +1,73 @@
+"""The robots behind bridges, found or told, as the console takes them."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import click
+
+from webmap.cli.described import describe, overrules
+from webmap.cli.finding import find
+from webmap.console import RobotDescription
+from webmap.discovery.words import in_one_line
+
+if TYPE_CHECKING:
+    from webmap import Bridge
+
+
+@dataclass(slots=True)
+class FoundFleet:
+    """What the console shows, and what is known already when it looks again."""
+
+    robots: list[RobotDescription]
+    known: list[tuple["Bridge", list[str]]] = field(default_factory=list)
+    """For each bridge the namespaces in which robots were found."""
+
+    stops_within: float | None = None
+
+    def look_for_more(self) -> None:
+        """Show robots that come later; after the console was opened."""
+        from webmap.cli.latecomers import LateRobots, Looking, greet
+
+        came = greet(
+            LateRobots(), [about.name for about in self.robots], self.stops_within
+        )
+        for bridge, namespaces in self.known:
+            _services.append(Looking(bridge, namespaces, came))
+
+
+_services: list[object] = []
+"""What runs as long as the process does; nobody else holds it."""
+
+
+def find_fleet(
+    bridges: Sequence["Bridge"],
+    told: Sequence[RobotDescription],
+    *,
+    wait: float,
+    stops_within: float | None,
+) -> FoundFleet:
+    """Return the robots behind bridges, and say on standard error what was found.
+
+    Args:
+        bridges: The bridges.
+        told: Robots that were told by hand; each takes the place of one found.
+        wait: How long to wait for a bridge that cannot be reached, in seconds.
+        stops_within: Seconds within which every base stops by itself, if known.
+
+    """
+    found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
+    fleet = FoundFleet([*told], stops_within=stops_within)
+    for bridge, one in zip(bridges, found, strict=True):
+        if one.why:
+            click.echo(one.why, err=True)
+        for robot in one.findings.robots:
+            about = describe(robot, bridge, stops_within=stops_within)
+            if any(overrules(other, about) for other in told):
+                continue
+            click.echo(f"Found {in_one_line(robot)}", err=True)
+            fleet.robots.append(about)
+        spaces = [robot.namespace for robot in one.findings.robots]
+        fleet.known.append((bridge, spaces))
+    return fleet

@@ -1,0 +1,146 @@
+"""Robots that appear while the console runs."""
+
+import asyncio
+import weakref
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from webmap.console import RobotDescription
+from webmap.console.fleet import make_robot
+from webmap.core.page import Page, site
+from webmap.discovery import FoundRobot, discover
+from webmap.discovery.naming import same_name
+from webmap.discovery.newcomers import Newcomers
+from webmap.discovery.robots import host_name
+from webmap.discovery.words import in_one_line
+from webmap.errors import BridgeError
+from webmap.lifecycle import lifecycle
+from webmap.scope import no_scope
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+PERIOD = 5.0
+"""Seconds between two looks."""
+
+LONGEST = 60.0
+"""Seconds between two looks at a rosapi that does not answer: each costs a call."""
+
+
+class LateRobots:
+    """The robots that came after the console was opened, on every page of it.
+
+    Args:
+        path: The page's path.
+
+    """
+
+    def __init__(self, path: str = "/") -> None:
+        self.robots: list[Robot] = []
+        self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
+        entry = site.pages[path]
+
+        def open_page(page: Page) -> object:
+            result = entry.function(page)
+            self._pages.add(page)
+            for robot in self.robots:
+                _show(robot, page)
+            return result
+
+        site.pages[path] = replace(entry, function=open_page)
+
+    def add(self, about: RobotDescription) -> None:
+        """Show one more robot, on the pages that are open and on those to come."""
+        with no_scope():
+            robot = make_robot(about)
+        self.robots.append(robot)
+        for page in list(self._pages):
+            _show(robot, page)
+
+
+def _show(robot: "Robot", page: Page) -> None:
+    for map in page.maps:
+        map.add_robot(robot)
+
+
+class Looking:
+    """Looks again and again what is behind a bridge; a service of the process.
+
+    Args:
+        bridge: The bridge.
+        known: Namespaces of the robots that are shown already.
+        came: Called with each robot that is new.
+
+    """
+
+    def __init__(
+        self,
+        bridge: "Bridge",
+        known: Iterable[str],
+        came: Callable[[FoundRobot, "Bridge"], object],
+    ) -> None:
+        self.bridge = bridge
+        self._newcomers = Newcomers(known)
+        self._came = came
+        self._task: asyncio.Task[None] | None = None
+        lifecycle.add(self)
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to look."""
+        self._task = loop.create_task(self._look_on())
+
+    async def stop(self) -> None:
+        """Look no more."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+
+    async def _look_on(self) -> None:
+        pause = PERIOD
+        while True:
+            await asyncio.sleep(pause)
+            if self.bridge.state != "open":
+                pause = PERIOD
+                continue
+            try:
+                topics = await self.bridge.topics()
+            except BridgeError:
+                pause = min(2 * pause, LONGEST)
+                continue
+            pause = PERIOD
+            found = discover(topics, host_name(self.bridge.url))
+            for robot in self._newcomers.look(found):
+                self._came(robot, self.bridge)
+
+
+def greet(
+    late: LateRobots, taken: Iterable[str], stops_within: float | None
+) -> Callable[[FoundRobot, "Bridge"], None]:
+    """Return what shows a newcomer under a name that nobody has, and says so.
+
+    Args:
+        late: Where it is shown.
+        taken: Names of the robots that are there.
+        stops_within: Seconds within which every base stops by itself, if known.
+
+    """
+    from webmap.cli.described import describe
+
+    names = {same_name(name) for name in taken}
+
+    def came(robot: FoundRobot, bridge: "Bridge") -> None:
+        name, number = robot.name, 1
+        while same_name(name) in names:
+            number += 1
+            name = f"{robot.name} {number}"
+        names.add(same_name(name))
+        robot = replace(robot, name=name)
+        click.echo(
+            f"A robot appeared behind {bridge.url}: {in_one_line(robot)}", err=True
+        )
+        late.add(describe(robot, bridge, stops_within=stops_within))
+
+    return came

@@ -1,0 +1,175 @@
+"""``webmap view``: robots are found, told, and come later."""
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+from cli_simulator import simulator
+
+from webmap import Bridge
+from webmap.cli.described import describe, overrules
+from webmap.cli.latecomers import LateRobots, greet
+from webmap.console import RobotDescription
+from webmap.core.page import PageEntry, site
+from webmap.discovery import discover
+
+COMMAND = [sys.executable, "-m", "webmap", "view"]
+READY = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
+TOPICS = {"/odom": "nav_msgs/Odometry", "/cmd_vel": "geometry_msgs/Twist"}
+
+
+class View:
+    """A view that runs, and all that it said on standard error."""
+
+    def __init__(self, process):
+        self.process, self.said = process, ""
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        for line in self.process.stderr:
+            self.said += line
+
+    def wait_for(self, pattern, within=20.0):
+        deadline = time.monotonic() + within
+        while time.monotonic() < deadline:
+            if re.search(pattern, self.said):
+                return
+            time.sleep(0.05)
+        raise AssertionError(f"never said {pattern!r}, but:\n{self.said}")
+
+
+@contextmanager
+def viewing(*arguments):
+    with subprocess.Popen(
+        [*COMMAND, "--port", "0", "--no-browser", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield View(process)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(15) == 0
+            assert process.stdout.read() == "", "nothing but the one line"
+        finally:
+            process.kill()
+
+
+def test_robots_of_both_dialects_are_found_before_the_page_opens(ros1, ros2):
+    with viewing(ros1, ros2) as view:
+        assert re.fullmatch(READY, view.process.stdout.readline())
+        view.wait_for(r"Found robot_0: odometry /robot_0/odom, velocity /robot_0/")
+        view.wait_for(r"Found robot_1: ")
+        view.wait_for(r"Found 127\.0\.0\.1: odometry /odom, velocity /cmd_vel")
+
+
+def test_robots_that_are_told_are_all_there_is(ros1):
+    with viewing(ros1, "--robot", "Bob:/odom:/cmd_vel:/scan") as view:
+        assert re.fullmatch(READY, view.process.stdout.readline())
+    assert "Found" not in view.said
+
+
+def test_a_robot_that_is_told_takes_the_place_of_the_one_found(ros1):
+    told = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
+    with viewing(ros1, "--discover", "--robot", told) as view:
+        assert re.fullmatch(READY, view.process.stdout.readline())
+        view.wait_for("Found robot_1")
+    assert "Found robot_0" not in view.said
+
+
+def test_the_page_opens_without_a_bridge_and_its_robots_come_later():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+    with viewing(f"ws://127.0.0.1:{port}", "--wait", "0.1") as view:
+        assert re.fullmatch(READY, view.process.stdout.readline())
+        view.wait_for(r"Waiting for the rosbridge at ws://127\.0\.0\.1")
+        view.wait_for("cannot reach the rosbridge")
+        with simulator("--port", str(port), "--robots", "1"):
+            view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
+
+
+@pytest.fixture
+def bridge():
+    return Bridge("ws://bob:9090")
+
+
+@pytest.fixture
+def opened():
+    """A page at / that was opened by its function, and what that got."""
+    got = []
+    before = dict(site.pages)
+    site.pages["/"] = PageEntry("/", got.append, None, None, "")
+    yield got
+    site.pages.clear()
+    site.pages.update(before)
+
+
+class FakeMap:
+    def __init__(self):
+        self.robots = []
+
+    def add_robot(self, robot):
+        self.robots.append(robot.name)
+
+
+class FakePage:
+    def __init__(self):
+        self.maps = [FakeMap()]
+
+
+def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge, opened):
+    late = LateRobots()
+    early = FakePage()
+    site.pages["/"].function(early)
+    late.add(RobotDescription(name="Bob", bridge=bridge, odometry="/odom"))
+    assert early.maps[0].robots == ["Bob"]
+    after = FakePage()
+    site.pages["/"].function(after)
+    assert after.maps[0].robots == ["Bob"]
+    assert opened == [early, after]
+    late.robots[0].destroy()
+
+
+def test_a_newcomer_gets_a_name_that_nobody_has(bridge, opened, capsys):
+    late = LateRobots()
+    came = greet(late, ["BOB"], 0.25)
+    (robot,) = discover(TOPICS, "bob").robots
+    came(robot, bridge)
+    assert late.robots[0].name == "bob 2"
+    assert late.robots[0].motion.spec().stops_within == 0.25
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "A robot appeared behind ws://bob:9090: bob 2: odometry /odom" in said.err
+    late.robots[0].destroy()
+
+
+def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
+    topics = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
+    (robot,) = discover(topics, "bob").robots
+    assert describe(robot, bridge).odometry == "/amcl_pose"
+
+
+@pytest.mark.parametrize(
+    ("told", "is_it"),
+    [
+        ({"name": "bob"}, True),
+        ({"name": "Al", "odometry": "/odom"}, True),
+        ({"name": "Al", "twist": "/cmd_vel"}, True),
+        ({"name": "Al", "scan": "/scan"}, False),
+    ],
+)
+def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
+    bridge, told, is_it
+):
+    (robot,) = discover(TOPICS, "bob").robots
+    found = describe(robot, bridge)
+    assert overrules(RobotDescription(bridge=bridge, **told), found) is is_it
+    elsewhere = RobotDescription(bridge=Bridge("ws://al:9090"), **told)
+    assert not overrules(elsewhere, found)
