@@ -16,7 +16,7 @@ from webmap.core.pictures import pictures
 from webmap.errors import ProtocolError
 from webmap.geometry import Affine
 from webmap.ros.protocol import Protocol
-from webmap.scope import Removal, current_scope, keep
+from webmap.scope import Removal, current_scope, keep, no_scope
 
 
 class Link:
@@ -56,7 +56,7 @@ class Link:
             except ProtocolError as error:
                 scope.report(str(error), True)
                 continue
-            with scope.active():
+            with scope.active() if scope else no_scope():
                 callback(value)
 
 

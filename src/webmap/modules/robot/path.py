@@ -1,0 +1,98 @@
+"""The way that a robot's planner has in mind."""
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from webmap.core.placed import Placed, check_finite, rounded, thinned
+from webmap.core.refusals import refusing
+from webmap.errors import ConfigError
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages import PathMsg
+from webmap.scene import svg
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+
+class Path:
+    """Draws a ``nav_msgs/Path`` as a line, and fires ``on_path_update``.
+
+    The poses are taken to be in the map's frame, whatever the robot's. A path without
+    poses takes the line away.
+
+    Style it by CSS: ``.path > polyline``; a second path can be told by its ``name``,
+    which is a class too: ``.path.local > polyline { stroke: orange }``.
+
+    Args:
+        robot: The robot that is to go there.
+        bridge: The link to the ROS system that has the topic.
+        topic: The topic.
+        name: A further class.
+        max_points: How many poses are drawn at the most, evenly chosen.
+        throttle: The least time between two paths, in milliseconds.
+        age_limit: Seconds after which the path is drawn as old.
+
+    Raises:
+        ConfigError: If ``max_points`` is less than 2.
+
+    """
+
+    def __init__(
+        self,
+        robot: "Robot",
+        bridge: Bridge,
+        topic: str = "/plan",
+        *,
+        name: str = "",
+        max_points: int = 500,
+        throttle: int = 500,
+        age_limit: float = 5.0,
+    ) -> None:
+        if max_points < 2:
+            raise ConfigError(f"max_points must be at least 2, got {max_points}")
+        self.robot = robot
+        self.max_points = max_points
+        self.age_limit = age_limit
+        self.points: list[tuple[float, float]] = []
+        """The newest path, all of it, in metres in the map's frame."""
+        self.line = svg.polyline(
+            fill="none",
+            stroke="#12805c",
+            stroke_width=2,
+            stroke_linejoin="round",
+            vector_effect="non-scaling-stroke",
+        )
+        self._placed = Placed(robot, self.line, class_=f"path {name}".strip())
+        self.svg = self._placed.svg
+        bridge.subscribe(
+            topic,
+            refusing(robot, topic, self.on_path),
+            "nav_msgs/Path",
+            throttle=throttle,
+            decode=PathMsg,
+        )
+
+    @property
+    def length(self) -> float:
+        """How long the path is, in metres; 0 if there is none."""
+        return sum(math.dist(one, next) for one, next in pairwise(self.points))
+
+    def on_path(self, path: PathMsg) -> None:
+        """Draw a path in place of the one before.
+
+        Raises:
+            ProtocolError: If a position is not finite.
+
+        """
+        points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
+        check_finite(points, "a path")
+        self.points = points
+        drawn = (points[index] for index in thinned(len(points), self.max_points))
+        self.line.set(points=[(rounded(x), rounded(y)) for x, y in drawn])
+        self.svg.set_age(0.0, limit=self.age_limit)
+        self.robot.notify_modules("on_path_update", self)
+
+    def on_odometry_update(self) -> None:
+        """Keep the path where it is while the robot goes along."""
+        self._placed.follow()
