@@ -100,3 +100,21 @@ def thinned(count: int, most: int) -> range | list[int]:
         return range(count)
     step = count / most
     return [*(int(i * step) for i in range(most - 1)), count - 1]
+
+
+def sector(radius: float, half: float) -> str | None:
+    """Return the path of a sector about x; None if it has no size.
+
+    Args:
+        radius: Metres.
+        half: Half its angle, in radians; all round from pi on.
+
+    """
+    if radius <= 0 or half < 1e-4:
+        return None
+    half = min(half, math.pi - 1e-3)
+    x, y = radius * math.cos(half), radius * math.sin(half)
+    large = int(half > math.pi / 2)
+    return (
+        f"M0 0L{x:.4f} {-y:.4f}A{radius:.4f} {radius:.4f} 0 {large} 1 {x:.4f} {y:.4f}z"
+    )
