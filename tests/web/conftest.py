@@ -1,8 +1,10 @@
 """Real Chromium, and a small display for it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
+from fake_drive import FakeDrive
+from hands_bench import Bench
 from playwright.sync_api import Browser, Page
 from scene_host import SceneHost
 
@@ -19,3 +21,28 @@ def host() -> Iterator[SceneHost]:
 def tab(chromium: Browser) -> Iterator[Page]:
     with watched_tab(chromium, 800, 600) as page:
         yield page
+
+
+@pytest.fixture
+def gate() -> Iterator[FakeDrive]:
+    with FakeDrive() as gate:
+        yield gate
+
+
+@pytest.fixture
+def open_bench(chromium: Browser, gate: FakeDrive) -> Iterator[Callable[..., Bench]]:
+    benches: list[Bench] = []
+
+    def open_bench(query: str = "", **kw) -> Bench:
+        benches.append(Bench(chromium, gate, query, **kw))
+        return benches[-1]
+
+    yield open_bench
+    for bench in benches:
+        bench.context.close()
+    assert [problem for bench in benches for problem in bench.problems] == []
+
+
+@pytest.fixture
+def bench(open_bench: Callable[..., Bench]) -> Bench:
+    return open_bench()

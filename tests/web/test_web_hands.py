@@ -1,105 +1,11 @@
 """Hands on a page, in a real Chromium, against a fake of the gate."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
 
 import pytest
-from fake_drive import FakeDrive
-from playwright.sync_api import Browser, Page
+from hands_bench import DOUBTS, Bench
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture
-def gate() -> Iterator[FakeDrive]:
-    with FakeDrive() as gate:
-        yield gate
-
-
-class Bench:
-    """A page with a map and the modules under test."""
-
-    def __init__(self, browser: Browser, gate: FakeDrive, query: str, **kw) -> None:
-        self.gate = gate
-        self.problems: list[str] = []
-        self.context = browser.new_context(**kw)
-        self.page: Page = self.context.new_page()
-        self.page.on("console", self._note)
-        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
-        self.page.goto(gate.url + query)
-        self.page.wait_for_selector("body[data-ready=yes]")
-        self.until(lambda: self.state == "open")
-        self.page.wait_for_timeout(250)  # the hands' own rest after loading
-
-    def _note(self, message) -> None:
-        if message.type in ("error", "warning") and "ERR_" not in message.text:
-            self.problems.append(message.text)
-
-    @property
-    def state(self) -> str:
-        return self.page.evaluate("bench.drive.state")
-
-    def until(self, true: Callable[[], object], patience: float = 5.0) -> None:
-        deadline = time.monotonic() + patience
-        while not true():
-            assert time.monotonic() < deadline, f"waited in vain; {self.gate.said[-3:]}"
-            # A turn of the loop in which the page's own events are heard.
-            self.page.wait_for_timeout(10)
-
-    def select(self, robot: str | None, map: int = 0) -> None:
-        self.page.evaluate("([m, r]) => bench.maps[m].select(r)", [map, robot])
-
-    def view(self) -> dict:
-        return self.page.evaluate("bench.maps[0].view")
-
-    def shown(self) -> str:
-        return self.page.locator(".webmap-teleop").first.get_attribute("data-state")
-
-    def drive(self) -> float:
-        """Hold W until the robot moves; return when that was seen."""
-        self.select("r1")
-        for _ in range(5):
-            self.page.keyboard.down("w")
-            with suppress(AssertionError):
-                self.until(self.gate.moves, patience=1.5)
-                return time.monotonic()
-            # On a busy machine the page may sleep for a moment, which is a doubt.
-            self.page.keyboard.up("w")
-            self.page.wait_for_timeout(300)
-        raise AssertionError(f"never drove: {self.gate.said[-3:]}")
-
-    def still(self, seconds: float = 0.6, tolerance: float = 0.0) -> None:
-        """Check that nothing moves from now on."""
-        since = time.monotonic() + tolerance
-        self.page.wait_for_timeout(1000 * (seconds + tolerance))
-        assert self.gate.moves(since) == []
-
-    def neutral_within(self, ms: float) -> None:
-        """Check that after the last key, or mark, neutral left the page in time."""
-        self.until(lambda: self.page.evaluate("bench.neutralDelay()"))
-        delay, jitter = self.page.evaluate("bench.neutralDelay()")
-        # The bound, and what a timer was late in the same moment on this machine.
-        assert delay <= ms + jitter
-
-
-@pytest.fixture
-def open_bench(chromium: Browser, gate: FakeDrive) -> Iterator[Callable[..., Bench]]:
-    benches: list[Bench] = []
-
-    def open_bench(query: str = "", **kw) -> Bench:
-        benches.append(Bench(chromium, gate, query, **kw))
-        return benches[-1]
-
-    yield open_bench
-    for bench in benches:
-        bench.context.close()
-    assert [problem for bench in benches for problem in bench.problems] == []
-
-
-@pytest.fixture
-def bench(open_bench: Callable[..., Bench]) -> Bench:
-    return open_bench()
 
 
 def test_holding_w_takes_the_robot_and_drives_after_neutral(bench: Bench) -> None:
@@ -128,26 +34,6 @@ def test_letting_go_is_neutral_at_once_and_pressing_again_drives(bench: Bench) -
     bench.page.keyboard.down("a")
     bench.until(lambda: bench.gate.moves(since))
     assert bench.gate.moves(since)[0]["turn"] == 1
-
-
-DOUBTS = {
-    "blur": "window.dispatchEvent(new Event('blur'))",
-    "pagehide": "window.dispatchEvent(new PageTransitionEvent('pagehide'))",
-    "freeze": "document.dispatchEvent(new Event('freeze'))",
-    "context menu": "document.body.dispatchEvent(new MouseEvent('contextmenu'))",
-    "text field": "document.getElementById('text').focus()",
-    "lost focus": "document.hasFocus = () => false",
-    "hidden": """
-        Object.defineProperty(document, 'visibilityState', {value: 'hidden'});
-        document.dispatchEvent(new Event('visibilitychange'));
-    """,
-    "dialog": """
-        const dialog = document.createElement('dialog');
-        document.body.append(dialog);
-        dialog.showModal();
-    """,
-    "busy page": "for (const t = performance.now(); performance.now() < t + 500;);",
-}
 
 
 @pytest.mark.parametrize("doubt", DOUBTS)

@@ -7,6 +7,8 @@ const SVG = "http://www.w3.org/2000/svg";
 const query = new URLSearchParams(location.search);
 const modules = (query.get("modules") ?? "teleop,mouse_view_control").split(",");
 
+const options = { holonomic: query.has("holonomic") };
+
 const releaseAfter = Number(query.get("release") ?? 30_000);
 const drive = new Drive(new URL("/_webmap/", location.href), { id: "page1", releaseAfter });
 
@@ -83,7 +85,7 @@ async function makeMap(number) {
     link.rel = "stylesheet";
     link.href = `/_webmap/modules/${name}.css`;
     document.head.append(link);
-    map.halves.push(attach(map, {}, (message) => map.sent.push(message)));
+    map.halves.push(attach(map, options, (message) => map.sent.push(message)));
   }
   return map;
 }

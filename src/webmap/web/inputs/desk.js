@@ -1,3 +1,4 @@
+import { Gamepads } from "./gamepads.js";
 import { Keys } from "./keys.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
@@ -28,9 +29,9 @@ export function deskOf(drive) {
 }
 
 /**
- * Where the operator sits: one keyboard for all the maps of a page.
+ * Where the operator sits: one keyboard and its gamepads for all the maps of a page.
  *
- * Keys drive the robot that is selected on the map that was touched last, so that two
+ * They drive the robot that is selected on the map that was touched last, so that two
  * maps on a page never both drive.
  */
 export class Desk {
@@ -46,18 +47,34 @@ export class Desk {
     this._uses = 0;
     /** @type {Keys | null} */
     this._keys = null;
+    /** @type {Gamepads | null} */
+    this._pads = null;
+  }
+
+  /** Whether a gamepad is there to drive with. */
+  get gamepad() {
+    return this._pads?.present ?? false;
+  }
+
+  /** Whether a gamepad's dead-man button is held that does nothing. */
+  get spent() {
+    return this._pads?.spent ?? false;
   }
 
   /**
-   * Use the STOP keys, whether or not anything can be driven from here.
+   * Use the STOP keys and the inputs of the page, whether or not anything can be driven from here.
    *
    * @returns {() => void} Ends the use.
    */
   open() {
     this._uses += 1;
-    this._keys ??= new Keys(this._drive, {
+    const owner = {
       wanted: () => this.active?.robot() != null,
       holonomic: () => this.active?.holonomic ?? false,
+    };
+    this._pads ??= new Gamepads(this._drive, owner);
+    this._keys ??= new Keys(this._drive, {
+      ...owner,
       stop: (all, event) => this._stop(all, event),
     });
     let ended = false;
@@ -68,6 +85,8 @@ export class Desk {
       if (this._uses > 0) return;
       this._keys?.destroy();
       this._keys = null;
+      this._pads?.destroy();
+      this._pads = null;
     };
   }
 

@@ -1,10 +1,11 @@
 import { deskOf } from "../inputs/desk.js";
 import { heldByAnother, heldByProgram, isLatched } from "../motion/report.js";
-import { capOf, describe } from "../motion/status.js";
+import { capOf, describe, inputsOf } from "../motion/status.js";
 import { button, html, say } from "./elements.js";
 import { lay, overlayOf } from "./overlay.js";
 import { Requests } from "./requests.js";
 import { ResetButton } from "./reset_button.js";
+import { StickPad } from "./stick_pad.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
@@ -14,9 +15,10 @@ import { ResetButton } from "./reset_button.js";
 const SLOW = 150;
 
 /**
- * Drive the selected robot with W A S D or the arrows, and show how that stands.
+ * Drive the selected robot with keys, an on-screen stick or a gamepad, and show how that
+ * stands.
  *
- * Options: `holonomic`, whether Q and E move the base sideways. Speeds are not known
+ * Options: `holonomic`, whether Q and E, and the sticks, move the base sideways. Speeds are not known
  * here: the gate scales. Sends `{active}` when the page's keys start or stop to belong
  * to this map.
  *
@@ -44,11 +46,14 @@ class Teleop {
       stop: () => this._stop(),
       lease: () => this._lease(),
       reset: () => this._reset(),
+      stick: () => this._toggleStick(),
     });
+    this._stick = new StickPad(this._drive, holonomic);
     this._requests = new Requests(this._drive);
     const takes = [
       lay(map, this._requests.element, "bottom-left"),
       lay(map, this._panel.element, "bottom-left"),
+      lay(map, this._stick.element, "bottom-right"),
     ];
     this._desk = deskOf(this._drive);
     this._seat = {
@@ -57,6 +62,8 @@ class Teleop {
       robot: () => map.selected,
       onActive: (/** @type {boolean} */ active) => {
         send({ active });
+        // A finger that stays on this map must not drive another map's robot.
+        if (!active) this._stick.release();
         this._show();
       },
     };
@@ -81,6 +88,7 @@ class Teleop {
 
   destroy() {
     this._ending.abort();
+    this._stick.destroy();
     for (const off of this._offs) off();
   }
 
@@ -114,27 +122,41 @@ class Teleop {
     this._show();
   }
 
+  _toggleStick() {
+    this._stick.wanted = !this._stick.wanted;
+    this._show();
+  }
+
   _show() {
     const active = this._desk.active === this._seat;
     const status = this._drive.status;
+    if (this._desk.spent) Object.assign(status, { pressed: true, dead: true });
     const report = this._report;
     const robot = this._map.selected;
     const requests = this._drive.requests;
     const verdict = this._drive.verdicts.find((one) => one.robot === robot);
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
+    const useful = report !== null && !isLatched(report) && (report.mine || report.armable);
+    this._stick.show(useful, status.pressed && status.dead);
+    const inputs = inputsOf({
+      touch: matchMedia("(pointer: coarse)").matches,
+      stick: this._stick.wanted,
+      gamepad: this._desk.gamepad,
+    });
     this._panel.show(
-      describe(status, robot, report, active, { verdict, request }),
+      describe(status, robot, report, active, { verdict, request, inputs }),
       report,
       status.delay,
       actOf(report, request, status.connection),
+      this._stick.wanted,
     );
   }
 }
 
 /** The words, the shape and the buttons in the corner of the map. */
 class Panel {
-  /** @param {{stop: () => void, lease: () => void, reset: () => void}} acts */
+  /** @param {Record<'stop' | 'lease' | 'reset' | 'stick', () => void>} acts */
   constructor(acts) {
     this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
     this._title = html("strong", "webmap-teleop-title");
@@ -143,6 +165,8 @@ class Panel {
     this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
     this._reset = new ResetButton(acts.reset);
+    this._stick = button("webmap-teleop-stick", "Stick", acts.stick);
+    this._stick.title = "A stick on the screen to drive with";
     const state = html(
       "p",
       "webmap-teleop-state",
@@ -157,7 +181,7 @@ class Panel {
       { "aria-label": "Driving" },
       this._mark,
       html("div", "webmap-teleop-words", {}, state, this._cap),
-      html("div", "webmap-teleop-acts", {}, this._lease, this._reset.element),
+      html("div", "webmap-teleop-acts", {}, this._lease, this._reset.element, this._stick),
       this._stop,
     );
   }
@@ -167,13 +191,18 @@ class Panel {
    * @param {import('../motion/report.js').RobotReport | null} report
    * @param {number | null} delay
    * @param {string | null} act What can be done about the lease.
+   * @param {boolean} stick Whether the stick is wanted.
    */
-  show({ state, title, detail }, report, delay, act) {
+  show({ state, title, detail }, report, delay, act, stick) {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
     say(this._title, title);
     say(this._detail, detail);
     say(this._cap, report ? capOf(report) + slowness(delay) : "");
     this._showButtons(report, act);
+    this._stick.hidden = report === null;
+    if (this._stick.getAttribute("aria-pressed") !== String(stick)) {
+      this._stick.setAttribute("aria-pressed", String(stick));
+    }
   }
 
   /**

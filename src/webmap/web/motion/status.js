@@ -19,6 +19,20 @@ import { stopWords } from "./stopping.js";
 
 /** @typedef {import('../drive.js').Drive['status']} Status */
 
+const KEYS = "W A S D or the arrows";
+
+/**
+ * Say what there is to drive with.
+ *
+ * @param {{touch: boolean, stick: boolean, gamepad: boolean}} what `touch`: whether
+ *     fingers are the pointer, so that there may be no keys.
+ */
+export function inputsOf({ touch, stick, gamepad }) {
+  const pad = gamepad ? ", or LB and the left stick of the gamepad" : "";
+  if (touch && stick) return `the stick${pad}`;
+  return `${stick ? "W A S D, the arrows or the stick" : KEYS}${pad}`;
+}
+
 /**
  * Say how it stands.
  *
@@ -26,11 +40,13 @@ import { stopWords } from "./stopping.js";
  * @param {string | null} robot The robot that is selected where this is shown.
  * @param {RobotReport | null} report The gate's word on it.
  * @param {boolean} active Whether the page's keys belong to that map.
- * @param {{verdict?: Verdict, request?: Request}} [more] What became of a STOP for it
- *     that was said here, and who asks for it.
+ * @param {{verdict?: Verdict, request?: Request, inputs?: string}} [more] What became
+ *     of a STOP for it that was said here, who asks for it, and what there is to drive
+ *     with.
  * @returns {Description}
  */
-export function describe(status, robot, report, active, { verdict, request } = {}) {
+export function describe(status, robot, report, active, more = {}) {
+  const { verdict, request, inputs = KEYS } = more;
   const link = ofLink(status);
   if (link) return link;
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
@@ -48,8 +64,8 @@ export function describe(status, robot, report, active, { verdict, request } = {
   if (!active) {
     return say("free", "Not driven here", "Click on this map to drive from it.");
   }
-  if (status.driven === robot) return ofMine(status, report);
-  return ofFree(status, report);
+  if (status.driven === robot) return ofMine(status, report, inputs);
+  return ofFree(status, report, inputs);
 }
 
 /**
@@ -130,21 +146,23 @@ function ofOther(status, report, request) {
 /**
  * @param {Status} status
  * @param {RobotReport} report
+ * @param {string} inputs
  */
-function ofMine(status, report) {
+function ofMine(status, report, inputs) {
   if (report.state === "driving") return say("driving", "Driving", speedOf(report));
   if (report.reason) return say("fixed", "Cannot move", sentence(report.reason));
   if (status.pressed && status.dead) return handsOff();
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
   if (!status.settled) return say("taking", "Getting ready", "");
-  return say("ready", "Ready", "Hold W A S D or the arrows. Space stops.");
+  return say("ready", "Ready", `Hold ${inputs}. Space stops.`);
 }
 
 /**
  * @param {Status} status
  * @param {RobotReport} report
+ * @param {string} inputs
  */
-function ofFree(status, report) {
+function ofFree(status, report, inputs) {
   if (status.taking) return say("taking", "Getting ready", "");
   if (!report.armable) {
     return say(
@@ -156,7 +174,7 @@ function ofFree(status, report) {
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
   if (status.refusal) return say("free", "Free", sentence(status.refusal));
   if (status.pressed && status.dead) return handsOff();
-  return say("free", "Free", "Hold W A S D or the arrows to drive.");
+  return say("free", "Free", `Hold ${inputs} to drive.`);
 }
 
 function handsOff() {

@@ -1,0 +1,110 @@
+import { takesKeys } from "../motion/attention.js";
+import { throwOf } from "./throws.js";
+
+/** @typedef {import('../drive.js').Drive} Drive */
+
+/** How far from its middle the knob goes, as a share of the pad's radius. */
+const WAY = 0.62;
+
+/**
+ * A pad with a knob as a drive input, for one finger, pen or mouse button.
+ *
+ * The pointer is captured: wherever it goes, its release is heard here. Whatever ends it
+ * is neutral, and a pointer that was forgotten does nothing until it presses anew.
+ */
+export class Stick {
+  /**
+   * @param {Drive} drive
+   * @param {HTMLElement} pad
+   * @param {() => boolean} sideways Whether left and right move the base sideways.
+   */
+  constructor(drive, pad, sideways) {
+    this._drive = drive;
+    this._pad = pad;
+    this._sideways = sideways;
+    /** @type {number | null} */
+    this._pointer = null;
+    this._ending = new AbortController();
+    const options = { signal: this._ending.signal };
+    pad.addEventListener("pointerdown", (event) => this._down(event), options);
+    pad.addEventListener("pointermove", (event) => this._move(event), options);
+    for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      pad.addEventListener(
+        kind,
+        (event) => {
+          if (/** @type {PointerEvent} */ (event).pointerId === this._pointer) {
+            this.release();
+          }
+        },
+        options,
+      );
+    }
+    // A finger that rests would open a menu, and a menu is a doubt.
+    pad.addEventListener("touchstart", (event) => event.preventDefault(), {
+      ...options,
+      passive: false,
+    });
+    this._offs = [
+      drive.on("drop", () => this.release()),
+      drive.on("read", () => this._check()),
+    ];
+  }
+
+  /** Forget the pointer, neutral. */
+  release() {
+    const pointer = this._pointer;
+    if (pointer === null) return;
+    this._pointer = null;
+    if (this._pad.hasPointerCapture(pointer)) this._pad.releasePointerCapture(pointer);
+    this._draw(0, 0);
+    this._pad.classList.remove("held");
+    this._drive.setInput("stick", null);
+  }
+
+  /** Stop listening, neutral. */
+  destroy() {
+    this._ending.abort();
+    for (const off of this._offs) off();
+    this.release();
+  }
+
+  /** A capture that is lost is not told before the pointer moves again. */
+  _check() {
+    if (this._pointer === null) return;
+    if (!this._pad.hasPointerCapture(this._pointer)) this.release();
+  }
+
+  /** @param {PointerEvent} event */
+  _down(event) {
+    event.preventDefault();
+    if (this._pointer !== null || event.button !== 0) return;
+    // As the press is not heard of elsewhere, it would leave the keys in a text field.
+    const focused = document.activeElement;
+    if (focused instanceof HTMLElement && takesKeys(focused)) focused.blur();
+    this._pointer = event.pointerId;
+    this._pad.setPointerCapture(event.pointerId);
+    this._pad.classList.add("held");
+    this._move(event);
+  }
+
+  /** @param {PointerEvent} event */
+  _move(event) {
+    if (event.pointerId !== this._pointer) return;
+    const { left, top, width, height } = this._pad.getBoundingClientRect();
+    const way = (WAY * width) / 2;
+    const right = (event.clientX - left - width / 2) / way;
+    const down = (event.clientY - top - height / 2) / way;
+    this._draw(right, down);
+    this._drive.setInput("stick", throwOf(right, down, { sideways: this._sideways() }));
+  }
+
+  /**
+   * @param {number} right
+   * @param {number} down
+   */
+  _draw(right, down) {
+    const beyond = Math.max(1, Math.hypot(right, down));
+    this._pad.style.setProperty("--right", `${right / beyond}`);
+    this._pad.style.setProperty("--down", `${down / beyond}`);
+  }
+}

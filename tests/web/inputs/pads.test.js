@@ -1,0 +1,98 @@
+import assert from "node:assert/strict";
+import { beforeEach, test } from "node:test";
+
+import { DEAD_MAN, Pads, SILENT } from "../../../src/webmap/web/inputs/pads.js";
+
+const AHEAD = [0, -1, 0, 0];
+
+let pads;
+let now;
+
+/** One gamepad whose news are as old as the reading, unless said otherwise. */
+function pad(held, fields = {}) {
+  const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
+  buttons[DEAD_MAN] = { pressed: held };
+  const base = { index: 0, id: "Pad", connected: true, mapping: "standard" };
+  return { ...base, timestamp: now, axes: AHEAD, buttons, ...fields };
+}
+
+function read(...list) {
+  now += 50;
+  return pads.read(list, now);
+}
+
+beforeEach(() => {
+  pads = new Pads();
+  now = 0;
+});
+
+test("a gamepad drives only while its dead-man button is held", () => {
+  assert.equal(read(pad(false)), null);
+  assert.deepEqual(read(pad(true)), { x: 1, y: 0, turn: 0 });
+  assert.equal(read(pad(false)), null);
+});
+
+test("a button that was held as the gamepad came does nothing until it was let go of", () => {
+  assert.equal(read(pad(true)), null);
+  assert.equal(pads.spent, true);
+  read(pad(false));
+  assert.notEqual(read(pad(true)), null);
+  assert.equal(pads.spent, false);
+});
+
+test("after a doubt the button must be let go of", () => {
+  read(pad(false));
+  read(pad(true));
+  pads.drop();
+  assert.equal(read(pad(true)), null);
+});
+
+for (const [what, fields] of Object.entries({
+  "that is not connected": { connected: false },
+  "whose buttons are not known": { mapping: "" },
+  "with too few buttons": { buttons: [] },
+})) {
+  test(`a gamepad ${what} does nothing`, () => {
+    read(pad(false));
+    assert.equal(read(pad(true, fields)), null);
+  });
+}
+
+test("a gamepad that went away and came back starts anew", () => {
+  read(pad(false));
+  read(pad(true));
+  assert.equal(read(null), null);
+  assert.equal(pads.present, false);
+  assert.equal(read(pad(true)), null);
+});
+
+test("a gamepad that says nothing new is doubted, also when it speaks again", () => {
+  read(pad(false));
+  const { timestamp } = pad(true);
+  for (let t = 0; t < SILENT - 100; t += 50) {
+    assert.notEqual(read(pad(true, { timestamp })), null);
+  }
+  for (let t = 0; t < 200; t += 50) read(pad(true, { timestamp }));
+  assert.equal(read(pad(true, { timestamp })), null);
+  assert.equal(pads.spent, true);
+  assert.equal(read(pad(true)), null);
+});
+
+test("of two gamepads the one whose button is held drives", () => {
+  const other = (held) => pad(held, { index: 1, axes: [0, 1, 0, 0] });
+  read(pad(false), other(false));
+  assert.equal(read(pad(false), other(true)).x, -1);
+});
+
+test("on a base that moves sideways the right stick turns", () => {
+  read(pad(false));
+  const axes = [-1, 0, -1, 0];
+  const asked = pads.read([pad(true, { axes })], now + 50, { holonomic: true });
+  assert.deepEqual(asked, { x: 0, y: 1, turn: 1 });
+});
+
+test("garbage on the axes is no throw", () => {
+  read(pad(false));
+  const asked = read(pad(true, { axes: [] }));
+  assert.deepEqual(asked, { x: 0, y: 0, turn: 0 });
+});

@@ -1,0 +1,225 @@
+"""The on-screen stick and gamepads, in a real Chromium, against a fake of the gate."""
+
+import time
+
+import pytest
+from hands_bench import DOUBTS, Bench
+from playwright.sync_api import CDPSession
+
+pytestmark = pytest.mark.browser
+
+PADS = """
+    window.pad = {
+        index: 0, id: 'Pad', connected: true, mapping: 'standard', timestamp: 1,
+        axes: [0, 0, 0, 0],
+        buttons: Array.from({length: 17}, () => ({pressed: false})),
+    };
+    window.plugged = true;
+    navigator.getGamepads = () => {
+        if (window.alive) window.pad.timestamp += 1;
+        return [window.plugged ? window.pad : null];
+    };
+    window.alive = true;
+"""
+
+
+class Finger:
+    """Touches the page by the browser's own input."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._cdp: CDPSession = bench.context.new_cdp_session(bench.page)
+        box = bench.page.locator(".webmap-stick").bounding_box()
+        self.x, self.y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.size = box["width"]
+
+    def say(self, kind: str, right: float = 0, down: float = 0) -> None:
+        """Say where the finger is, in shares of the pad's radius from its middle."""
+        x, y = self.x + right * self.size / 2, self.y + down * self.size / 2
+        points = [] if kind in ("touchEnd", "touchCancel") else [{"x": x, "y": y}]
+        say = {"type": kind, "touchPoints": points}
+        self._cdp.send("Input.dispatchTouchEvent", say)
+
+
+@pytest.fixture
+def touched(open_bench) -> Bench:
+    bench = open_bench("?modules=teleop,mouse_view_control", has_touch=True)
+    bench.select("r1")
+    bench.page.locator(".webmap-stick").wait_for()
+    return bench
+
+
+@pytest.fixture
+def padded(open_bench) -> Bench:
+    bench = open_bench()
+    bench.page.evaluate(PADS)
+    bench.select("r1")
+    bench.page.wait_for_timeout(150)
+    return bench
+
+
+def drive_by_finger(bench: Bench) -> Finger:
+    finger = Finger(bench)
+    for _ in range(5):
+        finger.say("touchStart")
+        finger.say("touchMove", down=-0.9)
+        try:
+            bench.until(bench.gate.moves, patience=1.5)
+        except AssertionError:
+            finger.say("touchEnd")
+            bench.page.wait_for_timeout(300)
+        else:
+            return finger
+    raise AssertionError("never drove")
+
+
+def hold(bench: Bench, held: bool, *axes: float) -> None:
+    bench.page.evaluate(
+        "([held, axes]) => { pad.buttons[4] = {pressed: held}; pad.axes = axes; }",
+        [held, [*axes, 0, 0]],
+    )
+
+
+def drive_by_pad(bench: Bench) -> None:
+    for _ in range(5):
+        hold(bench, True, 0, -1)
+        try:
+            bench.until(bench.gate.moves, patience=1.5)
+        except AssertionError:
+            hold(bench, False, 0, -1)
+            bench.page.wait_for_timeout(300)
+        else:
+            return
+    raise AssertionError("never drove")
+
+
+def test_a_thumb_on_the_stick_drives_and_letting_go_is_neutral(touched: Bench) -> None:
+    finger = drive_by_finger(touched)
+    touched.until(lambda: touched.gate.moves()[-1]["x"] == 1)
+    assert finger.size >= 120
+    since = time.monotonic()
+    finger.say("touchMove", right=-0.9)
+    touched.until(lambda: touched.gate.moves(since)[-1:] != [])
+    touched.until(lambda: touched.gate.moves(since)[-1]["turn"] == 1)
+    assert touched.gate.moves(since)[-1]["x"] == 0
+    touched.page.evaluate(
+        "addEventListener('pointerup', () => bench.mark(), {capture: true})"
+    )
+    finger.say("touchEnd")
+    touched.neutral_within(50)
+    touched.still()
+    assert touched.view()["e"] == 400, "the map did not move along"
+
+
+def test_a_touch_that_the_system_takes_away_is_neutral(touched: Bench) -> None:
+    finger = drive_by_finger(touched)
+    touched.page.evaluate(
+        "addEventListener('pointercancel', () => bench.mark(), {capture: true})"
+    )
+    finger.say("touchCancel")
+    touched.neutral_within(50)
+    touched.still()
+
+
+def test_a_pointer_that_is_captured_elsewhere_is_neutral(touched: Bench) -> None:
+    finger = drive_by_finger(touched)
+    touched.page.evaluate(
+        """bench.mark(() => {
+            const pad = document.querySelector('.webmap-stick');
+            for (let id = 0; id < 100; id++) {
+                if (pad.hasPointerCapture(id)) pad.releasePointerCapture(id);
+            }
+        })"""
+    )
+    touched.neutral_within(50)
+    finger.say("touchMove", down=-0.8)
+    touched.still()
+
+
+@pytest.mark.parametrize("doubt", ["blur", "hidden", "lost focus"])
+def test_a_finger_that_rests_through_a_doubt_moves_nothing(
+    touched: Bench, doubt: str
+) -> None:
+    finger = drive_by_finger(touched)
+    touched.page.evaluate(f"bench.mark(() => {{ {DOUBTS[doubt]} }})")
+    touched.neutral_within(50)
+    touched.page.wait_for_timeout(250)
+    finger.say("touchMove", down=-0.8)
+    touched.still()
+
+
+def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
+    bench = open_bench("?holonomic")
+    bench.select("r1")
+    stick = bench.page.locator(".webmap-stick")
+    assert not stick.is_visible()
+    bench.page.get_by_role("button", name="Stick", exact=True).click()
+    box = stick.bounding_box()
+    bench.page.get_by_role("button", name="Sideways").click()
+    bench.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    bench.page.mouse.down()
+    bench.page.mouse.move(box["x"] - 300, box["y"] + box["height"] / 2)
+    bench.until(bench.gate.moves)
+    last = bench.gate.moves()[-1]
+    assert (last["x"], last["y"], last["turn"]) == (0, 1, 0)
+    bench.page.mouse.up()
+    bench.still(tolerance=0.05)
+    bench.page.get_by_role("button", name="Stick", exact=True).click()
+    assert not stick.is_visible()
+
+
+def test_the_keys_and_the_stick_do_not_both_drive(touched: Bench) -> None:
+    finger = drive_by_finger(touched)
+    since = time.monotonic()
+    touched.page.keyboard.down("s")
+    touched.until(lambda: len(touched.gate.moves(since)) > 4)
+    assert {said["x"] for said in touched.gate.moves(since)} == {1}
+    finger.say("touchEnd")
+    touched.still(tolerance=0.05)
+
+
+def test_a_gamepad_drives_while_its_dead_man_button_is_held(padded: Bench) -> None:
+    hold(padded, False, 0, -1)
+    padded.still(0.3)
+    drive_by_pad(padded)
+    assert padded.gate.moves()[-1]["x"] == 1
+    hold(padded, False, 0, -1)
+    padded.still(tolerance=0.1)
+
+
+GONE = {
+    "unplugged": "plugged = false",
+    "reported gone": "dispatchEvent(new Event('gamepaddisconnected'))",
+    "marked gone": "pad.connected = false",
+}
+
+
+@pytest.mark.parametrize("how", GONE)
+def test_a_gamepad_that_is_gone_is_neutral_and_its_return_moves_nothing(
+    padded: Bench, how: str
+) -> None:
+    drive_by_pad(padded)
+    padded.page.evaluate(f"{{ {GONE[how]} }}")
+    padded.still(0.3, tolerance=0.1)
+    padded.page.evaluate("plugged = true; pad.connected = true;")
+    padded.still()
+    assert padded.shown() == "hands-off"
+    hold(padded, False, 0, 0)
+    padded.page.wait_for_timeout(300)
+    since = time.monotonic()
+    hold(padded, True, 0, -1)
+    padded.until(lambda: padded.gate.moves(since))
+
+
+def test_a_gamepad_that_says_nothing_new_is_neutral(padded: Bench) -> None:
+    drive_by_pad(padded)
+    padded.page.evaluate("alive = false")
+    padded.until(lambda: padded.shown() == "hands-off")
+    padded.still(tolerance=0.1)
+    padded.page.evaluate("alive = true")
+    padded.still()
+
+
+def test_a_doubt_needs_the_dead_man_button_anew(padded: Bench) -> None:
+    drive_by_pad(padded)
+    padded.page.evaluate(f"{{ {DOUBTS['blur']} }}")
+    padded.still(tolerance=0.1)
