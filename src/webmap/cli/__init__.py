@@ -8,6 +8,7 @@ import webmap
 from webmap.errors import WebMapError
 
 COMMANDS = {
+    "check": "webmap.cli.check:check",
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
     "run": "webmap.cli.run:run",
@@ -47,6 +48,8 @@ def cli() -> None:
     webmap view ws://robot:9090    the robots behind a rosbridge
     webmap discover ws://...       which robots are there, and why it thinks so
     webmap run FILE.py             your own page, in Python
+    webmap run FILE.toml           the robots of a fleet file
+    webmap check FILE.toml         what is wrong in a fleet file
     webmap sim                     the simulator and its rosbridge alone
 
     Each command prints one line when it is ready, logs to standard error, and ends

@@ -64,6 +64,7 @@ def demo(
                 twist=f"/robot_{index}/cmd_vel",
                 scan=f"/robot_{index}/base_scan",
                 battery=f"/robot_{index}/battery_state",
+                cameras=(f"/robot_{index}/camera/image_raw/compressed",),
                 goal=f"/robot_{index}/move_base_simple/goal",
                 cancel=f"/robot_{index}/move_base/cancel",
                 stops_within=0.25,

@@ -53,9 +53,12 @@ class LateRobots:
         site.pages[path] = replace(entry, function=open_page)
 
     def add(self, about: RobotDescription) -> None:
-        """Show one more robot, on the pages that are open and on those to come."""
+        """Make one more robot and show it."""
         with no_scope():
-            robot = make_robot(about)
+            self.show(make_robot(about))
+
+    def show(self, robot: "Robot") -> None:
+        """Show a robot on the pages that are open and on those to come."""
         self.robots.append(robot)
         for page in list(self._pages):
             _show(robot, page)

@@ -1,4 +1,4 @@
-"""``webmap run FILE.py``: a page of one's own."""
+"""``webmap run FILE``: a page of one's own in Python, or a fleet file in TOML."""
 
 import runpy
 import sys
@@ -13,13 +13,22 @@ from webmap.cli.options import web_options
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @web_options
 def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) -> None:
-    """Serve the pages that FILE.py makes with @webmap.page.
+    """Serve the pages that FILE.py makes, or the fleet that FILE.toml describes.
 
-    The script may call webmap.run() itself; what is said here comes before what it
-    says there.
+    A script makes pages with @webmap.page and may call webmap.run() itself; what is
+    said here comes before what it says there. A fleet file says which bridges, robots
+    and modules there are; webmap check FILE.toml says what is wrong in it.
     """
     from webmap.server import application
 
+    if file.suffix.lower() == ".toml":
+        from webmap.cli.fleet.show import open_fleet, prepare
+
+        open_fleet(prepare(file))
+        application.run(
+            host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
+        )
+        return
     application.command_line.update(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -1,0 +1,26 @@
+"""``webmap check FILE``: whether a fleet file is right."""
+
+from pathlib import Path
+
+import click
+
+from webmap.cli.options import verbose_option
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@verbose_option
+def check(file: Path) -> None:
+    """Read a fleet file as ``webmap run`` does, and say what is wrong in it.
+
+    No robot is reached. Every mistake is named with its line; the exit code is 2 if
+    there is one.
+    """
+    from webmap.cli.fleet.show import prepare
+
+    ready = prepare(file)
+    robots, bridges = len(ready.robots), len(ready.bridges)
+    click.echo(
+        f"{file}: {robots} robot{'s' * (robots != 1)} behind "
+        f"{bridges} bridge{'s' * (bridges != 1)}, and nothing wrong"
+    )

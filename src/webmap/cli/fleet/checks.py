@@ -1,0 +1,166 @@
+"""Checks of one value each: what was got, what was expected, and where."""
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from webmap.cli.fleet.lines import Path
+from webmap.errors import ConfigError
+from webmap.ros.names import normalise_topic, split_type
+
+Check: TypeAlias = Callable[[Any], Any]
+"""Takes a value and returns what it means, or raises ConfigError."""
+
+_KINDS: tuple[tuple[type, str], ...] = (
+    (bool, "the boolean"),
+    (int, "the whole number"),
+    (float, "the number"),
+    (str, "the text"),
+    (list, "the array"),
+    (dict, "the table"),
+)
+_LONGEST = 60
+
+LARGEST = 1e6
+"""No speed, time or length in a file is larger."""
+
+
+@dataclass(slots=True)
+class Mistakes:
+    """What is wrong in a file, with the way to it."""
+
+    found: list[tuple[Path, str]] = field(default_factory=list)
+
+    def add(self, path: Path, words: str) -> None:
+        """Note one mistake."""
+        self.found.append((path, words))
+
+
+def show(value: object) -> str:
+    """Return a value and its kind, as a person would say it."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, int) and abs(value) >= 10**_LONGEST:
+        text = "of very many digits"
+    else:
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+    if len(text) > _LONGEST:
+        text = text[: _LONGEST - 3] + "..."
+    kind = next((words for cls, words in _KINDS if isinstance(value, cls)), "the value")
+    return f"{kind} {''.join(c if c.isprintable() else '?' for c in text)}"
+
+
+def text(value: Any) -> str:
+    """Take a text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise ConfigError("a text that is not empty")
+    return value
+
+
+def topic(value: Any) -> str:
+    """Take the name of a topic."""
+    try:
+        return normalise_topic(value)
+    except ConfigError:
+        raise ConfigError('the name of a topic, such as "/odom"') from None
+
+
+def message_type(*allowed: str) -> Check:
+    """Return what takes one of these types, in either dialect."""
+
+    def check(value: Any) -> str:
+        try:
+            if isinstance(value, str) and (str(split_type(value)) in allowed):
+                return value
+        except ConfigError:
+            pass
+        raise ConfigError(f"one of the types {', '.join(allowed)}")
+
+    return check
+
+
+def above_zero(unit: str) -> Check:
+    """Return what takes a finite number above zero."""
+
+    def check(value: Any) -> float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0 < value < math.inf or value > LARGEST:
+            raise ConfigError(f"a number of {unit} above 0")
+        return float(value)
+
+    return check
+
+
+def milliseconds(value: Any) -> int:
+    """Take a whole number of milliseconds."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise ConfigError("a whole number of milliseconds, 0 or more")
+    return value
+
+
+def yes_or_no(value: Any) -> bool:
+    """Take a boolean."""
+    if not isinstance(value, bool):
+        raise ConfigError("true or false")
+    return value
+
+
+def one_of(*words: str) -> Check:
+    """Return what takes one of these words."""
+
+    def check(value: Any) -> str:
+        if value not in words or not isinstance(value, str):
+            listed = " or ".join(f'"{word}"' for word in words)
+            raise ConfigError(f"{listed}{near(value, words)}")
+        return value
+
+    return check
+
+
+def near(got: object, known: Iterable[str]) -> str:
+    """Return a hint at what was meant, empty if nothing is like it."""
+    found = difflib.get_close_matches(str(got), list(known), n=1)
+    return f'; did you mean "{found[0]}"?' if found else ""
+
+
+def one(check: Check, value: Any, path: Path, mistakes: Mistakes) -> Any:
+    """Return what a value means; None, and a mistake, if it is wrong."""
+    try:
+        return check(value)
+    except ConfigError as error:
+        mistakes.add(path, f"got {show(value)}, expected {error}")
+        return None
+
+
+def table(
+    value: Any,
+    checks: Mapping[str, Check],
+    path: Path,
+    mistakes: Mistakes,
+    *,
+    needed: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Return what the keys of a table mean; each wrong one is a mistake."""
+    if not isinstance(value, dict):
+        mistakes.add(path, f"got {show(value)}, expected a table of keys and values")
+        return {}
+    meant = {}
+    for key, got in value.items():
+        if key in checks:
+            meant[key] = one(checks[key], got, (*path, key), mistakes)
+        else:
+            unknown(key, checks, (*path, key), mistakes)
+    for key in needed:
+        if key not in value:
+            mistakes.add(path, f'the key "{key}" is missing')
+    return meant
+
+
+def unknown(key: str, known: Iterable[str], path: Path, mistakes: Mistakes) -> None:
+    """Note a key that means nothing."""
+    listed = ", ".join(known)
+    mistakes.add(
+        path, f'there is no key "{key}" here{near(key, known)}; there are {listed}'
+    )

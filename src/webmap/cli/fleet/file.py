@@ -1,0 +1,109 @@
+"""Reading a fleet file."""
+
+import tomllib
+from pathlib import Path
+
+from webmap.cli.fleet.checks import Mistakes
+from webmap.cli.fleet.lines import Lines
+from webmap.cli.fleet.lines import Path as Way
+from webmap.cli.fleet.schema import Fleet, read_table
+from webmap.errors import ConfigError
+
+LARGEST = 1 << 20
+"""Bytes that a file may have."""
+
+EXPECTED = "expected TOML with a table [bridges] and a table [[robots]] for each robot"
+
+
+class FleetText:
+    """A file that was read, and where in it something stands.
+
+    Args:
+        name: The file's name, for people.
+        text: What is in it.
+
+    Raises:
+        ConfigError: If it is not TOML; line and column are named.
+
+    """
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name = name
+        if not text.strip():
+            raise ConfigError(f"{name}: the file is empty; {EXPECTED}")
+        try:
+            self.data = tomllib.loads(text)
+        except ValueError as error:  # also whole numbers of thousands of digits
+            raise ConfigError(f"{name}: this is not TOML: {error}") from None
+        except RecursionError:
+            raise ConfigError(
+                f"{name}: values are nested too deep; {EXPECTED}"
+            ) from None
+        self._lines = Lines(text)
+
+    def complaint(self, way: Way, words: str) -> str:
+        """Return a mistake with file, line and key."""
+        said = f"{way_in_words(way)}: {words}"
+        # What a file holds must not steer the terminal that shows it.
+        said = "".join(char if char.isprintable() else "?" for char in said)
+        return f"{self.name}:{self._lines.of(way)}: {said}"
+
+    def refuse(self, mistakes: Mistakes) -> None:
+        """Raise all mistakes at once, if there are any.
+
+        Raises:
+            ConfigError: If there are.
+
+        """
+        if mistakes.found:
+            lines = [self.complaint(way, words) for way, words in mistakes.found]
+            raise ConfigError("\n".join(lines))
+
+
+def read_text(file: Path) -> FleetText:
+    """Read a file.
+
+    Raises:
+        ConfigError: If it is too large, not UTF-8, or not TOML.
+        OSError: If it cannot be read.
+
+    """
+    with file.open("rb") as stream:
+        data = stream.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise ConfigError(
+            f"{file}: the file is larger than {LARGEST >> 20} MiB; {EXPECTED}"
+        )
+    if data.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
+        raise ConfigError(
+            f"{file}: the file begins with a byte order mark; save it as UTF-8 without"
+        )
+    try:
+        return FleetText(str(file), data.decode())
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ConfigError(f"{file}:{line}: this is not UTF-8; {EXPECTED}") from None
+
+
+def read_fleet(file: Path) -> tuple[Fleet, FleetText]:
+    """Return what a file says, and where it says it.
+
+    Raises:
+        ConfigError: If anything in it is wrong; every mistake is named with its line.
+        OSError: If it cannot be read.
+
+    """
+    text = read_text(file)
+    mistakes = Mistakes()
+    fleet = read_table(text.data, mistakes)
+    text.refuse(mistakes)
+    return fleet, text
+
+
+def way_in_words(way: Way) -> str:
+    """Return the way to a value as TOML writes it: ``robots[0].twist.v_max``."""
+    words = ""
+    for part in way:
+        dot = "." if words else ""
+        words += f"[{part}]" if isinstance(part, int) else f"{dot}{part}"
+    return words or "the file"

@@ -1,0 +1,91 @@
+"""From a fleet file to robots."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import webmap
+from webmap.cli.fleet.checks import Mistakes
+from webmap.cli.fleet.schema import Fleet, ModuleLine, RobotLine
+from webmap.console import RobotDescription
+from webmap.console.fleet import make_robot
+from webmap.core.registry import robot_modules
+from webmap.errors import WebMapError
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+
+def make_bridges(fleet: Fleet) -> dict[str, "Bridge"]:
+    """Return the bridges of a file, by name."""
+    return {name: webmap.Bridge(url, name=name) for name, url in fleet.bridges.items()}
+
+
+def make_robots(
+    fleet: Fleet, bridges: Mapping[str, "Bridge"], mistakes: Mistakes
+) -> list["Robot"]:
+    """Return the robots of a file; what a robot or a module refuses is noted."""
+    return [_robot(line, bridges, mistakes) for line in fleet.robots]
+
+
+def _robot(
+    line: RobotLine, bridges: Mapping[str, "Bridge"], mistakes: Mistakes
+) -> "Robot":
+    bridge = bridges[line.bridge]
+    first, *others = line.scans or [""]
+    robot = make_robot(
+        RobotDescription(
+            name=line.name, bridge=bridge, scan=first, battery=line.battery
+        )
+    )
+    robot.base_link = line.base_link
+    for topic in others:
+        scanner = robot.add_module(
+            "LaserScanner", bridge, topic, max_dots=None, throttle=100
+        )
+        robot.svg.insert(1, scanner.svg)
+    setters: dict[str, tuple[dict[str, Any] | None, Callable[..., None]]] = {
+        "odometry": (line.odometry, robot.set_odometry_topic),
+        "twist": (line.twist, robot.set_twist_topic),
+        "move": (line.move, robot.set_move_topic),
+    }
+    for key, (options, setter) in setters.items():
+        if options is not None:
+            try:
+                setter(bridge, **options)
+            except WebMapError as error:
+                mistakes.add((*line.path, key), str(error))
+    for module in line.modules:
+        _add_module(robot, module, bridges, mistakes)
+    return robot
+
+
+def _add_module(
+    robot: "Robot",
+    module: ModuleLine,
+    bridges: Mapping[str, "Bridge"],
+    mistakes: Mistakes,
+) -> None:
+    args = [_meant(value, bridges) for value in module.args]
+    options = {key: _meant(value, bridges) for key, value in module.options.items()}
+    try:
+        factory = robot_modules[module.name]
+    except WebMapError as error:
+        mistakes.add((*module.path, "name"), str(error))
+        return
+    try:
+        inspect.signature(factory).bind(robot, *args, **options)
+    except TypeError as error:
+        takes = ", ".join(list(inspect.signature(factory).parameters)[1:])
+        mistakes.add(module.path, f"{module.name} takes ({takes}): {error}")
+        return
+    try:
+        robot.add_module(module.name, *args, **options)
+    except Exception as error:  # a module of somebody else's may raise anything
+        mistakes.add(module.path, f"{module.name} refused its arguments: {error}")
+
+
+def _meant(value: Any, bridges: Mapping[str, "Bridge"]) -> Any:
+    if isinstance(value, dict) and set(value) == {"bridge"}:
+        return bridges[value["bridge"]]
+    return value

@@ -1,0 +1,63 @@
+"""Showing the robots of a fleet file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from webmap import console
+from webmap.cli.fleet.checks import Mistakes
+from webmap.cli.fleet.file import read_fleet
+from webmap.cli.fleet.robots import make_bridges, make_robots
+from webmap.cli.fleet.schema import Fleet
+from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+
+@dataclass(frozen=True, slots=True)
+class ReadyFleet:
+    """A file that is right, with everything in it made."""
+
+    fleet: Fleet
+    bridges: dict[str, "Bridge"]
+    robots: list["Robot"]
+    floor: Path | None
+
+
+def prepare(file: Path) -> ReadyFleet:
+    """Make everything that a file says; no link is opened yet.
+
+    Raises:
+        ConfigError: If anything in it is wrong; every mistake is named with its line.
+        OSError: If it cannot be read.
+
+    """
+    import tempfile
+
+    from webmap.console.floor import load_floor
+
+    fleet, text = read_fleet(file)
+    mistakes = Mistakes()
+    bridges = make_bridges(fleet)
+    robots = make_robots(fleet, bridges, mistakes)
+    floor = file.parent / fleet.floor if fleet.floor else None
+    if floor is not None:
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                load_floor(floor, Path(folder))
+        except (ConfigError, OSError) as error:
+            mistakes.add(("floor",), str(error))
+    text.refuse(mistakes)
+    return ReadyFleet(fleet, bridges, robots, floor)
+
+
+def open_fleet(ready: ReadyFleet) -> None:
+    """Make the console with these robots the page at ``/``."""
+    from webmap.cli.latecomers import LateRobots
+
+    options = {"title": ready.fleet.title} if ready.fleet.title else {}
+    console.open_console(list(ready.bridges.values()), [], floor=ready.floor, **options)
+    shown = LateRobots()
+    for robot in ready.robots:
+        shown.show(robot)

@@ -1,0 +1,49 @@
+"""``webmap check`` and ``webmap run`` with a fleet file."""
+
+import re
+import signal
+import subprocess
+import sys
+
+
+def webmap(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "webmap", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+
+
+def test_the_file_that_discovery_writes_is_right_and_runs(ros1, ros2, tmp_path):
+    file = tmp_path / "fleet.toml"
+    file.write_text(webmap("discover", "--toml", ros1, ros2).stdout)
+    said = webmap("check", file)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout == f"{file}: 3 robots behind 2 bridges, and nothing wrong\n"
+    with subprocess.Popen(
+        [sys.executable, "-m", "webmap", "run", file, "--port", "0", "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert re.match("WebMap is ready at http://", process.stdout.readline())
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=15)
+        finally:
+            process.kill()
+    assert process.returncode == 0, err
+    assert out == ""
+
+
+def test_a_wrong_file_is_refused_with_exit_code_2_by_both(tmp_path):
+    file = tmp_path / "fleet.toml"
+    file.write_text('[bridges]\na = "ws://a"\n[[robots]]\nnmae = "Bob"\n')
+    for command in ("check", "run"):
+        said = webmap(command, file)
+        assert said.returncode == 2
+        assert f'{file}:4: robots[0].nmae: there is no key "nmae" here' in said.stderr
+        assert said.stdout == ""
+        assert "Traceback" not in said.stderr

@@ -1,0 +1,219 @@
+"""Fleet files: read strictly, each mistake with its line."""
+
+import pytest
+
+from webmap.cli.fleet.show import prepare
+from webmap.errors import ConfigError
+
+GOOD = """\
+title = "Two halls"
+
+[bridges]
+north = "ws://north:9090"
+south = "wss://south/ros"
+
+[[robots]]
+name = "Bob"
+bridge = "north"
+odometry = "/bob/odom"
+scan = ["/bob/front/scan", "/bob/rear/scan"]
+battery = "/bob/battery_state"
+
+[robots.twist]
+topic = "/bob/cmd_vel"
+type = "geometry_msgs/Twist"
+stops_within = 0.25
+v_max = 0.5
+w_max = 1
+
+[robots.move]
+topic = "/bob/move_base_simple/goal"
+cancel_topic = "/bob/move_base/cancel"
+on_operator_loss = "cancel"
+
+[[robots]]
+name = "Ann"
+bridge = "south"
+base_link = "base_footprint"
+odometry = { topic = "/odom", type = "nav_msgs/msg/Odometry", throttle = 50 }
+twist = { topic = "/cmd_vel", type = "geometry_msgs/msg/TwistStamped" }
+modules = [
+  { name = "LaserScanner", args = [{ bridge = "north" }, "/s"], options = { x = 1 } },
+]
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write_(text):
+        file = tmp_path / "fleet.toml"
+        file.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return file
+
+    return write_
+
+
+@pytest.fixture
+def ready(write):
+    made = []
+
+    def ready_(text):
+        made.append(prepare(write(text)))
+        return made[-1]
+
+    yield ready_
+    for fleet in made:
+        for robot in fleet.robots:
+            robot.destroy()
+
+
+def refused(write, text):
+    file = write(text)
+    with pytest.raises(ConfigError) as error:
+        prepare(file)
+    return str(error.value).replace(str(file), "FILE")
+
+
+def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
+    fleet = ready(GOOD)
+    assert [bridge.url for bridge in fleet.bridges.values()] == [
+        "ws://north:9090",
+        "wss://south/ros",
+    ]
+    bob, ann = fleet.robots
+    spec = bob.motion.spec()
+    assert (bob.name, spec.twist_topic, spec.stops_within) == (
+        "Bob",
+        "/bob/cmd_vel",
+        0.25,
+    )
+    assert (spec.v_max, spec.w_max) == (0.5, 1.0)
+    assert spec.cancel_topic == "/bob/move_base/cancel"
+    names = [type(module).__name__ for module in bob.modules]
+    assert names.count("LaserScanner") == 2
+    assert "Battery" in names
+    assert ann.base_link == "base_footprint"
+    assert ann.feed.throttle == 50
+    assert "TwistStamped" in ann.motion.spec().twist_type
+    scanner = next(m for m in ann.modules if type(m).__name__ == "LaserScanner")
+    assert scanner is not None
+
+
+def test_the_only_bridge_need_not_be_said_and_a_topic_is_enough(ready):
+    fleet = ready(
+        '[bridges]\nhall = "ws://hall:9090"\n'
+        '[[robots]]\nname = "Bob"\ntwist = "/cmd_vel"\nscan = "/scan"\n'
+    )
+    assert fleet.robots[0].motion.twist_topic.bridge.url == "ws://hall:9090"
+
+
+def changed(old, new):
+    assert old in GOOD
+    return GOOD.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            changed("stops_within", "stops_witin"),
+            'FILE:17: robots[0].twist.stops_witin: there is no key "stops_witin" here; '
+            'did you mean "stops_within"?; there are topic, type,',
+        ),
+        (
+            changed("v_max = 0.5", 'v_max = "0.5"'),
+            'FILE:18: robots[0].twist.v_max: got the text "0.5", expected a number of '
+            "metres per second above 0",
+        ),
+        (changed("0.25", "0"), "FILE:17: robots[0].twist.stops_within: got the whole"),
+        (changed("0.25", "-1.5"), "got the number -1.5, expected a number of seconds"),
+        (changed("0.25", "inf"), "got the number inf, expected a number of seconds"),
+        (changed("0.25", "nan"), "got the number nan, expected a number of seconds"),
+        (changed("0.25", "true"), "got the boolean true, expected a number of seconds"),
+        (changed("0.25", "9" * 400), "got the whole number of very many digits"),
+        (changed("title", "tilte"), 'FILE:1: tilte: there is no key "tilte" here; did'),
+        (
+            changed('"ws://north:9090"', '"http://north"'),
+            'FILE:4: bridges.north: got the text "http://north", expected the address',
+        ),
+        (
+            changed('bridge = "north"', 'bridge = "nroth"'),
+            'FILE:9: robots[0].bridge: got the text "nroth", expected the name of a '
+            'bridge (north, south); did you mean "north"?',
+        ),
+        (changed('bridge = "north"\n', ""), 'FILE:7: robots[0]: the key "bridge" is'),
+        (changed('name = "Bob"\n', ""), 'FILE:7: robots[0]: the key "name" is missing'),
+        (
+            changed('"Ann"', '"BOB"'),
+            'FILE:27: robots[1].name: got the text "BOB", expected a name that differs',
+        ),
+        (
+            changed('"Ann"', '"\uff22ob"'),
+            "expected a name that differs from",
+        ),
+        (
+            changed('"/bob/odom"', '"/bob odom"'),
+            'FILE:10: robots[0].odometry: got the text "/bob odom", expected the name',
+        ),
+        (
+            changed('"/bob/rear/scan"', "7"),
+            "FILE:11: robots[0].scan[1]: got the whole number 7, expected the name of",
+        ),
+        (
+            changed('"geometry_msgs/Twist"', '"nav_msgs/Odometry"'),
+            "FILE:16: robots[0].twist.type: got",
+        ),
+        (changed('"cancel"', '"cancle"'), 'did you mean "cancel"?'),
+        (
+            changed("throttle = 50", "throttle = 1.5"),
+            "FILE:30: robots[1].odometry.thro",
+        ),
+        (
+            changed('"LaserScanner"', '"LaserScaner"'),
+            "FILE:33: robots[1].modules[0].name: there is no robot module "
+            "'LaserScaner'. Did you mean 'LaserScanner'?",
+        ),
+        (
+            changed("{ x = 1 }", "{ colour = 1 }"),
+            "FILE:33: robots[1].modules[0]: Laser",
+        ),
+        (
+            changed('{ bridge = "north" }', '{ bridge = "east" }'),
+            "FILE:33: robots[1].modules[0].args[0].bridge: got the text",
+        ),
+        (changed("[[robots]]", "[robots]"), "this is not TOML"),
+        (
+            "title = 1\n[[robots]]\n",
+            "FILE:1: title: got the whole number 1, expected a",
+        ),
+        ('[bridges]\na = "ws://a"\n', "FILE:1: robots: got nothing, expected a table"),
+        (changed('title = "Two halls"', 'floor = "none.yaml"'), "FILE:1: floor: "),
+        ("", "FILE: the file is empty; expected TOML with a table [bridges]"),
+        ("# nothing\n", "FILE:1: bridges: got nothing"),
+        ("title = \n", "FILE: this is not TOML: Invalid value (at line 1, column 9)"),
+        (
+            b"\xef\xbb\xbf" + GOOD.encode(),
+            "FILE: the file begins with a byte order mark",
+        ),
+        (GOOD.encode("utf-16"), "byte order mark"),
+        (b'title = "ok"\nfloor = "\xff"\n', "FILE:2: this is not UTF-8"),
+        ("x = " + "[" * 5000, "FILE: values are nested too deep"),
+        ("x = " + "9" * 5000, "FILE: this is not TOML: Exceeds the limit"),
+        ("#" * (2 << 20), "FILE: the file is larger than 1 MiB"),
+    ],
+)
+def test_a_mistake_is_named_with_its_line_and_what_was_expected(write, text, said):
+    assert said in refused(write, text)
+
+
+def test_every_mistake_is_named_at_once(write):
+    text = changed("v_max", "vmax").replace("w_max = 1", "w_max = false")
+    said = refused(write, text).splitlines()
+    assert len(said) == 2
+    assert said[0].startswith("FILE:18: ")
+    assert said[1].startswith("FILE:19: ")
+
+
+def test_control_characters_of_a_file_do_not_reach_the_terminal(write):
+    for odd in (changed('"north"', r'"\u001b[2J"'), changed("title", r'"\u001b[2J"')):
+        assert "\x1b" not in refused(write, odd)
