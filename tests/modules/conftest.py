@@ -33,5 +33,7 @@ def map(page) -> Map:
 
 
 @pytest.fixture
-def robot() -> Robot:
-    return Robot("Bob")
+def robot() -> Iterator[Robot]:
+    robot = Robot("Bob")
+    yield robot
+    robot.destroy()

@@ -44,7 +44,7 @@ def refusing(
         try:
             draw(message)
         except WebMapError as error:
-            owner.set_problem(about, f"{topic}: {error}; the message was left out")
+            owner.set_problem(about, f"{topic}: {error}")
         else:
             owner.clear_problem(about)
 
