@@ -56,16 +56,29 @@ class Bench:
     up: bool = True
     lock_held: bool = True
     was_driven: bool = False
+    disk: dict[Key, str] = field(default_factory=dict)
+    """Whose STOP stands, as the disk has it."""
+    slow_disk: bool = False
+    """Whether the disk says nothing by itself."""
+    full_disk: bool = False
+    depth: int = 0
+    to_keep: list[actions.KeepLatch] = field(default_factory=list)
     gate: Gate = field(default_factory=lambda: Gate(Ticks(5000), Epochs(0)))
     written: list[Written] = field(default_factory=list)
     dropped: list[Written] = field(default_factory=list)
+    attempts: list[Written] = field(default_factory=list)
+    """What was written and what was dropped, in order."""
     done: list[actions.Action] = field(default_factory=list)
     said: list[messages.FromGate] = field(default_factory=list)
     tick: int = -1
     seq: int = 0
 
     def tell(self, event):
+        self.depth += 1
         self._do(self.gate.handle(event, self.now))
+        self.depth -= 1
+        while self.to_keep and not self.depth:
+            self.keep(self.to_keep.pop(0))
 
     def run(self, seconds, each=None, step=0.01):
         """Let time pass; ``each`` is called every 50 ms, before the gate's own step."""
@@ -91,8 +104,16 @@ class Bench:
                 case actions.Lock(key):
                     why = None if self.lock_held else "another has it"
                     self.tell(
-                        events.LockState(key, self.lock_held, self.was_driven, why)
+                        events.LockState(
+                            key,
+                            self.lock_held,
+                            self.was_driven,
+                            why,
+                            self.disk.get(key),
+                        )
                     )
+                case actions.KeepLatch() if not self.slow_disk:
+                    self.to_keep.append(action)  # in a thread: never within an action
                 case actions.WriteTwist(_, twist) if (
                     self.losing_zeros and twist.is_zero
                 ):
@@ -100,13 +121,24 @@ class Bench:
                 case actions.WriteTwist(key, twist, epoch, by):
                     out = self.up and (self.clear or twist.is_zero)
                     log = self.written if out else self.dropped
-                    log.append(Written(self.now, key, twist, epoch, by))
+                    write = Written(self.now, key, twist, epoch, by)
+                    log.append(write)
+                    self.attempts.append(write)
                     self.tell(events.Wrote(key, twist, epoch, by, out))
                 case actions.SendGoal(_, robot, id, x, y, yaw, by):
                     self.tell(events.WroteGoal(robot, id, x, y, yaw, by, self.clear))
                 case actions.CutLink(url):
                     self.up = False
                     self.tell(events.LinkDown(url, "control"))
+
+    def keep(self, latch):
+        """Have the disk do as it is told, and say so."""
+        error = "the disk is full" if self.full_disk else None
+        if not self.full_disk and latch.by is not None:
+            self.disk[latch.key] = latch.by
+        elif not self.full_disk:
+            self.disk.pop(latch.key, None)
+        self.tell(events.LatchKept(latch.key, latch.number, error))
 
     # What happens outside.
 

@@ -4,6 +4,7 @@ import os
 import signal
 import time
 
+import msgspec
 import pytest
 from gate_page import Page
 from gate_robot import FakeRobot, eventually
@@ -92,7 +93,8 @@ class TestPages:
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.05 + JITTER
         eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
-        eventually(lambda: page.robot()["state"] == "free", "the end of the lease")
+        eventually(lambda: page.robot()["latched"], "the word that STOP stands")
+        assert page.robot()["holder"] is None
         moves = len(fake.moving)
         page.x = 1.0
         eventually(lambda: page.of("refused"), "a refusal")
@@ -435,3 +437,75 @@ class TestLife:
         assert client.pid is None
         client.start()
         eventually(lambda: client._ready, "a gate")
+
+
+class TestStopStands:
+    def test_it_is_there_again_after_the_gate_was_killed(self, page, client, fake):
+        page.drive_off(fake)
+        client.stop_robot("r1")
+        eventually(lambda: page.robot().get("latched"), "the word that STOP stands")
+        page.robots.clear()
+        os.kill(client.pid, signal.SIGKILL)
+        eventually(lambda: page.robot().get("latched"), "the STOP of the first gate")
+        assert page.robot()["state"] == "stopped"
+        assert page.robot()["stop"]["by"] == "program"
+        at, moves = time.monotonic(), len(fake.moving)
+        page.x = 1.0
+        page.say(op="take", robot="r1")
+
+        def told():
+            return [r["why"] for r in page.of("refused") if r["what"] == "take"]
+
+        assert "reset it first" in eventually(told, "a refusal")[-1]
+        eventually(lambda: first_zero_after(fake, at), "zeros that go on")
+        page.say(op="reset", robot="r1")
+        eventually(lambda: page.robot().get("armable"), "a robot to be had")
+        assert len(fake.moving) == moves
+        page.x = 0.0
+        page.drive_off(fake)
+
+    def test_it_is_there_again_for_another_display(self, client, robot_spec):
+        client.declare(robot_spec)
+        heard = []
+        client.on_report(heard.append)
+        client.stop_robot(None)
+
+        def latched():
+            return [r for r in of(heard, messages.RobotReport) if r.latched]
+
+        eventually(latched, "the word that STOP stands")
+        client.stop()
+        heard.clear()
+        client.start()
+        eventually(latched, "the STOP of before")
+        client.reset("r1")
+        eventually(lambda: not heard[-1].latched, "the reset")
+
+    def test_a_gate_that_does_not_run_resets_nothing(self):
+        GateClient().reset(None)
+
+    def test_hooks_are_said_and_taken_back(self, client, robot_spec, fake):
+        hooks = (
+            {"topic": "/lock", "type": "std_msgs/Bool"},
+            {"service": "/e_stop", "type": "std_srvs/Trigger"},
+        )
+        spec = msgspec.structs.replace(robot_spec, stop_hooks=hooks, action="/go")
+        client.declare(spec)
+        page = Page(client)
+        eventually(lambda: page.robot().get("armable"), "a link")
+        page.say(op="stop", robot="r1")
+
+        def said():
+            return [t.message["msg"]["data"] for t in fake.of("publish", "/lock")]
+
+        eventually(lambda: said() == [True], "the flag")
+
+        def called():
+            return {t.message["service"] for t in fake.of("call_service")}
+
+        eventually(lambda: "/e_stop" in called(), "the call")
+        assert "/go/_action/cancel_goal" in called()
+        page.say(op="reset", robot="r1")
+        eventually(lambda: said() == [True, False], "the flag taken back")
+        page.end()
+        client.forget("r1")

@@ -168,7 +168,7 @@ class TestSeveral:
         bench.say("a", op="stop", robot="r1")
         assert bench.report("r2").state == "driving"
         bench.say("a", op="stop", robot="*")
-        assert bench.report("r2").state == "stopping"
+        assert bench.report("r2").state == "stopped"
 
     def test_links_of_other_bridges_do_not_matter(self):
         other = "ws://other:9090"

@@ -153,6 +153,7 @@ def test_a_robot_without_ways_for_goals_says_so():
     bench.say("a", op="cancel", robot="r1")
     assert "no cancel topic" in bench.refusals()[-1].why
     bench.say("a", op="stop", robot="r1")
+    bench.say("a", op="reset", robot="r1")
     bench.drive_off()
     assert bench.written[-1].twist == Twist(1.0)
 

@@ -1,4 +1,4 @@
-"""Whatever happens in whatever order, what the robot is told keeps five promises.
+"""Whatever happens in whatever order, what the robot is told keeps seven promises.
 
 1. A velocity is written only in answer to a command of the lease's holder that was
    accepted just now, and when the newest such command is older than the limit, what is
@@ -6,7 +6,10 @@
 2. Between two epochs in the log of a robot there is a zero.
 3. No velocity of an old epoch comes after one of a newer epoch.
 4. No velocity exceeds the limit in force.
-5. After half a second of zeros there is silence.
+5. After half a second of zeros there is silence, unless STOP stands.
+6. After a STOP nothing but zero is written, and nobody has the robot, until a reset;
+   not even when the gate is killed and started anew meanwhile.
+7. A reset writes nothing.
 
 And, of hands: after any doubt nothing moves before they were seen to be off.
 """
@@ -14,7 +17,7 @@ And, of hands: after any doubt nothing moves before they were seen to be off.
 import os
 from dataclasses import dataclass
 
-from gate_harness import URL, Bench, spec
+from gate_harness import KEY, URL, Bench, spec
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -26,7 +29,10 @@ from hypothesis.stateful import (
 )
 
 from webmap.gate import actions, events, messages
+from webmap.gate.gate import Gate
+from webmap.gate.lease import Epochs
 from webmap.gate.messages import PROGRAM
+from webmap.gate.ticks import Ticks
 from webmap.geometry import Twist
 
 PEOPLE = ("a", "b")
@@ -55,7 +61,7 @@ class Motion(RuleBasedStateMachine):
         self.doubts = [self.bench.now]
         """When hands were last known to be in doubt, for a reason outside of them."""
         self.speeds = dict.fromkeys((*PEOPLE, PROGRAM), 9.0)
-        self.last_seq = dict.fromkeys(PEOPLE, 0)
+        self.last_seq = dict.fromkeys(PEOPLE, -1)
         self.seeing = True
         self.checked = 0
         self.request = 0
@@ -165,9 +171,40 @@ class Motion(RuleBasedStateMachine):
         at, before = self.bench.now, len(self._attempts())
         self.bench.say(who, op="stop", robot=robot)
         assert self.bench.report().holder is None
+        self.stands = True
+        self._doubt()
         zeros = [w for w in self._attempts() if w.at == at and w.twist.is_zero]
         assert zeros, "STOP is zero at once"
         assert len(self._attempts()) <= before + 1
+
+    @rule(who=st.sampled_from(PEOPLE), robot=st.sampled_from(["r1", "*"]))
+    def reset(self, who, robot):
+        before = len(self._attempts())
+        self.bench.say(who, op="reset", robot=robot)
+        assert len(self._attempts()) == before, "reset moves nothing"
+        assert self.bench.report().holder is None or not self.stands
+        self.stands = False
+
+    @rule()
+    def gate_is_killed_and_started_anew(self):
+        """Nothing is left of it but the disk."""
+        old = self.bench
+        driven = [a.driven for a in old.did(actions.MarkDriven)]
+        ticks, epochs = Ticks(old.tick + 1000), Epochs(old.gate._epochs.next())
+        self.bench = Bench(
+            now=old.now,
+            beating=old.beating,
+            answering=old.answering,
+            clear=old.clear,
+            was_driven=bool(driven and driven[-1]),
+            disk=old.disk,
+            gate=Gate(ticks, epochs),
+        )
+        self.checked, self.sent, self.silent_for = 0, [], 0.0
+        self.speeds = dict.fromkeys((*PEOPLE, PROGRAM), 9.0)
+        self.last_seq = dict.fromkeys(PEOPLE, -1)
+        self.bench.begin(self._spec())
+        self._doubt()
 
     @rule(who=st.sampled_from(PEOPLE), v=st.sampled_from([0.2, 0.8, 9.0]))
     def speeds_of_page(self, who, v):
@@ -234,6 +271,8 @@ class Motion(RuleBasedStateMachine):
             self._doubt()
 
     silent_for = 0.0
+    stands = False
+    """Whether somebody said STOP, and nobody has reset it since."""
 
     @rule(seconds=st.sampled_from([0.01, 0.05, 0.15, 0.25, 0.5]))
     def time_passes(self, seconds):
@@ -250,7 +289,11 @@ class Motion(RuleBasedStateMachine):
     def everybody_rests(self):
         self._run(1.6)
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
-        assert late == [], "after zeros there is silence"
+        if self.stands:
+            assert all(w.twist.is_zero for w in late)
+            assert len(late) >= 6 or not self.bench.up, "zeros while STOP stands"
+        else:
+            assert late == [], "after zeros there is silence"
         assert self.bench.gate.silent
 
     @rule()
@@ -287,8 +330,7 @@ class Motion(RuleBasedStateMachine):
         self.doubts.append(self.bench.now)
 
     def _attempts(self):
-        both = self.bench.written + self.bench.dropped
-        return sorted(both, key=lambda w: w.at)
+        return self.bench.attempts
 
     @invariant()
     def velocity_answers_an_accepted_command(self):
@@ -336,6 +378,14 @@ class Motion(RuleBasedStateMachine):
                 seen = True
             last = s.at
         assert seen, "the hands were not seen to be off"
+
+    @invariant()
+    def a_stop_stands_until_a_reset(self):
+        assert self.bench.report().latched == self.stands
+        assert (KEY in self.bench.disk) == self.stands
+        if self.stands:
+            assert self.bench.report().holder is None
+            assert all(w.twist.is_zero for w in self.bench.written[self.checked :])
 
     @invariant()
     def speed_is_within_what_the_page_asks_for(self):

@@ -97,6 +97,36 @@ class MarkDriven:
 
 
 @dataclass(frozen=True, slots=True)
+class KeepLatch:
+    """Keep on disk that STOP stands, or (``by`` is ``None``) that it does not.
+
+    Answered by ``LatchKept`` when the disk has it; nothing waits for that.
+    """
+
+    key: Key
+    number: int
+    by: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class KeepStopTest:
+    """Keep what a stop test found; answered by ``StopTestKept``."""
+
+    key: Key
+    seconds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class RunHook:
+    """Publish the robot's Bool (``stopped``), or call its service."""
+
+    key: Key
+    robot: str
+    hook: dict[str, str]
+    stopped: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Say:
     """Tell the display."""
 
@@ -114,6 +144,9 @@ Action = (
     | Lock
     | Unlock
     | MarkDriven
+    | KeepLatch
+    | KeepStopTest
+    | RunHook
     | Say
 )
 

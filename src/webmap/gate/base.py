@@ -11,20 +11,27 @@
 
 Doubt (a link that does not answer, a display that is silent, odometry that does not
 come) stops the machine and disarms its driver, whose hands must then be seen to be off.
+
+STOP latches: from any state the machine gets zero and nobody has it, and it stays so
+until a reset, which leads to *free*.
 """
 
 from typing import Literal
 
-from webmap.gate.actions import Detach, Emit, Say, Watch
+from webmap.gate.actions import Detach, Emit, Say
+from webmap.gate.confirm import Confirmation
 from webmap.gate.deadman import DeadMan
-from webmap.gate.events import Key, LockState, Wrote
+from webmap.gate.events import Key, LatchKept, LockState, Wrote
 from webmap.gate.goals import Goals
 from webmap.gate.health import Health, Pulse
+from webmap.gate.hooks import Hooks
+from webmap.gate.latch import Latch
 from webmap.gate.lease import Lease
 from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
 from webmap.gate.messages import Refused, RobotSpec, SentTwist
 from webmap.gate.motion import Bounds, Motion
 from webmap.gate.refusal import Refusal
+from webmap.gate.sight import Sight
 from webmap.geometry import Twist
 
 BLIND_LIMIT = 1.0
@@ -40,27 +47,32 @@ class Base:
         key: The bridge and the topic.
         control: The link that velocity goes to.
         pulse: Whether the display is there.
+        latch: Its STOP, which outlives it.
         emit: Takes the actions.
 
     """
 
-    def __init__(self, key: Key, control: Health, pulse: Pulse, emit: Emit) -> None:
+    def __init__(
+        self, key: Key, control: Health, pulse: Pulse, latch: Latch, emit: Emit
+    ) -> None:
         self.key = key
         self.control = control
+        self.latch = latch
+        self.confirmation = Confirmation()
         self.specs: dict[str, RobotSpec] = {}
         """The robots that this machine goes by; the newest is the last."""
         self.goals: dict[str, Goals] = {}
+        self.hooks: dict[str, Hooks] = {}
         self.lease: Lease | None = None
         self.deadman = DeadMan()
         self.motion = Motion(key, control, self._bounds, emit)
-        self.echoed: Twist | None = None
-        self.measured: Twist | None = None
+        self.sight = Sight(key, emit)
+        self.known = False
+        """Whether it was asked if this gate alone has it, and if STOP stands."""
         self._pulse = pulse
         self._emit = emit
-        self._lock = LockState(key, held=False, why="not locked yet")
+        self._lock = LockState(key, held=False)
         self._page_cap: Cap | None = None
-        self._watched = False
-        self._seen_at: float | None = None
         self._leaving: set[str] = set()
 
     @property
@@ -71,6 +83,8 @@ class Base:
     @property
     def state(self) -> State:
         """What the machine does, as far as the gate has a hand in it."""
+        if self.latch.acknowledged:
+            return "stopped"
         if self.motion.driving:
             return "driving"
         if self.motion.stopping:
@@ -103,11 +117,24 @@ class Base:
     @property
     def active(self) -> bool:
         """Whether time alone may make a difference."""
-        return self.lease is not None or not self.silent or self.motion.owes_zero
+        return (
+            self.lease is not None
+            or not self.silent
+            or self.motion.owes_zero
+            or self._confirming
+            or self.motion.held
+        )
+
+    @property
+    def _confirming(self) -> bool:
+        """Whether STOP stands and nobody knows yet that the machine does as well."""
+        return self.latch.on and not self.confirmation.confirmed
 
     # The robots that it is.
 
-    def declare(self, spec: RobotSpec, tasks: Health, now: float) -> None:
+    def declare(
+        self, spec: RobotSpec, tasks: Health, hooks: Health, now: float
+    ) -> None:
         """Take in a robot, or what changed of it; a change ends the lease."""
         self.end_lease("the robot was declared anew", now)
         self._leaving.discard(spec.id)
@@ -118,6 +145,12 @@ class Base:
             self.goals[spec.id] = Goals(self.key, spec, tasks, self._emit)
         else:
             goals.spec, goals.link = spec, tasks
+        self.hooks[spec.id] = Hooks(self.key, spec, hooks, self._emit)
+
+    def attached(self, now: float) -> None:
+        """Note that the robot can be spoken to, as soon as there are links."""
+        if self.latch.on:
+            self._stand_by_stop(now)
 
     def forget(self, robot: str, now: float) -> None:
         """Drop a robot; the last one stays until its machine has stopped."""
@@ -132,13 +165,15 @@ class Base:
                 return
             self._leaving.discard(robot)
             del self.specs[robot]
-            del self.goals[robot]
+            del self.goals[robot], self.hooks[robot]
             self._emit(Detach(self.key, robot))
 
     # Whether it may move.
 
     def unarmable(self, now: float) -> str | None:
         """Return why nobody can take the machine now, in words."""
+        if self.latch.on:
+            return f"STOP by {self.latch.by} stands: reset it first"
         if not self._lock.held:
             return self._lock.why
         if doubt := self._pulse.doubt(now):
@@ -160,9 +195,9 @@ class Base:
             return f"{self.key.url} does not answer"
         if all(spec.odometry_topic is None for spec in self.specs.values()):
             return None
-        if self._seen_at is None:
+        if self.sight.seen_at is None:
             return "no odometry yet"
-        if now - self._seen_at > BLIND_LIMIT:
+        if now - self.sight.seen_at > BLIND_LIMIT:
             return f"no odometry for {BLIND_LIMIT:g} s"
         return None
 
@@ -248,14 +283,54 @@ class Base:
         self._lapse(now)
         self.goals[robot].send(*pose, by)
 
-    def stop(self, why: str, now: float) -> None:
+    def stop(self, by: str, now: float) -> None:
         """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
-        self.end_lease(why, now)
+        self.end_lease(f"STOP by {by}", now)
         if self.drivable:
             self.motion.zero(now)
+        self.latch.set(by)
+        self._stand_by_stop(now)
+
+    def _stand_by_stop(self, now: float) -> None:
+        """Say everything that STOP has to say, as far as there are links."""
+        if self.drivable:
+            self.motion.hold(now)
         for goals in self.goals.values():
             goals.stop()
+        for hooks in self.hooks.values():
+            hooks.say(stopped=True)
+        self.confirmation.begin(now)
+        self._confirm(now)
         self._update_watch()
+
+    def reset(self, now: float) -> None:
+        """End the STOP that stands; nothing moves by that, and nobody has it.
+
+        Raises:
+            Refusal: If none stands.
+
+        """
+        if not self.latch.on:
+            raise Refusal("no STOP stands")
+        self.latch.reset()
+        self.motion.let_go()
+        for hooks in self.hooks.values():
+            hooks.say(stopped=False)
+        self._update_watch()
+
+    def _confirm(self, now: float) -> None:
+        since = self.confirmation.since
+        delivered = not self.drivable or self.control.answered_since(since)
+        self.confirmation.judge(self._cannot_confirm(), delivered, now)
+
+    def _cannot_confirm(self) -> str | None:
+        """Return why nobody can tell whether the machine stands, in words."""
+        link = self.control if self.drivable else self.goals[self.spec.id].link
+        if not link.up:
+            return f"no link to {self.key.url}"
+        if all(spec.odometry_topic is None for spec in self.specs.values()):
+            return "no odometry"
+        return None
 
     def step(self, now: float) -> None:
         """Let time have its say."""
@@ -265,6 +340,8 @@ class Base:
             elif self.deadman.expired(now):
                 self._lapse(now)
         self.motion.step(now)
+        if self._confirming:
+            self._confirm(now)
         self._update_watch()
         self._drop_leaving()
 
@@ -294,25 +371,52 @@ class Base:
 
     def saw(self, measured: Twist | None, now: float) -> None:
         """Note that odometry came."""
-        if self._watched:
-            self.measured, self._seen_at = measured, now
+        if not self.sight.on:
+            return
+        self.sight.saw(measured, now)
+        if self._confirming:
+            self.confirmation.saw(measured, now)
 
     def saw_echo(self, twist: Twist) -> None:
         """Note what the robot's ROS says on the velocity topic."""
-        if self._watched:
-            self.echoed = twist
+        if self.sight.on:
+            self.sight.echoed = twist
 
     def locked(self, lock: LockState, now: float) -> None:
         """Note whether this gate alone has the machine."""
-        self._lock = lock
+        self._lock, self.known = lock, True
         if lock.driven:
             self.motion.owe_from_before()
-            self.link_up(now)
+        if lock.held and lock.latched_by is not None and not self.latch.on:
+            self.latch.found(lock.latched_by)
+            self._stand_by_stop(now)
+        self.link_up(now)
+
+    def latch_kept(self, event: LatchKept) -> None:
+        """Note that the disk knows whether STOP stands."""
+        self.latch.kept(event)
 
     def link_up(self, now: float) -> None:
         """A zero that may not have arrived goes first."""
-        if self.control.up:
+        if not self.control.up:
+            return
+        if self.latch.on:
+            self._stand_by_stop(now)
+        else:
             self.motion.pay(now)
+
+    def tasks_up(self, link: Health) -> None:
+        """Say what could not be said for want of this link."""
+        for goals in self.goals.values():
+            if goals.link is link and self.latch.on:
+                goals.stop()
+            elif goals.link is link:
+                goals.link_up()
+        for hooks in self.hooks.values():
+            if hooks.link is link and self.latch.on:
+                hooks.say(stopped=True)
+            elif hooks.link is link:
+                hooks.link_up()
 
     def link_down(self, now: float) -> None:
         """The control link is gone."""
@@ -320,9 +424,5 @@ class Base:
             self._fault(f"no link to {self.key.url}", now)
 
     def _update_watch(self) -> None:
-        on = self.lease is not None or not self.silent
-        if on != self._watched:
-            self._watched = on
-            self._emit(Watch(self.key, on))
-        if not on:
-            self.measured = self.echoed = self._seen_at = None
+        on = self.lease is not None or not self.silent or self._confirming
+        self.sight.update(on)

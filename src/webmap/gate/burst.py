@@ -7,10 +7,30 @@ LENGTH = 0.5
 """Seconds from the first zero to silence."""
 
 
-class Burst:
-    """When the zeros that stop a machine are due."""
+HELD_PERIOD = 0.1
+"""Seconds between two zeros while STOP stands (S8)."""
 
-    def __init__(self) -> None:
+HELD_LENGTH = 600.0
+"""Seconds for which they go on.
+
+Longer than anybody needs to get to the robot, and not for ever: a STOP that was
+forgotten over night should not fill its topic, or a robot's battery, until Monday.
+They begin anew with another STOP and with every new link.
+"""
+
+
+class Burst:
+    """When the zeros that stop a machine are due.
+
+    Args:
+        period: Seconds between two zeros.
+        length: Seconds from the first zero to silence.
+
+    """
+
+    def __init__(self, period: float = PERIOD, length: float = LENGTH) -> None:
+        self._period = period
+        self._length = length
         self.running = False
         self.started_at = float("-inf")
         self._due = float("-inf")
@@ -26,10 +46,10 @@ class Burst:
 
     def zero_due(self, now: float) -> bool:
         """Return whether a zero is to be written at ``now``, and count on it."""
-        if self.running and now >= self.started_at + LENGTH:
+        if self.running and now >= self.started_at + self._length:
             self.running = False
         if not self.running or now < self._due:
             return False
         # Zeros that a sleeping process missed are not made up for.
-        self._due = max(self._due + PERIOD, now + PERIOD / 2)
+        self._due = max(self._due + self._period, now + self._period / 2)
         return True

@@ -282,6 +282,15 @@ class GateClient:
                 self._undelivered_stops.add(robot_id)
             self.tell(messages.Stop(robot_id))
 
+    def reset(self, robot_id: str | None) -> None:
+        """End the STOP of a robot or, with ``None``, of all; moves nothing."""
+        with self._lock:
+            if self._ready:
+                self._undelivered_stops.clear()
+                self.tell(messages.Reset(robot_id))
+            else:
+                log.error("the gate does not run: reset is not kept for later")
+
     def _licence(self, robot_id: str) -> tuple[int, int]:
         epoch = self._epochs.get(robot_id)
         if epoch is None or self._tick is None:

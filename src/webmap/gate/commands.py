@@ -10,13 +10,15 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
      "x": 1.0, "y": 2.0, "yaw": 0.5}
     {"op": "cancel", "robot": "r1"}
     {"op": "stop", "robot": "r1"}        or "*" for all
+    {"op": "reset", "robot": "r1"}       or "*" for all
 
 ``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
 when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
 left and ``turn`` counter-clockwise, as parts of the speed in force, each in
 ``[-1, 1]``; what lies beyond is clamped. ``epoch`` is the lease's, ``tick`` the newest
 one that came, and ``seq`` grows with every ``drive`` and ``goal`` of the connection.
-``goal`` is a pose in the robot's goal frame, in metres and radians.
+``goal`` is a pose in the robot's goal frame, in metres and radians. ``reset`` ends a
+STOP that stands; it moves nothing and gives no lease.
 
 Whatever is not one of these is refused whole. What the gate says back stands in
 :mod:`webmap.gate.reports`.
@@ -105,7 +107,14 @@ class Stop:
     robot: str | None
 
 
-Command = Take | Release | Drive | Goal | Cancel | Stop
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """The STOP of the robot, or of every robot (``None``), should stand no longer."""
+
+    robot: str | None
+
+
+Command = Take | Release | Drive | Goal | Cancel | Stop | Reset
 
 
 def parse(data: bytes) -> Command:
@@ -217,9 +226,9 @@ def _goal(fields: _Fields) -> Goal:
     )
 
 
-def _stop(fields: _Fields) -> Stop:
+def _one_or_all(fields: _Fields) -> str | None:
     robot = fields.robot()
-    return Stop(None if robot == "*" else robot)
+    return None if robot == "*" else robot
 
 
 _READERS: dict[str, Callable[[_Fields], Command]] = {
@@ -228,7 +237,8 @@ _READERS: dict[str, Callable[[_Fields], Command]] = {
     "drive": _drive,
     "goal": _goal,
     "cancel": lambda fields: Cancel(fields.robot()),
-    "stop": _stop,
+    "stop": lambda fields: Stop(_one_or_all(fields)),
+    "reset": lambda fields: Reset(_one_or_all(fields)),
 }
 
 

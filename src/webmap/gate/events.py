@@ -88,6 +88,16 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
+class StopRecord:
+    """What a stop test found."""
+
+    seconds: float | None
+    """How long the machine went on without commands; ``None`` if it did not stop."""
+    date: str
+    """The day of the test, as ``2026-11-21``."""
+
+
+@dataclass(frozen=True, slots=True)
 class LockState:
     """Whether this gate alone on this computer has the machine."""
 
@@ -96,6 +106,28 @@ class LockState:
     driven: bool = False
     """Whether an earlier gate died while it drove the machine (S13)."""
     why: str | None = None
+    latched_by: str | None = None
+    """Whose STOP stands on disk, if one does (S7)."""
+    tested: StopRecord | None = None
+    """What the last stop test found, if there was one."""
+
+
+@dataclass(frozen=True, slots=True)
+class LatchKept:
+    """What became of a ``KeepLatch``."""
+
+    key: Key
+    number: int
+    error: str | None
+    """Why the disk does not have it, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopTestKept:
+    """The result of a stop test has its date."""
+
+    key: Key
+    record: StopRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,5 +147,7 @@ Event = (
     | Echoed
     | Measured
     | LockState
+    | LatchKept
+    | StopTestKept
     | Shutdown
 )

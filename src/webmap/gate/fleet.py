@@ -9,6 +9,7 @@ from webmap.gate import events
 from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
 from webmap.gate.base import Base
 from webmap.gate.health import Health, Pulse
+from webmap.gate.latch import Latch
 from webmap.gate.messages import Forget, RobotGone, RobotSpec, SentGoal
 from webmap.gate.refusal import Refusal
 from webmap.gate.reporting import Reporter, report
@@ -34,6 +35,7 @@ class Fleet:
         self._emit = emit
         self._refuse = refuse
         self._bases: dict[events.Key, Base] = {}
+        self._latches: dict[events.Key, Latch] = {}
         self._by_robot: dict[str, Base] = {}
         self._links: dict[tuple[str, events.Lane], Health] = {}
         self._reporters: dict[str, Reporter] = {}
@@ -50,6 +52,7 @@ class Fleet:
             events.Echoed: self._echoed,
             events.Measured: self._measured,
             events.LockState: self._locked,
+            events.LatchKept: self._latch_kept,
         }
 
     def __iter__(self) -> Iterator[Base]:
@@ -98,8 +101,10 @@ class Fleet:
         touched, self._touched = self._touched, set()
         for key in touched:
             base = self._bases.get(key)
-            for spec in list(base.specs.values()) if base is not None else ():
-                self._report(base, spec, now)  # type: ignore[arg-type]
+            # Before it is known whether STOP stands, nothing true can be said of it.
+            if base is not None and base.known:
+                for spec in list(base.specs.values()):
+                    self._report(base, spec, now)
 
     def _report(self, base: Base, spec: RobotSpec, now: float) -> None:
         reporter = self._reporters.get(spec.id)
@@ -125,16 +130,24 @@ class Fleet:
             self._forget(Forget(spec.id), now)
         elif earlier is not None and earlier.specs[spec.id] == spec:
             return
-        base = self._bases.get(key)
-        if base is None:
-            base = Base(key, self._link(key.url, "control"), self._pulse, self._emit)
-            self._bases[key] = base
-            self._emit(Lock(key))
-        base.declare(spec, self._link(spec.goal_url or key.url, "tasks"), now)
+        base = self._bases.get(key) or self._new_base(key)
+        tasks = self._link(spec.goal_url or key.url, "tasks")
+        base.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
         self._emit(Attach(key, spec))
+        if not base.known:
+            self._emit(Lock(key))
+        base.attached(now)
         self._by_robot[spec.id] = base
         self._reporters.setdefault(spec.id, Reporter())
         self._touched.add(key)
+
+    def _new_base(self, key: events.Key) -> Base:
+        if key not in self._latches:
+            self._latches[key] = Latch(key, self._emit)
+        control, latch = self._link(key.url, "control"), self._latches[key]
+        base = Base(key, control, self._pulse, latch, self._emit)
+        self._bases[key] = base
+        return base
 
     def _forget(self, message: Forget, now: float) -> None:
         base = self._by_robot.pop(message.robot, None)
@@ -162,9 +175,7 @@ class Fleet:
         for base in self:
             if base.control is link:
                 base.link_up(now)
-            for goals in base.goals.values():
-                if goals.link is link:
-                    goals.link_up()
+            base.tasks_up(link)
 
     def _link_down(self, event: events.LinkDown, now: float) -> None:
         link = self._link(event.url, event.lane)
@@ -216,6 +227,13 @@ class Fleet:
         base = self._of_key(event.key)
         if base is not None:
             base.locked(event, now)
+
+    def _latch_kept(self, event: events.LatchKept, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.latch_kept(event)
+        else:  # the robot was forgotten meanwhile; its STOP was not
+            self._latches[event.key].kept(event)
 
     def _of_key(self, key: events.Key) -> Base | None:
         """Return a machine, which may change by that; it may be gone meanwhile."""

@@ -18,6 +18,7 @@ from webmap.gate.commands import (
     Drive,
     Goal,
     Release,
+    Reset,
     Stop,
     Take,
     parse,
@@ -66,6 +67,7 @@ class Gate:
             messages.Speeds: self._speeds,
             messages.Heartbeat: self._beat,
             messages.Stop: self._program_stop,
+            messages.Reset: self._program_reset,
             messages.ProgramTake: self._program_take,
             messages.ProgramRelease: self._program_release,
             messages.ProgramTwist: self._program_twist,
@@ -187,6 +189,8 @@ class Gate:
             case Stop(robot):
                 # Before any check: a stop is always allowed.
                 self._stop(robot, connection, now)
+            case Reset(robot):
+                self._reset(robot, connection, now)
             case Drive():
                 self._drive(connection, command, now)
             case Goal(robot):
@@ -206,7 +210,16 @@ class Gate:
 
     def _stop(self, robot: str | None, by: Connection, now: float) -> None:
         for base in self._fleet if robot is None else [self._fleet.find(robot)]:
-            base.stop(f"STOP by {by.name or by.id}", now)
+            base.stop(by.name or by.id, now)
+
+    def _reset(self, robot: str | None, by: Connection, now: float) -> None:
+        check_role(by.role)
+        if robot is not None:
+            self._fleet.find(robot).reset(now)
+            return
+        for base in self._fleet:
+            if base.latch.on:
+                base.reset(now)
 
     def _take(self, connection: Connection, robot: str, now: float) -> int:
         base = self._fleet.find(robot)
@@ -262,6 +275,12 @@ class Gate:
         program, robot = self._people.program, message.robot
         self._attempt(
             program, robot, "stop", lambda: self._stop(robot, program, now), now
+        )
+
+    def _program_reset(self, message: messages.Reset, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._attempt(
+            program, robot, "reset", lambda: self._reset(robot, program, now), now
         )
 
     def _program_take(self, message: messages.ProgramTake, now: float) -> None:

@@ -8,7 +8,7 @@ from webmap.gate.control import ControlLane
 from webmap.gate.events import Event, Key, Wrote, WroteGoal
 from webmap.gate.messages import RobotSpec
 from webmap.gate.motion import ZERO
-from webmap.gate.tasks import TasksLane
+from webmap.gate.tasks import TasksLane, Topic, goal_topics, hook_topics
 from webmap.gate.witness import WitnessLane
 
 
@@ -40,6 +40,9 @@ class Links:
             case actions.CancelGoals(key, robot):
                 spec = self._robots[key][robot]
                 self._tasks[_goal_url(spec)].cancel(spec)
+            case actions.RunHook(key, robot, hook, stopped):
+                spec = self._robots[key][robot]
+                self._tasks[spec.bridge_url].run_hook(hook, stopped)
             case actions.Watch(key, on):
                 self._unwatch(key)
                 if on:
@@ -96,13 +99,12 @@ class Links:
             control.attach(spec.twist_topic, spec.twist_type)
         if spec.odometry_topic is not None:
             self._witness_of(spec).lane.hold("robots")
-        tasks = self._tasks.get(_goal_url(spec))
-        if tasks is None:
-            tasks = self._tasks[_goal_url(spec)] = TasksLane(
-                _goal_url(spec), self._tell
-            )
-        tasks.lane.hold("robots")
-        tasks.attach(spec)
+        for url, topics in _tasks_of(spec).items():
+            tasks = self._tasks.get(url)
+            if tasks is None:
+                tasks = self._tasks[url] = TasksLane(url, self._tell)
+            tasks.lane.hold("robots")
+            tasks.attach(topics)
         if watched:
             self._watch(key)
         self._close_unwanted()
@@ -112,9 +114,9 @@ class Links:
             self._control[spec.bridge_url].detach(spec.twist_topic, spec.twist_type)
         if spec.odometry_topic is not None:
             self._witness_of(spec).lane.let_go("robots")
-        tasks = self._tasks[_goal_url(spec)]
-        tasks.detach(spec)
-        tasks.lane.let_go("robots")
+        for url, topics in _tasks_of(spec).items():
+            self._tasks[url].detach(topics)
+            self._tasks[url].lane.let_go("robots")
 
     def _watch(self, key: Key) -> None:
         specs = list(self._robots[key].values())
@@ -155,3 +157,11 @@ class Links:
 
 def _goal_url(spec: RobotSpec) -> str:
     return spec.goal_url or spec.bridge_url
+
+
+def _tasks_of(spec: RobotSpec) -> dict[str, list[Topic]]:
+    """Return the tasks lanes that a robot needs, and the topics written on each."""
+    needed = {_goal_url(spec): goal_topics(spec)}
+    if spec.stop_hooks:
+        needed.setdefault(spec.bridge_url, []).extend(hook_topics(spec))
+    return needed

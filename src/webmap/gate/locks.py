@@ -4,13 +4,13 @@ The operating system lets go of a lock when its process ends, however it ends. W
 stands in the file stays: its first letter says whether the machine was being driven.
 """
 
-import hashlib
 import logging
 import os
 import sys
 from pathlib import Path
 
 from webmap.gate.events import Key, LockState
+from webmap.gate.records import path_of
 
 log = logging.getLogger("webmap.gate")
 
@@ -79,8 +79,7 @@ class Locks:
             log.warning("%s: %s", self._path(key), error.strerror)
 
     def _path(self, key: Key) -> Path:
-        name = hashlib.sha256("\n".join(key).encode()).hexdigest()[:24]
-        return self._folder / f"{name}.lock"
+        return path_of(self._folder, key, "lock")
 
 
 def _was_driven(file: int, key: Key) -> bool:

@@ -59,6 +59,10 @@ class RobotSpec(
     action_type: str = "nav2_msgs/action/NavigateToPose"
     on_operator_loss: Literal["continue", "cancel"] = "continue"
     """What becomes of a goal when the page (or program) that gave it is lost."""
+    stop_hooks: tuple[dict[str, str], ...] = ()
+    """What else the robot's bridge is told on STOP: ``{"topic": "/lock", "type":
+    "std_msgs/Bool"}`` publishes true (and false on reset), ``{"service": "/e_stop",
+    "type": "std_srvs/Trigger"}`` is called."""
 
 
 class Forget(msgspec.Struct, frozen=True, tag="forget"):
@@ -102,6 +106,12 @@ class Heartbeat(msgspec.Struct, frozen=True, tag="beat"):
 
 class Stop(msgspec.Struct, frozen=True, tag="stop"):
     """STOP from Python, for one robot or (``None``) for all."""
+
+    robot: str | None = None
+
+
+class Reset(msgspec.Struct, frozen=True, tag="reset"):
+    """From Python: STOP stands no longer, for one robot or (``None``) for all."""
 
     robot: str | None = None
 
@@ -152,6 +162,7 @@ ToGate = (
     | Speeds
     | Heartbeat
     | Stop
+    | Reset
     | ProgramTake
     | ProgramRelease
     | ProgramTwist
@@ -187,13 +198,28 @@ class Holder(msgspec.Struct, frozen=True):
     name: str
 
 
+class StopReport(msgspec.Struct, frozen=True):
+    """What is known of a STOP that stands."""
+
+    by: str
+    """Who said it, for people."""
+    confirmed: bool | None
+    """Whether odometry shows standstill; ``None`` while that is not known yet."""
+    why: str
+    """The reason in words."""
+
+
 class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Everything a page shows about a robot's motion."""
 
     robot: str
     name: str
     state: Literal["free", "held", "driving", "stopping", "stopped"]
-    """``stopping``: zeros are being sent; ``stopped`` is for a STOP that latches."""
+    """``stopping``: zeros are being sent; ``stopped``: STOP stands."""
+    latched: bool
+    """Whether STOP stands, and will after a restart: until a reset nothing moves."""
+    stop: StopReport | None
+    """What became of the STOP that stands."""
     holder: Holder | None
     epoch: int | None
     """The epoch of the lease, which commands must name; ``None`` without a lease."""

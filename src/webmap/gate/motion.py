@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
-from webmap.gate.burst import Burst
+from webmap.gate.burst import HELD_LENGTH, HELD_PERIOD, Burst
 from webmap.gate.events import Key, Wrote
 from webmap.gate.health import Health
 from webmap.gate.lease import Lease
@@ -56,6 +56,7 @@ class Motion:
         self._bounds = bounds
         self._emit = emit
         self._burst = Burst()
+        self._held = Burst(HELD_PERIOD, HELD_LENGTH)
         self._pending: tuple[Twist, Lease] | None = None
         self._tried_at = float("-inf")
         self._sent_at = float("-inf")
@@ -94,6 +95,20 @@ class Motion:
         self._owe_zero()
         self._write_zero_if_due(now)
 
+    def hold(self, now: float) -> None:
+        """Write zero at once, and go on with that while STOP stands (S8)."""
+        self.zero(now)
+        self._held.start(now)
+
+    def let_go(self) -> None:
+        """STOP stands no longer; nothing moves by that."""
+        self._held.end()
+
+    @property
+    def held(self) -> bool:
+        """Whether zeros are written because STOP stands."""
+        return self._held.running
+
     def pay(self, now: float) -> None:
         """Write the zero that is owed, now that there is a link again."""
         if self.owes_zero:
@@ -123,7 +138,10 @@ class Motion:
             self._emit(MarkDriven(self._key, True))
 
     def _write_zero_if_due(self, now: float) -> None:
-        if self._burst.zero_due(now):
+        due = self._burst.zero_due(now)
+        if not due and not self.stopping and self._control.up:
+            due = self._held.zero_due(now)
+        if due:
             self._write_zero()
 
     def _write_zero(self) -> None:

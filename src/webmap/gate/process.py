@@ -18,10 +18,12 @@ from types import FrameType
 from webmap.errors import WireError
 from webmap.gate import actions, events, framing, messages
 from webmap.gate.clock import now
+from webmap.gate.disk import Disk
 from webmap.gate.gate import Gate
 from webmap.gate.links import Links
 from webmap.gate.locks import Locks, state_folder
 from webmap.gate.outbox import BackgroundHandler, Outbox
+from webmap.gate.records import Records
 
 log = logging.getLogger("webmap.gate")
 
@@ -44,14 +46,16 @@ class Shell:
     Args:
         outbox: Takes what the display is told.
         locks: The machines of this computer.
+        disk: What outlives the process.
 
     """
 
-    def __init__(self, outbox: Outbox, locks: Locks) -> None:
+    def __init__(self, outbox: Outbox, locks: Locks, disk: Disk) -> None:
         self.failed = False
         self._gate = Gate()
         self._outbox = outbox
         self._locks = locks
+        self._disk = disk
         self._links = Links(self.tell)
         self._inbox: deque[messages.ToGate | events.Event] = deque()
         self._working = False
@@ -83,6 +87,7 @@ class Shell:
             async with asyncio.timeout(DRAIN):
                 await self._silent.wait()
                 await self._links.settle()
+                await self._disk.settle()
         stepping.cancel()
         self._links.close()
         await asyncio.sleep(0)  # the loop's chance to write what it still holds
@@ -122,12 +127,14 @@ class Shell:
                 self._locks.release(key)
             case actions.MarkDriven(key, driven):
                 self._locks.mark(key, driven)
+            case actions.KeepLatch() | actions.KeepStopTest():
+                self._disk.keep(action, self.tell)
             case _:
                 return self._links.perform(action)
         return None
 
     def _lock(self, key: events.Key) -> events.LockState:
-        state = self._locks.acquire(key)
+        state = self._disk.recall(self._locks.acquire(key))
         self._waiting_for_lock.pop(key, None)
         if not state.held:
             loop = asyncio.get_running_loop()
@@ -162,7 +169,8 @@ def main() -> int:
 
 async def _serve(pipe_in: int, outbox: Outbox) -> int:
     loop = asyncio.get_running_loop()
-    shell = Shell(outbox, Locks(state_folder()))
+    folder = state_folder()
+    shell = Shell(outbox, Locks(folder), Disk(Records(folder)))
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         why = f"the gate was ended by {signal.Signals(number).name}"

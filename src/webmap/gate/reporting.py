@@ -1,7 +1,7 @@
 """Reports on machines: what changed is said, but not more often than anybody looks."""
 
 from webmap.gate.base import Base
-from webmap.gate.messages import Holder, RobotReport, RobotSpec, Velocity
+from webmap.gate.messages import Holder, RobotReport, RobotSpec, StopReport, Velocity
 from webmap.geometry import Twist
 
 INTERVAL = 0.1
@@ -20,6 +20,8 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         robot=spec.id,
         name=spec.name,
         state=base.state,
+        latched=base.latch.acknowledged,
+        stop=_stop(base),
         holder=holder,
         epoch=None if lease is None else lease.epoch,
         armed=lease is not None and base.deadman.armed,
@@ -27,15 +29,27 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         w=speed.w,
         why=speed.why,
         link="up" if link.up else "down",
-        sent=_velocity(base.motion.sent),
-        echoed=None if base.echoed is None else _velocity(base.echoed),
-        measured=None if base.measured is None else _velocity(base.measured),
+        sent=_velocity(base.motion.sent) or (0.0, 0.0, 0.0),
+        echoed=_velocity(base.sight.echoed),
+        measured=_velocity(base.sight.measured),
         armable=unarmable is None,
         reason=unarmable if lease is None else base.doubt(now),
     )
 
 
-def _velocity(twist: Twist) -> Velocity:
+def _stop(base: Base) -> StopReport | None:
+    if not base.latch.acknowledged:
+        return None
+    seen = base.confirmation
+    why = seen.why
+    if base.latch.trouble is not None:
+        why = f"{why}; a restart would forget this STOP: {base.latch.trouble}"
+    return StopReport(base.latch.by or "", seen.confirmed, why)
+
+
+def _velocity(twist: Twist | None) -> Velocity | None:
+    if twist is None:
+        return None
     return (
         round(twist.vx, _DIGITS) + 0.0,
         round(twist.vy, _DIGITS) + 0.0,

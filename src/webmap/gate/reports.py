@@ -6,7 +6,8 @@
     {"op": "tick", "tick": 812, "ack": 16}
     {"op": "robot", "robot": "r1", "name": "Bob", "state": "held",
      "holder": {"connection": "c5", "name": "Ann"}, "mine": true, "epoch": 3,
-     "armed": false, "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
+     "latched": false, "stop": null, "armed": false,
+     "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
      "sent": [0.0, 0.0, 0.0], "echoed": null, "measured": [0.0, 0.0, 0.0],
      "armable": true, "reason": null}
     {"op": "gone", "robot": "r1"}
@@ -15,7 +16,11 @@
 ``hello`` comes first, also when the gate was started anew (all leases are then gone),
 and after it every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest accepted
 ``seq`` of this connection, -1 at first. ``robot`` comes when something changed,
-velocities (``[forward, left, counter-clockwise]``) at 10 Hz at most. ``holder`` and
+velocities (``[forward, left, counter-clockwise]``) at 10 Hz at most. While STOP stands
+``latched`` is true, ``state`` is ``"stopped"``, and ``stop`` tells what is known of it:
+``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by odometry"}``, where
+``confirmed`` is null while nobody knows yet and false, with the reason, when nobody
+could tell or the robot still moves. ``holder`` and
 ``epoch`` are null without a lease; ``armed`` says whether a command to move would be
 taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force; ``armable`` and
 ``reason``, whether it can be taken, and what stands against that or against moving it.

@@ -48,6 +48,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
         w_max=_number(spec, "w_max", least=0.0),
         a_max=_number(spec, "a_max", least=1e-3),
         stops_within=_number(spec, "stops_within", least=0.0),
+        stop_hooks=tuple(_hook(spec, hook) for hook in spec.stop_hooks),
     )
 
 
@@ -72,6 +73,22 @@ def _number(spec: RobotSpec, field: str, least: float) -> float | None:
             f"{least:g} on"
         )
     return float(value)
+
+
+def _hook(spec: RobotSpec, hook: dict[str, str]) -> dict[str, str]:
+    """Return a stop hook with its name resolved and its type filled in."""
+    for place, type in (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger")):
+        if hook.get(place) and hook.keys() <= {place, "type"}:
+            if not is_type(hook.get("type", type), type):
+                break
+            name = normalise_topic(hook[place])
+            if name == _topic(spec.twist_topic):
+                break
+            return {place: name, "type": hook.get("type", type)}
+    raise ConfigError(
+        f"robot {spec.name!r}: a stop hook is a topic of type std_msgs/Bool or a "
+        f"service of type std_srvs/Trigger, got {hook!r}"
+    )
 
 
 def _topic(topic: str | None) -> str | None:

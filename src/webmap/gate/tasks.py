@@ -9,7 +9,7 @@ socket of its own.
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from webmap.errors import BridgeClosed
 from webmap.gate import words
@@ -26,8 +26,11 @@ log = logging.getLogger("webmap.gate")
 MAX_SPENT = 8
 """How many sockets of action goals are kept for their results at most."""
 
-CANCEL_TIMEOUT = 2.0
-"""How long the cancel service is given to answer, in seconds."""
+CALL_TIMEOUT = 2.0
+"""How long a service is given to answer, in seconds."""
+
+Topic = tuple[str, str]
+"""The name of a topic and its type."""
 
 
 class TasksLane:
@@ -43,7 +46,7 @@ class TasksLane:
         self._url = url
         self._tell = tell
         self._spent: list[Socket] = []
-        self._cancelling: set[asyncio.Task[None]] = set()
+        self._calling: set[asyncio.Task[None]] = set()
         self.lane = Lane(
             url,
             up=lambda: tell(LinkUp(url, "tasks")),
@@ -51,16 +54,16 @@ class TasksLane:
             text=lambda _: None,
         )
 
-    def attach(self, spec: RobotSpec) -> None:
-        """Announce the topics of the robot's goals."""
-        for topic, type in _topics(spec):
+    def attach(self, topics: Iterable[Topic]) -> None:
+        """Announce the topics that a robot needs here."""
+        for topic, type in topics:
             id = _advertisement(topic, type)
             hello = ops.advertise(topic, type, id=id)
             self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
 
-    def detach(self, spec: RobotSpec) -> None:
+    def detach(self, topics: Iterable[Topic]) -> None:
         """Undo one :meth:`attach`."""
-        for topic, type in _topics(spec):
+        for topic, type in topics:
             self.lane.let_go(_advertisement(topic, type))
 
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
@@ -77,19 +80,34 @@ class TasksLane:
                 words.cancel_by_topic(spec.cancel_topic), only_if_clear=False
             )
         if spec.action is not None:
-            task = asyncio.get_running_loop().create_task(self._call(spec.action))
-            self._cancelling.add(task)
-            task.add_done_callback(self._cancelling.discard)
+            id, what = generate_id(), f"cancelling the goals of {spec.action}"
+            self._call(words.cancel_by_service(spec.action, id), id, what)
+
+    def run_hook(self, hook: dict[str, str], stopped: bool) -> None:
+        """Publish the Bool of a stop hook, or call its service."""
+        if "topic" in hook:
+            self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False)
+        else:
+            id, service = generate_id(), hook["service"]
+            self._call(words.trigger(service, hook["type"], id), id, service)
+
+    def _call(self, request: bytes, id: str, what: str) -> None:
+        """Call a service without waiting for its answer."""
+        task = asyncio.get_running_loop().create_task(
+            self._call_and_wait(request, id, what)
+        )
+        self._calling.add(task)
+        task.add_done_callback(self._calling.discard)
 
     async def settle(self) -> None:
         """Wait until what was to be cancelled is, or cannot be."""
-        if self._cancelling:
-            await asyncio.wait(self._cancelling)
+        if self._calling:
+            await asyncio.wait(self._calling)
 
     def close(self) -> None:
         """End for good."""
         self.lane.close()
-        for task in self._cancelling:
+        for task in self._calling:
             task.cancel()
         for link in self._spent:
             link.close()
@@ -114,9 +132,8 @@ class TasksLane:
         if len(self._spent) > MAX_SPENT:
             self._spent.pop(0).close()
 
-    async def _call(self, action: str) -> None:
-        """Call the action's cancel service on a socket of its own."""
-        id = generate_id()
+    async def _call_and_wait(self, request: bytes, id: str, what: str) -> None:
+        """Call a service on a socket of its own."""
         answered = asyncio.Event()
 
         def hear(data: bytes) -> None:
@@ -126,20 +143,27 @@ class TasksLane:
 
         ears = Ears(text=hear, pong=lambda _: None, lost=lambda why: answered.set())
         try:
-            async with asyncio.timeout(CANCEL_TIMEOUT):
+            async with asyncio.timeout(CALL_TIMEOUT):
                 link = await open_socket(self._url, ears)
                 try:
-                    link.send(words.cancel_by_service(action, id))
+                    link.send(request)
                     await answered.wait()
                 finally:
                     link.close()
         except BridgeClosed as error:
-            log.error("the goals of %s could not be cancelled: %s", action, error)
+            log.error("%s failed: %s", what, error)
         except TimeoutError:
-            log.warning("%s did not say whether its goals are cancelled", action)
+            log.warning("%s: no answer", what)
 
 
-def _topics(spec: RobotSpec) -> list[tuple[str, str]]:
+def hook_topics(spec: RobotSpec) -> list[Topic]:
+    """Return the topics of a robot's stop hooks."""
+    hooks = spec.stop_hooks
+    return [(hook["topic"], hook["type"]) for hook in hooks if "topic" in hook]
+
+
+def goal_topics(spec: RobotSpec) -> list[Topic]:
+    """Return the topics of a robot's goals."""
     topics = []
     if spec.goal_topic is not None:
         topics.append((spec.goal_topic, spec.goal_type))

@@ -62,6 +62,16 @@ def cancel_by_service(action: str, id: str) -> bytes:
     )
 
 
+def flag(topic: str, value: bool) -> bytes:
+    """Return the operation that publishes a Bool."""
+    return ops.publish(topic, {"data": value})
+
+
+def trigger(service: str, type: str, id: str) -> bytes:
+    """Return the operation that calls a service of type Trigger."""
+    return ops.call_service(service, {}, id=id, type=type)
+
+
 def _pose(type: str, spec: RobotSpec, goal: SendGoal) -> dict[str, Any]:
     q = Quaternion.from_yaw(goal.yaw)
     return {

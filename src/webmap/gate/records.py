@@ -1,0 +1,125 @@
+"""What must outlive the process, one small file for each thing and machine.
+
+A file whose name ends in ``.stop`` means that STOP stands for the machine, whatever is
+in it: it tells who said so, but one that is empty or cannot be read stops as well.
+"""
+
+import contextlib
+import hashlib
+import json
+import logging
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+from webmap.gate.events import Key, StopRecord
+
+log = logging.getLogger("webmap.gate")
+
+UNKNOWN = "an earlier session"
+"""Whose STOP it is if the file does not tell."""
+
+MAX_NAME = 80
+"""The longest name that is kept, in characters."""
+
+
+def path_of(folder: Path, key: Key, kind: str) -> Path:
+    """Return the file of one machine for one kind of thing."""
+    name = hashlib.sha256("\n".join(key).encode()).hexdigest()[:24]
+    return folder / f"{name}.{kind}"
+
+
+class Records:
+    """The files of one folder.
+
+    Args:
+        folder: Where the files are.
+
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def latch_of(self, key: Key) -> str | None:
+        """Return who said the STOP that stands for a machine, if one does."""
+        path = path_of(self._folder, key, "stop")
+        try:
+            by = json.loads(path.read_text("utf-8"))["by"]
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            log.warning("%s cannot be read (%s): STOP stands", path, error)
+            return UNKNOWN
+        sound = isinstance(by, str) and by and by.isprintable()
+        return by[:MAX_NAME] if sound else UNKNOWN
+
+    def keep_latch(self, key: Key, by: str | None) -> str | None:
+        """Have STOP stand on disk, or not; return what went wrong, in words.
+
+        When this returns, the disk has it: the file and its place in the folder.
+        """
+        path = path_of(self._folder, key, "stop")
+        try:
+            if by is None:
+                path.unlink(missing_ok=True)
+                _flush_folder(self._folder)
+            else:
+                self._write(path, {"by": by, "bridge": key.url, "topic": key.topic})
+        except OSError as error:
+            log.error("%s: %s", path, error)
+            return f"{path} cannot be written to ({error.strerror})"
+        return None
+
+    def stop_test_of(self, key: Key) -> StopRecord | None:
+        """Return what the last stop test of a machine found, if there was one."""
+        path = path_of(self._folder, key, "test")
+        try:
+            found = json.loads(path.read_text("utf-8"))
+            seconds, date = found["seconds"], found["date"]
+            if seconds is not None:
+                seconds = float(seconds)
+            if not isinstance(date, str) or (seconds is not None and _odd(seconds)):
+                raise ValueError("it makes no sense")
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            log.warning("%s cannot be read (%s): it is as if not tested", path, error)
+            return None
+        return StopRecord(seconds, date[:MAX_NAME])
+
+    def keep_stop_test(self, key: Key, record: StopRecord) -> None:
+        """Keep what a stop test found."""
+        path = path_of(self._folder, key, "test")
+        found = {"seconds": record.seconds, "date": record.date}
+        try:
+            self._write(path, {**found, "bridge": key.url, "topic": key.topic})
+        except OSError as error:
+            log.error("%s: %s", path, error)
+
+    def _write(self, path: Path, content: dict[str, Any]) -> None:
+        """Write a file so that after a crash it is whole, old or new."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_suffix(f"{path.suffix}.new")
+        with temporary.open("w", encoding="utf-8") as file:
+            json.dump(content, file)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+        _flush_folder(self._folder)
+
+
+def _odd(seconds: float) -> bool:
+    return not (math.isfinite(seconds) and seconds >= 0)
+
+
+def _flush_folder(folder: Path) -> None:
+    """Have the disk know which files there are; not every system lets us ask."""
+    if os.name == "nt":
+        return
+    file = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(file)
+    finally:
+        with contextlib.suppress(OSError):
+            os.close(file)

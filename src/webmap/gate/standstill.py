@@ -1,0 +1,54 @@
+"""Whether a machine stands, as its odometry tells. No I/O."""
+
+import math
+
+from webmap.geometry import Twist
+
+STILL_V = 0.02
+"""Metres per second below which a machine stands (S5)."""
+
+STILL_W = 0.05
+"""Radians per second below which a machine stands (S5)."""
+
+STILL_FOR = 0.3
+"""Seconds for which odometry must say so without a gap (S5)."""
+
+GAP = 0.5
+"""Seconds between two messages that are too many to know what was between."""
+
+
+def speed_of(twist: Twist) -> float:
+    """Return how fast ``twist`` goes, in m/s, whatever the direction."""
+    return math.hypot(twist.vx, twist.vy)
+
+
+class Standstill:
+    """Listens to odometry from a moment on, until the machine has stood for long."""
+
+    def __init__(self) -> None:
+        self.speed: float | None = None
+        """The newest speed in m/s; ``None`` before the first."""
+        self.heard_at = float("-inf")
+        """When odometry last told a velocity."""
+        self._since: float | None = None
+
+    def begin(self) -> None:
+        """Forget what was heard before."""
+        self.speed, self.heard_at, self._since = None, float("-inf"), None
+
+    def saw(self, twist: Twist | None, now: float) -> None:
+        """Take in a message of odometry; ``None`` is one without a velocity."""
+        if twist is None:
+            return
+        if now - self.heard_at > GAP:
+            self._since = None
+        self.speed, self.heard_at = speed_of(twist), now
+        if self.speed >= STILL_V or abs(twist.wz) >= STILL_W:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+
+    @property
+    def reached(self) -> bool:
+        """Whether the machine has stood for :data:`STILL_FOR`."""
+        return self._since is not None and self.heard_at - self._since >= STILL_FOR

@@ -1,0 +1,447 @@
+"""STOP: it stands until a reset, outlives the gate, and is confirmed or it is not."""
+
+import pytest
+from gate_harness import KEY, URL, ZERO, Bench, spec
+
+from webmap.errors import ConfigError
+from webmap.gate import actions, events, messages
+from webmap.gate.events import Key
+from webmap.gate.messages import PROGRAM, StopReport
+from webmap.gate.specs import checked
+from webmap.geometry import Twist
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin()
+
+
+@pytest.fixture
+def seen():
+    """A robot whose odometry is listened to."""
+    return Bench().begin(spec(odometry_topic="/odom"))
+
+
+def stop(bench, who="b", robot="r1"):
+    bench.say(who, op="stop", robot=robot)
+
+
+def reset(bench, who="b", robot="r1"):
+    bench.say(who, op="reset", robot=robot)
+
+
+def watch_it(bench, seconds, *speeds):
+    """Let odometry tell ``speeds``, one every 50 ms, the last one over and over."""
+    wanted = iter(speeds)
+    now = [0.0]
+
+    def each():
+        now[0] = next(wanted, now[0])
+        bench.tell(events.Measured(KEY, Twist(now[0])))
+
+    bench.run(seconds, each)
+
+
+class TestLatch:
+    def test_while_stop_stands_nobody_gets_the_robot(self, bench):
+        bench.drive_off()
+        stop(bench)
+        report = bench.report()
+        assert (report.latched, report.state) == (True, "stopped")
+        assert not report.armable
+        assert report.reason == "STOP by B stands: reset it first"
+        assert bench.take("a") is None
+        bench.run(5.0)
+        assert bench.take("b") is None
+        bench.tell(messages.ProgramTake(1, "r1"))
+        assert bench.of(messages.TakeReply)[-1].epoch is None
+        assert bench.report().latched
+
+    def test_no_command_and_no_goal_gets_through_it(self, bench):
+        epoch = bench.drive_off()
+        stop(bench)
+        at = bench.now
+        bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
+        bench.goal(epoch=epoch)
+        bench.tell(messages.ProgramTwist("r1", epoch, bench.tick, (1.0, 0, 0)))
+        bench.tell(messages.ProgramMove("r1", epoch, bench.tick, (1.0, 0, 0)))
+        assert bench.moving_since(at) == []
+        assert bench.did(actions.SendGoal) == []
+
+    def test_zeros_go_on_at_10_hz_and_not_for_ever(self, bench):
+        stop(bench)
+        bench.run(1.0)
+        at = bench.now
+        bench.run(5.0)
+        zeros = bench.since(at)
+        assert {w.twist for w in zeros} == {ZERO}
+        assert 49 <= len(zeros) <= 51
+        bench.now += 600
+        bench.run(0.2)
+        at = bench.now
+        bench.run(5.0)
+        assert bench.since(at) == []
+        assert bench.report().latched
+        assert bench.take() is None
+        stop(bench)
+        assert bench.since(at - 0.01)[0].twist == ZERO
+        bench.run(1.0)
+        assert bench.written[-1].at > bench.now - 0.11
+
+    def test_a_link_that_is_down_is_not_written_to(self, bench):
+        stop(bench)
+        bench.break_links()
+        bench.run(1.0)
+        before = len(bench.dropped)
+        bench.run(2.0)
+        assert len(bench.dropped) == before
+
+    def test_on_every_new_link_it_is_the_first_thing_sent(self, bench):
+        bench.drive_off()
+        stop(bench)
+        bench.break_links()
+        bench.run(20.0)
+        at, cancels = bench.now, len(bench.did(actions.CancelGoals))
+        bench.connect_links()
+        assert [w.twist for w in bench.written if w.at >= at] == [ZERO]
+        assert len(bench.did(actions.CancelGoals)) == cancels + 1
+        bench.run(2.0)
+        assert bench.written[-1].at > bench.now - 0.11
+
+    def test_reset_moves_nothing_and_gives_nothing(self, bench):
+        epoch = bench.drive_off()
+        stop(bench)
+        bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
+        at, before = bench.now, len(bench.written)
+        reset(bench)
+        assert len(bench.written) == before
+        report = bench.report()
+        assert (report.latched, report.stop, report.holder) == (False, None, None)
+        assert (report.state, report.armable) == ("free", True)
+        bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
+        assert bench.since(at) == []
+
+    def test_after_reset_a_key_that_was_held_all_along_moves_nothing(self, bench):
+        bench.drive_off()
+        stop(bench)
+        bench.hold(0.5, x=1.0)
+        reset(bench)
+        bench.take("a")
+        at = bench.now
+        bench.hold(1.0, x=1.0)
+        assert bench.moving_since(at) == []
+        bench.hold(0.3)
+        bench.hold(0.1, x=1.0)
+        assert bench.moving_since(at) != []
+
+    def test_reset_needs_an_operator_and_a_stop(self, bench):
+        bench.join("v", "viewer")
+        reset(bench)
+        assert bench.refusals("b")[-1].why == "no STOP stands"
+        stop(bench, "v")
+        reset(bench, "v")
+        assert "operator" in bench.refusals("v")[-1].why
+        assert bench.report().latched
+        reset(bench, "b", "r9")
+        assert "'r9'" in bench.refusals("b")[-1].why
+
+    def test_stop_for_all_latches_all_and_reset_for_all_ends_what_stands(self):
+        other = "/r2/cmd_vel"
+        bench = Bench().begin(spec(), spec(id="r2", twist_topic=other))
+        stop(bench, robot="*")
+        assert bench.report("r1").latched
+        assert bench.report("r2").latched
+        reset(bench, robot="r1")
+        assert not bench.report("r1").latched
+        assert bench.report("r2").latched
+        reset(bench, robot="*")
+        assert not bench.report("r2").latched
+        assert bench.refusals("b") == []
+
+    def test_python_stops_and_resets(self, bench):
+        bench.tell(messages.Stop("r1"))
+        assert bench.report().stop.by == PROGRAM
+        bench.tell(messages.Reset("r1"))
+        assert not bench.report().latched
+        bench.tell(messages.Reset("r1"))
+        assert bench.refusals(PROGRAM)[-1].what == "reset"
+
+    def test_a_robot_that_is_declared_anew_is_still_stopped(self, bench):
+        stop(bench)
+        bench.tell(spec(v_max=0.5))
+        assert bench.report().latched
+        bench.tell(messages.Forget("r1"))
+        bench.run(1.0)
+        assert bench.did(actions.Detach)
+        bench.tell(spec())
+        assert bench.report().latched
+        assert bench.take() is None
+        reset(bench)
+        assert bench.take()
+
+    def test_two_robots_that_are_one_machine_share_it(self):
+        bench = Bench().begin(spec(), spec(id="r2"))
+        stop(bench, robot="r1")
+        assert bench.report("r2").latched
+        assert bench.take("a", "r2") is None
+
+    def test_a_robot_that_takes_goals_only_is_latched_too(self):
+        bench = Bench().begin(spec(twist_topic=None))
+        stop(bench)
+        assert bench.report().latched
+        assert bench.report().stop.why == "no odometry"
+        assert bench.take() is None
+        bench.tell(events.LinkDown(URL, "tasks"))
+        stop(bench)
+        bench.run(0.2)
+        assert bench.report().stop.why == f"no link to {URL}"
+        assert bench.written == bench.dropped == []
+
+
+class TestOnDisk:
+    def test_zero_goes_out_before_the_disk_and_the_word_of_it_after(self):
+        bench = Bench(slow_disk=True).begin()
+        bench.drive_off()
+        stop(bench)
+        kept = (actions.WriteTwist, actions.KeepLatch)
+        last = [a for a in bench.done if isinstance(a, kept)][-2:]
+        assert last[0].twist == ZERO
+        assert last[1] == actions.KeepLatch(KEY, 1, "B")
+        bench.run(1.0)
+        assert not bench.report().latched
+        assert bench.report().stop is None
+        assert bench.take() is None
+        bench.keep(last[1])
+        assert bench.report().latched
+
+    def test_it_is_written_once_however_often_it_is_pressed(self, bench):
+        stop(bench, "b")
+        stop(bench, "a")
+        assert len(bench.did(actions.KeepLatch)) == 1
+        assert bench.report().stop.by == "B"
+
+    def test_an_answer_of_the_disk_that_was_overtaken_does_not_count(self):
+        bench = Bench(slow_disk=True).begin()
+        stop(bench)
+        reset(bench)
+        stop(bench)
+        first, second, third = bench.did(actions.KeepLatch)
+        bench.keep(first)
+        bench.keep(second)
+        bench.run(0.1)
+        assert not bench.report().latched
+        bench.keep(third)
+        assert bench.report().latched
+
+    def test_a_forgotten_robots_stop_is_kept_all_the_same(self):
+        bench = Bench(slow_disk=True).begin()
+        stop(bench)
+        bench.tell(messages.Forget("r1"))
+        bench.run(1.0)
+        bench.keep(bench.did(actions.KeepLatch)[-1])
+        bench.tell(spec())
+        assert bench.report().latched
+
+    def test_a_disk_that_is_full_is_said_and_stop_stands(self):
+        bench = Bench(full_disk=True).begin()
+        stop(bench)
+        assert bench.report().latched
+        assert "the disk is full" in bench.report().stop.why
+        bench.full_disk = False
+        stop(bench)
+        assert bench.disk == {KEY: "B"}
+        assert "disk" not in bench.report().stop.why
+
+    def test_a_new_gate_finds_it_and_says_it_all_again(self):
+        old = Bench().begin()
+        stop(old)
+        bench = Bench(disk=old.disk)
+        bench.begin()
+        assert bench.written[0].twist == ZERO
+        assert bench.did(actions.CancelGoals)
+        assert bench.did(actions.KeepLatch) == []
+        report = bench.report()
+        assert (report.latched, report.stop.by) == (True, "B")
+        assert bench.drive_off() is None
+        assert bench.moving_since(0) == []
+        reset(bench)
+        assert bench.disk == {}
+        assert bench.drive_off()
+        assert bench.moving_since(0)
+
+    def test_no_report_says_before_it_is_known_that_none_stands(self):
+        bench = Bench(disk={KEY: "B"}).begin()
+        assert all(r.latched for r in bench.of(messages.RobotReport))
+
+    def test_a_machine_that_another_gate_has_gets_no_zeros_from_the_disk(self):
+        bench = Bench(disk={KEY: "B"}, lock_held=False).begin()
+        bench.run(1.0)
+        assert bench.written == []
+        bench.tell(events.LockState(KEY, held=True, latched_by="B"))
+        assert bench.written[0].twist == ZERO
+        bench.tell(events.LockState(KEY, held=True, latched_by="Z"))
+        assert bench.report().stop.by == "B"
+
+
+class TestConfirmation:
+    def test_300_ms_of_standstill_confirm_it(self, seen):
+        stop(seen)
+        assert seen.report().stop == StopReport("B", None, "")
+        watch_it(seen, 0.4, 0.4, 0.2)
+        assert seen.report().stop.confirmed is None
+        watch_it(seen, 0.4, 0.01)
+        assert seen.report().stop.confirmed is True
+        assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, False)
+
+    def test_one_that_moves_on_is_not_confirmed_until_it_stands(self, seen):
+        stop(seen)
+        watch_it(seen, 2.1, 0.31)
+        assert seen.report().stop == StopReport("B", False, "still moving at 0.31 m/s")
+        watch_it(seen, 0.5, 0.0)
+        assert seen.report().stop.confirmed is True
+
+    def test_a_turn_is_a_motion_too(self, seen):
+        stop(seen)
+        seen.run(1.0, lambda: seen.tell(events.Measured(KEY, Twist(0, 0, 0.1))))
+        assert seen.report().stop.confirmed is None
+
+    def test_odometry_with_gaps_proves_nothing(self, seen):
+        stop(seen)
+        for _ in range(3):
+            seen.tell(events.Measured(KEY, ZERO))
+            seen.run(0.6)
+        assert seen.report().stop.confirmed is None
+
+    def test_what_was_seen_before_stop_does_not_count(self, seen):
+        seen.take()
+        watch_it(seen, 0.5, 0.0)
+        stop(seen)
+        watch_it(seen, 0.1, 0.0)
+        assert seen.report().stop.confirmed is None
+
+    @pytest.mark.parametrize("told", [[], [None]])
+    def test_odometry_that_does_not_come_confirms_nothing(self, seen, told):
+        stop(seen)
+        for twist in told:
+            seen.tell(events.Measured(KEY, twist))
+        seen.run(2.2)
+        assert seen.report().stop == StopReport("B", False, "no odometry")
+
+    def test_odometry_that_fell_silent_says_so(self, seen):
+        stop(seen)
+        watch_it(seen, 0.2, 0.3)
+        seen.run(2.5)
+        assert seen.report().stop.why == "no odometry"
+
+    def test_without_odometry_nothing_is_confirmed(self, bench):
+        stop(bench)
+        assert bench.report().stop == StopReport("B", False, "no odometry")
+
+    def test_without_a_link_it_is_not_confirmed_and_with_one_it_is_looked_at(
+        self, seen
+    ):
+        seen.break_links()
+        stop(seen)
+        assert seen.report().stop == StopReport("B", False, f"no link to {URL}")
+        seen.connect_links()
+        assert seen.report().stop.confirmed is None
+        watch_it(seen, 0.6, 0.0)
+        assert seen.report().stop.confirmed is True
+
+    def test_a_bridge_that_does_not_answer_has_perhaps_not_heard_it(self, seen):
+        seen.answering = False
+        seen.run(0.2)
+        stop(seen)
+        watch_it(seen, 0.6, 0.0)
+        assert seen.report().stop.confirmed is None
+        seen.answering = True
+        watch_it(seen, 0.1, 0.0)
+        assert seen.report().stop.confirmed is True
+
+    def test_one_that_never_answered_says_so_in_the_end(self):
+        from webmap.gate.confirm import Confirmation
+
+        confirmation = Confirmation()
+        confirmation.begin(0.0)
+        confirmation.judge(None, delivered=False, now=2.5)
+        assert confirmation.why == "its bridge does not answer"
+
+
+class TestHooks:
+    HOOKS = (
+        {"topic": "/lock", "type": "std_msgs/Bool"},
+        {"service": "/e_stop", "type": "std_srvs/Trigger"},
+    )
+
+    @pytest.fixture
+    def bench(self):
+        return Bench().begin(spec(stop_hooks=self.HOOKS))
+
+    def said(self, bench):
+        hooks = bench.did(actions.RunHook)
+        return [(h.hook.get("topic") or h.hook["service"], h.stopped) for h in hooks]
+
+    def test_are_said_on_stop_and_the_flag_is_taken_back_on_reset(self, bench):
+        stop(bench)
+        assert self.said(bench) == [("/lock", True), ("/e_stop", True)]
+        reset(bench)
+        assert self.said(bench)[2:] == [("/lock", False)]
+
+    def test_come_after_the_zero(self, bench):
+        bench.drive_off()
+        stop(bench)
+        kept = (actions.WriteTwist, actions.RunHook)
+        last = [a for a in bench.done if isinstance(a, kept)][-3:]
+        assert isinstance(last[0], actions.WriteTwist)
+
+    def test_are_said_again_on_every_new_link(self, bench):
+        stop(bench)
+        bench.break_links()
+        bench.connect_links()
+        assert self.said(bench)[2:] == [("/lock", True), ("/e_stop", True)]
+
+    def test_what_could_not_be_taken_back_is_as_soon_as_there_is_a_link(self, bench):
+        stop(bench)
+        bench.break_links()
+        reset(bench)
+        assert len(self.said(bench)) == 2
+        bench.connect_links()
+        bench.connect_links()
+        assert self.said(bench)[2:] == [("/lock", False)]
+
+    def test_go_to_the_bridge_of_the_velocity_when_goals_have_another(self):
+        other = "ws://nav:9090"
+        bench = Bench().begin(spec(stop_hooks=self.HOOKS, goal_url=other))
+        stop(bench)
+        assert len(self.said(bench)) == 2
+        bench.tell(events.LinkUp(other, "tasks"))
+        assert len(self.said(bench)) == 2
+
+    @pytest.mark.parametrize(
+        "hook",
+        [
+            {},
+            {"topic": ""},
+            {"topic": "/lock", "service": "/lock"},
+            {"topic": "/lock", "type": "std_msgs/String"},
+            {"service": "/e_stop", "type": "std_msgs/Bool"},
+            {"topic": "cmd_vel"},
+            {"topic": "/lock", "extra": "1"},
+        ],
+    )
+    def test_that_make_no_sense_are_refused(self, hook):
+        with pytest.raises(ConfigError, match="stop hook"):
+            checked(spec(stop_hooks=(hook,)))
+
+    def test_get_their_type_and_the_full_name(self):
+        (hook,) = checked(spec(stop_hooks=({"topic": "lock"},))).stop_hooks
+        assert hook == {"topic": "/lock", "type": "std_msgs/Bool"}
+
+
+def test_a_robots_stop_leaves_other_machines_alone():
+    other = "/r2/cmd_vel"
+    bench = Bench().begin(spec(), spec(id="r2", twist_topic=other))
+    stop(bench)
+    assert not bench.report("r2").latched
+    assert {w.key for w in bench.written} == {KEY}
+    assert Key(URL, other) not in bench.disk
