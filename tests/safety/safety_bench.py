@@ -1,0 +1,314 @@
+"""A person who holds W, a robot that notes what it is told, and faults in between.
+
+::
+
+    Chromium ── proxy ── display ── gate ── proxy ── witness robot
+                "web"                       "robot"
+"""
+
+import json
+import math
+import os
+import signal
+import time
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import psutil
+from devtools import Chromium, Tab
+from processes import WEB, Process
+from safety_figures import Figure, note
+
+from webmap.testing import (
+    Bounds,
+    FaultProxy,
+    Quiet,
+    Sentinel,
+    Shape,
+    WitnessRobot,
+    check_invariants,
+)
+
+SITE = Path(__file__).with_name("safety_site.py")
+TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "1"))
+V_MAX, W_MAX = 1.0, 1.5
+
+ROBOT_TIMEOUT = 0.5
+"""Seconds until the witness stops by itself."""
+
+
+def wait_for(check, what, within=15.0):
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
+        if found := check():
+            return found
+        time.sleep(0.01)
+    raise AssertionError(f"{what} did not happen within {within} s")
+
+
+def pass_time(seconds):
+    """Let the machine go on: what must not happen has this long to happen."""
+    time.sleep(seconds)
+
+
+class Bench:
+    """Everything from the finger to the wheel, with real processes."""
+
+    def __init__(self, folder):
+        self._folder = folder
+        self._open = ExitStack()
+        self.browser = self.tab = self.display = None
+        self.quiet, self.unreachable, self.causes = [], [], []
+
+    def __enter__(self):
+        enter = self._open.enter_context
+        self.robot = enter(WitnessRobot(timeout=ROBOT_TIMEOUT))
+        self.robot_hop = enter(FaultProxy(self.robot.port))
+        self.sentinel = enter(Sentinel())
+        self._open.callback(self.end_display)
+        self.start_display()
+        self.web_hop = enter(FaultProxy(self.display_port))
+        self._open.callback(self.end_browser)
+        return self
+
+    def __exit__(self, *exception):
+        self._open.close()
+
+    # The parts.
+
+    def start_display(self):
+        os.environ["SAFETY_BRIDGE"] = f"ws://127.0.0.1:{self.robot_hop.port}"
+        os.environ["WEBMAP_STATE_DIR"] = str(self._folder / "state")
+        port = self.display_port if self.display else 0
+        self.display = Process("run", SITE, "--port", port, "--no-browser")
+        self.url = self.display.ready(WEB)
+        self.display_port = int(self.url.split("/")[2].split(":")[1])
+
+    def end_display(self, sig=signal.SIGINT):
+        if not self.display.popen.stdout.closed:
+            self.display.end(sig)
+        print(self.display.log)
+
+    def start_browser(self):
+        self.browser = Chromium().__enter__()
+
+    def end_browser(self):
+        if self.browser is not None:
+            self.browser.__exit__()
+            self.browser = self.tab = None
+
+    def renew_browser(self):
+        """Open the page in another browser: the one of before is dead or maimed."""
+        self.tab.close()
+        self.end_browser()
+        self.open_page()
+
+    def open_page(self):
+        """Open the page in a new tab of a browser that runs."""
+        if self.browser is None:
+            self.start_browser()
+        self.tab = self.browser.new_tab()
+        self.tab.go(self.url.replace(str(self.display_port), str(self.web_hop.port)))
+        self.tab.wait("document.querySelector('.robot.selected') !== null")
+
+    def close_page(self):
+        tab, self.tab = self.tab, None
+        if tab is not None:
+            self.browser._ask(f"close/{tab.id}")
+            tab.close()
+
+    def look_away(self):
+        """Open another tab in front of the page."""
+        self._other = self.browser.new_tab()
+
+    def look_back(self):
+        """Bring the page to the front again."""
+        self.browser.activate(self.tab)
+        self.tab.wait("document.visibilityState === 'visible'")
+        self.browser._ask(f"close/{self._other.id}")
+        self._other.close()
+
+    def look_away_and_back(self):
+        self.look_away()
+        self.look_back()
+
+    def display_kill(self):
+        """Kill the display, and leave its gate to itself."""
+        self.display.popen.kill()
+
+    def wait_for_gate(self):
+        """Wait until the display has started another gate."""
+        wait_for(lambda: self.gate is not None, "another gate")
+
+    @property
+    def gate(self):
+        """The process of the gate that runs now."""
+        for child in psutil.Process(self.display.popen.pid).children(recursive=True):
+            with suppress(psutil.Error):
+                if "webmap.gate" in child.cmdline():
+                    return child
+        return None
+
+    def renderers(self):
+        """The processes that draw pages."""
+        everybody = psutil.Process(self.browser.process.pid).children(recursive=True)
+        return [p for p in everybody if "--type=renderer" in p.cmdline()]
+
+    # The person.
+
+    def press(self):
+        self.tab.down("w")
+
+    def let_go(self):
+        self.causes.append(time.monotonic())
+        self.tab.up("w")
+
+    def repeat_press(self):
+        """What a keyboard sends on while a key is held."""
+        self.tab.call(
+            "Input.dispatchKeyEvent",
+            type="keyDown",
+            key="w",
+            code="KeyW",
+            windowsVirtualKeyCode=ord("W"),
+            text="w",
+            autoRepeat=True,
+        )
+
+    def drive_off(self, within=40.0):
+        """Press W until the robot moves, and keep pressing; like a person, again."""
+        if self.tab is None:
+            self.open_page()
+        deadline = time.monotonic() + within
+        while time.monotonic() < deadline:
+            pass_time(0.4)
+            self.press()
+            patience = time.monotonic() + 2.5
+            while time.monotonic() < patience:
+                if self.steady():
+                    return
+                pass_time(0.01)
+            self.let_go()
+        raise AssertionError(f"W does not drive the robot\n{self.display.log}")
+
+    def steady(self):
+        """Whether the robot has been moved without a break for a moment."""
+        now = time.monotonic()
+        recent = [told for told in self.robot.log.told[-12:] if told.at > now - 0.4]
+        return (
+            len(recent) >= 6
+            and now - recent[-1].at < 0.1
+            and not any(told.is_zero for told in recent)
+        )
+
+    # The proof.
+
+    def prove(
+        self,
+        name,
+        inflict,
+        *,
+        within,
+        back=lambda: None,
+        stops_by="zero",
+        held_after=True,
+        watch=0.5,
+        few_late=0,
+        before=lambda: None,
+    ):
+        """Inflict a fault on a robot that is driven, as often as is asked for.
+
+        Args:
+            name: What fails, for the table.
+            inflict: Makes it fail.
+            within: Seconds in which the robot is promised to be stopped.
+            back: Mends it.
+            stops_by: ``zero``: a zero must come; ``itself``: nobody can send one, and
+                the robot's own timeout must stop it.
+            held_after: Whether the key is still down when it is mended.
+            watch: Seconds for which nothing may move after it is mended.
+            few_late: How many moving velocities may still come when it is mended, if
+                the robot is driven through a link that keeps what it cannot pass on.
+            before: Happens while the robot moves, before the fault.
+
+        """
+        begin, figures = time.monotonic(), []
+        self.quiet, self.unreachable, self.causes = [], [], []
+        for _ in range(TRIALS):
+            self.drive_off()
+            before()
+            self.fault_at = time.monotonic()
+            inflict()
+            figure = self._measure(within, stops_by)
+            self._mend(figure, back, held_after, watch, few_late)
+            figures.append(figure)
+        pass_time(0.7)
+        log = [told for told in self.robot.log.told if told.at >= begin]
+        wrong = check_invariants(
+            log,
+            Bounds(V_MAX, W_MAX, slack=0.1 + self.sentinel.worst(begin)),
+            quiet=self.quiet,
+            unreachable=self.unreachable,
+            causes=self.causes,
+        )
+        assert not wrong, (name, wrong)
+        worst = max(figures, key=lambda figure: figure["late"] - figure["jitter"])
+        note(
+            Figure(
+                name=name,
+                stops_by=stops_by,
+                promised=within,
+                worst=max(figure["late"] for figure in figures),
+                jitter=max(figure["jitter"] for figure in figures),
+                trials=len(figures),
+            )
+        )
+        for figure in figures:
+            assert figure["late"] <= within + figure["jitter"], (name, worst, figures)
+
+    def _measure(self, within, stops_by):
+        """Wait until the robot is stopped, and say how long that took."""
+        stopped = self._stopped_after(self.fault_at, stops_by)
+        jitter = self.sentinel.worst(self.fault_at - 0.3, stopped)
+        if stops_by == "itself":
+            # From the last word before the fault until the first one after it.
+            self.unreachable.append((self.fault_at - 0.5, math.inf))
+        return {"late": stopped - self.fault_at, "jitter": jitter, "within": within}
+
+    def _mend(self, figure, back, held_after, watch, few_late):
+        """Mend what failed, with the key held on, and see that nothing resumes."""
+        still = self.fault_at + figure["within"] + figure["jitter"] + 0.001
+        mending = time.monotonic()
+        self.causes.append(mending)
+        back()
+        self.causes.append(time.monotonic())
+        if self.tab is not None and held_after:
+            self.repeat_press()
+        pass_time(watch)
+        if self.unreachable and self.unreachable[-1][1] == math.inf:
+            self.unreachable[-1] = (self.unreachable[-1][0], time.monotonic())
+        late = self.robot.log.moving_since(max(still, mending))
+        if few_late and late:
+            # TCP delivers what it had taken; then a zero must come, and nothing else.
+            assert len(late) <= few_late, f"{len(late)} late velocities"
+            still = late[-1].at
+        self.quiet.append(Quiet(still, time.monotonic(), "after a fault, W held on"))
+        if self.tab is not None:
+            self.let_go()
+
+    def _stopped_after(self, begun, stops_by):
+        log = self.robot.log
+        if stops_by == "zero":
+            wait_for(lambda: log.first_zero(begun), "a zero")
+            # A moving command that was on its way may come first, never after.
+            return log.first_zero(begun)
+        return wait_for(lambda: log.standstill(begun + 0.02), "standing still")
+
+
+SLOW = Shape(latency=0.4)
+
+
+def send_only(tab: Tab, method, **parameters):
+    """Call a method whose answer will never come."""
+    message = {"id": next(tab._numbers), "method": method, "params": parameters}
+    tab._socket.send(json.dumps(message))

@@ -1,0 +1,45 @@
+"""A page with one robot, and code of its user that blocks when the robot says so.
+
+The addresses come from the environment: SAFETY_BRIDGE, where the robot is.
+"""
+
+import itertools
+import os
+import time
+
+import webmap
+
+bridge = webmap.Bridge(os.environ["SAFETY_BRIDGE"])
+bob = webmap.Robot("Bob", webmap.svg.circle(cx=0, cy=0, r=0.2, fill="red"))
+bob.set_odometry_topic(bridge, "/odom")
+bob.set_twist_topic(bridge, "/cmd_vel", stops_within=0.5)
+
+
+def block(message):
+    """Block the model thread, as a callback does that waits for something."""
+    time.sleep(message["data"])
+
+
+def hold_the_interpreter(message):
+    """Let no thread of this process run, as a long call of an extension does."""
+    until = time.monotonic() + message["data"]
+    while time.monotonic() < until:
+        # One call that never gives the lock away; a loop of Python would.
+        sum(itertools.repeat(1, 200_000_000))
+
+
+bridge.subscribe("/block", block, "std_msgs/Float64")
+bridge.subscribe("/hold", hold_the_interpreter, "std_msgs/Float64")
+
+
+@webmap.page("/")
+def main(page):
+    """Show the robot, chosen, with keys to drive it."""
+    map = webmap.Map(page.element("webmap_container"), 400, 300)
+    map.add_module("Teleop", 1.0, 1.5)
+    map.scale(40, map.canvas_width * 0.5, map.canvas_height * 0.5)
+    map.add_robot(bob)
+    map.set_selected(bob)
+
+
+webmap.run()

@@ -1,0 +1,118 @@
+"""Everything that can happen to a page while a person holds W."""
+
+import os
+import signal
+
+import pytest
+from safety_bench import pass_time, send_only
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+PROMISED = 0.3
+"""Seconds from the fault to the first zero at the robot (S1)."""
+
+
+def test_a_key_that_is_let_go_stops_the_robot(bench):
+    bench.prove("the key is let go", bench.let_go, within=0.1, held_after=False)
+
+
+def test_a_killed_renderer_stops_the_robot(bench):
+    def kill():
+        for process in bench.renderers():
+            process.kill()
+
+    bench.prove(
+        "the renderer is killed", kill, within=PROMISED, back=bench.renew_browser
+    )
+
+
+def test_a_killed_browser_stops_the_robot(bench):
+    def kill():
+        os.killpg(bench.browser.process.pid, signal.SIGKILL)
+
+    bench.prove(
+        "the browser is killed", kill, within=PROMISED, back=bench.renew_browser
+    )
+
+
+def test_a_stopped_browser_stops_the_robot(bench):
+    def send(sig):
+        os.killpg(bench.browser.process.pid, sig)
+
+    def back():
+        pass_time(1.5)
+        send(signal.SIGCONT)
+
+    bench.prove(
+        "the browser is stopped (SIGSTOP) for 2 s",
+        lambda: send(signal.SIGSTOP),
+        within=PROMISED,
+        back=back,
+    )
+
+
+def test_a_frozen_page_stops_the_robot(bench):
+    def state(name):
+        bench.tab.call("Page.setWebLifecycleState", state=name)
+
+    def back():
+        state("active")
+        # DevTools leaves the page hidden; coming back to the tab shows it again.
+        bench.look_away_and_back()
+
+    bench.prove(
+        "the page is frozen", lambda: state("frozen"), within=PROMISED, back=back
+    )
+
+
+def test_navigation_stops_the_robot(bench):
+    def back():
+        bench.close_page()
+        bench.open_page()
+
+    bench.prove(
+        "the page is left for another",
+        lambda: bench.tab.go("about:blank"),
+        within=PROMISED,
+        back=back,
+    )
+
+
+def test_another_tab_in_front_stops_the_robot(bench):
+    bench.prove(
+        "another tab comes in front",
+        bench.look_away,
+        within=PROMISED,
+        back=bench.look_back,
+    )
+
+
+def test_a_closed_tab_stops_the_robot(bench):
+    bench.prove(
+        "the tab is closed", bench.close_page, within=PROMISED, back=bench.open_page
+    )
+
+
+def test_an_alert_stops_the_robot(bench):
+    def show():
+        send_only(
+            bench.tab,
+            "Runtime.evaluate",
+            expression="setTimeout(() => alert('Look here'), 0)",
+        )
+
+    def back():
+        pass_time(0.5)
+        bench.tab.call("Page.handleJavaScriptDialog", accept=True)
+
+    bench.prove("an alert is shown", show, within=PROMISED, back=back)
+
+
+def test_a_busy_page_stops_the_robot(bench):
+    busy = "{ const t = performance.now(); while (performance.now() - t < 2000); }"
+    bench.prove(
+        "the page is busy for 2 s",
+        lambda: bench.tab.evaluate(f"setTimeout(() => {busy}, 0), 0"),
+        within=PROMISED,
+        back=lambda: bench.tab.evaluate("0"),
+    )
