@@ -150,3 +150,19 @@ def test_the_console_becomes_the_page_at_the_root(bridge, monkeypatch):
 def test_a_floor_that_is_not_there_is_said_before_anything_is_served(bridge, tmp_path):
     with pytest.raises(ConfigError, match=r"none\.yaml"):
         open_console([bridge], [], floor=tmp_path / "none.yaml")
+
+
+def test_a_camera_is_asked_for_pictures_while_its_robot_is_selected(bridge, robots):
+    camera = robots[0].add_module("Camera", bridge, "/camera/compressed")
+
+    def scenario(page: Page) -> None:
+        map = page.maps[0]
+        assert not camera.watched
+        map.set_selected(robots[0])
+        assert camera.watched
+        map.set_selected(robots[1])
+        assert not camera.watched
+        map.set_selected(robots[0])
+
+    on_a_page(scenario, bridge, robots)
+    assert not camera.watched

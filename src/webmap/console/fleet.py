@@ -24,6 +24,8 @@ class RobotDescription:
     twist: str = ""
     scan: str = ""
     battery: str = ""
+    cameras: tuple[str, ...] = ()
+    """Topics of ``sensor_msgs/CompressedImage`` or ``Image``."""
     goal: str = ""
     """A topic of ``geometry_msgs/PoseStamped`` that sends it somewhere."""
     cancel: str = ""
@@ -99,5 +101,8 @@ def make_robot(about: RobotDescription) -> "Robot":
         robot.svg.insert(1, scanner.svg)  # after the title, under the body
     if about.battery:
         robot.add_module("Battery", bridge, about.battery)
+    for number, topic in enumerate(about.cameras, 1):
+        name = "Camera" if len(about.cameras) == 1 else f"Camera {number}"
+        robot.add_module("Camera", bridge, topic, name)
     robot.add_module(NameLabel)
     return robot

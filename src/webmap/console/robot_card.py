@@ -4,6 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap import html, svg
+from webmap.console.cameras import CameraViews
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.speeds import SpeedTable
 from webmap.console.words import UNKNOWN, describe, heading, number, sentence
@@ -60,6 +61,7 @@ class RobotCard:
         self._age = html.dd(class_="age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
         self._battery = html.dd()
+        self._cameras = CameraViews()
         self._speeds = SpeedTable()
         element.append(*self._parts())
         self.on_select()
@@ -82,6 +84,7 @@ class RobotCard:
         self._battery.text = "unknown"
         self._age.set_age(math.inf)
         self._feed = robot.add_module(lambda owner: Feed(owner, self))
+        self._cameras.show(robot)
         for module in robot.modules:
             if hasattr(module, "charge"):
                 self.show_battery(module)
@@ -92,6 +95,7 @@ class RobotCard:
         """Look again at what no trigger tells."""
         if self._robot is not None:
             self.show_state()
+            self._cameras.poll()
             age = self._robot.pose_age
             if age is not None:
                 self._age.set_age(age)
@@ -132,6 +136,7 @@ class RobotCard:
     def _let_go(self) -> None:
         if self._robot is not None and self._feed is not None:
             self._robot.remove_module(self._feed)
+        self._cameras.show(None)
         self._robot = self._feed = None
 
     def _parts(self) -> "list[Element]":
@@ -165,6 +170,7 @@ class RobotCard:
             state,
             self._reason,
             self._problems,
+            self._cameras.element,
             facts,
             *self._speeds.elements,
             actions,

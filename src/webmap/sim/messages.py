@@ -76,6 +76,14 @@ class Messages:
             "intensities": np.empty(0, np.float32),
         }
 
+    def camera(self, topic: str, stamp: float, robot: Robot, jpeg: bytes) -> Message:
+        """Return ``sensor_msgs/CompressedImage``."""
+        return {
+            "header": self.dialect.header(topic, stamp, f"{robot.frames}camera"),
+            "format": "jpeg",
+            "data": jpeg,
+        }
+
     def battery(self, topic: str, stamp: float, robot: Robot) -> Message:
         """Return ``sensor_msgs/BatteryState``; NaN is what nobody measures."""
         nothing = np.empty(0, np.float32)

@@ -18,6 +18,9 @@ from webmap.sim.world import World
 log = logging.getLogger(__name__)
 
 NODE = "/robots"
+CAMERA = "camera/image_raw/compressed"
+"""The camera's topic, below the robot's."""
+
 STEP = 0.025
 """Seconds of one step of the world."""
 
@@ -61,6 +64,7 @@ class RobotsNode:
         self._advertise(f"{prefix}/base_scan", "sensor_msgs/LaserScan")
         self._advertise(f"{prefix}/battery_state", "sensor_msgs/BatteryState")
         self._advertise(f"{prefix}/plan", "nav_msgs/Path")
+        self._advertise(f"{prefix}/{CAMERA}", "sensor_msgs/CompressedImage")
         self._subscribe(
             f"{prefix}/cmd_vel",
             f"geometry_msgs/{self._twist}",
@@ -97,6 +101,7 @@ class RobotsNode:
         if self._steps % _STATUS_EVERY == 0:
             for report in self.on_step:
                 report()
+            self._publish_views()
         slow = self._steps % _SLOW_EVERY == 0
         if slow:
             self._publish_batteries()
@@ -172,6 +177,14 @@ class RobotsNode:
             self.publish(
                 topic, self.messages.scan(topic, now, robots[i], options, ranges)
             )
+
+    def _publish_views(self) -> None:
+        for i, robot in enumerate(self.world.robots):
+            topic = f"{robot.topics}/{CAMERA}"
+            if self.graph.is_wanted(topic):
+                jpeg = self.world.look(i)
+                now = self.graph.clock()
+                self.publish(topic, self.messages.camera(topic, now, robot, jpeg))
 
     def _publish_batteries(self) -> None:
         now = self.graph.clock()

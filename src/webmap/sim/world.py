@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from webmap.errors import ConfigError
 from webmap.geometry import Pose, Twist
+from webmap.sim.camera import Camera
 from webmap.sim.maps import FloorPlan
 from webmap.sim.navigator import Goal, Navigator
 from webmap.sim.obstacles import Obstacles
@@ -51,6 +52,7 @@ class World:
         """Seconds since the world began."""
         self.obstacles = Obstacles(plan)
         self.planner = Planner(self.obstacles, options.base.radius)
+        self.camera = Camera(self.obstacles)
         self.scanner = Scanner(self.obstacles, options.scanner, options.seed)
         self._random = Random(options.seed)  # noqa: S311 - reproducible by design
         poses = self._spawn(options.robots)
@@ -121,6 +123,10 @@ class World:
             for i, pose in zip(indices, poses, strict=True)
         ]
         return self.scanner.sweep(poses, discs)
+
+    def look(self, index: int) -> bytes:
+        """Return what the camera of a robot sees, as JPEG."""
+        return self.camera.jpeg(self.robots[index].pose, self.others(index))
 
     def _next_to_plan(self) -> int:
         """Return whose search goes on: one at a time, to its end, then the next's."""

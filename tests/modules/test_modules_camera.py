@@ -1,0 +1,160 @@
+"""Cameras: one pull for all who watch."""
+
+import asyncio
+import base64
+import io
+import time
+
+import numpy as np
+import pytest
+from module_fakes import header
+from PIL import Image
+
+from webmap.core.pictures import pictures
+from webmap.errors import ProtocolError
+from webmap.modules.robot.camera import Camera
+from webmap.ros.messages_image import CompressedImageMsg, ImageMsg
+
+TOPIC = "/camera/image_raw/compressed"
+
+
+def a_jpeg(colour=(200, 30, 30)) -> bytes:
+    file = io.BytesIO()
+    Image.new("RGB", (16, 12), colour).save(file, "JPEG")
+    return file.getvalue()
+
+
+def compressed(data: bytes, **more) -> dict:
+    text = base64.b64encode(data).decode()
+    return {"header": header(), "format": "jpeg", "data": text, **more}
+
+
+def shown(camera) -> Image.Image:
+    published = pictures.get(camera.url.rpartition("/")[2])
+    return Image.open(io.BytesIO(published.data)).convert("RGB")
+
+
+def test_pictures_are_asked_for_while_somebody_watches_and_once_for_all(link, robot):
+    camera = robot.add_module(Camera, link, TOPIC)
+    assert TOPIC not in link.listeners
+    first, second = camera.watch(lambda: None), camera.watch(lambda: 1)
+    assert len(link.listeners[TOPIC]) == 1
+    first.remove()
+    assert TOPIC in link.listeners
+    second.remove()
+    assert TOPIC not in link.listeners
+
+
+@pytest.mark.parametrize("cbor", [False, True])
+def test_a_compressed_picture_is_shown_as_it_is(link, robot, cbor):
+    camera = robot.add_module(Camera, link, TOPIC)
+    told = []
+    camera.watch(lambda: told.append(camera.url))
+    data = a_jpeg()
+    message = compressed(data)
+    if cbor:
+        message["data"] = data
+    link.say(TOPIC, message, cbor=cbor)
+    assert told == [camera.url]
+    assert pictures.get(camera.url.rpartition("/")[2]) == (data, "image/jpeg")
+    assert link.options[TOPIC]["throttle"] == 200
+
+
+def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
+    link, robot
+):
+    before = len(pictures)
+    camera = robot.add_module(Camera, link, TOPIC)
+    watching = camera.watch(lambda: None)
+    for red in range(0, 250, 20):
+        link.say(TOPIC, compressed(a_jpeg((red, 0, 0))))
+    assert len(pictures) <= before + 3
+    watching.remove()
+    assert len(pictures) == before
+    assert camera.url is None
+
+
+def test_what_is_no_picture_is_said_once_and_the_picture_before_stays(link, robot):
+    camera = robot.add_module(Camera, link, TOPIC)
+    camera.watch(lambda: None)
+    link.say(TOPIC, compressed(a_jpeg()))
+    good = camera.url
+    link.say(TOPIC, compressed(b"<svg onload=alert(1)>", format="svg"))
+    assert camera.url == good
+    assert any("no JPEG, PNG or WebP" in text for text in robot.problems.values())
+    link.say(TOPIC, compressed(a_jpeg((0, 0, 9))))
+    assert not robot.problems
+
+
+def raw(encoding: str, pixels: np.ndarray, pad: int = 0) -> ImageMsg:
+    height, width = pixels.shape[:2]
+    rows = pixels.reshape(height, -1).view(np.uint8)
+    padded = np.pad(rows, ((0, 0), (0, pad)))
+    return ImageMsg(height, width, encoding, padded.shape[1], padded.tobytes())
+
+
+def test_colours_are_in_their_places_and_padding_is_left_out():
+    red = np.zeros((4, 5, 3), np.uint8)
+    red[..., 0] = 255
+    assert (raw("rgb8", red, pad=7).pixels() == red).all()
+    assert (raw("bgr8", red[..., ::-1].copy(), pad=3).pixels() == red).all()
+    with_alpha = np.dstack([red, np.full((4, 5), 9, np.uint8)])
+    assert (raw("rgba8", with_alpha).pixels() == red).all()
+
+
+def test_depth_is_stretched_and_what_is_not_finite_is_dark():
+    depth = np.array([[0.0, 1.0], [2.0, np.nan]], np.float32)
+    assert raw("32FC1", depth).pixels().tolist() == [[0, 127], [255, 0]]
+
+
+def test_the_order_of_bytes_is_minded():
+    values = np.array([[0, 256], [512, 768]], ">u2")
+    image = raw("mono16", values)
+    image.is_bigendian = 1
+    assert image.pixels().tolist() == [[0, 85], [170, 255]]
+
+
+@pytest.mark.parametrize(
+    ("image", "said"),
+    [
+        (ImageMsg(10, 10, "rgb8", 30, b"\0" * 299), "too few"),
+        (ImageMsg(10, 10, "rgb8", 29, b"\0" * 300), "too few"),
+        (ImageMsg(100000, 100000, "rgb8", 300000, b""), "at most"),
+        (ImageMsg(0, 10, "rgb8", 30, b""), "at most"),
+        (ImageMsg(1, 1, "yuv422", 2, b"\0\0"), "known are"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_words(image, said):
+    with pytest.raises(ProtocolError, match=said):
+        image.pixels()
+
+
+def test_a_picture_that_is_too_large_is_refused():
+    with pytest.raises(ProtocolError, match="at most"):
+        _ = CompressedImageMsg(b"\xff\xd8\xff" + b"\0" * (5 << 20)).media_type
+
+
+def test_a_raw_picture_is_made_a_jpeg_and_the_newest_wins(link, robot):
+    async def scenario():
+        topic = "/camera/image_raw"
+        camera = robot.add_module(Camera, link, topic)
+        camera.watch(lambda: None)
+        for value in (10, 100, 200):
+            pixels = np.full((8, 8, 3), value, np.uint8)
+            data = base64.b64encode(pixels.tobytes()).decode()
+            message = {
+                "header": header(),
+                "height": 8,
+                "width": 8,
+                "encoding": "rgb8",
+                "is_bigendian": 0,
+                "step": 24,
+                "data": data,
+            }
+            link.say(topic, message)
+        patience = time.monotonic() + 10
+        while camera.url is None or shown(camera).getpixel((4, 4))[0] < 190:
+            assert time.monotonic() < patience
+            await asyncio.sleep(0.01)
+
+    asyncio.run(scenario())
