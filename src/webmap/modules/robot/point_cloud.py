@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 UNIT = 0.001
 """Metres per unit of the dots on the wire, as long as they fit in 16 bits."""
 
+MANY = 100_000
+"""Points of which no more are looked at one by one."""
+
 COLOURS = (
     "#30318f", "#2f6fde", "#1aa5c8", "#1fbf7a", "#8fcf2f", "#e8c51c", "#f08a1d",
     "#d02f2f",
@@ -165,6 +168,7 @@ class PointCloud:
             with np.errstate(invalid="ignore"):
                 keep &= (columns["z"] >= z_min) & (columns["z"] <= z_max)
         chosen = np.flatnonzero(keep)
+        chosen = chosen[:: 1 + len(chosen) // MANY]
         points = np.column_stack((columns["x"][chosen], columns["y"][chosen]))
         if self.cell and len(points):
             kept = one_a_cell(points, self.cell)

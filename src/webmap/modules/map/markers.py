@@ -1,0 +1,198 @@
+"""Markers: what ROS programs draw to show what they think."""
+
+import asyncio
+import time
+from typing import TYPE_CHECKING
+
+from webmap.core.layer import Layer
+from webmap.core.marker_shapes import look_of, place, shape_of
+from webmap.core.refusals import refusing
+from webmap.errors import ConfigError, ProtocolError, WebMapError
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages_marker import (
+    ADD,
+    DELETE,
+    DELETE_ALL,
+    MarkerArrayMsg,
+    MarkerMsg,
+)
+from webmap.ros.names import split_type
+from webmap.scene.element import Element
+from webmap.scope import Removal, keep
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+MAX_MARKERS = 5000
+"""The most markers that one topic may show."""
+
+NEVER = 1e9
+"""Seconds after which markers without an age limit are drawn as old."""
+
+VIEWS: dict[str, type[MarkerMsg] | type[MarkerArrayMsg]] = {
+    "visualization_msgs/MarkerArray": MarkerArrayMsg,
+    "visualization_msgs/Marker": MarkerMsg,
+}
+
+Key = tuple[str, int]
+
+
+class Markers:
+    """Draws ``visualization_msgs/MarkerArray`` or ``Marker`` as it looks from above.
+
+    Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and
+    texts are drawn, with their colours; meshes are not. A marker that makes no sense
+    is left out by itself, and said.
+
+    Style it by CSS: ``.markers > .marker``, with the type as a further class
+    (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in ``data-ns``:
+    ``.marker[data-ns="goals"] { display: none }``.
+
+    Args:
+        map: The map. The markers' frame is taken for the map's.
+        bridge: The link to the ROS system that has the topic.
+        topic: The topic.
+        type: ``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``.
+        age_limit: Seconds after which all of them are drawn as old; None for what is
+            sent but once.
+        order: What lies over what: greater is nearer; robots have 100.
+
+    Raises:
+        ConfigError: If the type has no markers.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        bridge: Bridge,
+        topic: str,
+        *,
+        type: str = "visualization_msgs/MarkerArray",
+        age_limit: float | None = None,
+        order: float = 50.0,
+    ) -> None:
+        known = str(split_type(type))
+        if known not in VIEWS:
+            raise ConfigError(f"type is one of {', '.join(VIEWS)}, got {type!r}")
+        self.map = map
+        self.layer = MarkerLayer.shared(bridge, topic, known, age_limit)
+        self.layer.show_on(map, order=order)
+
+
+class MarkerLayer(Layer):
+    """The markers of one topic, for all maps that show them."""
+
+    def __init__(
+        self, bridge: Bridge, topic: str, type: str, age_limit: float | None
+    ) -> None:
+        super().__init__()
+        self.bridge = bridge
+        self.topic = topic
+        self.type = type
+        self.age_limit = NEVER if age_limit is None else age_limit
+        self.shapes: dict[Key, Element] = {}
+        """What is drawn, by namespace and number."""
+        self._looks: dict[Key, tuple[object, ...]] = {}
+        self._ends: dict[Key, float] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self.svg.classes.add("markers")
+        self.svg.set(pointer_events="none")
+
+    def start(self) -> None:
+        """Subscribe to the markers."""
+        keep(Removal(self._forget_timer))
+        # Every message counts: one may take away what another has put there.
+        self.bridge.subscribe(
+            self.topic,
+            refusing(self, self.topic, self.on_markers),
+            self.type,
+            decode=VIEWS[self.type],
+            queue_length=100,
+        )
+
+    def on_markers(self, message: MarkerArrayMsg | MarkerMsg) -> None:
+        """Add, change and delete as the markers say.
+
+        Raises:
+            ProtocolError: If there is one that makes no sense; the others are drawn.
+
+        """
+        single = isinstance(message, MarkerMsg)
+        markers = [message] if isinstance(message, MarkerMsg) else message.markers
+        wrong: list[str] = []
+        for marker in markers:
+            try:
+                self._take(marker)
+            except WebMapError as error:
+                wrong.append(f"marker {marker.id} of {marker.ns!r}: {error}")
+        self._set_timer()
+        self.svg.set_age(0.0, limit=self.age_limit)
+        if wrong:
+            more = "" if single else f" ({len(wrong)} of {len(markers)} are left out)"
+            raise ProtocolError(wrong[0] + more)
+
+    def _take(self, marker: MarkerMsg) -> None:
+        key = (marker.ns, marker.id)
+        if marker.action == ADD:
+            self._put(key, marker)
+        elif marker.action == DELETE:
+            self._drop(key)
+        elif marker.action == DELETE_ALL:
+            for each in tuple(self.shapes):
+                self._drop(each)
+        else:
+            raise ProtocolError(
+                f"an action is 0 (add or modify), 2 (delete) or 3 (delete all), got "
+                f"{marker.action}"
+            )
+
+    def _put(self, key: Key, marker: MarkerMsg) -> None:
+        before, look = self.shapes.get(key), look_of(marker)
+        if before is not None and self._looks[key] == look:
+            place(before, marker)
+        else:
+            self._draw(key, before, marker)
+            self._looks[key] = look
+        self._ends.pop(key, None)
+        if marker.lifetime.seconds > 0:
+            self._ends[key] = time.monotonic() + marker.lifetime.seconds
+
+    def _draw(self, key: Key, before: Element | None, marker: MarkerMsg) -> None:
+        if before is None and len(self.shapes) >= MAX_MARKERS:
+            raise ProtocolError(f"{MAX_MARKERS} markers are the limit")
+        shape = shape_of(marker)
+        shape.set("data-ns", marker.ns)
+        shape.set("data-id", str(marker.id))
+        if before is None:
+            self.svg.append(shape)
+        else:
+            self.svg.insert(self.svg.children.index(before), shape)
+            before.remove()
+        self.shapes[key] = shape
+
+    def _drop(self, key: Key) -> None:
+        shape = self.shapes.pop(key, None)
+        self._looks.pop(key, None)
+        self._ends.pop(key, None)
+        if shape is not None:
+            shape.remove()
+
+    def _set_timer(self) -> None:
+        """Come back when the next marker's time is over."""
+        self._forget_timer()
+        if self._ends:
+            wait = max(0.0, min(self._ends.values()) - time.monotonic())
+            loop = asyncio.get_running_loop()
+            self._timer = loop.call_later(wait, self._end_some)
+
+    def _end_some(self) -> None:
+        now = time.monotonic()
+        for key in [key for key, end in self._ends.items() if end <= now]:
+            self._drop(key)
+        self._set_timer()
+
+    def _forget_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
