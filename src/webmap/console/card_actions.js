@@ -4,7 +4,8 @@ import { closeSheet } from "./sheet.js";
 /** @typedef {import('./console.js').MapCanvas} MapCanvas */
 
 /**
- * The buttons of the card that act at once. Nothing here moves a robot.
+ * The buttons of the card that act at once. Only the test of its own stopping lets a
+ * robot creep, and only one that this page holds.
  *
  * @param {MapCanvas} map
  * @param {(message: Record<string, unknown>) => void} send
@@ -24,6 +25,7 @@ export function listenToActions(map, send, signal) {
     if (button.dataset.act === "follow" || button.dataset.act === "send") closeSheet();
     if (button.dataset.act === "cancel") map.drive.cancel(map.selected);
     if (button.dataset.act === "release") map.drive.release(map.selected);
+    if (button.dataset.act === "stop-test") map.drive.stopTest(map.selected);
     if (button.dataset.act !== "follow") return;
     if (map.following) map.follow(0);
     else send({ op: "follow" });

@@ -24,6 +24,7 @@ import { keepSizes, listenToTools } from "./view_tools.js";
  * @property {(kind: string, fn: () => void) => () => void} on
  * @property {(robot: string) => void} cancel
  * @property {(robot: string) => void} release
+ * @property {(robot: string) => void} stopTest
  *
  * @typedef {object} MapCanvas
  * @property {SVGSVGElement} svg

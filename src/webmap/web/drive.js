@@ -3,6 +3,7 @@ import { attentive, watchAttention } from "./motion/attention.js";
 import { Hands } from "./motion/hands.js";
 import { Line } from "./motion/line.js";
 import { Loop } from "./motion/loop.js";
+import { Onset } from "./motion/onset.js";
 import { Pilot, TAKE_PATIENCE } from "./motion/pilot.js";
 import { Stopping } from "./motion/stopping.js";
 
@@ -58,6 +59,7 @@ export class Drive {
     this._pilot = new Pilot(this._hands, this._loop, now, options);
     this._stopping = new Stopping();
     this._asking = new Asking();
+    this._onset = new Onset();
     this._line = new Line(socketUrl(baseUrl, options.id), {
       open: () => this._loop.open(performance.now()),
       receive: (message) => this._receive(message),
@@ -273,6 +275,26 @@ export class Drive {
   }
 
   /**
+   * Let a robot that this page holds creep, and find out how soon it stops by itself.
+   *
+   * @param {string} robot
+   */
+  stopTest(robot) {
+    this._pilot.doubt(performance.now());
+    this._send([{ op: "stop-test", robot }]);
+  }
+
+  /**
+   * How long it took a robot the last time from the first command to motion, in ms; null
+   * before that.
+   *
+   * @param {string} robot
+   */
+  motionDelay(robot) {
+    return this._onset.delay(robot);
+  }
+
+  /**
    * What became of the STOPs of this page.
    *
    * @returns {Verdict[]}
@@ -368,11 +390,13 @@ export class Drive {
       this._pilot.report(message, now);
       this._stopping.report(message, now);
       this._asking.report(message, now);
+      this._onset.report(message, now);
       this._tell("robot", message);
     } else if (message.op === "gone") {
       this._pilot.gone(message.robot, now);
       this._stopping.gone(message.robot);
       this._asking.gone(message.robot);
+      this._onset.gone(message.robot);
       this._tell("gone", message.robot);
     } else if (message.op === "refused") {
       this._pilot.refuse(message.robot, message.what, message.why, now);
@@ -382,7 +406,12 @@ export class Drive {
 
   /** @param {Command[]} messages */
   _send(messages) {
-    for (const message of messages) this._line.send(message);
+    for (const message of messages) {
+      this._line.send(message);
+      if (message.op !== "drive") continue;
+      const moving = ["x", "y", "turn"].some((axis) => message[axis] !== 0);
+      this._onset.sent(message.robot, moving, performance.now());
+    }
   }
 
   /**

@@ -101,16 +101,17 @@ class Stop {
   /**
    * The gate's own alarms, and what is seen here where the gate raises none.
    *
-   * @returns {string[]}
+   * @returns {Map<string, string>} What there is to say of each robot.
    */
   _alarms() {
-    const seen = new Set(this._obedience.disobeying(performance.now()).map(idOf));
-    const words = [];
-    for (const report of this._drive.robots.values()) {
-      if (report.alarm) words.push(`${report.name}: ${report.alarm}`);
-      else if (report.alarm === undefined && seen.has(report.robot)) words.push(report.name);
+    const alarms = new Map();
+    for (const { robot, name, alarm } of this._obedience.disobeying(performance.now())) {
+      if (alarm === undefined) alarms.set(robot, name);
     }
-    return words;
+    for (const { robot, name, alarm } of this._drive.robots.values()) {
+      if (alarm) alarms.set(robot, `${name}: ${alarm}`);
+    }
+    return alarms;
   }
 
   /** @param {Verdict[]} verdicts */
@@ -128,30 +129,26 @@ class Stop {
   }
 }
 
-/** @param {import('../motion/report.js').RobotReport} report */
-function idOf({ robot }) {
-  return robot;
-}
-
 /** Covers the page: a robot does not do what it is told. */
 class Alarm {
   /** @param {() => void} stopAll As the alarm covers the button that does. */
   constructor(stopAll) {
-    this._names = html("p", "webmap-alarm-names");
+    // Figures change several times a second, which nobody wants to have read out.
+    this._names = html("p", "webmap-alarm-names", { "aria-live": "off" });
     /** @type {Set<string>} */
     this._seen = new Set();
-    /** @type {string[]} */
-    this._current = [];
+    /** @type {ReadonlyMap<string, string>} */
+    this._current = new Map();
     this._element = html(
       "div",
       "webmap-alarm",
-      { role: "alert" },
+      { role: "alert", "aria-atomic": "false" },
       html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
       html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
       this._names,
       button("webmap-stop-button webmap-alarm-stop", "Stop all", stopAll),
       button("webmap-alarm-seen", "I have seen this", () => {
-        this._seen = new Set(this._current);
+        this._seen = new Set(this._current.keys());
         this.show(this._current);
       }),
     );
@@ -161,12 +158,12 @@ class Alarm {
     this._element.remove();
   }
 
-  /** @param {string[]} names */
-  show(names) {
-    this._current = names;
-    for (const name of this._seen) if (!names.includes(name)) this._seen.delete(name);
-    const news = names.filter((name) => !this._seen.has(name));
-    say(this._names, news.join(", "));
+  /** @param {ReadonlyMap<string, string>} alarms By robot. */
+  show(alarms) {
+    this._current = alarms;
+    for (const robot of this._seen) if (!alarms.has(robot)) this._seen.delete(robot);
+    const news = [...alarms].filter(([robot]) => !this._seen.has(robot));
+    say(this._names, news.map(([, words]) => words).join(", "));
     if (news.length === 0) this._element.remove();
     else if (!this._element.isConnected) document.body.append(this._element);
   }

@@ -1,7 +1,9 @@
 import { deskOf } from "../inputs/desk.js";
 import { heldByAnother, heldByProgram, isLatched } from "../motion/report.js";
+import { motions, ownStop, timings } from "../motion/figures.js";
 import { capOf, describe, inputsOf } from "../motion/status.js";
 import { button, html, say } from "./elements.js";
+import { Halos } from "./halos.js";
 import { lay, overlayOf } from "./overlay.js";
 import { Requests } from "./requests.js";
 import { ResetButton } from "./reset_button.js";
@@ -49,6 +51,7 @@ class Teleop {
       stick: () => this._toggleStick(),
     });
     this._stick = new StickPad(this._drive, holonomic);
+    this._halos = new Halos(map);
     this._requests = new Requests(this._drive);
     const takes = [
       lay(map, this._requests.element, "bottom-left"),
@@ -89,6 +92,7 @@ class Teleop {
   destroy() {
     this._ending.abort();
     this._stick.destroy();
+    this._halos.destroy();
     for (const off of this._offs) off();
   }
 
@@ -137,6 +141,7 @@ class Teleop {
     const verdict = this._drive.verdicts.find((one) => one.robot === robot);
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
+    this._halos.show();
     const useful = report !== null && !isLatched(report) && (report.mine || report.armable);
     this._stick.show(useful, status.pressed && status.dead);
     const inputs = inputsOf({
@@ -151,6 +156,8 @@ class Teleop {
       actOf(report, request, status.connection),
       this._stick.wanted,
     );
+    const moving = robot === null ? null : this._drive.motionDelay(robot);
+    this._panel.showFigures(report, status.delay, moving);
   }
 }
 
@@ -162,6 +169,9 @@ class Panel {
     this._title = html("strong", "webmap-teleop-title");
     this._detail = html("span", "webmap-teleop-detail");
     this._cap = html("p", "webmap-teleop-cap");
+    this._own = html("p", "webmap-teleop-own");
+    this._test = html("p", "webmap-teleop-test", { role: "status" });
+    this._figures = html("dl", "webmap-teleop-figures");
     this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
     this._reset = new ResetButton(acts.reset);
@@ -180,9 +190,10 @@ class Panel {
       "webmap-panel webmap-teleop",
       { "aria-label": "Driving" },
       this._mark,
-      html("div", "webmap-teleop-words", {}, state, this._cap),
+      html("div", "webmap-teleop-words", {}, state, this._test, this._cap, this._own),
       html("div", "webmap-teleop-acts", {}, this._lease, this._reset.element, this._stick),
       this._stop,
+      this._figures,
     );
   }
 
@@ -203,6 +214,27 @@ class Panel {
     if (this._stick.getAttribute("aria-pressed") !== String(stick)) {
       this._stick.setAttribute("aria-pressed", String(stick));
     }
+  }
+
+  /**
+   * @param {import('../motion/report.js').RobotReport | null} report
+   * @param {number | null} loop
+   * @param {number | null} moving
+   */
+  showFigures(report, loop, moving) {
+    say(this._own, report ? ownStop(report) : "");
+    say(this._test, report?.test ? report.test.text : "");
+    this._figures.hidden = !report?.mine;
+    if (!report?.mine) return;
+    const all = [...motions(report), ...timings(report, loop, moving)];
+    while (this._figures.childElementCount < all.length) {
+      this._figures.append(html("div", "", {}, html("dt", ""), html("dd", "")));
+    }
+    all.forEach(({ name, text }, i) => {
+      const [dt, dd] = this._figures.children[i].children;
+      say(dt, name);
+      say(dd, text);
+    });
   }
 
   /**

@@ -1,0 +1,100 @@
+/** @typedef {import('./report.js').RobotReport} RobotReport */
+
+/** Slower than this a robot is as good as standing, and has no halo; m/s. */
+export const STANDING = 0.02;
+
+/** What is assumed where an older gate does not say it: seconds, m/s². */
+const ASSUMED = { reaction: 1, brake: 0.5 };
+
+/**
+ * @param {readonly number[] | null | undefined} velocity
+ * @returns {number | null} Along the ground in m/s, below zero for backwards; null when it
+ *     is not known.
+ */
+export function speedAlong(velocity) {
+  if (!velocity) return null;
+  const [x, y] = velocity;
+  const speed = Math.hypot(x, y);
+  return Number.isFinite(speed) ? Math.sign(x || 1) * speed : null;
+}
+
+/**
+ * @param {RobotReport} report
+ * @returns {number} How fast it moves, in m/s, by the best word that there is: what was
+ *     measured, else what its ROS said back, else what was sent.
+ */
+export function speedNow({ measured, echoed, sent }) {
+  return Math.abs(speedAlong(measured) ?? speedAlong(echoed) ?? speedAlong(sent) ?? 0);
+}
+
+/**
+ * Say how far a robot goes at most from now until it stands.
+ *
+ * @param {RobotReport} report
+ * @returns {number | null} Metres from its middle; null when it stands, or when nobody
+ *     drives it from here.
+ */
+export function stoppingDistance(report) {
+  const speed = speedNow(report);
+  if (report.state === "free" || speed < STANDING) return null;
+  const { reaction = ASSUMED.reaction, brake = ASSUMED.brake } = report;
+  const distance = speed * reaction + speed ** 2 / (2 * brake);
+  return Number.isFinite(distance) ? distance : null;
+}
+
+/**
+ * Say one motion three times: as it was sent, as the robot's ROS said it back, and as it
+ * was measured.
+ *
+ * @param {RobotReport} report
+ * @returns {{name: string, text: string}[]}
+ */
+export function motions({ sent, echoed, measured }) {
+  const text = (/** @type {readonly number[] | null} */ velocity) => {
+    const speed = speedAlong(velocity);
+    if (speed === null || !velocity) return "not known";
+    return `${signed(speed)} m/s, ${signed(velocity[2])} rad/s`;
+  };
+  return [
+    { name: "Sent", text: text(sent) },
+    { name: "Echoed", text: text(echoed) },
+    { name: "Measured", text: text(measured) },
+  ];
+}
+
+/**
+ * Say how long things take, and how the robot would stop.
+ *
+ * @param {RobotReport} report
+ * @param {number | null} loop How long commands take to the gate and back, in ms.
+ * @param {number | null} motion How long from the last press to motion, in ms.
+ * @returns {{name: string, text: string}[]}
+ */
+export function timings(report, loop, motion) {
+  const age = report.age ?? loop;
+  const distance = stoppingDistance(report);
+  return [
+    { name: "Loop", text: age === null ? "not known" : `${Math.round(age)} ms` },
+    { name: "To motion", text: motion === null ? "not known" : `${Math.round(motion)} ms` },
+    { name: "To a stop", text: distance === null ? "stands" : `${distance.toFixed(2)} m` },
+  ];
+}
+
+/**
+ * Say within what time the robot stops when nothing tells it to.
+ *
+ * @param {RobotReport} report
+ * @returns {string} "" when an older gate does not say.
+ */
+export function ownStop({ stop_time, stop_source, stop_date }) {
+  if (stop_time === undefined) return "";
+  if (stop_time === null) return "Nobody knows whether it stops by itself.";
+  const how = stop_source === "tested" ? `tested ${stop_date ?? ""}`.trim() : "stated";
+  return `Stops by itself within ${stop_time.toFixed(2)} s (${how}).`;
+}
+
+/** @param {number} value */
+function signed(value) {
+  const text = Math.abs(value).toFixed(2);
+  return value < 0 && Number(text) !== 0 ? `\u2212${text}` : text;
+}

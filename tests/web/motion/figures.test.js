@@ -1,0 +1,84 @@
+import assert from "node:assert/strict";
+import { describe, test } from "node:test";
+
+import {
+  motions,
+  ownStop,
+  speedAlong,
+  speedNow,
+  stoppingDistance,
+  timings,
+} from "../../../src/webmap/web/motion/figures.js";
+
+function report(fields = {}) {
+  const known = { reaction: 0.6, brake: 0.5, state: "driving" };
+  return { sent: [0.4, 0, 0], echoed: null, measured: [0.4, 0, 0], ...known, ...fields };
+}
+
+describe("a speed", () => {
+  test("is along the ground and below zero backwards", () => {
+    assert.equal(speedAlong([0.3, 0.4, 9]), 0.5);
+    assert.equal(speedAlong([-0.3, 0.4, 9]), -0.5);
+    assert.equal(speedAlong([0, 0.4, 0]), 0.4);
+    assert.equal(speedAlong(null), null);
+    assert.equal(speedAlong([NaN, 0, 0]), null);
+  });
+
+  test("of now is the measured one, else the best there is", () => {
+    const echoed = [0.2, 0, 0];
+    assert.equal(speedNow(report({ echoed, sent: [0.1, 0, 0] })), 0.4);
+    assert.equal(speedNow(report({ echoed, measured: null })), 0.2);
+    assert.equal(speedNow(report({ measured: null })), 0.4);
+  });
+});
+
+describe("the way to a stop", () => {
+  test("is the reaction at the speed of now, and then the braking", () => {
+    assert.ok(Math.abs(stoppingDistance(report()) - (0.24 + 0.16)) < 1e-9);
+  });
+
+  test("is none for a robot that stands or that nobody drives", () => {
+    assert.equal(stoppingDistance(report({ measured: [0.019, 0, 0.5] })), null);
+    assert.equal(stoppingDistance(report({ state: "free" })), null);
+  });
+
+  test("is there while a stopped robot still moves", () => {
+    assert.ok(stoppingDistance(report({ state: "stopped" })) > 0);
+  });
+
+  test("is assumed on the safe side where an older gate says nothing", () => {
+    const older = report({ reaction: undefined, brake: undefined });
+    assert.ok(Math.abs(stoppingDistance(older) - (0.4 + 0.16)) < 1e-9);
+  });
+
+  test("is not told when it has no end", () => {
+    assert.equal(stoppingDistance(report({ brake: 0 })), null);
+  });
+});
+
+test("one motion is told three times", () => {
+  const told = motions(report({ measured: [-0.3, 0, -0.001] }));
+  assert.deepEqual(told, [
+    { name: "Sent", text: "0.40 m/s, 0.00 rad/s" },
+    { name: "Echoed", text: "not known" },
+    { name: "Measured", text: "\u22120.30 m/s, 0.00 rad/s" },
+  ]);
+});
+
+test("times are the gate's own where it gives them", () => {
+  const texts = (...about) => timings(...about).map(({ text }) => text);
+  assert.deepEqual(texts(report({ age: 41.6 }), 55, 230), ["42 ms", "230 ms", "0.40 m"]);
+  assert.deepEqual(texts(report({ age: null }), 55, null)[0], "55 ms");
+  const standing = report({ measured: [0, 0, 0] });
+  assert.deepEqual(texts(standing, null, null), ["not known", "not known", "stands"]);
+});
+
+test("how a robot stops by itself is said with where that is known from", () => {
+  const said = (stop_time, stop_source, stop_date) =>
+    ownStop({ stop_time, stop_source, stop_date });
+  assert.equal(said(undefined), "");
+  assert.equal(said(null, null, null), "Nobody knows whether it stops by itself.");
+  assert.equal(said(0.25, "stated", null), "Stops by itself within 0.25 s (stated).");
+  const tested = "Stops by itself within 0.31 s (tested 2026-11-21).";
+  assert.equal(said(0.31, "tested", "2026-11-21"), tested);
+});

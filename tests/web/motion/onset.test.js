@@ -1,0 +1,62 @@
+import assert from "node:assert/strict";
+import { beforeEach, test } from "node:test";
+
+import { Onset } from "../../../src/webmap/web/motion/onset.js";
+
+const STILL = { robot: "r1", measured: [0, 0, 0] };
+const GOING = { robot: "r1", measured: [0.1, 0, 0] };
+
+let onset;
+
+beforeEach(() => {
+  onset = new Onset();
+  onset.report(STILL, 0);
+});
+
+test("motion is measured from the first command that asks for it", () => {
+  onset.sent("r1", false, 900);
+  onset.sent("r1", true, 1000);
+  onset.sent("r1", true, 1050);
+  onset.report(STILL, 1100);
+  assert.equal(onset.delay("r1"), null);
+  onset.report(GOING, 1230);
+  assert.equal(onset.delay("r1"), 230);
+});
+
+test("turning is motion, too", () => {
+  onset.sent("r1", true, 1000);
+  onset.report({ robot: "r1", measured: [0, 0, -0.2] }, 1150);
+  assert.equal(onset.delay("r1"), 150);
+});
+
+test("a robot that moves already tells nothing", () => {
+  onset.report(GOING, 500);
+  onset.sent("r1", true, 1000);
+  onset.report(GOING, 1100);
+  assert.equal(onset.delay("r1"), null);
+});
+
+test("motion that comes after the release, or much later, was not ours", () => {
+  onset.sent("r1", true, 1000);
+  onset.sent("r1", false, 1050);
+  onset.report(GOING, 1100);
+  onset.report(STILL, 1200);
+  onset.sent("r1", true, 2000);
+  onset.report(GOING, 9000);
+  assert.equal(onset.delay("r1"), null);
+});
+
+test("another robot's motion, and odometry that is silent, say nothing", () => {
+  onset.sent("r1", true, 1000);
+  onset.report({ ...GOING, robot: "r2" }, 1100);
+  onset.report({ robot: "r1", measured: null }, 1150);
+  assert.equal(onset.delay("r1"), null);
+  assert.equal(onset.delay("r2"), null);
+});
+
+test("what is gone is forgotten", () => {
+  onset.sent("r1", true, 1000);
+  onset.report(GOING, 1230);
+  onset.gone("r1");
+  assert.equal(onset.delay("r1"), null);
+});

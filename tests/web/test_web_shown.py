@@ -1,0 +1,111 @@
+"""What a person sees of a robot that is driven, in a real Chromium."""
+
+import pytest
+from hands_bench import Bench
+
+pytestmark = pytest.mark.browser
+
+HALO = ".stopping-halo"
+
+
+def test_a_halo_shows_how_far_a_driven_robot_gets(bench: Bench) -> None:
+    moving = {"state": "driving", "measured": [0.4, 0, 0]}
+    bench.gate.change("r1", **moving, reaction=0.6, brake=0.5)
+    bench.page.wait_for_selector(HALO)
+    halo = bench.page.locator(HALO)
+    assert float(halo.get_attribute("r")) == pytest.approx(0.4)
+    assert (halo.get_attribute("cx"), halo.get_attribute("cy")) == ("1", "1")
+    bench.page.evaluate(
+        "document.querySelector('[data-robot=r1]')"
+        ".setAttribute('transform', 'translate(2 3) rotate(90)')"
+    )
+    bench.until(lambda: halo.get_attribute("cx") == "2")
+    assert halo.get_attribute("cy") == "3"
+    bench.gate.change("r1", measured=[0.01, 0, 0])
+    bench.until(lambda: halo.count() == 0)
+
+
+def test_the_halo_is_no_obstacle_to_a_click_on_the_robot(bench: Bench) -> None:
+    bench.gate.change("r1", state="driving", measured=[1, 0, 0])
+    bench.page.wait_for_selector(HALO)
+    box = bench.page.locator("#map1").bounding_box()
+    bench.page.mouse.click(box["x"] + 440, box["y"] + 110)
+    assert bench.page.evaluate("bench.maps[0].selected") == "r1"
+
+
+def test_what_was_sent_echoed_and_measured_stand_side_by_side(bench: Bench) -> None:
+    bench.drive()
+    bench.gate.change(
+        "r1", sent=[0.3, 0, 0], echoed=[0.2, 0, 0], measured=[-0.1, 0, 0.5], age=42.0
+    )
+    figures = bench.page.locator(".webmap-teleop-figures dd")
+    bench.until(lambda: figures.nth(0).inner_text() == "0.30 m/s, 0.00 rad/s")
+    assert figures.nth(1).inner_text() == "0.20 m/s, 0.00 rad/s"
+    assert figures.nth(2).inner_text() == "\u22120.10 m/s, 0.50 rad/s"
+    assert figures.nth(3).inner_text() == "42 ms"
+    bench.until(lambda: figures.nth(4).inner_text().endswith(" ms"))
+
+
+def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
+    bench.select("r1")
+    tested = {"stop_source": "tested", "stop_date": "2026-11-21"}
+    bench.gate.change("r1", stop_time=0.31, **tested)
+    own = bench.page.locator(".webmap-teleop-own")
+    words = "Stops by itself within 0.31 s (tested 2026-11-21)."
+    bench.until(lambda: own.inner_text() == words)
+    bench.gate.change("r1", test={"state": "creeping", "text": "Creeping at 0.1 m/s"})
+    test = bench.page.locator(".webmap-teleop-test")
+    bench.until(lambda: test.inner_text() == "Creeping at 0.1 m/s")
+
+
+def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
+    alarm = bench.page.get_by_role("alert")
+    alarm.wait_for(timeout=5000)
+    said = alarm.inner_text()
+    assert "ROBOT NOT OBEYING" in said
+    assert "Use the hardware stop." in said
+    assert "Robot r1: zero sent, still moving at 0.31 m/s" in said
+    alarm.get_by_role("button", name="Stop all").click()
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
+    bench.page.keyboard.press("Shift+Escape")
+    bench.until(lambda: len(bench.gate.of("stop")) == 2)
+    bench.gate.change("r1", alarm="zero sent, still moving at 0.12 m/s")
+    bench.until(lambda: "0.12" in alarm.inner_text())
+    bench.page.get_by_role("button", name="I have seen this").click()
+    alarm.wait_for(state="detached")
+    bench.gate.change("r1", alarm="zero sent, still moving at 0.11 m/s")
+    bench.page.wait_for_timeout(200)
+    assert alarm.count() == 0, "what was seen does not come again"
+    bench.gate.change("r1", alarm=None)
+    bench.page.wait_for_timeout(200)
+    bench.gate.change("r1", alarm="zero sent, still moving at 0.40 m/s")
+    alarm.wait_for(timeout=5000)
+
+
+def test_a_robots_line_has_a_width_that_any_word_of_the_user_overrides(
+    bench: Bench,
+) -> None:
+    bench.page.add_style_tag(url="/_webmap/webmap.css")
+    widths = bench.page.evaluate(
+        """() => {
+            const robot = document.querySelector('[data-robot=r1]');
+            const add = (attributes) => {
+                const path = document.createElementNS(robot.namespaceURI, 'path');
+                for (const [name, value] of Object.entries(attributes)) {
+                    path.setAttribute(name, value);
+                }
+                robot.append(path);
+                return getComputedStyle(path).strokeWidth;
+            };
+            const own = [
+                add({}), add({'stroke-width': '0.2'}),
+                add({'vector-effect': 'non-scaling-stroke'}),
+                add({'vector-effect': 'non-scaling-stroke', 'stroke-width': '4'}),
+            ];
+            robot.setAttribute('stroke-width', '0.5');
+            return [...own, getComputedStyle(robot).strokeWidth];
+        }"""
+    )
+    assert widths == ["0.03px", "0.2px", "1px", "4px", "0.5px"]
