@@ -77,6 +77,17 @@ test-parallel: $(DEV) $(NODE)
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial
 
+## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50)
+.PHONY: test-safety
+TRIALS ?= 50
+FIGURES := docs/_build/safety-figures.jsonl
+test-safety: $(DEV) $(NODE)
+	mkdir -p $(dir $(FIGURES))
+	rm -f $(FIGURES)
+	WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_FIGURES=$(FIGURES) \
+	  $(BIN)/pytest -q --timeout 3600 tests/safety
+	$(PY) tests/safety/safety_figures.py $(FIGURES)
+
 ## docs: the documentation, in docs/_build/html
 .PHONY: docs
 docs: $(DEV)

@@ -49,6 +49,14 @@ def test_a_cut_link_excuses_a_missing_zero_if_the_next_velocity_is_one():
     assert found == "2.100 s: the first velocity after a cut is not zero"
 
 
+def test_a_link_may_deliver_late_what_it_had_taken_but_no_more_than_that():
+    cut = [(100.9, 102.0)]
+    log = told(*drive(zeros=0.0), (2.1, 0.5), (2.1, 0.5), (2.1, 0.0))
+    assert check_invariants(log, Bounds(late=2), unreachable=cut) == []
+    (found,) = check_invariants(log, Bounds(late=1), unreachable=cut)
+    assert found == "2.100 s: 2 velocities after a cut come before the first zero"
+
+
 @pytest.mark.parametrize("vx", [0.6, -0.6, math.nan, math.inf])
 def test_a_velocity_beyond_the_limit_is_found(vx):
     found = check_invariants(told((0, vx), (0.05, 0)), Bounds(v_max=0.5))

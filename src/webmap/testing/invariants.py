@@ -34,6 +34,9 @@ class Bounds:
     zeros: float = 0.5
     """Seconds for which zeros go on after a stop; then there is silence."""
 
+    late: int = 0
+    """How many moving velocities a link that was cut may have kept and deliver late."""
+
     slack: float = 0.1
     """Seconds by which the machine may have been late in all of this."""
 
@@ -128,18 +131,23 @@ def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
 def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
     """The last velocity of any activity is zero.
 
-    If the robot could not be reached then, the first one that reaches it is.
+    If the robot could not be reached then, the first one that reaches it is, but for
+    the few that the link had taken before.
     """
-    for told, following in itertools.zip_longest(log, log[1:]):
+    for index, told in enumerate(log):
+        following = log[index + 1] if index + 1 < len(log) else None
         over = following is None or following.at - told.at > BREATH
         if told.is_zero or not over:
             continue
         until = math.inf if following is None else following.at
-        cut = any(b < until and e > told.at for b, e in story.unreachable)
-        if not cut:
+        if not any(b < until and e > told.at for b, e in story.unreachable):
             yield told.at, "an activity ended with a velocity that is not zero"
-        elif following is not None and not following.is_zero:
-            yield following.at, "the first velocity after a cut is not zero"
+            continue
+        late = list(itertools.takewhile(lambda t: not t.is_zero, log[index + 1 :]))
+        if len(late) > bounds.late:
+            what = f"{len(late)} velocities" if bounds.late else "the first velocity"
+            is_not = "come before the first" if bounds.late else "is not"
+            yield late[0].at, f"{what} after a cut {is_not} zero"
 
 
 def _handovers(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:

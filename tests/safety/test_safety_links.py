@@ -1,0 +1,154 @@
+"""Everything that can happen to the two links while a person holds W."""
+
+import time
+
+import pytest
+from safety_bench import ROBOT_TIMEOUT, SLOW, pass_time, wait_for
+
+from webmap.testing import Shape
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+PROMISED = 0.3
+"""Seconds from the fault to the first zero at the robot (S1)."""
+
+BLIND = 0.55
+"""The same when commands still come but the browser hears nothing any more: the age
+limit of 300 ms has to pass before the dead-man's time begins (S1, worst case)."""
+
+BY_ITSELF = ROBOT_TIMEOUT + 0.05
+"""Seconds until a robot stands that no zero reaches: its own timeout and its brakes."""
+
+
+@pytest.mark.parametrize("way", ["up", "down", "both"])
+def test_a_stall_between_browser_and_display_stops_the_robot(bench, way):
+    def back():
+        pass_time(2.0)
+        bench.web_hop.release()
+
+    names = {"up": "to the display", "down": "to the browser", "both": "both ways"}
+    bench.prove(
+        f"the browser's link stalls for 2 s, {names[way]}",
+        lambda: bench.web_hop.hold(way),
+        within=BLIND if way == "down" else PROMISED,
+        back=back,
+    )
+
+
+def test_a_reset_between_browser_and_display_stops_the_robot(bench):
+    bench.prove(
+        "the browser's link is reset",
+        bench.web_hop.reset,
+        within=PROMISED,
+        watch=1.5,
+    )
+
+
+def test_a_half_that_the_browser_closes_stops_the_robot(bench):
+    bench.prove(
+        "half of the browser's link is closed",
+        lambda: bench.web_hop.half_close("up"),
+        within=PROMISED,
+        watch=1.5,
+    )
+
+
+def test_latency_between_browser_and_display_stops_the_robot(bench):
+    def back():
+        pass_time(1.0)
+        bench.web_hop.shape(Shape())
+
+    bench.prove(
+        "the browser's link gets 400 ms of latency each way",
+        lambda: bench.web_hop.shape(SLOW),
+        within=PROMISED,
+        back=back,
+    )
+
+
+@pytest.mark.parametrize("seconds", [0.7, 1.5, 3.0])
+def test_a_stall_between_gate_and_robot_ends_with_few_late_words_and_a_zero(
+    bench, seconds
+):
+    released = []
+
+    def back():
+        wait_for(lambda: time.monotonic() > bench.fault_at + seconds, "the stall")
+        released.append(time.monotonic())
+        bench.robot_hop.release()
+
+    bench.prove(
+        f"the robot's link stalls for {seconds:g} s",
+        bench.robot_hop.hold,
+        within=BY_ITSELF,
+        back=back,
+        stops_by="itself",
+        few_late=6,
+        watch=1.0,
+    )
+
+
+def test_a_reset_between_gate_and_robot_stops_the_robot(bench):
+    bench.prove(
+        "the robot's link is reset",
+        bench.robot_hop.reset,
+        within=BY_ITSELF,
+        stops_by="itself",
+        watch=1.5,
+    )
+
+
+def test_a_half_that_the_gate_closes_stops_the_robot(bench):
+    bench.prove(
+        "half of the robot's link is closed",
+        lambda: bench.robot_hop.half_close("up"),
+        within=BY_ITSELF,
+        stops_by="itself",
+        watch=1.5,
+    )
+
+
+def test_latency_between_gate_and_robot_stops_the_robot(bench):
+    def back():
+        pass_time(1.0)
+        bench.robot_hop.shape(Shape())
+
+    # What was written before the doubt, 300 ms, is still on its way for 400 ms.
+    bench.prove(
+        "the robot's link gets 400 ms of latency each way",
+        lambda: bench.robot_hop.shape(SLOW),
+        within=0.3 + SLOW.latency + 0.1,
+        back=back,
+        watch=1.0,
+    )
+
+
+def test_a_rosbridge_that_is_killed_and_restarted_moves_nothing(bench):
+    def back():
+        pass_time(0.5)
+        bench.robot.restart_bridge()
+
+    bench.prove(
+        "rosbridge is killed and started again",
+        bench.robot.kill_bridge,
+        within=BY_ITSELF,
+        back=back,
+        stops_by="itself",
+        watch=2.0,
+    )
+
+
+def test_a_robot_that_falls_silent_is_stopped(bench):
+    def fall_silent():
+        bench.robot.sends_telemetry = False
+
+    def back():
+        bench.robot.sends_telemetry = True
+
+    bench.prove(
+        "odometry ceases",
+        fall_silent,
+        within=1.0 + 0.05,
+        back=back,
+        watch=1.0,
+    )

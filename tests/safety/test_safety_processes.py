@@ -1,0 +1,112 @@
+"""Everything that can happen to our own processes while a person holds W."""
+
+import signal
+import time
+
+import pytest
+from safety_bench import ROBOT_TIMEOUT, pass_time, wait_for
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+PROMISED = 0.3
+"""Seconds from the fault to the first zero at the robot (S1, S14)."""
+
+BY_ITSELF = ROBOT_TIMEOUT + 0.05
+"""Seconds until a robot stands to which nobody can speak: its timeout and brakes."""
+
+
+def test_a_killed_display_stops_the_robot(bench):
+    def back():
+        bench.end_display()
+        bench.start_display()
+        # The page that was there has a key down still; then it is opened anew.
+        bench.repeat_press()
+        pass_time(1.0)
+        bench.close_page()
+        bench.open_page()
+
+    bench.prove(
+        "the display is killed",
+        bench.display_kill,
+        within=PROMISED,
+        back=back,
+    )
+
+
+def test_a_stopped_display_stops_the_robot(bench):
+    def send(sig):
+        bench.display.popen.send_signal(sig)
+
+    def back():
+        pass_time(1.5)
+        send(signal.SIGCONT)
+
+    bench.prove(
+        "the display is stopped (SIGSTOP) for 2 s",
+        lambda: send(signal.SIGSTOP),
+        within=PROMISED,
+        back=back,
+        watch=1.5,
+    )
+
+
+def test_a_display_whose_user_code_holds_the_interpreter_stops_the_robot(bench):
+    bench.prove(
+        "user code holds the interpreter for 2 s",
+        lambda: bench.robot.publish("/hold", {"data": 2.0}),
+        within=PROMISED,
+        back=lambda: pass_time(3.0),
+        watch=1.0,
+    )
+
+
+def test_letting_go_stops_the_robot_while_user_code_blocks(bench):
+    def let_go_while_it_blocks():
+        bench.let_go()
+
+    def block():
+        bench.robot.publish("/block", {"data": 2.0})
+        begun = time.monotonic()
+        wait_for(lambda: time.monotonic() > begun + 0.8, "most of a second")
+        assert bench.steady(), "the robot does not go on while user code blocks"
+
+    bench.prove(
+        "user code blocks for 2 s, then the key is let go",
+        let_go_while_it_blocks,
+        before=block,
+        within=0.1,
+        held_after=False,
+        back=lambda: pass_time(1.5),
+    )
+
+
+def test_a_robot_stops_by_itself_when_the_gate_is_killed(bench):
+    bench.prove(
+        "the gate is killed",
+        lambda: bench.gate.kill(),
+        within=BY_ITSELF,
+        back=bench.wait_for_gate,
+        stops_by="itself",
+        watch=1.5,
+    )
+
+
+def test_a_robot_stops_by_itself_when_the_gate_is_stopped(bench):
+    stopped = []
+
+    def stop():
+        stopped.append(bench.gate)
+        stopped[-1].suspend()
+
+    def back():
+        pass_time(1.0)
+        stopped[-1].resume()
+
+    bench.prove(
+        "the gate is stopped (SIGSTOP) for 1.5 s",
+        stop,
+        within=BY_ITSELF,
+        back=back,
+        stops_by="itself",
+        watch=1.5,
+    )
