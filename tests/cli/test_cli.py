@@ -35,7 +35,7 @@ def start(*arguments):
 def test_help_names_every_command():
     said = run("--help")
     assert said.returncode == 0
-    for command in ("demo", "view", "run", "sim"):
+    for command in ("demo", "view", "discover", "doctor", "run", "check", "sim"):
         assert re.search(rf"^  {command} ", said.stdout, re.M)
         assert run(command, "--help").returncode == 0
 
@@ -54,6 +54,10 @@ def test_version_is_the_packages():
         (("view", "http://robot:9090"), "ws://"),
         (("view", "ws://127.0.0.1:1", "--robot", "Bob"), "NAME:ODOM:CMD_VEL:SCAN"),
         (("run", "nowhere.py"), "nowhere.py"),
+        (("check", "nowhere.toml"), "nowhere.toml"),
+        (("discover",), "Missing argument"),
+        (("discover", "http://robot:9090"), "ws://"),
+        (("doctor", "http://robot:9090"), "ws://"),
         (("sim", "--map", "nowhere.yaml"), "nowhere.yaml"),
         (("sim", "--flat", "--robots", "2"), "one robot only"),
         (("demo", "--host", "0.0.0.0"), "--insecure-lan"),

@@ -11,6 +11,7 @@ COMMANDS = {
     "check": "webmap.cli.check:check",
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
+    "doctor": "webmap.cli.doctor:doctor",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
     "view": "webmap.cli.view:view",
@@ -47,6 +48,7 @@ def cli() -> None:
     webmap demo                    two simulated robots, to try everything
     webmap view ws://robot:9090    the robots behind a rosbridge
     webmap discover ws://...       which robots are there, and why it thinks so
+    webmap doctor ws://...         what would be in the way of driving
     webmap run FILE.py             your own page, in Python
     webmap run FILE.toml           the robots of a fleet file
     webmap check FILE.toml         what is wrong in a fleet file

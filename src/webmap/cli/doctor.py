@@ -1,0 +1,64 @@
+"""``webmap doctor URL``: what would be in the way of driving."""
+
+import asyncio
+import sys
+
+import click
+
+from webmap.cli.options import verbose_option
+
+
+@click.command()
+@click.argument("url", nargs=-1, required=True)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0.5, 60.0),
+    default=3.0,
+    show_default=True,
+    help="How long to listen to odometry and scans.",
+)
+@click.option(
+    "--wait",
+    type=click.FloatRange(0.0),
+    default=5.0,
+    show_default=True,
+    help="Seconds to wait for a rosbridge that cannot be reached.",
+)
+@click.option(
+    "--ask-parameters",
+    is_flag=True,
+    help="Ask rosapi for a parameter of rosbridge too, which tells whether a service "
+    "that hangs blocks its socket.",
+)
+@verbose_option
+def doctor(
+    url: tuple[str, ...], seconds: float, wait: float, ask_parameters: bool
+) -> None:
+    """Look at a rosbridge and the robots behind it, and say what to do.
+
+    Nothing is driven, published or changed. The exit code is 1 if anything is wrong.
+    """
+    from webmap.discovery.doctor import is_ready, judge
+    from webmap.discovery.doctor.measure import observe
+    from webmap.discovery.doctor.verdict import report
+    from webmap.ros.names import normalise_url
+
+    ready = True
+    for number, address in enumerate([normalise_url(text) for text in url]):
+
+        def waiting(why: str, address: str = address) -> None:
+            click.echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
+
+        seen = asyncio.run(
+            observe(
+                address,
+                wait=wait,
+                seconds=seconds,
+                ask_parameters=ask_parameters,
+                waiting=waiting,
+            )
+        )
+        findings = judge(seen)
+        ready &= is_ready(findings)
+        click.echo("\n" * bool(number) + report(address, findings))
+    sys.exit(0 if ready else 1)

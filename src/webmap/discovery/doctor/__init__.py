@@ -1,0 +1,11 @@
+"""The readiness check: what would be in the way of driving, and what to do about it.
+
+:func:`~webmap.discovery.doctor.measure.observe` looks, and
+:func:`~webmap.discovery.doctor.verdict.judge` decides; what it decides is plain data,
+so that a terminal and a page say the same.
+"""
+
+from webmap.discovery.doctor.observed import Finding, Heard, Observed
+from webmap.discovery.doctor.verdict import is_ready, judge
+
+__all__ = ["Finding", "Heard", "Observed", "is_ready", "judge"]

@@ -1,0 +1,159 @@
+"""What the readiness check says of a bridge."""
+
+import ipaddress
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+from webmap.discovery.doctor.observed import Clock, Finding, Observed
+
+ABOUT = "bridge"
+
+SLOW_LOOP = 0.15
+"""Seconds of a round trip from which driving is slowed down."""
+
+NO_LOOP = 0.3
+"""Seconds from which there is none: no command is that fresh."""
+
+CLOCK_OFF = 0.5
+SIMULATED = 365 * 24 * 3600.0
+"""Seconds of difference from which the robot's clock is a simulator's."""
+
+
+def bridge_findings(seen: Observed) -> Iterator[Finding]:
+    """Say what holds for the link and for everything behind it."""
+    if seen.trouble:
+        yield Finding(
+            "wrong",
+            ABOUT,
+            f"The rosbridge cannot be reached: {seen.trouble}.",
+            "Start rosbridge_server on the robot, and look at address and firewall.",
+        )
+        return
+    yield _openness(seen)
+    yield _rosapi(seen)
+    if seen.clock is not None:
+        yield from _clock(seen.clock)
+    elif not seen.rosapi:
+        yield Finding(
+            "note", ABOUT, "rosapi does not tell the time, so clocks are not compared."
+        )
+    yield _blocking(seen)
+    yield _compression(seen)
+
+
+def is_loopback(address: str) -> bool:
+    """Tell whether only this machine reaches an address."""
+    try:
+        return ipaddress.ip_address(address.partition("%")[0]).is_loopback
+    except ValueError:
+        return address == "localhost"
+
+
+def _openness(seen: Observed) -> Finding:
+    parts = urlsplit(seen.url)
+    if is_loopback(seen.peer or parts.hostname or ""):
+        return Finding(
+            "good", ABOUT, "The rosbridge was reached at an address of this machine."
+        )
+    secret = (
+        "the way there is encrypted"
+        if parts.scheme == "wss"
+        else "everybody on the way can read and change what is sent"
+    )
+    return Finding(
+        "note" if parts.scheme == "wss" else "warning",
+        ABOUT,
+        f"The rosbridge is open to the network ({seen.peer or parts.hostname}): it "
+        f"asks nobody who they are, so whoever reaches it can drive; {secret}.",
+        "Let it listen on the robot alone or on a VPN (address), hide what nobody "
+        "needs (topics_glob, services_glob), and use wss with a certificate.",
+    )
+
+
+def _rosapi(seen: Observed) -> Finding:
+    if seen.rosapi:
+        return Finding(
+            "warning",
+            ABOUT,
+            f"rosapi does not say which topics there are: {seen.rosapi}.",
+            "Start the rosapi node beside rosbridge; until then name robots with "
+            "--robot NAME:ODOM:CMD_VEL:SCAN.",
+        )
+    number = len(seen.findings.robots)
+    if not number:
+        said = " ".join(seen.findings.notes)
+        advice = "Name the robot with --robot NAME:ODOM:CMD_VEL:SCAN."
+        return Finding("wrong", ABOUT, f"No robot was found. {said}", advice)
+    names = ", ".join(robot.name for robot in seen.findings.robots)
+    return Finding("good", ABOUT, f"rosapi answers; robots found: {names}.")
+
+
+def _clock(clock: Clock) -> Iterator[Finding]:
+    trip = f"A call takes {clock.round_trip * 1000:.0f} ms there and back"
+    near = "Bring both ends nearer, by cable or by a better radio link."
+    if clock.round_trip > NO_LOOP:
+        yield Finding("wrong", ABOUT, f"{trip}: too long to drive.", near)
+    elif clock.round_trip > SLOW_LOOP:
+        yield Finding("warning", ABOUT, f"{trip}: driving is slow to answer.", near)
+    else:
+        yield Finding("good", ABOUT, f"{trip}.")
+    off = abs(clock.ahead)
+    side = "ahead of" if clock.ahead > 0 else "behind"
+    if off > SIMULATED:
+        yield Finding(
+            "note", ABOUT, "The robot's clock is not this world's: a simulator's."
+        )
+    elif off - clock.round_trip / 2 > CLOCK_OFF:
+        yield Finding(
+            "warning",
+            ABOUT,
+            f"The robot's clock is {off:.1f} s {side} this machine's.",
+            "Let both take the time from one server (chrony, systemd-timesyncd). "
+            "WebMap decides nothing by them, but stamps of both do not fit together.",
+        )
+    else:
+        yield Finding("good", ABOUT, "Both clocks agree.")
+
+
+def _blocking(seen: Observed) -> Finding:
+    advice = (
+        "Set call_services_in_new_thread: true on rosbridge_websocket. WebMap sends "
+        "velocity and calls over different sockets in any case."
+    )
+    if seen.calls_in_threads is True:
+        return Finding("good", ABOUT, "A service that hangs blocks no socket.")
+    if seen.calls_in_threads is False:
+        return Finding(
+            "warning", ABOUT, "A service that hangs blocks its whole socket.", advice
+        )
+    if seen.findings.dialect is None:
+        return Finding(
+            "note",
+            ABOUT,
+            "Whether a service that hangs blocks its socket is not known.",
+        )
+    if seen.findings.dialect == "ros2":
+        return Finding(
+            "note",
+            ABOUT,
+            "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
+            "does unless told otherwise; it was not asked (--ask-parameters does).",
+            advice,
+        )
+    return Finding(
+        "good",
+        ABOUT,
+        "rosbridge for ROS 1 makes each call in a thread of its own.",
+    )
+
+
+def _compression(seen: Observed) -> Finding:
+    packed = [topic for topic, heard in seen.heard.items() if heard.binary]
+    words = (
+        "The socket could be compressed"
+        if seen.deflate
+        else "No compression is offered"
+    )
+    if packed:
+        words = f"Scans come packed as CBOR ({', '.join(packed)}). {words}"
+    return Finding("good", ABOUT, f"{words}; WebMap does without.")

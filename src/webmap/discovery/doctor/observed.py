@@ -1,0 +1,102 @@
+"""What the readiness check saw, and what it says."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+from webmap.discovery.found import Findings
+
+Level: TypeAlias = Literal["wrong", "warning", "note", "good"]
+"""``wrong``: it will not work, or not safely. ``note``: cannot be told from here."""
+
+LEVELS: tuple[Level, ...] = ("wrong", "warning", "note", "good")
+"""All levels, the worst first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was found out."""
+
+    level: Level
+    about: str
+    """A robot's name, or ``bridge``."""
+
+    words: str
+    """What is so, in a sentence."""
+
+    advice: str = ""
+    """What to do about it, in a sentence; empty if nothing is to be done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What came on one topic while it was listened to."""
+
+    count: int = 0
+    seconds: float = 0.0
+    """How long it was listened to."""
+
+    longest_gap: float = 0.0
+    """The longest time without a message, in seconds, to the end of listening."""
+
+    bytes: int = 0
+    frame: str = ""
+    """The frame that the newest message names."""
+
+    stamp: float | None = None
+    """The newest message's stamp, in seconds of the robot's clock; None if unset."""
+
+    arrived: float = 0.0
+    """When it came in, in seconds of this machine's wall clock."""
+
+    binary: bool = False
+    """Whether messages came as CBOR."""
+
+    trouble: str = ""
+    """Why a message could not be read."""
+
+    @property
+    def rate(self) -> float:
+        """Messages a second."""
+        return self.count / self.seconds if self.seconds else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The robot's clock beside this machine's."""
+
+    ahead: float
+    """Seconds by which the robot's is ahead."""
+
+    round_trip: float
+    """Seconds that asking took; the offset is known to half of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """All that was seen of one bridge and the robots behind it."""
+
+    url: str
+    trouble: str = ""
+    """Why the bridge could not be reached, empty if it was."""
+
+    peer: str = ""
+    """The address that answered."""
+
+    deflate: bool = False
+    """Whether the bridge would compress its socket."""
+
+    rosapi: str = ""
+    """Why the topics are not known, empty if they are."""
+
+    findings: Findings = field(default_factory=Findings)
+    clock: Clock | None = None
+    publishers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """The nodes that publish on a topic, where rosapi said so."""
+
+    subscribers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """The nodes that listen to a topic, where rosapi said so."""
+
+    heard: Mapping[str, Heard] = field(default_factory=dict)
+    calls_in_threads: bool | None = None
+    """Whether the bridge makes calls in threads of their own, if it said so."""

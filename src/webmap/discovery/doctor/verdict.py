@@ -1,0 +1,47 @@
+"""All that the readiness check says, in order."""
+
+from collections.abc import Sequence
+
+from webmap.discovery.doctor.bridge_rules import bridge_findings
+from webmap.discovery.doctor.observed import LEVELS, Finding, Observed
+from webmap.discovery.doctor.robot_rules import robot_findings
+
+MARKS = {"wrong": "WRONG", "warning": "warning", "note": "note", "good": "good"}
+
+
+def judge(seen: Observed) -> list[Finding]:
+    """Return what is to be said, the bridge first, then each robot, worst first."""
+    groups = [list(bridge_findings(seen))]
+    groups += [list(robot_findings(one, seen)) for one in seen.findings.robots]
+    return [
+        finding
+        for group in groups
+        for finding in sorted(group, key=lambda each: LEVELS.index(each.level))
+    ]
+
+
+def is_ready(findings: Sequence[Finding]) -> bool:
+    """Tell whether nothing is wrong."""
+    return not any(finding.level == "wrong" for finding in findings)
+
+
+def report(url: str, findings: Sequence[Finding]) -> str:
+    """Return the findings for a terminal."""
+    lines = [url]
+    about = ""
+    for finding in findings:
+        if finding.about != about:
+            about = finding.about
+            lines += ["", about]
+        lines.append(f"  {MARKS[finding.level]:<8} {_printable(finding.words)}")
+        if finding.advice:
+            lines.append(f"           -> {finding.advice}")
+    counts = [
+        f"{sum(each.level == level for each in findings)} {level}" for level in LEVELS
+    ]
+    return "\n".join([*lines, "", ", ".join(counts)])
+
+
+def _printable(text: str) -> str:
+    # Names of nodes and frames come from the robot, and steer no terminal.
+    return "".join(char if char.isprintable() else "?" for char in text)

@@ -1,0 +1,55 @@
+"""``webmap doctor`` against the simulator, in both dialects."""
+
+import re
+import subprocess
+import sys
+
+from cli_simulator import simulator
+
+
+def webmap(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "webmap", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_robots_of_ros_1_are_ready(ros1):
+    said = webmap("doctor", ros1, "--seconds", "2")
+    assert said.returncode == 0, said.stdout
+    assert "0 wrong" in said.stdout
+    assert re.search(r"/robot_1/odom: 1\d\.\d|20\.\d messages a second", said.stdout)
+    assert "each call in a thread of its own" in said.stdout
+    assert "/robot_0/cmd_vel takes Twist," in said.stdout
+
+
+def test_ros_2_is_asked_nothing_that_ends_its_rosapi(ros2):
+    said = webmap("doctor", ros2, "--seconds", "1", "--ask-parameters")
+    assert said.returncode == 0, said.stdout
+    assert "takes TwistStamped" in said.stdout
+    assert "may block its whole socket" in said.stdout
+    assert "Scans come packed as CBOR (/base_scan)" in said.stdout
+    assert webmap("discover", ros2).returncode == 0, "rosapi is still there"
+
+
+def test_another_client_that_writes_velocity_is_noted():
+    from websockets.sync.client import connect
+
+    with (
+        simulator("--port", "0", "--robots", "1") as url,
+        connect(url, proxy=None) as other,
+    ):
+        other.send('{"op":"advertise","topic":"/robot_0/cmd_vel",'
+                   '"type":"geometry_msgs/Twist"}')  # fmt: skip
+        said = webmap("doctor", url, "--seconds", "1")
+    assert "writes to /robot_0/cmd_vel now" in said.stdout
+
+
+def test_a_bridge_that_is_away_is_wrong():
+    said = webmap("doctor", "ws://127.0.0.1:1", "--wait", "0")
+    assert said.returncode == 1
+    assert "WRONG    The rosbridge cannot be reached" in said.stdout
+    assert "Traceback" not in said.stderr

@@ -1,0 +1,226 @@
+"""What the readiness check decides."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from webmap.discovery import discover
+from webmap.discovery.doctor import Heard, Observed, is_ready, judge
+from webmap.discovery.doctor.listening import Listening
+from webmap.discovery.doctor.observed import Clock
+from webmap.discovery.doctor.verdict import report
+from webmap.ros.events import Publish
+
+TOPICS = {
+    "/odom": "nav_msgs/Odometry",
+    "/cmd_vel": "geometry_msgs/Twist",
+    "/scan": "sensor_msgs/LaserScan",
+}
+LISTENED = {
+    "/odom": Heard(60, 3.0, 0.06, 50_000, "odom", 99.97, 100.0),
+    "/scan": Heard(30, 3.0, 0.11, 90_000, "laser", 99.95, 100.0, binary=True),
+}
+GOOD = Observed(
+    "ws://localhost:9090",
+    peer="127.0.0.1",
+    findings=discover(TOPICS, "bob"),
+    clock=Clock(0.01, 0.004),
+    publishers={"/cmd_vel": ()},
+    subscribers={"/cmd_vel": ("/base",)},
+    heard=LISTENED,
+)
+
+
+def said(seen, words):
+    """The level of the only finding that says these words."""
+    (found,) = [each for each in judge(seen) if words in each.words]
+    if found.level in ("wrong", "warning"):
+        assert found.advice, "what to do is said"
+    return found.level
+
+
+def heard(**changes):
+    odometry = replace(LISTENED["/odom"], **changes)
+    return replace(GOOD, heard={**LISTENED, "/odom": odometry})
+
+
+def test_a_good_robot_is_ready_and_what_cannot_be_seen_is_a_note():
+    findings = judge(GOOD)
+    assert is_ready(findings)
+    assert {each.level for each in findings} == {"good", "note"}
+    assert said(GOOD, "stops by itself") == "note"
+
+
+def test_a_bridge_that_is_away_is_all_there_is_to_say():
+    findings = judge(Observed("ws://bob:9090", trouble="nothing listens there"))
+    assert [each.level for each in findings] == ["wrong"]
+    assert not is_ready(findings)
+
+
+@pytest.mark.parametrize(
+    ("url", "peer", "level"),
+    [
+        ("ws://localhost:9090", "::1", "good"),
+        ("ws://localhost:9090", "", "good"),
+        ("ws://bob:9090", "192.168.1.7", "warning"),
+        ("ws://bob:9090", "fe80::1%eth0", "warning"),
+        ("wss://bob:9090", "192.168.1.7", "note"),
+    ],
+)
+def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
+    findings = judge(replace(GOOD, url=url, peer=peer))
+    (found,) = [f for f in findings if "open to the" in f.words or "reached" in f.words]
+    assert found.level == level
+    assert ("topics_glob" in found.advice) is (level != "good")
+
+
+def test_a_bridge_without_rosapi_is_told_what_to_do():
+    bare = Observed("ws://localhost:9090", rosapi="no answer")
+    assert said(bare, "rosapi does not say") == "warning"
+    assert said(bare, "is not known") == "note"
+
+
+def test_no_robot_is_wrong():
+    empty = replace(GOOD, findings=discover({}))
+    assert said(empty, "No robot was found") == "wrong"
+
+
+@pytest.mark.parametrize(
+    ("ahead", "level", "words"),
+    [
+        (0.2, "good", "Both clocks agree"),
+        (3.0, "warning", "3.0 s ahead of"),
+        (-3600.0, "warning", "3600.0 s behind"),
+        (-1.7e9, "note", "a simulator's"),
+    ],
+)
+def test_clocks_are_compared(ahead, level, words):
+    assert said(replace(GOOD, clock=Clock(ahead, 0.004)), words) == level
+
+
+@pytest.mark.parametrize(
+    ("trip", "level"), [(0.02, "good"), (0.2, "warning"), (0.5, "wrong")]
+)
+def test_a_long_way_is_no_way_to_drive(trip, level):
+    assert said(replace(GOOD, clock=Clock(0.0, trip)), "there and back") == level
+
+
+def test_an_offset_within_half_the_way_is_no_offset():
+    assert said(replace(GOOD, clock=Clock(0.6, 0.28)), "Both clocks agree") == "good"
+
+
+@pytest.mark.parametrize(
+    ("dialect", "threads", "level"),
+    [
+        ("ros1", None, "good"),
+        ("ros2", None, "note"),
+        ("ros2", True, "good"),
+        ("ros2", False, "warning"),
+    ],
+)
+def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
+    findings = replace(GOOD.findings, dialect=dialect)
+    seen = replace(GOOD, findings=findings, calls_in_threads=threads)
+    (found,) = [f for f in judge(seen) if "hangs" in f.words or "of its own" in f.words]
+    assert found.level == level
+
+
+@pytest.mark.parametrize(
+    ("writers", "level", "words"),
+    [
+        ((), "good", "Nobody else writes"),
+        (("/joy", "/nav"), "warning", "other writers too: /joy, /nav"),
+        (("/rosbridge_websocket",), "note", "may be WebMap itself"),
+        (None, "note", "cannot be told"),
+    ],
+)
+def test_other_writers_of_velocity_are_named(writers, level, words):
+    publishers = {} if writers is None else {"/cmd_vel": writers}
+    assert said(replace(GOOD, publishers=publishers), words) == level
+
+
+def test_a_velocity_that_nobody_listens_to_is_wrong():
+    assert (
+        said(replace(GOOD, subscribers={"/cmd_vel": ()}), "Nobody listens") == "wrong"
+    )
+
+
+def test_the_type_of_velocity_is_said():
+    stamped = TOPICS | {"/cmd_vel": "geometry_msgs/msg/TwistStamped"}
+    seen = replace(GOOD, findings=discover(stamped, "bob"))
+    assert said(seen, "takes TwistStamped") == "good"
+
+
+def test_a_robot_without_velocity_or_place_is_warned_of():
+    blind = replace(GOOD, findings=discover({"/cmd_vel": "geometry_msgs/Twist"}))
+    assert said(blind, "Nothing says where it is") == "wrong"
+    fixed = replace(GOOD, findings=discover({"/odom": "nav_msgs/Odometry"}))
+    assert said(fixed, "seen and not driven") == "warning"
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "words"),
+    [
+        ({}, "good", "20.0 messages a second in the frame odom, 40 ms old"),
+        ({"count": 0}, "wrong", "Nothing came on /odom in 3 s"),
+        ({"trouble": "not JSON"}, "wrong", "/odom cannot be read: not JSON"),
+        ({"longest_gap": 1.4}, "wrong", "none for 1.4 s"),
+        ({"count": 9}, "warning", "3.0 messages a second"),
+        ({"stamp": 99.0}, "warning", "1.0 s old when they come"),
+        ({"stamp": 101.0}, "warning", "1.0 s ahead of the robot's own clock"),
+        ({"stamp": None}, "good", "in the frame odom."),
+    ],
+)
+def test_odometry_has_a_rate_and_an_age(changes, level, words):
+    assert said(heard(**changes), words) == level
+
+
+def test_a_silent_scan_is_a_warning_and_no_more():
+    seen = replace(GOOD, heard={**LISTENED, "/scan": Heard(seconds=3.0)})
+    assert said(seen, "Nothing came on /scan") == "warning"
+    assert is_ready(judge(seen))
+
+
+def test_the_worst_comes_first_for_each_robot():
+    levels = [each.level for each in judge(heard(count=0)) if each.about == "bob"]
+    assert levels == sorted(levels, key=["wrong", "warning", "note", "good"].index)
+
+
+def test_the_report_counts_and_lets_no_control_character_through():
+    odd = replace(GOOD, publishers={"/cmd_vel": ("/joy\x1b[2J",)})
+    text = report(odd.url, judge(odd))
+    assert "\x1b" not in text
+    assert text.endswith("0 wrong, 1 warning, 1 note, 9 good")
+
+
+def message(topic, stamp=(5, 250_000_000), frame="odom"):
+    header = {"stamp": {"sec": stamp[0], "nanosec": stamp[1]}, "frame_id": frame}
+    operation = {"op": "publish", "topic": topic, "msg": {"header": header}}
+    return Publish(topic, json.dumps(operation).encode())
+
+
+def test_messages_are_counted_with_the_longest_silence():
+    listening = Listening({"/odom": ""}, 10.0)
+    for now in (10.5, 10.6, 11.4, 11.5):
+        listening.received(message("/odom"), now, now + 1000)
+    listening.received(message("/other"), 11.6, 1011.6)
+    found = listening.end(13.0)["/odom"]
+    assert (found.count, found.seconds, found.frame) == (4, 3.0, "odom")
+    assert found.longest_gap == pytest.approx(1.5), "to the end of listening"
+    assert found.stamp == 5.25
+    assert found.arrived == 1011.5
+    assert not found.binary
+
+
+def test_a_stamp_that_nobody_set_is_none():
+    listening = Listening({"/odom": ""}, 0.0)
+    listening.received(message("/odom", (0, 0)), 1.0, 1.0)
+    assert listening.end(2.0)["/odom"].stamp is None
+
+
+def test_a_message_that_is_none_is_said():
+    listening = Listening({"/odom": ""}, 0.0)
+    broken = Publish("/odom", b'{"op":"publish","topic":"/odom","msg":[}')
+    listening.received(broken, 1.0, 1.0)
+    assert "not JSON" in listening.end(2.0)["/odom"].trouble
