@@ -1,5 +1,7 @@
 """What every test shares."""
 
+import os
+import tempfile
 from collections.abc import Iterator
 
 import pytest
@@ -13,6 +15,19 @@ settings.register_profile(
     "webmap", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("webmap")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def state_folder() -> Iterator[None]:
+    """Keep what stands on disk, such as a STOP, from the user's own and from others."""
+    with tempfile.TemporaryDirectory(prefix="webmap-state-") as folder:
+        before = os.environ.get("WEBMAP_STATE_DIR")
+        os.environ["WEBMAP_STATE_DIR"] = folder
+        yield
+        if before is None:
+            del os.environ["WEBMAP_STATE_DIR"]
+        else:
+            os.environ["WEBMAP_STATE_DIR"] = before
 
 
 @pytest.fixture(scope="module")

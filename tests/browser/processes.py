@@ -146,6 +146,15 @@ def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
     raise AssertionError(f"{what} did not happen within {within} s")
 
 
+def reset(tab: Page) -> None:
+    """End the STOP of the selected robot, by two presses as a person does."""
+    button = tab.locator(".webmap-teleop .webmap-reset")
+    button.click()
+    tab.wait_for_timeout(400)
+    button.click()
+    expect(button).to_be_hidden()
+
+
 def hold(keyboard, key: str, condition, within: float = 30.0) -> None:
     """Hold a key until it has its effect, and keep holding it.
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from devtools import Chromium
-from processes import BRIDGE, EXAMPLES, WEB, hold, matrix, running, wait_until
+from processes import BRIDGE, EXAMPLES, WEB, hold, matrix, reset, running, wait_until
 from robots import Witness
 
 pytestmark = pytest.mark.browser
@@ -240,13 +240,21 @@ def test_a_closed_tab_stops_the_robot(opened, witness, chromium, server):
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
 
 
-def test_stop_ends_the_drive_until_the_key_is_pressed_again(opened, witness):
+def test_stop_stands_until_it_is_reset_and_the_key_is_pressed_again(opened, witness):
     select(opened)
     hold(opened.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     opened.keyboard.press("Space")
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
     opened.wait_for_timeout(700)
     assert witness.speed(ODOM) == (0.0, 0.0), "the held key drives on"
+    opened.keyboard.up("s")
+    opened.wait_for_timeout(300)
+    opened.keyboard.down("s")
+    opened.wait_for_timeout(700)
+    assert witness.speed(ODOM) == (0.0, 0.0), "a STOP that stands lets a press through"
+    opened.keyboard.up("s")
+    reset(opened)
+    hold(opened.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     opened.keyboard.up("s")
 
 
