@@ -249,8 +249,8 @@ def _by_colour(
     for path, colour in parts:
         key = (_shade(colour.r), _shade(colour.g), _shade(colour.b), _shade(colour.a))
         paths.setdefault(key, []).append(path)
-    for key, together in paths.items():
-        colour = ColorMsg(*(part / (SHADES - 1) for part in key))
+    for shades, together in paths.items():
+        colour = ColorMsg(*(part / (SHADES - 1) for part in shades))
         yield svg.path(d="".join(together), **style(colour))
 
 

@@ -45,8 +45,8 @@ class Markers:
     is left out by itself, and said.
 
     Style it by CSS: ``.markers > .marker``, with the type as a further class
-    (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in ``data-ns``:
-    ``.marker[data-ns="goals"] { display: none }``.
+    (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in
+    ``data-ns``: ``.marker[data-ns="goals"] { display: none }``.
 
     Args:
         map: The map. The markers' frame is taken for the map's.

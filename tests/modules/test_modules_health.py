@@ -1,0 +1,129 @@
+"""What the parts of a robot say of themselves."""
+
+import base64
+
+import pytest
+from module_fakes import header
+
+from webmap.modules.robot import diagnostics as room
+from webmap.scene import html
+from webmap.scope import Scope
+
+
+def status(name, level, message="", **values) -> dict:
+    return {
+        "name": name,
+        "level": level,
+        "message": message,
+        "hardware_id": "rosbot",
+        "values": [{"key": key, "value": value} for key, value in values.items()],
+    }
+
+
+def array(*parts, ros2=False) -> dict:
+    return {"header": header("", ros2=ros2), "status": list(parts)}
+
+
+@pytest.fixture
+def module(robot, link):
+    return robot.add_module("Diagnostics", link)
+
+
+def levels(module) -> dict[str, str]:
+    return {part.name: part.level for part in module.parts}
+
+
+@pytest.mark.parametrize("ros2", [False, True])
+def test_each_part_is_known_by_its_name_and_the_worst_is_first(link, module, ros2):
+    assert module.level is None
+    link.say("/diagnostics", array(status("motors", 0), status("lidar", 1), ros2=ros2))
+    link.say("/diagnostics", array(status("battery", 2, "low", volts="21.5")))
+    assert [part.name for part in module.parts] == ["battery", "lidar", "motors"]
+    assert module.level == "error"
+    assert module.parts[0].values == {"volts": "21.5"}
+    assert set(module.svg.classes) == {"diagnostics", "error"}
+    assert module.svg.text == "battery: low"
+    link.say("/diagnostics", array(status("battery", 0)))
+    assert module.level == "warn"
+
+
+@pytest.mark.parametrize(
+    "write", [chr, lambda n: base64.b64encode(bytes([n])).decode()]
+)
+def test_a_level_may_come_as_a_byte_in_text(link, module, write):
+    parts = [status(name, write(level)) for level, name in enumerate("abcd")]
+    link.say("/diagnostics", array(*parts))
+    assert levels(module) == {"a": "ok", "b": "warn", "c": "error", "d": "stale"}
+
+
+@pytest.mark.parametrize("level", [4, -1, 48, "0", "error", "AAA=", ""])
+def test_a_level_that_there_is_not_is_said_and_the_other_parts_count(
+    link, module, robot, level
+):
+    link.say("/diagnostics", array(status("one", 1)))
+    link.say("/diagnostics", array(status("one", level), status("two", 0)))
+    assert levels(module) == {"one": "warn", "two": "ok"}
+    (problem,) = robot.problems.values()
+    assert problem == f"/diagnostics: 'one': a level is 0 to 3, got {level!r}"
+    link.say("/diagnostics", array(status("one", 0)))
+    assert robot.problems == {}
+
+
+def test_a_part_that_falls_silent_is_stale(link, module, monkeypatch):
+    now = room.time.monotonic()
+    link.say("/diagnostics", array(status("one", 0), status("two", 0)))
+    monkeypatch.setattr(room.time, "monotonic", lambda: now + 12)
+    link.say("/diagnostics", array(status("two", 0)))
+    assert levels(module) == {"one": "stale", "two": "ok"}
+    assert module.parts[0].message == "silent for 12 s"
+
+
+def test_robots_that_share_a_topic_have_each_its_own_parts(link, robot):
+    module = robot.add_module("Diagnostics", link, prefix="bob: ")
+    link.say("/diagnostics", array(status("bob: arm", 0), status("eve: arm", 2)))
+    assert levels(module) == {"bob: arm": "ok"}
+
+
+def test_a_list_on_a_page_has_a_row_for_each_part_until_the_page_ends(link, module):
+    rows, page = html.ul(), Scope("page")
+    with page.active():
+        module.show_in(rows)
+    link.say("/diagnostics", array(status("a", 0, "<b>fine</b>"), status("b", 2)))
+    first, second = rows.children
+    assert (str(first.classes), str(second.classes)) == ("error", "ok")
+    assert second.text == "a<b>fine</b>"
+    link.say("/diagnostics", array(status("b", 2)))
+    assert rows.children == (first, second), "what is the same is not made anew"
+    page.close()
+    link.say("/diagnostics", array(status("c", 2)))
+    assert len(rows.children) == 2
+
+
+def test_there_is_an_end_to_the_number_of_parts(link, module, robot, monkeypatch):
+    monkeypatch.setattr(room, "MAX_PARTS", 3)
+    link.say("/diagnostics", array(*(status(f"p{i}", 0) for i in range(5))))
+    assert len(module.parts) == 3
+    assert "3 parts are the limit" in next(iter(robot.problems.values()))
+
+
+def test_others_are_told_and_the_badge_goes_with_the_module(link, robot, module):
+    heard = []
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_diagnostics_update(self, diagnostics):
+            heard.append(diagnostics.level)
+
+    robot.add_module(Listener)
+    link.say("/diagnostics", array(status("a", 1)))
+    assert heard == ["warn"]
+    robot.remove_module(module)
+    assert module.svg.parent is None
+    assert link.listeners == {}
+
+
+def test_a_time_of_nothing_is_refused(link, robot):
+    with pytest.raises(ValueError, match="hold must be seconds above 0, got 0"):
+        robot.add_module("Diagnostics", link, hold=0)
