@@ -1,4 +1,4 @@
-"""Whatever happens in whatever order, what the robot is told keeps seven promises.
+"""Whatever happens in whatever order, what the robot is told keeps eight promises.
 
 1. A velocity is written only in answer to a command of the lease's holder that was
    accepted just now, and when the newest such command is older than the limit, what is
@@ -10,6 +10,7 @@
 6. After a STOP nothing but zero is written, and nobody has the robot, until a reset;
    not even when the gate is killed and started anew meanwhile.
 7. A reset writes nothing.
+8. While a robot changes hands and its odometry shows motion, nobody has it.
 
 And, of hands: after any doubt nothing moves before they were seen to be off.
 """
@@ -76,6 +77,31 @@ class Motion(RuleBasedStateMachine):
         before = self.bench.report().epoch
         if self.bench.take(who) != before:
             self._doubt()
+
+    @rule(who=st.sampled_from(PEOPLE))
+    def ask(self, who):
+        self.bench.say(who, op="ask", robot="r1")
+
+    @rule(who=st.sampled_from(PEOPLE), answer=st.sampled_from(["grant", "deny"]))
+    def answer(self, who, answer):
+        self.bench.say(who, op=answer, robot="r1")
+
+    @rule(other=st.sampled_from(PEOPLE), speed=st.sampled_from([0.0, 0.3]))
+    def takes_over(self, other, speed):
+        """The usual way from hand to hand, perhaps of a robot that moves on."""
+        holder = self.bench.report().holder
+        if holder is None or holder.connection == other:
+            return
+        self.ask(other)
+        self.answer(holder.connection, "grant")
+        if not self.bench.report().changing:
+            return
+        assert self._attempts()[-1].twist.is_zero
+        seen = events.Measured(self.bench_key, Twist(speed))
+        self.bench.run(0.6, lambda: self.bench.tell(seen) if self.odometry else None)
+        self._doubt()
+        if speed or not self.odometry:
+            assert self.bench.report().holder is None, "nobody has what moves"
 
     @rule(who=st.sampled_from(PEOPLE))
     def release(self, who):
@@ -190,7 +216,7 @@ class Motion(RuleBasedStateMachine):
         """Nothing is left of it but the disk."""
         old = self.bench
         driven = [a.driven for a in old.did(actions.MarkDriven)]
-        ticks, epochs = Ticks(old.tick + 1000), Epochs(old.gate._epochs.next())
+        ticks, epochs = Ticks(old.tick + 1000), Epochs(old.gate._fleet._epochs.next())
         self.bench = Bench(
             now=old.now,
             beating=old.beating,
@@ -271,6 +297,8 @@ class Motion(RuleBasedStateMachine):
             self._doubt()
 
     silent_for = 0.0
+    epoch = 0
+    """The newest epoch that was seen."""
     stands = False
     """Whether somebody said STOP, and nobody has reset it since."""
 
@@ -287,7 +315,10 @@ class Motion(RuleBasedStateMachine):
 
     @rule()
     def everybody_rests(self):
-        self._run(1.6)
+        if self.bench.report().asker is not None:
+            self._run(10.0)  # it is granted by itself
+        self._run(3.0)
+        assert not self.bench.report().changing or not self.bench.up
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
         if self.stands:
             assert all(w.twist.is_zero for w in late)
@@ -378,6 +409,13 @@ class Motion(RuleBasedStateMachine):
                 seen = True
             last = s.at
         assert seen, "the hands were not seen to be off"
+
+    @invariant()
+    def epochs_only_grow(self):
+        epoch = self.bench.report().epoch
+        if epoch is not None:
+            assert epoch >= self.epoch
+            self.epoch = epoch
 
     @invariant()
     def a_stop_stands_until_a_reset(self):

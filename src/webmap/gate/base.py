@@ -20,13 +20,15 @@ from typing import Literal
 
 from webmap.gate.actions import Detach, Emit, Say
 from webmap.gate.confirm import Confirmation
+from webmap.gate.connection import Connection
 from webmap.gate.deadman import DeadMan
 from webmap.gate.events import Key, LatchKept, LockState, Wrote
 from webmap.gate.goals import Goals
+from webmap.gate.handover import HandOver
 from webmap.gate.health import Health, Pulse
 from webmap.gate.hooks import Hooks
 from webmap.gate.latch import Latch
-from webmap.gate.lease import Lease
+from webmap.gate.lease import Epochs, Lease
 from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
 from webmap.gate.messages import Refused, RobotSpec, SentTwist
 from webmap.gate.motion import Bounds, Motion
@@ -48,12 +50,19 @@ class Base:
         control: The link that velocity goes to.
         pulse: Whether the display is there.
         latch: Its STOP, which outlives it.
+        epochs: The epochs to give to leases.
         emit: Takes the actions.
 
     """
 
     def __init__(
-        self, key: Key, control: Health, pulse: Pulse, latch: Latch, emit: Emit
+        self,
+        key: Key,
+        control: Health,
+        pulse: Pulse,
+        latch: Latch,
+        epochs: Epochs,
+        emit: Emit,
     ) -> None:
         self.key = key
         self.control = control
@@ -64,12 +73,14 @@ class Base:
         self.goals: dict[str, Goals] = {}
         self.hooks: dict[str, Hooks] = {}
         self.lease: Lease | None = None
+        self.handover = HandOver()
         self.deadman = DeadMan()
         self.motion = Motion(key, control, self._bounds, emit)
         self.sight = Sight(key, emit)
         self.known = False
         """Whether it was asked if this gate alone has it, and if STOP stands."""
         self._pulse = pulse
+        self._epochs = epochs
         self._emit = emit
         self._lock = LockState(key, held=False)
         self._page_cap: Cap | None = None
@@ -123,6 +134,7 @@ class Base:
             or self.motion.owes_zero
             or self._confirming
             or self.motion.held
+            or self.handover.going_on
         )
 
     @property
@@ -172,6 +184,12 @@ class Base:
 
     def unarmable(self, now: float) -> str | None:
         """Return why nobody can take the machine now, in words."""
+        heir = self.handover.heir
+        if heir is not None and not self.latch.on:
+            return f"it goes to {heir.name or heir.id} as soon as it stands"
+        return self._obstacle(now)
+
+    def _obstacle(self, now: float) -> str | None:
         if self.latch.on:
             return f"STOP by {self.latch.by} stands: reset it first"
         if not self._lock.held:
@@ -187,7 +205,7 @@ class Base:
 
     def doubt(self, now: float) -> str | None:
         """Return why the machine must not be driven now, in words."""
-        if reason := self.unarmable(now):
+        if reason := self._obstacle(now):
             return reason
         if not self.drivable:
             return "it has no velocity topic"
@@ -203,25 +221,38 @@ class Base:
 
     # Leases.
 
-    def give(self, lease: Lease, cap: Cap) -> None:
+    def is_held_by(self, connection: str) -> bool:
+        """Return whether this connection has the lease."""
+        return self.lease is not None and self.lease.connection == connection
+
+    def give(self, to: Connection, now: float) -> int:
         """Let somebody have the machine; nothing moves by that."""
-        self.lease = lease
-        self.deadman = DeadMan(needs_neutral=not lease.program)
-        self._page_cap = cap
+        epoch = self._epochs.next()
+        self.lease = Lease(to.id, to.name, epoch, to.program)
+        self.deadman = DeadMan(needs_neutral=not to.program)
+        self._page_cap = to.cap
         self._update_watch()
+        return epoch
 
     def set_cap(self, cap: Cap) -> None:
         """Change what the page of the lease's holder asks for at most."""
         self._page_cap = cap
 
     def end_lease(self, why: str | None, now: float) -> None:
-        """Take the machine out of its driver's hands; it stops if it is driven.
+        """Take the machine out of everybody's hands; it stops if it is driven.
 
         Args:
-            why: What the driver is told, if it is not the driver's own doing.
+            why: What its driver, and who wanted it, are told, if it is not the
+                driver's own doing.
             now: The time.
 
         """
+        disappointed = self.handover.end()
+        if disappointed is not None:
+            self._refuse(disappointed.id, "ask", why or "it is gone")
+        self._end_lease(why, now)
+
+    def _end_lease(self, why: str | None, now: float) -> None:
         lease = self.lease
         if lease is None:
             return
@@ -230,15 +261,70 @@ class Base:
         self.deadman = DeadMan()
         self._update_watch()
         if why is not None:
-            for robot in self.specs:
-                self._emit(Say(Refused(lease.connection, robot, "lease", why)))
+            self._refuse(lease.connection, "lease", why)
+
+    def _refuse(self, connection: str, what: str, why: str) -> None:
+        for robot in self.specs:
+            self._emit(Say(Refused(connection, robot, what, why)))
+
+    def release(self, connection: str, now: float) -> None:
+        """Give the machine back, or ask for it no longer."""
+        self.handover.withdraw(connection)
+        if not self.is_held_by(connection):
+            return
+        if self.handover.asker is not None:
+            self.hand_over(self.handover.asker, now)
+        else:
+            self._end_lease(None, now)
 
     def lost(self, connection: str, now: float) -> None:
         """A page is gone: what it drove stops."""
-        if self.lease is not None and self.lease.connection == connection:
-            self.end_lease(None, now)
+        self.release(connection, now)
         for goals in self.goals.values():
             goals.lost(connection)
+
+    def ask(self, who: Connection, now: float) -> None:
+        """Ask the holder for the machine.
+
+        Raises:
+            Refusal: If it can be taken without asking, or not at all.
+
+        """
+        if reason := self.unarmable(now):
+            raise Refusal(reason)
+        if self.lease is None or self.lease.program:
+            raise Refusal("no person has it: take it")
+        self.handover.ask(who, now)
+
+    def deny(self, why: str) -> None:
+        """Have the holder keep it."""
+        asker = self.handover.end()
+        if asker is not None:
+            self._refuse(asker.id, "ask", why)
+
+    def hand_over(self, heir: Connection, now: float) -> None:
+        """Zero first; ``heir`` gets the machine when it stands (S5)."""
+        self._end_lease(f"{heir.name or heir.id} gets it", now)
+        if self.drivable:
+            self.motion.zero(now)
+        self.handover.begin(heir, now)
+        self._update_watch()
+
+    def _change_hands(self, now: float) -> None:
+        """Let time have its say about who gets the machine."""
+        handover = self.handover
+        if handover.asker is not None and handover.left(now) == 0:
+            self.hand_over(handover.asker, now)
+        heir = handover.heir
+        if heir is None:
+            return
+        if reason := self._obstacle(now):
+            self.end_lease(reason, now)
+        elif handover.stands(now):
+            handover.end()
+            self.give(heir, now)
+        elif self.drivable and not self.motion.stopping:
+            self.motion.zero(now)
 
     # Motion.
 
@@ -339,6 +425,7 @@ class Base:
                 self._fault(reason, now)
             elif self.deadman.expired(now):
                 self._lapse(now)
+        self._change_hands(now)
         self.motion.step(now)
         if self._confirming:
             self._confirm(now)
@@ -376,6 +463,8 @@ class Base:
         self.sight.saw(measured, now)
         if self._confirming:
             self.confirmation.saw(measured, now)
+        if self.handover.heir is not None:
+            self.handover.saw(measured, now)
 
     def saw_echo(self, twist: Twist) -> None:
         """Note what the robot's ROS says on the velocity topic."""
@@ -424,5 +513,9 @@ class Base:
             self._fault(f"no link to {self.key.url}", now)
 
     def _update_watch(self) -> None:
-        on = self.lease is not None or not self.silent or self._confirming
-        self.sight.update(on)
+        self.sight.update(
+            self.lease is not None
+            or not self.silent
+            or self._confirming
+            or self.handover.heir is not None
+        )

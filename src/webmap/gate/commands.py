@@ -11,6 +11,9 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
     {"op": "cancel", "robot": "r1"}
     {"op": "stop", "robot": "r1"}        or "*" for all
     {"op": "reset", "robot": "r1"}       or "*" for all
+    {"op": "ask", "robot": "r1"}
+    {"op": "grant", "robot": "r1"}
+    {"op": "deny", "robot": "r1"}
 
 ``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
 when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
@@ -18,7 +21,9 @@ left and ``turn`` counter-clockwise, as parts of the speed in force, each in
 ``[-1, 1]``; what lies beyond is clamped. ``epoch`` is the lease's, ``tick`` the newest
 one that came, and ``seq`` grows with every ``drive`` and ``goal`` of the connection.
 ``goal`` is a pose in the robot's goal frame, in metres and radians. ``reset`` ends a
-STOP that stands; it moves nothing and gives no lease.
+STOP that stands; it moves nothing and gives no lease. ``ask`` asks the holder of the
+lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
+10 s; ``release`` also takes the question back.
 
 Whatever is not one of these is refused whole. What the gate says back stands in
 :mod:`webmap.gate.reports`.
@@ -114,7 +119,28 @@ class Reset:
     robot: str | None
 
 
-Command = Take | Release | Drive | Goal | Cancel | Stop | Reset
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """The page asks the holder of the lease for it."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """The holder gives the lease to who asks."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Deny:
+    """The holder keeps the lease."""
+
+    robot: str
+
+
+Command = Take | Release | Drive | Goal | Cancel | Stop | Reset | Ask | Grant | Deny
 
 
 def parse(data: bytes) -> Command:
@@ -237,6 +263,9 @@ _READERS: dict[str, Callable[[_Fields], Command]] = {
     "drive": _drive,
     "goal": _goal,
     "cancel": lambda fields: Cancel(fields.robot()),
+    "ask": lambda fields: Ask(fields.robot()),
+    "grant": lambda fields: Grant(fields.robot()),
+    "deny": lambda fields: Deny(fields.robot()),
     "stop": lambda fields: Stop(_one_or_all(fields)),
     "reset": lambda fields: Reset(_one_or_all(fields)),
 }

@@ -10,6 +10,7 @@ from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
 from webmap.gate.base import Base
 from webmap.gate.health import Health, Pulse
 from webmap.gate.latch import Latch
+from webmap.gate.lease import Epochs
 from webmap.gate.messages import Forget, RobotGone, RobotSpec, SentGoal
 from webmap.gate.refusal import Refusal
 from webmap.gate.reporting import Reporter, report
@@ -25,13 +26,17 @@ class Fleet:
 
     Args:
         pulse: Whether the display is there.
+        epochs: The epochs to give to leases.
         emit: Takes the actions.
         refuse: Tells a connection that its command was not taken.
 
     """
 
-    def __init__(self, pulse: Pulse, emit: Emit, refuse: Refuse) -> None:
+    def __init__(
+        self, pulse: Pulse, epochs: Epochs, emit: Emit, refuse: Refuse
+    ) -> None:
         self._pulse = pulse
+        self._epochs = epochs
         self._emit = emit
         self._refuse = refuse
         self._bases: dict[events.Key, Base] = {}
@@ -145,7 +150,7 @@ class Fleet:
         if key not in self._latches:
             self._latches[key] = Latch(key, self._emit)
         control, latch = self._link(key.url, "control"), self._latches[key]
-        base = Base(key, control, self._pulse, latch, self._emit)
+        base = Base(key, control, self._pulse, latch, self._epochs, self._emit)
         self._bases[key] = base
         return base
 

@@ -14,9 +14,12 @@ from webmap.gate import events, messages
 from webmap.gate.actions import Action, Say
 from webmap.gate.base import Base
 from webmap.gate.commands import (
+    Ask,
     Command,
+    Deny,
     Drive,
     Goal,
+    Grant,
     Release,
     Reset,
     Stop,
@@ -26,7 +29,7 @@ from webmap.gate.commands import (
 from webmap.gate.connection import Connection
 from webmap.gate.fleet import Fleet
 from webmap.gate.health import Pulse
-from webmap.gate.lease import Epochs, Lease, check_lease, check_role, check_take
+from webmap.gate.lease import Epochs, check_lease, check_role, check_take
 from webmap.gate.messages import PROGRAM
 from webmap.gate.people import People
 from webmap.gate.refusal import Refusal
@@ -52,11 +55,12 @@ class Gate:
         self, ticks: Ticks | None = None, epochs: Epochs | None = None
     ) -> None:
         self._ticks = ticks or Ticks()
-        self._epochs = epochs or Epochs()
         self._out: list[Action] = []
         self._pulse = Pulse()
         self._people = People(self._out.append)
-        self._fleet = Fleet(self._pulse, self._out.append, self._people.refuse)
+        self._fleet = Fleet(
+            self._pulse, epochs or Epochs(), self._out.append, self._people.refuse
+        )
         self._display_there = False
         self._takes: list[tuple[messages.ProgramTake, int, float]] = []
         self._handlers: dict[type, Callable[[Any, float], None]] = {
@@ -144,7 +148,7 @@ class Gate:
             return
         connection.set_speeds(message.v, message.w)
         for base in self._fleet:
-            if base.lease is not None and base.lease.connection == connection.id:
+            if base.is_held_by(connection.id):
                 base.set_cap(connection.cap)
 
     def _from_browser(self, message: messages.FromBrowser, now: float) -> None:
@@ -201,6 +205,10 @@ class Gate:
                 self._take(connection, robot, now)
             case Release(robot):
                 self._release(connection, robot, now)
+            case Ask(robot):
+                self._ask(connection, robot, now)
+            case Grant() | Deny():
+                self._answer(connection, command, now)
             case _:
                 self._cancel(connection, command.robot)
 
@@ -221,23 +229,42 @@ class Gate:
             if base.latch.on:
                 base.reset(now)
 
-    def _take(self, connection: Connection, robot: str, now: float) -> int:
+    def _take(self, connection: Connection, robot: str, now: float) -> int | None:
+        """Give somebody the lease; ``None`` if it comes when the machine stands."""
         base = self._fleet.find(robot)
-        if base.lease is not None and base.lease.connection == connection.id:
-            return base.lease.epoch
+        if base.is_held_by(connection.id):
+            return base.lease.epoch  # type: ignore[union-attr]
+        if base.handover.heir is connection:
+            return None
         check_take(base.lease, connection.role, connection.program)
         if reason := base.unarmable(now):
             raise Refusal(reason)
-        base.end_lease(f"{connection.name or connection.id} took it", now)
-        epoch = self._epochs.next()
-        lease = Lease(connection.id, connection.name, epoch, connection.program)
-        base.give(lease, connection.cap)
-        return epoch
+        if base.lease is not None:
+            base.hand_over(connection, now)
+            return None
+        return base.give(connection, now)
 
     def _release(self, connection: Connection, robot: str, now: float) -> None:
+        self._fleet.find(robot).release(connection.id, now)
+
+    def _ask(self, connection: Connection, robot: str, now: float) -> None:
+        check_role(connection.role)
         base = self._fleet.find(robot)
-        if base.lease is not None and base.lease.connection == connection.id:
-            base.end_lease(None, now)
+        if base.is_held_by(connection.id):
+            raise Refusal("you have it already")
+        base.ask(connection, now)
+
+    def _answer(self, connection: Connection, answer: Grant | Deny, now: float) -> None:
+        base = self._fleet.find(answer.robot)
+        if not base.is_held_by(connection.id):
+            raise Refusal("only who has it can answer")
+        asker = base.handover.asker
+        if asker is None:
+            raise Refusal("nobody asks for it")
+        if isinstance(answer, Grant):
+            base.hand_over(asker, now)
+        else:
+            base.deny(f"{connection.name or connection.id} keeps it")
 
     def _checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float
@@ -289,6 +316,7 @@ class Gate:
         except Refusal as refusal:
             self._reply(message, None, refusal.why)
         else:
+            assert epoch is not None  # a program never waits for another to let go
             self._takes.append((message, epoch, now + SETTLE))
             self._answer_takes(now)
 

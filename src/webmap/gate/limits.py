@@ -82,8 +82,8 @@ def fit(wanted: Twist, speed: Speed, *, holonomic: bool) -> Twist:
     length = math.hypot(vx, vy)
     if length > speed.v:
         # A velocity along one axis is clamped exactly, without rounding.
-        vx = math.copysign(speed.v, vx) if vy == 0 else vx * (speed.v / length)
-        vy *= speed.v / length
+        vx = math.copysign(speed.v, vx) if vy == 0 else vx / length * speed.v
+        vy = vy / length * speed.v
     wz = min(speed.w, max(-speed.w, wanted.wz))
     return Twist(vx + 0.0, vy + 0.0, wz + 0.0)  # no negative zeros on the wire
 

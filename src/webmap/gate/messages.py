@@ -198,6 +198,15 @@ class Holder(msgspec.Struct, frozen=True):
     name: str
 
 
+class AskerReport(msgspec.Struct, frozen=True):
+    """Who asks the holder of a robot's lease for it."""
+
+    connection: str
+    name: str
+    left: float
+    """Seconds until it is granted by itself."""
+
+
 class StopReport(msgspec.Struct, frozen=True):
     """What is known of a STOP that stands."""
 
@@ -223,6 +232,9 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     holder: Holder | None
     epoch: int | None
     """The epoch of the lease, which commands must name; ``None`` without a lease."""
+    asker: AskerReport | None
+    changing: bool
+    """Whether the lease goes to somebody else as soon as the robot stands."""
     armed: bool
     """Whether a command to move would be taken now."""
     v: float

@@ -1,13 +1,23 @@
 """Reports on machines: what changed is said, but not more often than anybody looks."""
 
+import msgspec
+
 from webmap.gate.base import Base
-from webmap.gate.messages import Holder, RobotReport, RobotSpec, StopReport, Velocity
+from webmap.gate.messages import (
+    AskerReport,
+    Holder,
+    RobotReport,
+    RobotSpec,
+    StopReport,
+    Velocity,
+)
 from webmap.geometry import Twist
 
 INTERVAL = 0.1
-"""The shortest time between two reports that differ in velocities only."""
+"""The shortest time between two reports that differ only in numbers that flow."""
 
 _DIGITS = 3
+_REST = (0.0, 0.0, 0.0)
 
 
 def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
@@ -24,17 +34,26 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         stop=_stop(base),
         holder=holder,
         epoch=None if lease is None else lease.epoch,
+        asker=_asker(base, now),
+        changing=base.handover.heir is not None,
         armed=lease is not None and base.deadman.armed,
         v=speed.v,
         w=speed.w,
         why=speed.why,
         link="up" if link.up else "down",
-        sent=_velocity(base.motion.sent) or (0.0, 0.0, 0.0),
+        sent=_velocity(base.motion.sent) or _REST,
         echoed=_velocity(base.sight.echoed),
         measured=_velocity(base.sight.measured),
         armable=unarmable is None,
         reason=unarmable if lease is None else base.doubt(now),
     )
+
+
+def _asker(base: Base, now: float) -> AskerReport | None:
+    asker = base.handover.asker
+    if asker is None:
+        return None
+    return AskerReport(asker.id, asker.name, round(base.handover.left(now), 1))
 
 
 def _stop(base: Base) -> StopReport | None:
@@ -76,9 +95,17 @@ class Reporter:
 
 
 def _alike(one: RobotReport, other: RobotReport) -> bool:
-    """Return whether two reports differ in velocities only."""
-    return all(
-        getattr(one, field) == getattr(other, field)
-        for field in RobotReport.__struct_fields__
-        if field not in ("sent", "echoed", "measured")
+    """Return whether two reports differ only in numbers that flow."""
+    return _gist(one) == _gist(other)
+
+
+def _gist(report: RobotReport) -> RobotReport:
+    """Return ``report`` without the numbers that change all the time."""
+    asker, stop = report.asker, report.stop
+    if asker is not None:
+        asker = msgspec.structs.replace(asker, left=0.0)
+    if stop is not None:
+        stop = msgspec.structs.replace(stop, why="")
+    return msgspec.structs.replace(
+        report, sent=_REST, echoed=None, measured=None, asker=asker, stop=stop
     )

@@ -20,7 +20,10 @@ velocities (``[forward, left, counter-clockwise]``) at 10 Hz at most. While STOP
 ``latched`` is true, ``state`` is ``"stopped"``, and ``stop`` tells what is known of it:
 ``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by odometry"}``, where
 ``confirmed`` is null while nobody knows yet and false, with the reason, when nobody
-could tell or the robot still moves. ``holder`` and
+could tell or the robot still moves. ``asker`` is who asks the holder for the lease:
+``{"connection": "c6", "name": "Ben", "left": 7.5}`` with the seconds until it is
+granted by itself; ``changing`` tells that it goes to somebody else as soon as the robot
+stands. ``holder`` and
 ``epoch`` are null without a lease; ``armed`` says whether a command to move would be
 taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force; ``armable`` and
 ``reason``, whether it can be taken, and what stands against that or against moving it.
