@@ -1,0 +1,239 @@
+"""The transforms between all frames, over the last seconds."""
+
+import difflib
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+from webmap.tf.errors import (
+    FrameMissing,
+    NotConnected,
+    NotKnownThen,
+    TransformError,
+)
+from webmap.tf.track import Track
+from webmap.tf.transform import Transform
+
+HISTORY = 10.0
+"""Seconds of transforms that are kept."""
+
+GAP = 1.0
+"""Seconds between two transforms beyond which nothing is told in between."""
+
+JUMP = 1.0
+"""Seconds by which a stamp may be older than the newest; more is a jump of time."""
+
+SHARED = ("map", "world", "earth")
+"""Frames that are the same for all robots, whatever namespace tells of them."""
+
+MOST_FRAMES = 4096
+_LISTED = 12
+
+
+class Buffer:
+    """Knows where frames are in each other, from what it is told.
+
+    Args:
+        history: How much is kept before the newest transform, in seconds.
+        gap: The longest time between two transforms that is bridged, in seconds.
+        shared: Frames that no namespace gets in front of.
+
+    """
+
+    def __init__(
+        self,
+        history: float = HISTORY,
+        *,
+        gap: float = GAP,
+        shared: Iterable[str] = SHARED,
+    ) -> None:
+        self.history = history
+        self.gap = gap
+        self.shared = frozenset(shared)
+        self.notes: deque[str] = deque(maxlen=20)
+        """What was odd and was dealt with, in sentences, the newest last."""
+        self._tracks: dict[str, Track] = {}
+        self._roots: dict[str, int] = {}
+
+    @property
+    def frames(self) -> list[str]:
+        """The names of all frames, sorted."""
+        return sorted({*self._tracks, *self._roots})
+
+    def name(self, frame: str, namespace: str = "") -> str:
+        """Return the whole name of a frame that was told in a namespace.
+
+        ``base_link`` on ``/robot_0/tf`` is ``robot_0/base_link``. A slash in front,
+        as ROS 1 had it once, is left out, and what has the namespace in front
+        already keeps its name.
+        """
+        frame, space = frame.strip().strip("/"), namespace.strip("/")
+        if not space or frame in self.shared or frame.startswith(f"{space}/"):
+            return frame
+        return f"{space}/{frame}" if frame else ""
+
+    def add(
+        self,
+        parent: str,
+        child: str,
+        transform: Transform,
+        stamp: float,
+        *,
+        static: bool = False,
+        namespace: str = "",
+    ) -> None:
+        """Take one transform.
+
+        Args:
+            parent: The frame that the numbers are in: the header's.
+            child: The frame whose place they are.
+            transform: Takes coordinates of the child to those of the parent.
+            stamp: When it held, in seconds of the robot's clock.
+            static: Whether it holds for all times: it came on ``/tf_static``.
+            namespace: Of the topic: ``/robot_0`` for ``/robot_0/tf``.
+
+        Raises:
+            TransformError: If it is none, or would close a loop; nothing is changed.
+
+        """
+        parent, child = self.name(parent, namespace), self.name(child, namespace)
+        said = f"{parent!r} -> {child!r}"
+        if not parent or not child:
+            raise TransformError(f"{said}: a frame has no name")
+        try:
+            transform = transform.checked()
+        except TransformError as error:
+            raise TransformError(f"{said}: {error}") from None
+        if not math.isfinite(stamp):
+            raise TransformError(f"{said}: the stamp is {stamp}")
+        track = self._track(parent, child, static)
+        newest = track.newest
+        if newest is not None and stamp < newest - JUMP:
+            self.notes.append(
+                f"{said}: time jumped back by {newest - stamp:.3f} s; what was known "
+                f"of it is forgotten"
+            )
+            track.clear()
+        track.add(transform, stamp, self.history)
+
+    def lookup(self, target: str, source: str, time: float | None = None) -> Transform:
+        """Return what takes coordinates of ``source`` to those of ``target``.
+
+        Args:
+            target: The frame that is wanted.
+            source: The frame that the numbers are in.
+            time: When, in seconds of the robot's clock; None for the newest time at
+                which the whole way is known.
+
+        Raises:
+            FrameMissing: If nobody told of a frame; the words name what there is.
+            NotConnected: If nothing leads from one to the other.
+            NotKnownThen: If a part of the way is not known at that time.
+
+        """
+        target, source = self._known(target), self._known(source)
+        if target == source:
+            return Transform()
+        down, up = self._way(target, source)
+        if time is None:
+            time = self._newest_common([*down, *up])
+        return self._along(down, time).inverse @ self._along(up, time)
+
+    def newest(self, target: str, source: str) -> float | None:
+        """Return the newest time at which the way is known; None for all times.
+
+        Raises:
+            FrameMissing: If nobody told of a frame.
+            NotConnected: If nothing leads from one to the other.
+
+        """
+        down, up = self._way(self._known(target), self._known(source))
+        stamps = [self._tracks[frame].newest for frame in (*down, *up)]
+        return min((stamp for stamp in stamps if stamp is not None), default=None)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._tracks.clear()
+        self._roots.clear()
+
+    def _track(self, parent: str, child: str, static: bool) -> Track:
+        """Return where to keep a transform; parents and kinds may change."""
+        track = self._tracks.get(child)
+        if track is not None and track.parent == parent and track.static == static:
+            return track
+        self._refuse_loop(parent, child)
+        if track is None and len(self._tracks) >= MOST_FRAMES:
+            raise TransformError(
+                f"{parent!r} -> {child!r}: there are {MOST_FRAMES} frames already"
+            )
+        if track is not None and track.parent != parent:
+            self.notes.append(
+                f"{child!r} was in {track.parent!r} and is in {parent!r} now; if that "
+                f"happens again and again, two nodes tell of it"
+            )
+            self._let_go(track.parent)
+        if track is None or track.parent != parent:
+            self._roots[parent] = self._roots.get(parent, 0) + 1
+        self._tracks[child] = found = Track(parent, static=static)
+        return found
+
+    def _let_go(self, parent: str) -> None:
+        self._roots[parent] -= 1
+        if not self._roots[parent]:
+            del self._roots[parent]
+
+    def _refuse_loop(self, parent: str, child: str) -> None:
+        way = [parent]
+        while way[-1] != child:
+            track = self._tracks.get(way[-1])
+            if track is None:
+                return
+            way.append(track.parent)
+        loop = " -> ".join(map(repr, [child, *reversed(way[:-1]), child]))
+        raise TransformError(f"{parent!r} -> {child!r} would close a loop: {loop}")
+
+    def _known(self, frame: str) -> str:
+        name = self.name(frame)
+        if name in self._tracks or name in self._roots:
+            return name
+        frames = self.frames
+        near = difflib.get_close_matches(name, frames, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        listed = ", ".join(frames[:_LISTED]) or "none"
+        more = f" and {len(frames) - _LISTED} more" if len(frames) > _LISTED else ""
+        raise FrameMissing(
+            f"there is no frame {name!r}{hint}; there are: {listed}{more}"
+        )
+
+    def _way(self, target: str, source: str) -> tuple[list[str], list[str]]:
+        """Return the frames below the common ancestor, on both sides."""
+        down, up = self._ancestors(target), self._ancestors(source)
+        common = set(down) & set(up)
+        if not common:
+            raise NotConnected(
+                f"nothing leads from {source!r} to {target!r}: the one is in the tree "
+                f"of {up[-1]!r}, the other in that of {down[-1]!r}"
+            )
+        meet = next(frame for frame in up if frame in common)
+        return down[: down.index(meet)], up[: up.index(meet)]
+
+    def _ancestors(self, frame: str) -> list[str]:
+        way = [frame]
+        while (track := self._tracks.get(way[-1])) is not None:
+            way.append(track.parent)
+        return way
+
+    def _along(self, frames: Sequence[str], time: float) -> Transform:
+        """Return what takes the first frame's coordinates to the last one's parent."""
+        total = Transform()
+        for frame in reversed(frames):
+            track = self._tracks[frame]
+            try:
+                total = total @ track.at(time, self.gap)
+            except NotKnownThen as error:
+                raise NotKnownThen(f"{track.parent!r} -> {frame!r}: {error}") from None
+        return total
+
+    def _newest_common(self, frames: Iterable[str]) -> float:
+        stamps = [self._tracks[frame].newest for frame in frames]
+        return min((stamp for stamp in stamps if stamp is not None), default=0.0)

@@ -1,0 +1,100 @@
+"""What is known of one frame in its parent, over time."""
+
+from bisect import bisect_left
+
+from webmap.tf.errors import NotKnownThen
+from webmap.tf.transform import Transform, between
+
+MOST = 4096
+"""Transforms that are kept of one frame, whatever their times."""
+
+
+class Track:
+    """The transforms of one frame in its parent.
+
+    Args:
+        parent: The parent's name.
+        static: Whether the one transform holds for all times.
+
+    """
+
+    def __init__(self, parent: str, *, static: bool = False) -> None:
+        self.parent = parent
+        self.static = static
+        self._stamps: list[float] = []
+        self._transforms: list[Transform] = []
+
+    @property
+    def newest(self) -> float | None:
+        """The newest stamp; None if there is none, or all times are alike."""
+        return self._stamps[-1] if self._stamps and not self.static else None
+
+    @property
+    def oldest(self) -> float | None:
+        """The oldest stamp; None if there is none, or all times are alike."""
+        return self._stamps[0] if self._stamps and not self.static else None
+
+    def clear(self) -> None:
+        """Forget all transforms."""
+        self._stamps.clear()
+        self._transforms.clear()
+
+    def add(self, transform: Transform, stamp: float, history: float) -> None:
+        """Take a transform, in whatever order they come.
+
+        Args:
+            transform: The frame in its parent.
+            stamp: When it held, in seconds.
+            history: How much is kept before the newest, in seconds.
+
+        """
+        if self.static:
+            self._stamps[:], self._transforms[:] = [stamp], [transform]
+            return
+        place = bisect_left(self._stamps, stamp)
+        if place < len(self._stamps) and self._stamps[place] == stamp:
+            self._transforms[place] = transform
+        else:
+            self._stamps.insert(place, stamp)
+            self._transforms.insert(place, transform)
+        old = bisect_left(self._stamps, self._stamps[-1] - history)
+        old = max(old, len(self._stamps) - MOST)
+        if old:
+            del self._stamps[:old], self._transforms[:old]
+
+    def at(self, time: float, gap: float) -> Transform:
+        """Return the transform at a time.
+
+        Args:
+            time: When, in seconds.
+            gap: The longest time between two transforms that is bridged, in seconds.
+
+        Raises:
+            NotKnownThen: If nothing was told of that time; the words have no frames.
+
+        """
+        if not self._stamps:
+            raise NotKnownThen("nothing was told since time jumped")
+        if self.static:
+            return self._transforms[0]
+        place = bisect_left(self._stamps, time)
+        if place == len(self._stamps):
+            raise NotKnownThen(
+                f"the newest is of {self._stamps[-1]:.3f} s, and {time:.3f} s is "
+                f"{time - self._stamps[-1]:.3f} s later"
+            )
+        if self._stamps[place] == time:
+            return self._transforms[place]
+        if place == 0:
+            raise NotKnownThen(
+                f"the oldest is of {self._stamps[0]:.3f} s, and {time:.3f} s is "
+                f"{self._stamps[0] - time:.3f} s earlier"
+            )
+        before, after = self._stamps[place - 1], self._stamps[place]
+        if after - before > gap:
+            raise NotKnownThen(
+                f"there is a gap of {after - before:.3f} s from {before:.3f} s on, and "
+                f"{time:.3f} s is in it"
+            )
+        share = (time - before) / (after - before)
+        return between(self._transforms[place - 1], self._transforms[place], share)

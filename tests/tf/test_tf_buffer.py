@@ -1,0 +1,253 @@
+"""The buffer of frames."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.geometry import Pose, Quaternion, Vector3
+from webmap.tf import (
+    Buffer,
+    FrameMissing,
+    NotConnected,
+    NotKnownThen,
+    Transform,
+    TransformError,
+)
+from webmap.tf.buffer import MOST_FRAMES
+
+
+def at(x, y=0.0, yaw=0.0):
+    return Transform.from_pose(Pose(x, y, yaw))
+
+
+@pytest.fixture
+def robot():
+    """A robot that drives along x at 1 m/s from 10 s to 12 s, ten times a second."""
+    buffer = Buffer()
+    buffer.add("map", "odom", at(100.0), 10.0)
+    buffer.add("map", "odom", at(100.0), 10.9)
+    buffer.add("map", "odom", at(100.0), 11.8)
+    for step in range(21):
+        buffer.add("odom", "base_link", at(step / 10), 10.0 + step / 10)
+    buffer.add("base_link", "laser", at(0.3, 0.0, math.pi), 0.0, static=True)
+    return buffer
+
+
+def place(transform):
+    return pytest.approx((transform.planar.x, transform.planar.y), abs=1e-9)
+
+
+def test_a_way_of_several_frames_is_put_together(robot):
+    assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
+    assert place(robot.lookup("map", "laser", 11.0)) == (101.3, 0.0)
+
+
+def test_between_two_transforms_there_is_one_in_between(robot):
+    assert place(robot.lookup("map", "base_link", 11.05)) == (101.05, 0.0)
+
+
+def test_without_a_time_it_is_the_newest_at_which_all_is_known(robot):
+    assert robot.newest("map", "base_link") == 11.8
+    assert place(robot.lookup("map", "base_link")) == (101.8, 0.0)
+    assert place(robot.lookup("odom", "base_link")) == (2.0, 0.0)
+
+
+def test_static_frames_are_known_at_all_times(robot):
+    assert robot.newest("base_link", "laser") is None
+    for time in (None, -5.0, 1e9):
+        assert place(robot.lookup("base_link", "laser", time)) == (0.3, 0.0)
+
+
+def test_a_frame_in_itself_is_at_its_origin(robot):
+    assert robot.lookup("laser", "laser", 1e9) == Transform()
+
+
+def test_two_branches_meet_at_their_common_ancestor(robot):
+    robot.add("base_link", "camera", at(-0.2), 0.0, static=True)
+    assert place(robot.lookup("laser", "camera")) != (-0.5, 0.0)
+    assert place(robot.lookup("laser", "camera")) == (0.5, 0.0)
+
+
+def test_a_sensor_that_hangs_upside_down_keeps_its_sides():
+    buffer = Buffer()
+    over = Transform(Vector3(0, 0, 0.5), Quaternion(1, 0, 0, 0))
+    buffer.add("base", "laser", over, 0.0, static=True)
+    point = buffer.lookup("base", "laser").apply(Vector3(1, 1, 0))
+    assert (point.x, point.y, point.z) == pytest.approx((1, -1, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        (12.5, "'odom' -> 'base_link': the newest is of 12.000 s, and 12.500 s is 0.5"),
+        (9.0, "the oldest is of 10.000 s, and 9.000 s is 1.000 s earlier"),
+    ],
+)
+def test_a_time_of_which_nothing_was_told_is_said(robot, time, words):
+    with pytest.raises(NotKnownThen) as error:
+        robot.lookup("odom", "base_link", time)
+    assert words in str(error.value)
+
+
+def test_a_gap_is_not_bridged(robot):
+    robot.add("odom", "base_link", at(9.0), 15.0)
+    with pytest.raises(NotKnownThen, match=r"gap of 3\.000 s from 12\.000 s on"):
+        robot.lookup("odom", "base_link", 13.0)
+    assert place(robot.lookup("odom", "base_link", 15.0)) == (9.0, 0.0)
+
+
+def test_a_missing_frame_is_said_with_what_there_is(robot):
+    with pytest.raises(FrameMissing) as error:
+        robot.lookup("map", "base_lnk")
+    assert "did you mean 'base_link'?" in str(error.value)
+    assert "there are: base_link, laser, map, odom" in str(error.value)
+    with pytest.raises(FrameMissing, match="there are: none"):
+        Buffer().lookup("map", "odom")
+
+
+def test_many_frames_are_not_all_listed():
+    buffer = Buffer()
+    for number in range(50):
+        buffer.add("root", f"f{number}", at(0), 0.0)
+    with pytest.raises(FrameMissing, match="and 39 more"):
+        buffer.lookup("root", "nothing")
+
+
+def test_two_trees_are_said_with_their_roots(robot):
+    robot.add("world_2", "odom_2", at(0), 10.0)
+    with pytest.raises(NotConnected, match="tree of 'map', the other in that of 'wor"):
+        robot.lookup("odom_2", "laser")
+
+
+def test_a_loop_is_refused_and_nothing_is_changed(robot):
+    words = "'laser' -> 'odom' would close a loop: 'odom' -> 'base_link' -> 'laser' -> "
+    with pytest.raises(TransformError, match=words):
+        robot.add("laser", "odom", at(0), 11.0)
+    with pytest.raises(TransformError, match="loop"):
+        robot.add("odom", "odom", at(0), 11.0)
+    assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
+
+
+def test_time_that_jumps_back_is_noted_and_what_was_known_forgotten(robot):
+    robot.add("odom", "base_link", at(5.0), 3.0)
+    assert "jumped back by 9.000 s" in robot.notes[-1]
+    assert place(robot.lookup("odom", "base_link", 3.0)) == (5.0, 0.0)
+    with pytest.raises(NotKnownThen):
+        robot.lookup("odom", "base_link", 11.0)
+
+
+def test_what_comes_a_little_late_is_put_where_it_belongs(robot):
+    robot.add("odom", "base_link", at(1.5, 1.0), 11.45)
+    assert place(robot.lookup("odom", "base_link", 11.45)) == (1.5, 1.0)
+    assert not robot.notes
+
+
+def test_ten_seconds_are_kept():
+    buffer = Buffer()
+    for step in range(300):
+        buffer.add("odom", "base", at(step), step / 10)
+    with pytest.raises(NotKnownThen, match=r"the oldest is of 19\.900 s"):
+        buffer.lookup("odom", "base", 19.0)
+
+
+def test_a_frame_that_changes_its_parent_is_noted(robot):
+    robot.add("map", "base_link", at(7.0), 11.0)
+    assert "was in 'odom' and is in 'map' now" in robot.notes[-1]
+    assert place(robot.lookup("map", "base_link", 11.0)) == (7.0, 0.0)
+    assert "odom" in robot.frames
+
+
+def test_a_parent_that_nobody_names_any_more_is_gone():
+    buffer = Buffer()
+    buffer.add("old", "base", at(0), 1.0)
+    buffer.add("new", "base", at(0), 2.0)
+    assert buffer.frames == ["base", "new"]
+
+
+def test_namespaces_are_put_in_front_but_for_what_is_shared():
+    buffer = Buffer()
+    for name in ("robot_0", "robot_1"):
+        buffer.add("map", "odom", at(1.0), 1.0, namespace=f"/{name}")
+        buffer.add("odom", "base_link", at(1.0), 1.0, namespace=f"/{name}")
+    assert buffer.frames == [
+        "map", "robot_0/base_link", "robot_0/odom", "robot_1/base_link", "robot_1/odom",
+    ]  # fmt: skip
+    assert place(buffer.lookup("robot_0/base_link", "robot_1/base_link")) == (0.0, 0.0)
+
+
+def test_a_prefix_that_is_there_already_is_not_put_there_twice():
+    buffer = Buffer()
+    assert buffer.name("robot_0/odom", "/robot_0") == "robot_0/odom"
+    assert buffer.name("/odom") == "odom"
+
+
+@pytest.mark.parametrize(
+    ("parent", "child", "stamp", "words"),
+    [
+        ("", "a", 0.0, "has no name"),
+        ("a", "/", 0.0, "has no name"),
+        ("a", "b", math.nan, "the stamp is nan"),
+    ],
+)
+def test_what_has_no_name_or_time_is_refused(parent, child, stamp, words):
+    with pytest.raises(TransformError, match=words):
+        Buffer().add(parent, child, at(0), stamp)
+
+
+def test_a_wrong_transform_is_refused_with_its_frames():
+    bad = Transform(rotation=Quaternion(0, 0, 0, 0))
+    with pytest.raises(TransformError, match="'odom' -> 'base': the rotation has a"):
+        Buffer().add("odom", "base", bad, 0.0)
+
+
+def test_a_flood_of_frames_ends():
+    buffer = Buffer()
+    for number in range(MOST_FRAMES):
+        buffer.add("root", f"f{number}", at(0), 0.0)
+    with pytest.raises(TransformError, match="4096 frames already"):
+        buffer.add("root", "one more", at(0), 0.0)
+    buffer.add("root", "f7", at(1), 1.0)
+
+
+POSES = st.builds(
+    Pose, st.floats(-10, 10), st.floats(-10, 10), st.floats(-math.pi, math.pi)
+)
+NAMES = ["a", "b", "c", "d", "e"]
+
+
+@st.composite
+def trees(draw):
+    """A tree of five frames that move at their own times, known from 1 s to 2 s."""
+    buffer = Buffer()
+    for index, child in enumerate(NAMES[1:], start=1):
+        parent = NAMES[draw(st.integers(0, index - 1))]
+        middle = draw(st.floats(1.1, 1.9))
+        for stamp in (1.0, middle, 2.0):
+            buffer.add(parent, child, Transform.from_pose(draw(POSES)), stamp)
+    return buffer
+
+
+FRAMES = st.sampled_from(NAMES)
+TIMES = st.floats(1.0, 2.0)
+
+
+def same(one, other):
+    for point in (Vector3(), Vector3(1, 0, 0), Vector3(0, 1, 0)):
+        p, q = one.apply(point), other.apply(point)
+        assert (p.x, p.y, p.z) == pytest.approx((q.x, q.y, q.z), abs=1e-6)
+
+
+@given(trees(), FRAMES, FRAMES, FRAMES, TIMES)
+def test_a_way_over_any_frame_is_the_same_way(tree, target, over, source, time):
+    same(
+        tree.lookup(target, source, time),
+        tree.lookup(target, over, time) @ tree.lookup(over, source, time),
+    )
+
+
+@given(trees(), FRAMES, FRAMES, TIMES)
+def test_the_way_back_undoes_the_way(tree, target, source, time):
+    there, back = tree.lookup(target, source, time), tree.lookup(source, target, time)
+    same(there @ back, Transform())
