@@ -1,0 +1,164 @@
+"""Scan assist: the robot slows down before what the scan sees."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.gate.assist import AssistSpec, Sweep, assist, free_way, inside, points_of
+from webmap.geometry import Twist
+
+BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
+SPEC = AssistSpec(topic="/scan", footprint=BOX)
+BEAMS = 360
+
+
+def sweep_of(distance_at, arrived=0.0, **more):
+    """A scan all around from the base's origin: bearing in radians to a range."""
+    step = math.tau / BEAMS
+    ranges = [distance_at(-math.pi + ray * step) for ray in range(BEAMS)]
+    about = {"angle_min": -math.pi, "angle_increment": step}
+    return Sweep(**about, range_min=0.05, range_max=8.0, ranges=ranges, arrived=arrived)
+
+
+def wall(distance, facing=0.0):
+    """A straight wall, ``distance`` metres from the base towards ``facing``."""
+
+    def reach(bearing):
+        toward = math.cos(bearing - facing)
+        return distance / toward if toward > 1e-3 else math.inf
+
+    return reach
+
+
+NOTHING = sweep_of(lambda bearing: math.inf)
+
+
+def test_nothing_in_the_way_lets_everything_through():
+    assert assist(SPEC, NOTHING, Twist(1.0, 0.0, 0.3), 0.1).scale == 1.0
+
+
+def test_standing_still_is_always_allowed():
+    assert assist(SPEC, None, Twist(0.0, 0.0, 0.0), 0.1).scale == 1.0
+
+
+def test_a_wall_is_measured_from_the_edge_of_the_robot():
+    points = points_of(SPEC, sweep_of(wall(2.3)))
+    assert free_way(BOX, points, Twist(1.0, 0.0, 0.0)) == pytest.approx(2.0)
+    assert free_way(BOX, points, Twist(-1.0, 0.0, 0.0)) == math.inf
+
+
+def test_a_point_beside_a_straight_way_is_passed():
+    assert free_way(BOX, [(2.0, 0.21)], Twist(1.0, 0.0, 0.0)) == math.inf
+    assert free_way(BOX, [(2.0, 0.19)], Twist(1.0, 0.0, 0.0)) == pytest.approx(1.7)
+
+
+def test_a_point_that_an_arc_meets_is_met_though_it_lies_aside():
+    ahead, aside = (0.0, 2.0), (2.0, 0.0)
+    turning = Twist(1.0, 0.0, 1.0)  # on a circle of 1 m about (0, 1)
+    met = free_way(BOX, [ahead], turning)
+    assert 2.0 < met < math.pi
+    assert free_way(BOX, [aside], turning) == math.inf
+
+
+def test_turning_on_the_spot_minds_the_corners():
+    outer = math.hypot(0.3, 0.2)
+    assert free_way(BOX, [(0.0, outer - 0.01)], Twist(0.0, 0.0, 1.0)) < math.pi / 2
+    assert free_way(BOX, [(0.0, outer + 0.01)], Twist(0.0, 0.0, 1.0)) == math.inf
+
+
+def test_the_nearer_the_wall_the_slower_and_at_last_not_at_all():
+    scales = [
+        assist(SPEC, sweep_of(wall(0.3 + gap)), Twist(1.0, 0.0, 0.0), 0.1).scale
+        for gap in (0.1, 0.3, 0.6, 1.0, 3.0)
+    ]
+    assert scales == sorted(scales)
+    assert scales[0] == 0.0
+    assert scales[-1] == 1.0
+
+
+def test_away_from_a_wall_that_is_too_near_is_allowed():
+    near = sweep_of(wall(0.35))
+    assert assist(SPEC, near, Twist(0.5, 0.0, 0.0), 0.1).scale == 0.0
+    assert assist(SPEC, near, Twist(-0.5, 0.0, 0.0), 0.1).scale == 1.0
+
+
+def test_the_robot_s_own_body_is_not_in_its_way():
+    body = sweep_of(lambda bearing: 0.15 if abs(bearing) < 0.3 else math.inf)
+    assert assist(SPEC, body, Twist(1.0, 0.0, 0.0), 0.1).scale == 1.0
+
+
+def test_too_near_to_measure_is_an_obstacle():
+    spec = AssistSpec(topic="/scan", footprint=BOX, sensor=(0.3, 0.0, 0.0))
+    near = sweep_of(lambda bearing: -math.inf if abs(bearing) < 0.5 else math.inf)
+    assert assist(spec, near, Twist(0.2, 0.0, 0.0), 0.1).scale == 0.0
+
+
+@pytest.mark.parametrize(
+    ("sweep", "said"),
+    [
+        (None, "no scan yet"),
+        (sweep_of(lambda b: math.inf, arrived=-0.5), "old"),
+        (sweep_of(lambda b: math.inf, arrived=9.0), "old"),
+        (sweep_of(lambda b: math.nan), "unknown"),
+        (sweep_of(lambda b: 0.0), "unknown"),
+        (sweep_of(lambda b: math.nan if abs(b) < 0.6 else math.inf), "unknown"),
+        (Sweep(math.nan, 0.1, 0.1, 8.0, [1.0] * 10, 0.0), "no angles"),
+        (Sweep(0.0, 0.1, 0.1, 8.0, [], 0.0), "does not look"),
+        (Sweep(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not look"),
+    ],
+)
+def test_a_blind_robot_stops_or_creeps_as_configured(sweep, said):
+    wanted = Twist(0.5, 0.0, 0.0)
+    stop = assist(SPEC, sweep, wanted, 0.1)
+    assert stop.scale == 0.0
+    assert said in stop.why
+    creeping = AssistSpec(topic="/scan", footprint=BOX, blind="creep")
+    assert assist(creeping, sweep, wanted, 0.1).scale == pytest.approx(0.2)
+    assert assist(creeping, sweep, Twist(0.05, 0.0, 0.0), 0.1).scale == 1.0
+
+
+def test_a_lidar_that_does_not_look_behind_lets_nobody_back():
+    front = Sweep(-1.5, 0.01, 0.05, 8.0, [math.inf] * 300, 0.0)
+    assert assist(SPEC, front, Twist(0.5, 0.0, 0.0), 0.1).scale == 1.0
+    assert assist(SPEC, front, Twist(-0.5, 0.0, 0.0), 0.1).scale == 0.0
+
+
+@given(
+    distance=st.floats(0.35, 5.0),
+    speed=st.floats(0.05, 2.0),
+    facing=st.floats(-0.9, 0.9),
+    turn=st.floats(-1.0, 1.0),
+)
+def test_a_robot_that_is_assisted_never_touches_a_wall(distance, speed, facing, turn):
+    # The worst that is assumed: it keeps its speed for the whole reaction, then brakes.
+    gap_at_start = distance - max(
+        x * math.cos(facing) + y * math.sin(facing) for x, y in BOX
+    )
+    if gap_at_start <= 0:
+        return
+    wanted = Twist(speed, 0.0, turn)
+    sweep = sweep_of(wall(distance, facing))
+    scale = assist(SPEC, sweep, wanted, 0.1).scale
+    v, w = speed * scale, turn * scale
+    way = v * 0.2 + v * v / (2 * SPEC.brake)
+    x = y = yaw = 0.0
+    for _ in range(200):
+        if v == 0:
+            break
+        dt = way / v / 200
+        x, y = x + v * dt * math.cos(yaw), y + v * dt * math.sin(yaw)
+        yaw += w * dt
+        for cx, cy in BOX:
+            px = x + cx * math.cos(yaw) - cy * math.sin(yaw)
+            py = y + cx * math.sin(yaw) + cy * math.cos(yaw)
+            reach = px * math.cos(facing) + py * math.sin(facing)
+            # Between two rays the wall is not seen: what is allowed for that.
+            assert reach < distance + 0.02
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2))
+def test_inside_is_inside_the_box(x, y):
+    if abs(abs(x) - 0.3) > 1e-9 and abs(abs(y) - 0.2) > 1e-9:
+        assert inside(BOX, (x, y)) == (abs(x) < 0.3 and abs(y) < 0.2)
