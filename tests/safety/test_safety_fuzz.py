@@ -1,0 +1,230 @@
+"""Whatever comes from a browser: what is not whole never moves a robot."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from safety_corpus import CORPUS, NO_NUMBERS, REST, ROBOT
+
+from webmap.gate import messages
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "gate"))
+from gate_harness import Bench
+
+FIELDS = {"op", "robot", "epoch", "seq", "tick", "x", "y", "turn"}
+
+
+def armed():
+    """A gate whose robot would move by the next good command, and just did."""
+    bench = Bench().begin()
+    bench.drive_off()
+    bench.hold(0.3)
+    assert bench.report().armed
+    return bench
+
+
+def filled(bench, text):
+    bench.seq += 1
+    for name, value in (
+        ("ROBOT", "r1"),
+        ("EPOCH", bench.report().epoch),
+        ("SEQ", bench.seq),
+        ("TICK", bench.tick),
+    ):
+        text = text.replace(name, str(value))
+    return text
+
+
+def say(bench, text):
+    data = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
+    bench.tell(messages.FromBrowser("a", data))
+
+
+def good(bench, **changes):
+    bench.seq += 1
+    fields = {
+        "op": "drive",
+        "robot": "r1",
+        "epoch": bench.report().epoch,
+        "seq": bench.seq,
+        "tick": bench.tick,
+        "x": 1.0,
+        "y": 0.0,
+        "turn": 0.0,
+    }
+    return {**fields, **changes}
+
+
+def test_what_the_corpus_is_made_from_moves_the_robot_if_nothing_is_wrong():
+    bench = armed()
+    at = bench.now
+    stamp = '"epoch":EPOCH,"seq":SEQ,"tick":TICK'
+    say(bench, filled(bench, f'{{{ROBOT},{stamp},"x":1.0,{REST}}}'))
+    assert bench.moving_since(at)
+
+
+@pytest.mark.parametrize("text", CORPUS, ids=range(len(CORPUS)))
+def test_nothing_of_the_corpus_moves_the_robot_or_keeps_it_moving(text):
+    bench = armed()
+    at = bench.now
+    say(bench, filled(bench, text))
+    bench.run(0.1)
+    assert bench.moving_since(at) == []
+    assert bench.refusals()
+
+    bench = armed()
+    bench.hold(0.3, x=1.0)
+    since = bench.now
+    bench.run(0.5, lambda: say(bench, filled(bench, text)))
+    assert bench.moving_since(since + 0.2101) == []
+    assert bench.written[-1].twist.is_zero
+
+
+values = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.sampled_from(["r1", "drive", "take", "goal", 1, 0.5]),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.sampled_from(sorted(FIELDS)) | st.text(max_size=4), inner)
+    ),
+    max_leaves=8,
+)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.lists(st.binary(max_size=200) | st.text(max_size=200), max_size=15))
+def test_bytes_and_texts_never_move_it(texts):
+    bench = armed()
+    at = bench.now
+    for text in texts:
+        say(bench, text)
+        bench.run(0.06)
+    assert bench.moving_since(at) == []
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.lists(values, max_size=15))
+def test_json_of_any_form_never_moves_it(whole):
+    bench = armed()
+    at = bench.now
+    for value in whole:
+        say(bench, json.dumps(value))
+        bench.run(0.06)
+    assert bench.moving_since(at) == []
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.data())
+def test_a_good_command_with_one_field_spoilt_never_moves_it(data):
+    bench = armed()
+    at = bench.now
+    name = data.draw(st.sampled_from(sorted(FIELDS)))
+    how = data.draw(st.sampled_from(["dropped", "twice", "token", "renamed"]))
+    command = good(bench)
+    if how == "dropped":
+        del command[name]
+        text = json.dumps(command)
+    elif how == "renamed":
+        command[data.draw(st.text(max_size=6).filter(lambda n: n not in FIELDS))] = (
+            command.pop(name)
+        )
+        text = json.dumps(command)
+    elif how == "twice":
+        again = json.dumps({name: command[name]})
+        text = f"{json.dumps(command)[:-1]},{again[1:]}"
+    else:
+        token = data.draw(st.sampled_from(NO_NUMBERS))
+        parts = [
+            f"{json.dumps(key)}:{token if key == name else json.dumps(value)}"
+            for key, value in command.items()
+        ]
+        text = f"{{{','.join(parts)}}}"
+    say(bench, text)
+    bench.run(0.1)
+    assert bench.moving_since(at) == []
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.integers(0, 9), min_size=10, max_size=30))
+def test_one_good_command_among_bad_ones_moves_it_for_200_ms_at_most(kinds):
+    bench = armed()
+    good_at = [bench.now]
+
+    def send():
+        nonlocal kinds
+        kind, kinds = kinds[0], [*kinds[1:], kinds[0]]
+        if kind == 0:
+            good_at.append(bench.now)
+            say(bench, json.dumps(good(bench)))
+        elif kind < 3:  # fewer than 20 a second, or the page is shown the door
+            say(bench, filled(bench, CORPUS[kind]))
+
+    bench.run(2.0, send)
+    for written in bench.moving_since(good_at[0]):
+        assert min(written.at - at for at in good_at if at <= written.at) <= 0.2101
+
+
+FROM_THE_PAGE = """(async () => {
+    const url = new URL("/_webmap/drive", location.href);
+    url.protocol = "ws:";
+    const socket = new WebSocket(url);
+    let tick = null, robot = null, epoch = null, seq = 0, refused = 0, closed = false;
+    socket.onclose = () => { closed = true; };
+    socket.onmessage = (event) => {
+        const message = JSON.parse(event.data);
+        if (message.op === "tick") tick = message.tick;
+        if (message.op === "robot") {
+            robot = message.robot;
+            epoch = message.mine ? message.epoch : null;
+        }
+        if (message.op === "refused") refused += 1;
+    };
+    const until = async (check) => {
+        for (let n = 0; n < 400 && !check(); n += 1)
+            await new Promise((done) => setTimeout(done, 25));
+    };
+    const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+    await until(() => tick !== null && robot !== null);
+    socket.send(JSON.stringify({ op: "take", robot }));
+    await until(() => epoch !== null);
+    const drive = (x) => socket.send(JSON.stringify(
+        { op: "drive", robot, epoch, seq: ++seq, tick, x, y: 0, turn: 0 }));
+    for (let n = 0; n < 8; n += 1) { drive(0); await wait(50); }
+    const taken = epoch !== null;
+    for (const text of CORPUS) {
+        const filled = text.replaceAll("ROBOT", robot).replaceAll("EPOCH", epoch)
+            .replaceAll("SEQ", ++seq).replaceAll("TICK", tick);
+        socket.send(filled);
+        await wait(35);
+        if (!closed) drive(0);
+        await wait(35);
+    }
+    const alive = !closed;
+    socket.close();
+    return { taken, refused, alive };
+})()"""
+
+
+@pytest.mark.safety
+@pytest.mark.browser
+@pytest.mark.serial
+def test_nothing_of_the_corpus_moves_the_robot_through_all_processes(bench):
+    bench.open_page()
+    before = len(bench.robot.log.told)
+    # What is too long is not even read: the server closes the socket.
+    short = [text for text in CORPUS if len(text) < 1000]
+    script = FROM_THE_PAGE.replace("CORPUS", json.dumps(short), 1)
+    result = bench.tab.evaluate(script)
+    assert result["taken"], "the page's own socket did not get the robot"
+    assert result["alive"], "the page was shown the door, so the test shows little"
+    assert result["refused"] > 0
+    assert [t for t in bench.robot.log.told[before:] if not t.is_zero] == []
+    bench.drive_off()
+    bench.let_go()
