@@ -223,7 +223,10 @@ def test_fifty_maps_cost_one_picture_and_leave_none_behind(page, link, monkeypat
     assert len(pictures) == before
 
 
-def test_the_server_serves_the_newest_picture_and_drops_the_old_ones(link, module):
+def test_the_server_serves_the_newest_picture_and_drops_the_old_ones(
+    link, module, monkeypatch
+):
+    monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 0.0)
     published, before = Published(), len(pictures)
     for value in range(4):
         link.say("/map", grid([[value * 10]]))
@@ -259,3 +262,12 @@ def test_the_age_of_a_map_is_known_but_it_is_old_only_where_that_is_said(map, li
         link.say(topic, grid(CORNERS))
     assert once.layer.svg._age.limit > 1e6
     assert often.layer.svg._age.limit == 2.0
+
+
+def test_a_page_that_is_behind_still_gets_the_pictures_of_a_moment_ago(link, module):
+    urls, before = [], len(pictures)
+    for value in range(100):
+        link.say("/map", grid([[value]]))
+        urls.append(shown(module).get("href"))
+    assert Published().image(urls[-50].rpartition("/")[2]).data
+    assert len(pictures) == before + 64

@@ -166,9 +166,10 @@ def test_a_text_stands_upright_and_is_only_text(link, layer):
     say(link, marker(TEXT, text=words, scale=(0, 0, 0.3), pose=at))
     (text,) = only(layer).children
     assert text.text == words
-    assert text.get("font-size") == "0.3"
+    size = float(text.get("font-size"))
     assert to_root(text).apply(0, 0) == (1, 2)
-    assert to_root(text).apply(0, -1) == (1, 3), "letters have y downward"
+    letter = to_root(text).apply(0, -size)
+    assert letter == pytest.approx((1, 2.3)), "letters have y downward"
 
 
 def test_markers_are_changed_in_place_and_deleted_by_namespace_and_number(link, layer):

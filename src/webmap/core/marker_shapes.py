@@ -21,6 +21,9 @@ MAX_POINTS = 20_000
 MAX_TEXT = 500
 """The most characters that are shown of a text."""
 
+LETTERS = 16.0
+"""The size of letters before they are scaled: browsers round what is below 1."""
+
 SHADES = 16
 """How finely the colours of single points are told apart, from 0 to 1."""
 
@@ -82,17 +85,18 @@ def place(shape: Element, marker: MarkerMsg) -> None:
         at = (marker.pose.position.x, marker.pose.position.y)
         check_finite([at], "the place of a text")
         # The world has y upward; letters have it downward.
-        shape.set_matrix(Affine(1, 0, 0, -1, *at))
+        size = _sizes(marker, "z")[0] / LETTERS
+        shape.set_matrix(Affine(size, 0, 0, -size, *at))
     else:
         pose = marker.pose.usable
         shape.set_pose(pose.x, pose.y, pose.yaw)
 
 
 def _text(marker: MarkerMsg) -> Iterable[Element]:
-    (size,) = _sizes(marker, "z")
     text = svg.text(
         text=marker.text[:MAX_TEXT],
-        font_size=size,
+        font_size=LETTERS,
+        font_family="sans-serif",
         text_anchor="middle",
         dominant_baseline="central",
         text_rendering="geometricPrecision",

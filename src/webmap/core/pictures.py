@@ -5,12 +5,19 @@ The model's thread publishes and the web thread serves, hence the lock.
 
 import hashlib
 import threading
+import time
 from collections import deque
 from typing import NamedTuple
 
 from webmap.geometry import Affine
 from webmap.scene import svg
 from webmap.scope import Removal, keep
+
+KEPT_FOR = 3.0
+"""Seconds for which a picture is served after another took its place."""
+
+MOST_KEPT = 64
+"""How many of them, so that what changes often does not pile up."""
 
 PREFIX = "/_webmap/images/"
 """How the URL of every image begins that has no name of its own."""
@@ -71,7 +78,7 @@ class Picture:
 
     def __init__(self) -> None:
         self.element = svg.image(preserveAspectRatio="none")
-        self._urls: deque[str] = deque()
+        self._urls: deque[tuple[str, float]] = deque()
         keep(Removal(self._end))
 
     def show(self, data: bytes, matrix: Affine, width: float, height: float) -> None:
@@ -85,12 +92,15 @@ class Picture:
             height: In metres.
 
         """
-        self._urls.append(pictures.publish(data))
-        self.element.set(href=self._urls[-1], width=width, height=height)
+        now = time.monotonic()
+        self._urls.append((pictures.publish(data), now))
+        self.element.set(href=self._urls[-1][0], width=width, height=height)
         self.element.set_matrix(matrix)
-        # A page that is a frame behind still asks for the one before.
-        while len(self._urls) > 2:
-            pictures.withdraw(self._urls.popleft())
+        # A page that is a little behind still asks for those before.
+        while len(self._urls) > 2 and (
+            now - self._urls[0][1] > KEPT_FOR or len(self._urls) > MOST_KEPT
+        ):
+            pictures.withdraw(self._urls.popleft()[0])
 
     def clear(self) -> None:
         """Show nothing."""
@@ -99,4 +109,4 @@ class Picture:
 
     def _end(self) -> None:
         while self._urls:
-            pictures.withdraw(self._urls.popleft())
+            pictures.withdraw(self._urls.popleft()[0])

@@ -1,0 +1,130 @@
+"""Layers as a real browser draws them: where on the screen, and in which colour."""
+
+import io
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
+
+from real_browser import watched_tab
+
+pytestmark = pytest.mark.browser
+
+HERE = Path(__file__).parent
+WALL, FREE, BLUE = (0, 0, 0), (255, 255, 255), (0, 0, 255)
+LETHAL = pytest.approx((255, 76, 255), abs=3)
+
+POINT = """([selector, x, y]) => {
+  const m = document.querySelector(selector).getScreenCTM();
+  return [m.a * x + m.c * y + m.e, m.b * x + m.d * y + m.f];
+}"""
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    command = [sys.executable, "-m", "webmap", "run", str(HERE / "scene_of_layers.py")]
+    process = subprocess.Popen(
+        [*command, "--port", "0", "--no-browser"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(HERE)},
+    )
+    assert process.stdout is not None
+    try:
+        line = process.stdout.readline()
+        found = re.search(r"http\S+", line)
+        assert found, line
+        yield found.group(0)
+    finally:
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+
+
+@pytest.fixture
+def tab(chromium: Browser, url: str) -> Iterator[Page]:
+    with watched_tab(chromium, 900, 700) as page:
+        page.goto(url)
+        page.wait_for_selector(".occupancy-grid.map > image[href]", state="attached")
+        page.wait_for_selector(".path > polyline[points]", state="attached")
+        yield page
+
+
+def on_screen(tab: Page, x: float, y: float, of: str = "svg.webmap .world"):
+    """Where a point of an element's own coordinates is on the screen."""
+    return tab.evaluate(POINT, [of, x, y])
+
+
+def colours(tab: Page, *places: tuple[float, float]) -> list[tuple[int, ...]]:
+    """What is drawn now at places of the world, in metres."""
+    picture = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+    pixels = [on_screen(tab, x, y) for x, y in places]
+    return [picture.getpixel((round(u), round(v))) for u, v in pixels]
+
+
+def floor(x: float, y: float) -> tuple[float, float]:
+    """A place of the floor, from its lower left corner, in the world."""
+    cos, sin = math.cos(0.2), math.sin(0.2)
+    return -3 + cos * x - sin * y, -2 + sin * x + cos * y
+
+
+def test_the_map_is_drawn_where_it_is_and_stays_so_while_it_changes(tab):
+    corner = [(0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9)]
+    beside = [(1.1, 0.5), (0.5, 1.1), (0.1, 3.9), (5.0, 0.1)]
+    for _ in range(3):  # it is drawn anew twenty times a second meanwhile
+        assert colours(tab, *(floor(*at) for at in corner + beside)) == [
+            *([WALL] * 4),
+            *([FREE] * 4),
+        ]
+
+
+def test_costs_are_drawn_over_the_map_and_free_ones_let_it_through(tab):
+    row = [(-0.7, 1.1), (-0.5, 1.1), (-0.3, 1.1)]
+    assert colours(tab, *row) == [FREE, LETHAL, FREE]
+
+
+def test_a_cube_and_a_text_are_where_their_markers_are(tab):
+    assert colours(tab, (-1.5, 0.25), (-1.5, 0.65)) == [BLUE, FREE]
+    text = tab.locator(".marker.text > text")
+    expect(text).to_have_text("<b>Küche</b>")
+    box = text.bounding_box()
+    x, y = on_screen(tab, 0, 0.4)
+    assert abs(box["x"] + box["width"] / 2 - x) < 6
+    assert abs(box["y"] + box["height"] / 2 - y) < 12
+    assert box["width"] > box["height"], "it stands upright"
+
+
+def test_a_path_stays_and_a_cloud_and_a_footprint_go_along_with_the_robot(tab):
+    robot = 'svg.webmap g.robot[data-name="Bob"]'
+    before = on_screen(tab, 0, 0, robot)
+    for _ in range(2):
+        for at in [(1, -1), (2, 1)]:
+            drawn = on_screen(tab, *at, of=".path > polyline")
+            assert drawn == pytest.approx(on_screen(tab, *at), abs=0.5)
+        dot = tab.locator(".pointcloud > .dot").bounding_box()
+        x, y = on_screen(tab, 1, 0, robot)
+        assert abs(dot["x"] + dot["width"] / 2 - x) < 2
+        assert abs(dot["y"] + dot["height"] / 2 - y) < 2
+        corner = on_screen(tab, 0.3, 0.2, ".polygon > polygon")
+        assert corner == pytest.approx(on_screen(tab, 0.3, 0.2, robot), abs=0.5)
+        tab.wait_for_function(
+            "([selector, before]) => {"
+            " const m = document.querySelector(selector).getScreenCTM();"
+            " return Math.hypot(m.e - before[0], m.f - before[1]) > 9; }",
+            arg=[robot, before],
+        )
+
+
+def test_costs_that_make_no_sense_are_said_once_and_the_old_ones_stay(tab):
+    tab.goto(tab.url + "broken")
+    notice = tab.locator(".webmap-notice")
+    expect(notice).to_contain_text("/costs: a grid of 10 x 1 cells came with 3 of them")
+    expect(notice).to_have_count(1)
+    assert colours(tab, (-0.5, 1.1)) == [LETHAL]
