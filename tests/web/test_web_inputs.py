@@ -80,10 +80,11 @@ def hold(bench: Bench, held: bool, *axes: float) -> None:
 
 
 def drive_by_pad(bench: Bench) -> None:
+    since = time.monotonic()
     for _ in range(5):
         hold(bench, True, 0, -1)
         try:
-            bench.until(bench.gate.moves, patience=1.5)
+            bench.until(lambda: bench.gate.moves(since), patience=1.5)
         except AssertionError:
             hold(bench, False, 0, -1)
             bench.page.wait_for_timeout(300)
@@ -108,6 +109,23 @@ def test_a_thumb_on_the_stick_drives_and_letting_go_is_neutral(touched: Bench) -
     touched.neutral_within(50)
     touched.still()
     assert touched.view()["e"] == 400, "the map did not move along"
+
+
+def test_words_that_move_the_pad_under_a_finger_do_not_change_what_it_asks(
+    touched: Bench,
+) -> None:
+    finger = drive_by_finger(touched)
+    finger.say("touchMove", down=-0.4)
+    touched.until(lambda: 0 < touched.gate.moves()[-1]["x"] < 1)
+    before = touched.gate.moves()[-1]
+    touched.page.evaluate(
+        "document.querySelector('.webmap-stick-place').style.marginBottom = '60px'"
+    )
+    since = time.monotonic()
+    finger.say("touchMove", down=-0.401)
+    touched.until(lambda: len(touched.gate.moves(since)) > 2)
+    after = touched.gate.moves(since)[-1]
+    assert after["x"] == pytest.approx(before["x"], abs=0.02)
 
 
 def test_a_touch_that_the_system_takes_away_is_neutral(touched: Bench) -> None:
@@ -205,9 +223,7 @@ def test_a_gamepad_that_is_gone_is_neutral_and_its_return_moves_nothing(
     assert padded.shown() == "hands-off"
     hold(padded, False, 0, 0)
     padded.page.wait_for_timeout(300)
-    since = time.monotonic()
-    hold(padded, True, 0, -1)
-    padded.until(lambda: padded.gate.moves(since))
+    drive_by_pad(padded)
 
 
 def test_a_gamepad_that_says_nothing_new_is_neutral(padded: Bench) -> None:

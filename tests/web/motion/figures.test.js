@@ -59,9 +59,9 @@ describe("the way to a stop", () => {
 test("one motion is told three times", () => {
   const told = motions(report({ measured: [-0.3, 0, -0.001] }));
   assert.deepEqual(told, [
-    { name: "Sent", text: "0.40 m/s, 0.00 rad/s" },
-    { name: "Echoed", text: "not known" },
-    { name: "Measured", text: "\u22120.30 m/s, 0.00 rad/s" },
+    { name: "Sent", kind: "motion", text: "0.40 m/s", more: ", 0.00 rad/s" },
+    { name: "Echoed", kind: "motion", text: "not known", more: "" },
+    { name: "Measured", kind: "motion", text: "\u22120.30 m/s", more: ", 0.00 rad/s" },
   ]);
 });
 

@@ -24,6 +24,8 @@ export class Stick {
     this._sideways = sideways;
     /** @type {number | null} */
     this._pointer = null;
+    /** Where the pad was when it was pressed; it may move as words around it change. */
+    this._middle = { x: 0, y: 0, way: 1 };
     this._ending = new AbortController();
     const options = { signal: this._ending.signal };
     pad.addEventListener("pointerdown", (event) => this._down(event), options);
@@ -81,6 +83,8 @@ export class Stick {
     // As the press is not heard of elsewhere, it would leave the keys in a text field.
     const focused = document.activeElement;
     if (focused instanceof HTMLElement && takesKeys(focused)) focused.blur();
+    const { left, top, width, height } = this._pad.getBoundingClientRect();
+    this._middle = { x: left + width / 2, y: top + height / 2, way: (WAY * width) / 2 };
     this._pointer = event.pointerId;
     this._pad.setPointerCapture(event.pointerId);
     this._pad.classList.add("held");
@@ -90,10 +94,9 @@ export class Stick {
   /** @param {PointerEvent} event */
   _move(event) {
     if (event.pointerId !== this._pointer) return;
-    const { left, top, width, height } = this._pad.getBoundingClientRect();
-    const way = (WAY * width) / 2;
-    const right = (event.clientX - left - width / 2) / way;
-    const down = (event.clientY - top - height / 2) / way;
+    const { x, y, way } = this._middle;
+    const right = (event.clientX - x) / way;
+    const down = (event.clientY - y) / way;
     this._draw(right, down);
     this._drive.setInput("stick", throwOf(right, down, { sideways: this._sideways() }));
   }

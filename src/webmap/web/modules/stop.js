@@ -95,7 +95,7 @@ class Stop {
     this._reset.show(latched > 1 ? "Reset all" : "Reset", latched > 0);
     this._close.hidden = verdicts.length === 0;
     this._list.hidden = verdicts.length === 0 && standing === "";
-    this._showVerdicts(verdicts);
+    this._showVerdicts(verdicts.sort(byName));
   }
 
   /**
@@ -127,6 +127,14 @@ class Stop {
       }),
     );
   }
+}
+
+/**
+ * @param {Verdict} one
+ * @param {Verdict} other
+ */
+function byName(one, other) {
+  return one.name.localeCompare(other.name, undefined, { numeric: true });
 }
 
 /** Covers the page: a robot does not do what it is told. */

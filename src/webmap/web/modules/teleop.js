@@ -154,7 +154,7 @@ class Teleop {
       report,
       status.delay,
       actOf(report, request, status.connection),
-      this._stick.wanted,
+      useful ? this._stick.wanted : null,
     );
     const moving = robot === null ? null : this._drive.motionDelay(robot);
     this._panel.showFigures(report, status.delay, moving);
@@ -172,6 +172,8 @@ class Panel {
     this._own = html("p", "webmap-teleop-own");
     this._test = html("p", "webmap-teleop-test", { role: "status" });
     this._figures = html("dl", "webmap-teleop-figures");
+    /** @type {Map<string, HTMLElement>} */
+    this._values = new Map();
     this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
     this._reset = new ResetButton(acts.reset);
@@ -202,7 +204,7 @@ class Panel {
    * @param {import('../motion/report.js').RobotReport | null} report
    * @param {number | null} delay
    * @param {string | null} act What can be done about the lease.
-   * @param {boolean} stick Whether the stick is wanted.
+   * @param {boolean | null} stick Whether the stick is wanted; null when it is no use.
    */
   show({ state, title, detail }, report, delay, act, stick) {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
@@ -210,9 +212,9 @@ class Panel {
     say(this._detail, detail);
     say(this._cap, report ? capOf(report) + slowness(delay) : "");
     this._showButtons(report, act);
-    this._stick.hidden = report === null;
-    if (this._stick.getAttribute("aria-pressed") !== String(stick)) {
-      this._stick.setAttribute("aria-pressed", String(stick));
+    this._stick.hidden = stick === null;
+    if (this._stick.getAttribute("aria-pressed") !== String(stick === true)) {
+      this._stick.setAttribute("aria-pressed", String(stick === true));
     }
   }
 
@@ -224,17 +226,28 @@ class Panel {
   showFigures(report, loop, moving) {
     say(this._own, report ? ownStop(report) : "");
     say(this._test, report?.test ? report.test.text : "");
-    this._figures.hidden = !report?.mine;
-    if (!report?.mine) return;
+    // There before it is driven, so that nothing moves under a thumb as it begins.
+    this._figures.hidden = report === null || isLatched(report);
+    if (report === null) return;
     const all = [...motions(report), ...timings(report, loop, moving)];
-    while (this._figures.childElementCount < all.length) {
-      this._figures.append(html("div", "", {}, html("dt", ""), html("dd", "")));
+    for (const { name, kind, text, more = "" } of all) {
+      const [value, rest] = this._figure(name, kind).children;
+      say(value, text);
+      say(rest, more);
     }
-    all.forEach(({ name, text }, i) => {
-      const [dt, dd] = this._figures.children[i].children;
-      say(dt, name);
-      say(dd, text);
-    });
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} kind
+   */
+  _figure(name, kind) {
+    const known = this._values.get(name);
+    if (known) return known;
+    const value = html("dd", "", {}, html("span", ""), html("span", "more"));
+    this._figures.append(html("div", kind, {}, html("dt", "", {}, name), value));
+    this._values.set(name, value);
+    return value;
   }
 
   /**

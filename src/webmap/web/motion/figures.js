@@ -1,5 +1,13 @@
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
+/**
+ * @typedef {object} Figure
+ * @property {string} name
+ * @property {'motion' | 'time'} kind
+ * @property {string} text
+ * @property {string} [more] What there may be no room for.
+ */
+
 /** Slower than this a robot is as good as standing, and has no halo; m/s. */
 export const STANDING = 0.02;
 
@@ -47,18 +55,18 @@ export function stoppingDistance(report) {
  * was measured.
  *
  * @param {RobotReport} report
- * @returns {{name: string, text: string}[]}
+ * @returns {Figure[]}
  */
 export function motions({ sent, echoed, measured }) {
   const text = (/** @type {readonly number[] | null} */ velocity) => {
     const speed = speedAlong(velocity);
-    if (speed === null || !velocity) return "not known";
-    return `${signed(speed)} m/s, ${signed(velocity[2])} rad/s`;
+    if (speed === null || !velocity) return { text: "not known", more: "" };
+    return { text: `${signed(speed)} m/s`, more: `, ${signed(velocity[2])} rad/s` };
   };
   return [
-    { name: "Sent", text: text(sent) },
-    { name: "Echoed", text: text(echoed) },
-    { name: "Measured", text: text(measured) },
+    { name: "Sent", kind: "motion", ...text(sent) },
+    { name: "Echoed", kind: "motion", ...text(echoed) },
+    { name: "Measured", kind: "motion", ...text(measured) },
   ];
 }
 
@@ -68,15 +76,19 @@ export function motions({ sent, echoed, measured }) {
  * @param {RobotReport} report
  * @param {number | null} loop How long commands take to the gate and back, in ms.
  * @param {number | null} motion How long from the last press to motion, in ms.
- * @returns {{name: string, text: string}[]}
+ * @returns {Figure[]}
  */
 export function timings(report, loop, motion) {
   const age = report.age ?? loop;
   const distance = stoppingDistance(report);
   return [
-    { name: "Loop", text: age === null ? "not known" : `${Math.round(age)} ms` },
-    { name: "To motion", text: motion === null ? "not known" : `${Math.round(motion)} ms` },
-    { name: "To a stop", text: distance === null ? "stands" : `${distance.toFixed(2)} m` },
+    { name: "Loop", kind: "time", text: duration(age) },
+    { name: "To motion", kind: "time", text: duration(motion) },
+    {
+      name: "To a stop",
+      kind: "time",
+      text: distance === null ? "stands" : `${distance.toFixed(2)} m`,
+    },
   ];
 }
 
@@ -91,6 +103,11 @@ export function ownStop({ stop_time, stop_source, stop_date }) {
   if (stop_time === null) return "Nobody knows whether it stops by itself.";
   const how = stop_source === "tested" ? `tested ${stop_date ?? ""}`.trim() : "stated";
   return `Stops by itself within ${stop_time.toFixed(2)} s (${how}).`;
+}
+
+/** @param {number | null} ms */
+function duration(ms) {
+  return ms === null ? "not known" : `${Math.round(ms)} ms`;
 }
 
 /** @param {number} value */

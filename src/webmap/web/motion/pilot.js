@@ -58,6 +58,8 @@ export class Pilot {
      * @type {string | null}
      */
     this.refusal = null;
+    /** What it was that was refused. */
+    this.refused = "";
     this._seq = 0;
     this._steppedAt = now;
     /**
@@ -126,6 +128,7 @@ export class Pilot {
       dead: this.hands.dead,
       axes: this.hands.axes,
       refusal: this.refusal,
+      refused: this.refused,
       delay: this.loop.delay === null ? null : Math.max(this.loop.delay, waited),
     };
   }
@@ -352,6 +355,7 @@ export class Pilot {
     // A command that met the end of its lease on the way is no news.
     if (what === "drive" && !this._lease) return;
     this.refusal = why;
+    this.refused = what;
     if (what === "take" && this._asked?.robot === robot) this._giveUp(now);
     if (what === "drive") this.doubt(now);
   }

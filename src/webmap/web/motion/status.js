@@ -117,7 +117,9 @@ function ofLink({ link }) {
 function ofStopped(status, report) {
   const { confirmed, text } = stopWords(report);
   const detail = text || report.reason || "";
-  const refusal = status.refusal ? ` ${sentence(status.refusal)}` : "";
+  // That commands are refused now is no news.
+  const refused = status.refused === "reset" ? status.refusal : null;
+  const refusal = refused ? ` ${sentence(refused)}` : "";
   if (confirmed === false) return say("unconfirmed", "STOP", `${detail}${refusal}`);
   return say("stopped", "Stopped", `${detail}${refusal}`);
 }
