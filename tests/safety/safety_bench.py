@@ -132,10 +132,6 @@ class Bench:
         self.look_away()
         self.look_back()
 
-    def display_kill(self):
-        """Kill the display, and leave its gate to itself."""
-        self.display.popen.kill()
-
     def wait_for_gate(self):
         """Wait until the display has started another gate."""
         wait_for(lambda: self.gate is not None, "another gate")

@@ -38,6 +38,10 @@ def note(figure: Figure) -> None:
 def table(figures: list[Figure]) -> str:
     """Return the figures as a table in Markdown."""
     lines = [
+        "---",
+        "orphan: true",
+        "---",
+        "",
         "| what fails while W is held | stopped by | promised | worst measured "
         "| worst jitter | trials |",
         "|---|---|---|---|---|---|",

@@ -3,11 +3,14 @@
 The addresses come from the environment: SAFETY_BRIDGE, where the robot is.
 """
 
+import asyncio
+import contextlib
 import itertools
 import os
 import time
 
 import webmap
+import webmap.errors
 
 bridge = webmap.Bridge(os.environ["SAFETY_BRIDGE"])
 bob = webmap.Robot("Bob", webmap.svg.circle(cx=0, cy=0, r=0.2, fill="red"))
@@ -28,6 +31,18 @@ def hold_the_interpreter(message):
         sum(itertools.repeat(1, 200_000_000))
 
 
+def call(message):
+    """Call a service that may never answer."""
+
+    async def wait():
+        with contextlib.suppress(webmap.errors.WebMapError):
+            await bridge.call_service("/slow", {}, timeout=message["data"])
+
+    tasks.append(asyncio.get_running_loop().create_task(wait()))
+
+
+tasks = []
+bridge.subscribe("/call", call, "std_msgs/Float64")
 bridge.subscribe("/block", block, "std_msgs/Float64")
 bridge.subscribe("/hold", hold_the_interpreter, "std_msgs/Float64")
 

@@ -15,7 +15,10 @@ BY_ITSELF = ROBOT_TIMEOUT + 0.05
 """Seconds until a robot stands to which nobody can speak: its timeout and brakes."""
 
 
-def test_a_killed_display_stops_the_robot(bench):
+@pytest.mark.parametrize(
+    ("name", "sig"), [("killed", signal.SIGKILL), ("ended (SIGTERM)", signal.SIGTERM)]
+)
+def test_the_end_of_the_display_stops_the_robot(bench, name, sig):
     def back():
         bench.end_display()
         bench.start_display()
@@ -26,8 +29,8 @@ def test_a_killed_display_stops_the_robot(bench):
         bench.open_page()
 
     bench.prove(
-        "the display is killed",
-        bench.display_kill,
+        f"the display is {name}",
+        lambda: bench.display.popen.send_signal(sig),
         within=PROMISED,
         back=back,
     )
@@ -77,6 +80,29 @@ def test_letting_go_stops_the_robot_while_user_code_blocks(bench):
         within=0.1,
         held_after=False,
         back=lambda: pass_time(1.5),
+    )
+
+
+def test_letting_go_stops_the_robot_while_a_service_call_hangs(bench):
+    def call():
+        bench.robot.answers_services(False)
+        bench.robot.publish("/call", {"data": 1.0})
+        wait_for(lambda: bench.robot.log.of("call_service"), "the call")
+        begun = time.monotonic()
+        wait_for(lambda: time.monotonic() > begun + 0.5, "half a second")
+        assert bench.steady(), "the robot does not go on while a call hangs"
+
+    def back():
+        bench.robot.answers_services(True)
+        bench.robot.unblock()
+
+    bench.prove(
+        "a service call hangs, then the key is let go",
+        bench.let_go,
+        before=call,
+        within=0.1,
+        held_after=False,
+        back=back,
     )
 
 
