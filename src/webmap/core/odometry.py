@@ -29,6 +29,11 @@ class PoseReading:
     position: Vector3
     orientation: Quaternion
     twist: Twist | None = None
+    frame_id: str = ""
+    """The frame of the pose; empty if the message does not say."""
+
+    stamp: float = 0.0
+    """When it was measured, in seconds of the robot's clock; 0 if not said."""
 
     @classmethod
     def of(cls, message: OdometryView) -> "PoseReading":
@@ -38,6 +43,8 @@ class PoseReading:
             place.position.vector,
             place.orientation.quaternion,
             message.velocity if isinstance(message, OdometryMsg) else None,
+            message.frame_id,
+            message.stamp,
         )
 
     @property

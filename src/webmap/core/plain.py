@@ -37,6 +37,16 @@ class TwistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     holonomic: bool = False
 
 
+class TfData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The arguments of ``set_tf``."""
+
+    bridge: str
+    map_frame: str = "map"
+    base_frame: str | None = None
+    namespace: str = ""
+    quiet: bool = False
+
+
 class MoveData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """The arguments of ``set_move_topic``."""
 
@@ -63,6 +73,7 @@ class RobotData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     classes: list[str] = []
     model: dict[str, Any] | None = None
     odometry: OdometryData | None = None
+    tf: TfData | None = None
     twist: TwistData | None = None
     move: MoveData | None = None
     modules: list[ModuleData] = []
@@ -91,6 +102,9 @@ def robot_from_dict(
     if plain.odometry is not None:
         o = plain.odometry
         robot.set_odometry_topic(link(o.bridge), o.topic, o.throttle, type=o.type)
+    if plain.tf is not None:
+        f = msgspec.structs.asdict(plain.tf)
+        robot.set_tf(link(f.pop("bridge")), **f)
     if plain.twist is not None:
         t = msgspec.structs.asdict(plain.twist)
         robot.set_twist_topic(link(t.pop("bridge")), t.pop("topic"), **t)
@@ -116,6 +130,9 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
         odometry=None
         if feed is None
         else OdometryData(feed.bridge.url, feed.topic, feed.throttle, feed.type),
+        tf=None
+        if robot.tf is None
+        else TfData(**{**robot.tf, "bridge": robot.tf["bridge"].url}),
         twist=None
         if twist is None
         else TwistData(

@@ -9,8 +9,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap.core.extendable import Extendable
+from webmap.core.frames import Frames, frames_of
 from webmap.core.motion import MotionRoad, MoveTopic, TwistTopic
 from webmap.core.odometry import OdometryFeed, PoseReading
+from webmap.core.placing import Placing
 from webmap.core.registry import Namespace, robot_modules
 from webmap.errors import MotionError
 from webmap.gate.messages import RobotReport
@@ -28,6 +30,9 @@ log = logging.getLogger("webmap.robot")
 
 POSE_LIMIT = 1.0
 """Seconds after which a pose is drawn as old."""
+
+TF_PERIOD = 0.05
+"""Least seconds between two poses that are taken from frames alone."""
 
 
 class Position(Protocol):
@@ -104,6 +109,10 @@ class Robot(Extendable):
         self.report: RobotReport | None = None
         self._destroyed = False
         self._feed: OdometryFeed | None = None
+        self._frames: Frames | None = None
+        self._placing: Placing | None = None
+        self._says_placing = True
+        self._hears_frames = Removal(lambda: None)
         self.motion = MotionRoad(self.name, self.report_error)
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
         self.svg.set("data-name", self.name)
@@ -149,6 +158,7 @@ class Robot(Extendable):
             map.remove_robot(self)
         self.remove_modules()
         self.unsubscribe_odometry_topic()
+        self.unset_tf()
         self.motion.close()
         robots.pop(self.id, None)
 
@@ -192,6 +202,60 @@ class Robot(Extendable):
             self._feed = None
             self.clear_problem("odometry")
             self.motion.clear_odometry()
+
+    def set_tf(
+        self,
+        bridge: Bridge,
+        *,
+        map_frame: str = "map",
+        base_frame: str | None = None,
+        namespace: str = "",
+        quiet: bool = False,
+    ) -> None:
+        """Draw the robot in the frame of the map, by the frames of ``/tf``.
+
+        A pose of the odometry topic is taken from its own frame to ``map_frame`` as
+        the frames were at its stamp. Without an odometry topic the robot is drawn
+        where the frames have its base. Robots of one bridge share what they hear.
+
+        Args:
+            bridge: The link to the ROS system that has the frames.
+            map_frame: The frame that robots are drawn in.
+            base_frame: The robot's own frame; ``base_link`` of the robot if not given.
+            namespace: ``/robot_0`` where the topics are ``/robot_0/tf`` and
+                ``/robot_0/tf_static``; the names of frames get it in front, but for
+                ``map``, ``world`` and ``earth``, which are everybody's.
+            quiet: Whether poses that stay in the odometry's frame, because nobody
+                tells of ``map_frame``, are no problem to be shown.
+
+        """
+        self.unset_tf()
+        frames = frames_of(bridge, namespace)
+        self._frames = frames
+        self._placing = Placing(
+            frames.buffer, map_frame, base_frame or self.base_link, frames.namespace
+        )
+        self._says_placing = not quiet
+        self._hears_frames = frames.join(self._on_frames)
+
+    def unset_tf(self) -> None:
+        """Draw the robot where its odometry has it; does nothing if it is so."""
+        self._hears_frames.remove()
+        self._frames = self._placing = None
+        self.clear_problem("tf")
+
+    @property
+    def tf(self) -> Mapping[str, Any] | None:
+        """The arguments of :meth:`set_tf`, None if it is not set."""
+        if self._frames is None or self._placing is None:
+            return None
+        return {
+            "bridge": self._frames.bridge,
+            "map_frame": self._placing.map_frame,
+            "base_frame": self._placing.base_frame,
+            "namespace": self._frames.namespace,
+            "quiet": not self._says_placing,
+        }
 
     # How it is moved.
 
@@ -451,6 +515,32 @@ class Robot(Extendable):
             self.motion.set_odometry(
                 self._feed.bridge, self._feed.topic, self._feed.type
             )
+        if self._placing is not None:
+            reading = self._placing.of_reading(reading)
+            self._tell_placing(self._placing)
+        self._place(reading)
+
+    def _on_frames(self) -> None:
+        """Look where the frames have the base, if no topic says where it is."""
+        if self._feed is not None or self._placing is None:
+            return
+        now = time.monotonic()
+        if self.pose_stamp is not None and now - self.pose_stamp < TF_PERIOD:
+            return
+        reading = self._placing.of_base()
+        self._tell_placing(self._placing)
+        if reading is not None:
+            self.pose_stamp = now
+            self.svg.set_age(0.0, limit=POSE_LIMIT)
+            self._place(reading)
+
+    def _tell_placing(self, placing: Placing) -> None:
+        if placing.problem is None:
+            self.clear_problem("tf")
+        elif self._says_placing and "tf" not in self.problems:
+            self.set_problem("tf", placing.problem)
+
+    def _place(self, reading: PoseReading) -> None:
         changed = (
             reading.position != self.position
             or reading.orientation != self.orientation

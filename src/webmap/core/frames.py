@@ -1,0 +1,100 @@
+"""The frames of a ROS system, heard once for all robots that need them."""
+
+import logging
+from collections.abc import Callable
+from functools import partial
+
+from webmap.geometry import Quaternion, Vector3
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages import TFMessage
+from webmap.scope import Removal, no_scope
+from webmap.tf import Buffer, Transform, TransformError
+
+log = logging.getLogger("webmap.tf")
+
+TYPE = "tf2_msgs/TFMessage"
+
+QUEUE = 100
+"""Messages that a bridge may hold back: many nodes share the topic, and each counts."""
+
+MOST_COMPLAINTS = 50
+
+_heard: dict[tuple[Bridge, str], "Frames"] = {}
+
+
+class Frames:
+    """A buffer that ``/tf`` and ``/tf_static`` of one namespace fill, while needed.
+
+    Args:
+        bridge: The link to the ROS system.
+        namespace: Of both topics: ``/robot_0`` for ``/robot_0/tf``.
+
+    """
+
+    def __init__(self, bridge: Bridge, namespace: str) -> None:
+        self.bridge = bridge
+        self.namespace = namespace
+        self.buffer = Buffer()
+        self._listeners: dict[int, Callable[[], object]] = {}
+        self._complained: set[str] = set()
+        with no_scope():
+            self._subscriptions = [
+                bridge.subscribe(
+                    f"{namespace}/{topic}",
+                    partial(self._hear, topic == "tf_static"),
+                    TYPE,
+                    decode=TFMessage,
+                    queue_length=QUEUE,
+                )
+                for topic in ("tf", "tf_static")
+            ]
+
+    def join(self, listener: Callable[[], object]) -> Removal:
+        """Call ``listener`` whenever frames have moved, until the removal."""
+        key = id(listener)
+        self._listeners[key] = listener
+
+        def leave() -> None:
+            del self._listeners[key]
+            if not self._listeners:
+                _heard.pop((self.bridge, self.namespace), None)
+                for subscription in self._subscriptions:
+                    subscription.remove()
+
+        return Removal(leave)
+
+    def _hear(self, static: bool, message: TFMessage) -> None:
+        for each in message.transforms:
+            place, turn = each.transform.translation, each.transform.rotation
+            try:
+                self.buffer.add(
+                    each.frame_id,
+                    each.child_frame_id,
+                    Transform(
+                        Vector3(place.x, place.y, place.z),
+                        Quaternion(turn.x, turn.y, turn.z, turn.w),
+                    ),
+                    each.stamp,
+                    static=static,
+                    namespace=self.namespace,
+                )
+            except TransformError as error:
+                self._complain(each.child_frame_id, str(error))
+        if not static:
+            for listener in list(self._listeners.values()):
+                listener()
+
+    def _complain(self, frame: str, words: str) -> None:
+        """Log what is wrong, once for each frame."""
+        if frame not in self._complained and len(self._complained) < MOST_COMPLAINTS:
+            self._complained.add(frame)
+            log.warning("%s: a transform was left out: %s", self.bridge.name, words)
+
+
+def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
+    """Return the frames of a ROS system; those who ask alike get the same."""
+    space = "/" + namespace.strip("/") if namespace.strip("/") else ""
+    key = (bridge, space)
+    if key not in _heard:
+        _heard[key] = Frames(bridge, space)
+    return _heard[key]
