@@ -30,7 +30,7 @@ def robot_spec(fake):
         bridge_url=fake.url,
         twist_topic="/cmd_vel",
         stops_within=0.25,
-        v_max=1.0,
+        v_max=0.25,  # low enough for a slow loop to take nothing off it
         w_max=1.5,
         odometry_topic="/odom",
         odometry_type="nav_msgs/Odometry",

@@ -22,7 +22,7 @@ def spec(**changes):
         "name": "Bob",
         "bridge_url": URL,
         "twist_topic": "/cmd_vel",
-        "stops_within": 0.25,
+        "stops_within": 0.0,  # so that a short loop leaves all of the speed
         "v_max": 1.0,
         "w_max": 1.5,
         "cancel_topic": "/cancel",
@@ -58,11 +58,12 @@ class Bench:
     was_driven: bool = False
     disk: dict[Key, str] = field(default_factory=dict)
     """Whose STOP stands, as the disk has it."""
+    tests: dict[Key, events.StopRecord] = field(default_factory=dict)
     slow_disk: bool = False
     """Whether the disk says nothing by itself."""
     full_disk: bool = False
     depth: int = 0
-    to_keep: list[actions.KeepLatch] = field(default_factory=list)
+    to_keep: list[actions.Action] = field(default_factory=list)
     gate: Gate = field(default_factory=lambda: Gate(Ticks(5000), Epochs(0)))
     written: list[Written] = field(default_factory=list)
     dropped: list[Written] = field(default_factory=list)
@@ -92,6 +93,8 @@ class Bench:
             if each is not None and n % round(0.05 / step) == 0:
                 each()
             self._do(self.gate.step(self.now))
+            while self.to_keep:
+                self.keep(self.to_keep.pop(0))
 
     def _do(self, todo):
         for action in todo:
@@ -110,10 +113,13 @@ class Bench:
                             self.was_driven,
                             why,
                             self.disk.get(key),
+                            self.tests.get(key),
                         )
                     )
-                case actions.KeepLatch() if not self.slow_disk:
-                    self.to_keep.append(action)  # in a thread: never within an action
+                case actions.KeepLatch() | actions.KeepStopTest():
+                    # In a thread: never answered within an action.
+                    if not self.slow_disk:
+                        self.to_keep.append(action)
                 case actions.WriteTwist(_, twist) if (
                     self.losing_zeros and twist.is_zero
                 ):
@@ -133,6 +139,11 @@ class Bench:
 
     def keep(self, latch):
         """Have the disk do as it is told, and say so."""
+        if isinstance(latch, actions.KeepStopTest):
+            record = events.StopRecord(latch.seconds, "2026-11-21")
+            self.tests[latch.key] = record
+            self.tell(events.StopTestKept(latch.key, record))
+            return
         error = "the disk is full" if self.full_disk else None
         if not self.full_disk and latch.by is not None:
             self.disk[latch.key] = latch.by

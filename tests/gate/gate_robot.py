@@ -36,6 +36,8 @@ class FakeRobot:
         self.told: list[Told] = []
         self.answers_services = answers_services
         self.sends_odometry = True
+        self.at_rest = False
+        """Whether its odometry says that it stands."""
         self.deaf = threading.Event()
         """While set, the robot reads nothing from any link."""
         self._links = 0
@@ -101,10 +103,11 @@ class FakeRobot:
 
     async def _odometry(self):
         twist = {"linear": {"x": 0.125, "y": 0.0}, "angular": {"z": None}}
+        rest = {"linear": {"x": 0.0, "y": 0.0}, "angular": {"z": 0.0}}
         good = {"linear": {"x": 0.125, "y": 0.0}, "angular": {"z": -0.5}}
         for n in range(10**9):
             await asyncio.sleep(0.05)
-            velocity = twist if n == 0 else good
+            velocity = twist if n == 0 else rest if self.at_rest else good
             message = {"header": {}, "twist": {"twist": velocity, "covariance": []}}
             text = json.dumps({"op": "publish", "topic": "/odom", "msg": message})
             for socket, topics in list(self._sockets.values()):

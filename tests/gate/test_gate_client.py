@@ -38,12 +38,12 @@ class TestPages:
     def test_a_page_takes_and_drives_and_sees_what_comes_of_it(self, page, fake):
         page.drive_off(fake)
         assert page.of("hello")[0]["connection"] == page.connection.id
-        eventually(lambda: page.robot()["echoed"] == [1.0, 0, 0], "the echo")
+        eventually(lambda: page.robot()["echoed"] == [0.25, 0, 0], "the echo")
         eventually(lambda: page.robot()["measured"] == [0.125, 0, -0.5], "odometry")
         report = page.robot()
         assert report["state"] == "driving"
-        assert report["sent"] == [1.0, 0.0, 0.0]
-        assert (report["v"], report["w"], report["link"]) == (1.0, 1.5, "up")
+        assert report["sent"] == [0.25, 0.0, 0.0]
+        assert (report["v"], report["w"], report["link"]) == (0.25, 1.5, "up")
         assert report["why"] == ["limit of the robot"]
 
     def test_the_robot_is_told_in_the_right_order_and_form(self, page, fake):
@@ -123,9 +123,9 @@ class TestPages:
         assert fake.velocities == []
 
     def test_the_pages_speeds_count(self, page, fake):
-        page.connection.set_speeds(0.25, 0.5)
+        page.connection.set_speeds(0.125, 0.5)
         page.drive_off(fake)
-        assert fake.last_speed == 0.25
+        assert fake.last_speed == 0.125
 
     def test_a_page_that_comes_later_hears_of_every_robot(self, page, client):
         eventually(lambda: page.robot(), "the first report")
@@ -232,10 +232,10 @@ class TestProgram:
             return fake.moving
 
         eventually(drive, "motion")
-        assert fake.last_speed in (1.0, 0.0)
+        assert fake.last_speed in (0.25, 0.0)
         eventually(lambda: of(reports, messages.SentTwist), "the report of it")
         sent = of(reports, messages.SentTwist)[0]
-        assert (sent.vx, sent.wz, sent.by) == (1.0, 0.5, "program")
+        assert (sent.vx, sent.wz, sent.by) == (0.25, 0.5, "program")
         at = fake.moving[-1][0]
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
@@ -276,6 +276,7 @@ class TestProgram:
         self, client, page, fake
     ):
         self.take(client)
+        fake.at_rest = True
         page.take()
 
         def refused():
@@ -479,7 +480,19 @@ class TestStopStands:
         client.start()
         eventually(latched, "the STOP of before")
         client.reset("r1")
-        eventually(lambda: not heard[-1].latched, "the reset")
+        eventually(lambda: not of(heard, messages.RobotReport)[-1].latched, "reset")
+
+    def test_it_is_confirmed_by_odometry_or_it_is_not(self, page, client, fake):
+        page.drive_off(fake)
+        client.stop_robot("r1")
+
+        def confirmed():
+            return (page.robot().get("stop") or {}).get("confirmed")
+
+        eventually(lambda: confirmed() is False, "the word that it moves on")
+        assert page.robot()["stop"]["why"].startswith("still moving at 0.1")
+        fake.at_rest = True
+        eventually(confirmed, "the word that it stands")
 
     def test_a_gate_that_does_not_run_resets_nothing(self):
         GateClient().reset(None)
@@ -509,3 +522,45 @@ class TestStopStands:
         eventually(lambda: said() == [True, False], "the flag taken back")
         page.end()
         client.forget("r1")
+
+
+class TestHands:
+    def test_a_robot_goes_from_page_to_page_at_standstill(self, page, client, fake):
+        other = Page(client, "Ben")
+        page.drive_off(fake)
+        other.say(op="ask", robot="r1")
+        eventually(lambda: page.robot().get("asker"), "the question")
+        page.say(op="grant", robot="r1")
+        eventually(lambda: page.robot().get("changing"), "the change")
+        page.x = None
+        assert not other.robot()["mine"]
+        fake.at_rest = True
+        eventually(lambda: other.robot().get("mine"), "the lease")
+        other.end()
+
+    def test_a_base_that_stops_by_itself_is_found(self, client, robot_spec, fake):
+        spec = msgspec.structs.replace(robot_spec, stops_within=None)
+        client.declare(spec)
+        page = Page(client)
+        fake.at_rest = True
+        page.take()
+        page.x = 0.0
+        eventually(lambda: page.robot().get("measured"), "odometry")
+        eventually(lambda: page.robot().get("armed"), "hands that were seen")
+        page.say(op="stop-test", robot="r1")
+        eventually(lambda: fake.moving, "creeping")
+        assert fake.moving[0][1] == 0.1
+        fake.at_rest = False
+
+        def state():
+            return (page.robot().get("test") or {}).get("state")
+
+        eventually(lambda: state() == "waiting", "silence")
+        fake.at_rest = True
+        eventually(lambda: state() == "done", "the result")
+        eventually(lambda: page.robot()["stop_source"] == "tested", "the date")
+        assert page.robot()["stop_time"] < 2
+        client.stop()
+        client.start()
+        eventually(lambda: page.robot().get("stop_date"), "the result of before")
+        page.end()

@@ -18,11 +18,11 @@ until a reset, which leads to *free*.
 
 from typing import Literal
 
-from webmap.gate.actions import Detach, Emit, Say
+from webmap.gate.actions import Detach, Emit, KeepStopTest, Say
 from webmap.gate.confirm import Confirmation
 from webmap.gate.connection import Connection
 from webmap.gate.deadman import DeadMan
-from webmap.gate.events import Key, LatchKept, LockState, Wrote
+from webmap.gate.events import Key, LatchKept, LockState, StopRecord, Wrote, WroteGoal
 from webmap.gate.goals import Goals
 from webmap.gate.handover import HandOver
 from webmap.gate.health import Health, Pulse
@@ -30,10 +30,14 @@ from webmap.gate.hooks import Hooks
 from webmap.gate.latch import Latch
 from webmap.gate.lease import Epochs, Lease
 from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
+from webmap.gate.loopage import LoopAge, governed
 from webmap.gate.messages import Refused, RobotSpec, SentTwist
 from webmap.gate.motion import Bounds, Motion
+from webmap.gate.obedience import Obedience
 from webmap.gate.refusal import Refusal
 from webmap.gate.sight import Sight
+from webmap.gate.standstill import STILL_V, speed_of
+from webmap.gate.stoptest import CREEP, StopTest
 from webmap.geometry import Twist
 
 BLIND_LIMIT = 1.0
@@ -75,6 +79,12 @@ class Base:
         self.lease: Lease | None = None
         self.handover = HandOver()
         self.deadman = DeadMan()
+        self.ages = LoopAge()
+        self.obedience = Obedience()
+        self.test: StopTest | None = None
+        """The last stop test, which may be going on."""
+        self.tested: StopRecord | None = None
+        """What the last stop test that came to an end found, whenever that was."""
         self.motion = Motion(key, control, self._bounds, emit)
         self.sight = Sight(key, emit)
         self.known = False
@@ -105,15 +115,31 @@ class Base:
     @property
     def speed(self) -> Speed:
         """The speeds in force now."""
-        caps = [cap for spec in self.specs.values() for cap in caps_of(spec)]
+        caps = [cap for spec in self.specs.values() for cap in self._caps(spec)]
         if self._page_cap is not None:
             caps.append(self._page_cap)
-        return speed_in_force(caps)
+        return governed(speed_in_force(caps), self.ages.p95, self.stop_time)
+
+    def _caps(self, spec: RobotSpec) -> list[Cap]:
+        return caps_of(spec, self.tested)
+
+    @property
+    def stop_time(self) -> float | None:
+        """Seconds within which the machine stops by itself, if that is known."""
+        if self.tested is not None:
+            return self.tested.seconds
+        stated = [spec.stops_within for spec in self.specs.values()]
+        known = [seconds for seconds in stated if seconds is not None]
+        return max(known) if len(known) == len(stated) else None
+
+    @property
+    def a_max(self) -> float | None:
+        """The greatest growth of its speed, in m/s², if one was stated."""
+        return min((s.a_max for s in self.specs.values() if s.a_max), default=None)
 
     def _bounds(self) -> Bounds:
-        a_max = min((s.a_max for s in self.specs.values() if s.a_max), default=None)
         holonomic = all(spec.holonomic for spec in self.specs.values())
-        return Bounds(self.speed, a_max, holonomic)
+        return Bounds(self.speed, self.a_max, holonomic)
 
     @property
     def drivable(self) -> bool:
@@ -123,7 +149,12 @@ class Base:
     @property
     def silent(self) -> bool:
         """Whether nothing is written now and nothing will be by itself."""
-        return self.motion.silent
+        return self.motion.silent and not self.testing
+
+    @property
+    def testing(self) -> bool:
+        """Whether a stop test is going on."""
+        return self.test is not None and self.test.running
 
     @property
     def active(self) -> bool:
@@ -135,6 +166,7 @@ class Base:
             or self._confirming
             or self.motion.held
             or self.handover.going_on
+            or self.sight.on
         )
 
     @property
@@ -211,7 +243,7 @@ class Base:
             return "it has no velocity topic"
         if not self.control.fresh(now):
             return f"{self.key.url} does not answer"
-        if all(spec.odometry_topic is None for spec in self.specs.values()):
+        if not self._has_odometry:
             return None
         if self.sight.seen_at is None:
             return "no odometry yet"
@@ -231,7 +263,8 @@ class Base:
         self.lease = Lease(to.id, to.name, epoch, to.program)
         self.deadman = DeadMan(needs_neutral=not to.program)
         self._page_cap = to.cap
-        self._update_watch()
+        self.ages.clear()
+        self._update_watch(now)
         return epoch
 
     def set_cap(self, cap: Cap) -> None:
@@ -256,10 +289,11 @@ class Base:
         lease = self.lease
         if lease is None:
             return
-        self.motion.halt(now)
+        self._halt(why or "the driver let go of it", now)
         self.lease, self._page_cap = None, None
         self.deadman = DeadMan()
-        self._update_watch()
+        self.ages.clear()
+        self._update_watch(now)
         if why is not None:
             self._refuse(lease.connection, "lease", why)
 
@@ -308,7 +342,7 @@ class Base:
         if self.drivable:
             self.motion.zero(now)
         self.handover.begin(heir, now)
-        self._update_watch()
+        self._update_watch(now)
 
     def _change_hands(self, now: float) -> None:
         """Let time have its say about who gets the machine."""
@@ -346,14 +380,65 @@ class Base:
             self._fault(reason, now)
             return None if neutral else reason
         self.deadman.accept(neutral, now)
+        if self.test is not None and self.test.running:
+            return self._go_on_with_test(self.test, lease, neutral, now)
         if neutral or not self.deadman.armed:
             self.motion.halt(now)
             return None if neutral else "release every input first"
+        self._drive(wanted, lease, now)
+        return None
+
+    def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         if not self.motion.driving:
             for goals in self.goals.values():
                 goals.make_way()
         self.motion.drive(wanted, lease, now)
+
+    def begin_test(self, now: float) -> None:
+        """Begin the stop test for the holder of the lease.
+
+        Raises:
+            Refusal: If the machine cannot be tested now.
+
+        """
+        if self.testing:
+            raise Refusal("a stop test is going on")
+        if reason := self.doubt(now):
+            raise Refusal(reason)
+        if not self.deadman.armed or not self.motion.silent:
+            raise Refusal("release every input first")
+        measured = self.sight.measured
+        if measured is None:
+            raise Refusal("without odometry nothing can be measured")
+        if speed_of(measured) >= STILL_V:
+            raise Refusal("it moves already")
+        self.test = StopTest(now)
+
+    def _go_on_with_test(
+        self, test: StopTest, lease: Lease, neutral: bool, now: float
+    ) -> str | None:
+        if not neutral:
+            self._lapse("a key was pressed", now)
+            return "a stop test was going on: release every input first"
+        if test.state == "creeping":
+            self._drive(CREEP, lease, now)
         return None
+
+    def _after_test(self, test: StopTest, now: float) -> None:
+        """Do what the stop test has come to."""
+        if test.state == "waiting":
+            self.motion.leave_alone()
+        elif not test.running:
+            self.motion.zero(now)
+            if test.concluded:
+                self._emit(KeepStopTest(self.key, test.seconds))
+
+    def _halt(self, why: str, now: float) -> None:
+        """Go to zeros if it was driven or tested, for the reason in words."""
+        if self.test is not None and self.test.running:
+            self.test.abort(why)
+            self.motion.zero(now)
+        self.motion.halt(now)
 
     def goal(
         self, robot: str, pose: tuple[float, float, float], by: str, now: float
@@ -366,8 +451,13 @@ class Base:
         """
         if reason := self.unarmable(now):
             raise Refusal(reason)
-        self._lapse(now)
+        self._lapse("a goal was sent", now)
         self.goals[robot].send(*pose, by)
+
+    def wrote_goal(self, write: WroteGoal) -> None:
+        """Note that a goal went out: what moves from here on moves by itself."""
+        self.goals[write.robot].wrote(write)
+        self.obedience.excuse()
 
     def stop(self, by: str, now: float) -> None:
         """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
@@ -385,9 +475,10 @@ class Base:
             goals.stop()
         for hooks in self.hooks.values():
             hooks.say(stopped=True)
+        self.obedience.expect(now)
         self.confirmation.begin(now)
         self._confirm(now)
-        self._update_watch()
+        self._update_watch(now)
 
     def reset(self, now: float) -> None:
         """End the STOP that stands; nothing moves by that, and nobody has it.
@@ -402,7 +493,7 @@ class Base:
         self.motion.let_go()
         for hooks in self.hooks.values():
             hooks.say(stopped=False)
-        self._update_watch()
+        self._update_watch(now)
 
     def _confirm(self, now: float) -> None:
         since = self.confirmation.since
@@ -414,7 +505,7 @@ class Base:
         link = self.control if self.drivable else self.goals[self.spec.id].link
         if not link.up:
             return f"no link to {self.key.url}"
-        if all(spec.odometry_topic is None for spec in self.specs.values()):
+        if not self._has_odometry:
             return "no odometry"
         return None
 
@@ -424,22 +515,27 @@ class Base:
             if reason := self.doubt(now):
                 self._fault(reason, now)
             elif self.deadman.expired(now):
-                self._lapse(now)
+                self._lapse("the driver fell silent", now)
+        if self.test is not None and self.test.running:
+            self.test.step(now)
+            if not self.test.running:
+                self._after_test(self.test, now)
+        self.ages.forget_old(now)
         self._change_hands(now)
         self.motion.step(now)
         if self._confirming:
             self._confirm(now)
-        self._update_watch()
+        self._update_watch(now)
         self._drop_leaving()
 
-    def _lapse(self, now: float) -> None:
+    def _lapse(self, why: str, now: float) -> None:
         self.deadman.disarm()
-        self.motion.halt(now)
+        self._halt(why, now)
 
     def _fault(self, reason: str, now: float) -> None:
         """Stop and disarm, because something may not be as it should."""
         driving = self.motion.driving
-        self._lapse(now)
+        self._lapse(reason, now)
         # A program is not seen to let go of anything, so it has to take it again.
         if driving and self.lease is not None and self.lease.program:
             self.end_lease(reason, now)
@@ -450,6 +546,7 @@ class Base:
         """Note what became of a velocity."""
         if not write.done:
             return
+        self.obedience.wrote(write.twist, self.motion.sent, now)
         self.motion.wrote(write, now)
         twist = write.twist
         for robot in self.specs:
@@ -465,6 +562,13 @@ class Base:
             self.confirmation.saw(measured, now)
         if self.handover.heir is not None:
             self.handover.saw(measured, now)
+        self.obedience.saw(measured, now)
+        test = self.test
+        if test is not None and test.running:
+            state = test.state
+            test.saw(measured, self.motion.moved_at, now)
+            if test.state != state:
+                self._after_test(test, now)
 
     def saw_echo(self, twist: Twist) -> None:
         """Note what the robot's ROS says on the velocity topic."""
@@ -476,6 +580,7 @@ class Base:
         self._lock, self.known = lock, True
         if lock.driven:
             self.motion.owe_from_before()
+        self.tested = lock.tested
         if lock.held and lock.latched_by is not None and not self.latch.on:
             self.latch.found(lock.latched_by)
             self._stand_by_stop(now)
@@ -485,14 +590,17 @@ class Base:
         """Note that the disk knows whether STOP stands."""
         self.latch.kept(event)
 
+    def stop_tested(self, record: StopRecord) -> None:
+        """Note what a stop test found, and the day of it."""
+        self.tested = record
+
     def link_up(self, now: float) -> None:
         """A zero that may not have arrived goes first."""
         if not self.control.up:
             return
+        self.motion.pay(now)
         if self.latch.on:
             self._stand_by_stop(now)
-        else:
-            self.motion.pay(now)
 
     def tasks_up(self, link: Health) -> None:
         """Say what could not be said for want of this link."""
@@ -512,10 +620,15 @@ class Base:
         if self.lease is not None:
             self._fault(f"no link to {self.key.url}", now)
 
-    def _update_watch(self) -> None:
+    def _update_watch(self, now: float) -> None:
         self.sight.update(
             self.lease is not None
             or not self.silent
             or self._confirming
             or self.handover.heir is not None
+            or (self._has_odometry and self.obedience.watching(now))
         )
+
+    @property
+    def _has_odometry(self) -> bool:
+        return any(spec.odometry_topic is not None for spec in self.specs.values())

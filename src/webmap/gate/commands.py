@@ -14,6 +14,7 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
     {"op": "ask", "robot": "r1"}
     {"op": "grant", "robot": "r1"}
     {"op": "deny", "robot": "r1"}
+    {"op": "stop-test", "robot": "r1"}
 
 ``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
 when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
@@ -23,7 +24,9 @@ one that came, and ``seq`` grows with every ``drive`` and ``goal`` of the connec
 ``goal`` is a pose in the robot's goal frame, in metres and radians. ``reset`` ends a
 STOP that stands; it moves nothing and gives no lease. ``ask`` asks the holder of the
 lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
-10 s; ``release`` also takes the question back.
+10 s; ``release`` also takes the question back. ``stop-test`` creeps, stops sending and
+measures whether the base stops by itself; it needs the lease, released inputs, and a
+page that goes on sending ``drive``.
 
 Whatever is not one of these is refused whole. What the gate says back stands in
 :mod:`webmap.gate.reports`.
@@ -140,7 +143,26 @@ class Deny:
     robot: str
 
 
-Command = Take | Release | Drive | Goal | Cancel | Stop | Reset | Ask | Grant | Deny
+@dataclass(frozen=True, slots=True)
+class StopTest:
+    """The page asks to measure whether the base stops by itself."""
+
+    robot: str
+
+
+Command = (
+    Take
+    | Release
+    | Drive
+    | Goal
+    | Cancel
+    | Stop
+    | Reset
+    | Ask
+    | Grant
+    | Deny
+    | StopTest
+)
 
 
 def parse(data: bytes) -> Command:
@@ -160,6 +182,13 @@ def parse(data: bytes) -> Command:
     if fields:
         _refuse(f"{_short(next(iter(fields)))} is not a field of {op!r}")
     return command
+
+
+def op_of(command: Command) -> str:
+    """Return the ``op`` of a command."""
+    if isinstance(command, StopTest):
+        return "stop-test"
+    return type(command).__name__.lower()
 
 
 def _object(data: bytes) -> dict[str, Any]:
@@ -266,6 +295,7 @@ _READERS: dict[str, Callable[[_Fields], Command]] = {
     "ask": lambda fields: Ask(fields.robot()),
     "grant": lambda fields: Grant(fields.robot()),
     "deny": lambda fields: Deny(fields.robot()),
+    "stop-test": lambda fields: StopTest(fields.robot()),
     "stop": lambda fields: Stop(_one_or_all(fields)),
     "reset": lambda fields: Reset(_one_or_all(fields)),
 }

@@ -58,6 +58,7 @@ class Fleet:
             events.Measured: self._measured,
             events.LockState: self._locked,
             events.LatchKept: self._latch_kept,
+            events.StopTestKept: self._stop_test_kept,
         }
 
     def __iter__(self) -> Iterator[Base]:
@@ -206,7 +207,7 @@ class Fleet:
         if base is None:
             return
         if event.done:
-            base.goals[event.robot].wrote(event)
+            base.wrote_goal(event)
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(Say(sent))
         else:
@@ -239,6 +240,11 @@ class Fleet:
             base.latch_kept(event)
         else:  # the robot was forgotten meanwhile; its STOP was not
             self._latches[event.key].kept(event)
+
+    def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.stop_tested(event.record)
 
     def _of_key(self, key: events.Key) -> Base | None:
         """Return a machine, which may change by that; it may be gone meanwhile."""

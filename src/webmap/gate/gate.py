@@ -23,7 +23,9 @@ from webmap.gate.commands import (
     Release,
     Reset,
     Stop,
+    StopTest,
     Take,
+    op_of,
     parse,
 )
 from webmap.gate.connection import Connection
@@ -162,7 +164,7 @@ class Gate:
             if connection.garbage.too_often(now):
                 self._people.close(connection, "too many messages that make no sense")
         else:
-            what = type(command).__name__.lower()
+            what = op_of(command)
             self._attempt(
                 connection,
                 command.robot,
@@ -198,7 +200,7 @@ class Gate:
             case Drive():
                 self._drive(connection, command, now)
             case Goal(robot):
-                base = self._licensed(connection, command, now)
+                base, _ = self._licensed(connection, command, now)
                 pose = (command.x, command.y, command.yaw)
                 base.goal(robot, pose, connection.id, now)
             case Take(robot):
@@ -209,6 +211,11 @@ class Gate:
                 self._ask(connection, robot, now)
             case Grant() | Deny():
                 self._answer(connection, command, now)
+            case StopTest(robot):
+                base = self._fleet.find(robot)
+                if not base.is_held_by(connection.id):
+                    raise Refusal("take it first")
+                base.begin_test(now)
             case _:
                 self._cancel(connection, command.robot)
 
@@ -268,26 +275,29 @@ class Gate:
 
     def _checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float
-    ) -> Base:
-        """Return the machine if this connection may move it by this command."""
+    ) -> tuple[Base, float]:
+        """Return the machine if this connection may move it by this command.
+
+        Besides it, the age of the command's loop in seconds.
+        """
         base = self._fleet.find(robot)
         check_lease(base.lease, connection.id, epoch)
-        self._ticks.check(tick, now)
-        return base
+        return base, self._ticks.check(tick, now)
 
     def _licensed(
         self, connection: Connection, command: Drive | Goal, now: float
-    ) -> Base:
-        base = self._checked(
+    ) -> tuple[Base, float]:
+        base, age = self._checked(
             connection, command.robot, command.epoch, command.tick, now
         )
         if command.seq <= connection.acked:
             raise Refusal("its seq is not larger than the one before")
         connection.acked = command.seq
-        return base
+        return base, age
 
     def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
-        base = self._licensed(connection, drive, now)
+        base, age = self._licensed(connection, drive, now)
+        base.ages.add(age, now)
         if drive.clamped and not connection.flagged:
             connection.flagged = True
             log.warning("connection %s asks for more than full speed", connection.id)
@@ -354,7 +364,8 @@ class Gate:
         program, robot = self._people.program, message.robot
 
         def drive() -> None:
-            base = self._checked(program, robot, message.epoch, message.tick, now)
+            base, age = self._checked(program, robot, message.epoch, message.tick, now)
+            base.ages.add(age, now)
             twist = Twist(*_finite(message.velocity))
             if reason := base.drive(twist, twist.is_zero, now):
                 raise Refusal(reason)
@@ -365,7 +376,7 @@ class Gate:
         program, robot = self._people.program, message.robot
 
         def move() -> None:
-            base = self._checked(program, robot, message.epoch, message.tick, now)
+            base, _ = self._checked(program, robot, message.epoch, message.tick, now)
             base.goal(robot, _finite(message.pose), program.id, now)
 
         self._attempt(program, robot, "goal", move, now)

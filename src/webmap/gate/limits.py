@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from webmap.gate.events import StopRecord
 from webmap.gate.messages import RobotSpec
 from webmap.geometry import Twist
 
@@ -39,13 +40,23 @@ class Speed:
     why: tuple[str, ...]
 
 
-def caps_of(spec: RobotSpec) -> list[Cap]:
-    """Return what the robot itself does not allow to exceed."""
+def caps_of(spec: RobotSpec, tested: StopRecord | None = None) -> list[Cap]:
+    """Return what the robot itself does not allow to exceed.
+
+    Args:
+        spec: The robot.
+        tested: What its stop test found; that counts more than what was stated.
+
+    """
     caps = []
-    if spec.stops_within is None:
+    seconds = spec.stops_within if tested is None else tested.seconds
+    if seconds is None and tested is not None:
+        why = f"did not stop by itself when tested on {tested.date}"
+        caps.append(Cap(SLOW_V, SLOW_W, why))
+    elif seconds is None:
         caps.append(Cap(SLOW_V, SLOW_W, "unverified stop"))
-    elif spec.stops_within > STOPS_WITHIN:
-        why = f"stops by itself only after {spec.stops_within:g} s"
+    elif seconds > STOPS_WITHIN:
+        why = f"stops by itself only after {seconds:g} s"
         caps.append(Cap(SLOW_V, SLOW_W, why))
     v = math.inf if spec.v_max is None else spec.v_max
     w = math.inf if spec.w_max is None else spec.w_max

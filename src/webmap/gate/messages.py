@@ -218,6 +218,13 @@ class StopReport(msgspec.Struct, frozen=True):
     """The reason in words."""
 
 
+class TestReport(msgspec.Struct, frozen=True):
+    """How it stands with the last stop test."""
+
+    state: Literal["creeping", "waiting", "done", "failed"]
+    text: str
+
+
 class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Everything a page shows about a robot's motion."""
 
@@ -248,6 +255,20 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """What the robot's ROS last said back on the velocity topic."""
     measured: Velocity | None
     """What odometry says, if it is fresh."""
+    alarm: str | None
+    """That the robot moves on although zero was sent, in words."""
+    age: float | None
+    """The age of the driver's loop in milliseconds, p95 of two seconds."""
+    reaction: float
+    """Seconds from a finger to the robot, at worst."""
+    brake: float
+    """The deceleration that is assumed, in m/s²."""
+    stop_time: float | None
+    """Seconds within which the base stops by itself, if that is known."""
+    stop_source: Literal["stated", "tested"] | None
+    stop_date: str | None
+    """The day of the stop test."""
+    test: TestReport | None
     armable: bool
     reason: str | None
     """Why the robot cannot be taken or moved now, in words."""

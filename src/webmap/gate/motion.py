@@ -57,9 +57,10 @@ class Motion:
         self._emit = emit
         self._burst = Burst()
         self._held = Burst(HELD_PERIOD, HELD_LENGTH)
+        self._left_alone = False
         self._pending: tuple[Twist, Lease] | None = None
         self._tried_at = float("-inf")
-        self._sent_at = float("-inf")
+        self._sent_at = self._moved_at = float("-inf")
         self._sent_epoch: int | None = None
 
     @property
@@ -70,7 +71,7 @@ class Motion:
     @property
     def silent(self) -> bool:
         """Whether nothing is written now and nothing will be by itself."""
-        return not self.driving and not self.stopping
+        return not (self.driving or self.stopping or self._left_alone)
 
     def drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         """Write ``wanted``, within the bounds, on behalf of ``lease``."""
@@ -81,6 +82,16 @@ class Motion:
         self._pending = (wanted, lease)
         self._flush(now)
 
+    def leave_alone(self) -> None:
+        """Write nothing more, not even zero, though it moves (stop test only)."""
+        self.driving, self._pending = False, None
+        self._left_alone = True
+
+    @property
+    def moved_at(self) -> float:
+        """When the machine was last told to move."""
+        return self._moved_at
+
     def halt(self, now: float) -> None:
         """Go from driving to zeros; nothing happens if it was not driven."""
         if self.driving:
@@ -90,7 +101,7 @@ class Motion:
         """Write zero at once, whatever was before, and for a moment from here on."""
         if self.stopping and self._burst.started_at == now:
             return
-        self.driving, self._pending = False, None
+        self.driving, self._pending, self._left_alone = False, None, False
         self._burst.start(now)
         self._owe_zero()
         self._write_zero_if_due(now)
@@ -112,6 +123,7 @@ class Motion:
     def pay(self, now: float) -> None:
         """Write the zero that is owed, now that there is a link again."""
         if self.owes_zero:
+            self._burst.end()  # what it wrote just now went to the link before
             self.zero(now)
 
     def owe_from_before(self) -> None:
@@ -131,6 +143,8 @@ class Motion:
     def wrote(self, write: Wrote, now: float) -> None:
         """Note a velocity that went out."""
         self.sent, self._sent_at, self._sent_epoch = write.twist, now, write.epoch
+        if not write.twist.is_zero:
+            self._moved_at = now
 
     def _owe_zero(self) -> None:
         if not self.owes_zero:

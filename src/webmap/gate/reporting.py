@@ -1,20 +1,27 @@
 """Reports on machines: what changed is said, but not more often than anybody looks."""
 
+from typing import Literal
+
 import msgspec
 
 from webmap.gate.base import Base
+from webmap.gate.loopage import reaction
 from webmap.gate.messages import (
     AskerReport,
     Holder,
     RobotReport,
     RobotSpec,
     StopReport,
+    TestReport,
     Velocity,
 )
 from webmap.geometry import Twist
 
 INTERVAL = 0.1
 """The shortest time between two reports that differ only in numbers that flow."""
+
+BRAKE = 0.5
+"""The deceleration that is assumed of a base of which none was stated, in m/s²."""
 
 _DIGITS = 3
 _REST = (0.0, 0.0, 0.0)
@@ -23,6 +30,7 @@ _REST = (0.0, 0.0, 0.0)
 def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     """Return how it stands with one robot at ``now``."""
     lease, speed = base.lease, base.speed
+    age, test = base.ages.p95, base.test
     unarmable = base.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
     link = base.control if spec.twist_topic else base.goals[spec.id].link
@@ -44,9 +52,23 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         sent=_velocity(base.motion.sent) or _REST,
         echoed=_velocity(base.sight.echoed),
         measured=_velocity(base.sight.measured),
+        alarm=base.obedience.alarm(now),
+        age=None if age is None else round(age * 1000, 0),
+        reaction=round(reaction(age, base.stop_time), 3),
+        brake=base.a_max or BRAKE,
+        stop_time=base.stop_time,
+        stop_source=_stop_source(base),
+        stop_date=None if base.tested is None else base.tested.date,
+        test=None if test is None else TestReport(test.state, test.text),
         armable=unarmable is None,
         reason=unarmable if lease is None else base.doubt(now),
     )
+
+
+def _stop_source(base: Base) -> Literal["stated", "tested"] | None:
+    if base.tested is not None:
+        return "tested"
+    return None if base.stop_time is None else "stated"
 
 
 def _asker(base: Base, now: float) -> AskerReport | None:
@@ -101,11 +123,19 @@ def _alike(one: RobotReport, other: RobotReport) -> bool:
 
 def _gist(report: RobotReport) -> RobotReport:
     """Return ``report`` without the numbers that change all the time."""
-    asker, stop = report.asker, report.stop
+    asker, stop, alarm = report.asker, report.stop, report.alarm
     if asker is not None:
         asker = msgspec.structs.replace(asker, left=0.0)
     if stop is not None:
         stop = msgspec.structs.replace(stop, why="")
     return msgspec.structs.replace(
-        report, sent=_REST, echoed=None, measured=None, asker=asker, stop=stop
+        report,
+        sent=_REST,
+        echoed=None,
+        measured=None,
+        asker=asker,
+        stop=stop,
+        alarm=None if alarm is None else "",
+        age=None,
+        reaction=0.0,
     )

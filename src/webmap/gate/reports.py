@@ -9,6 +9,8 @@
      "latched": false, "stop": null, "armed": false,
      "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
      "sent": [0.0, 0.0, 0.0], "echoed": null, "measured": [0.0, 0.0, 0.0],
+     "alarm": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
+     "stop_time": 0.25, "stop_source": "stated", "stop_date": null, "test": null,
      "armable": true, "reason": null}
     {"op": "gone", "robot": "r1"}
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
@@ -27,6 +29,13 @@ stands. ``holder`` and
 ``epoch`` are null without a lease; ``armed`` says whether a command to move would be
 taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force; ``armable`` and
 ``reason``, whether it can be taken, and what stands against that or against moving it.
+``alarm`` says that the robot moves on a second after zero was sent. ``age`` is the age
+of the driver's loop in milliseconds, ``reaction`` the seconds from a finger to the
+robot at worst, and ``brake`` the deceleration that is assumed, in m/s². ``stop_time``
+is what is known of the base stopping by itself, in seconds: ``"stated"``, or
+``"tested"`` on ``stop_date`` (null if it did not stop then). ``test`` tells of the stop
+test: ``{"state": "creeping", "text": "..."}``, then ``"waiting"``, ``"done"`` or
+``"failed"``.
 ``refused`` names the ``op`` (``what``) that was refused, or ``"command"`` for words
 that made no sense (``robot`` is then null), or ``"lease"`` when a lease has ended. The
 same refusal is said once a second.

@@ -50,8 +50,11 @@ class Ticks:
             return None
         return now - self._issued[-1 - back]
 
-    def check(self, tick: int, now: float) -> None:
+    def check(self, tick: int, now: float) -> float:
         """Let a command pass that echoes a tick which is young enough.
+
+        Returns:
+            The tick's age in seconds.
 
         Raises:
             Refusal: If the tick is too old or was never issued here.
@@ -62,3 +65,4 @@ class Ticks:
             raise Refusal("its tick is unknown: too old, or of another session")
         if age > MAX_AGE:
             raise Refusal(f"it is older than {MAX_AGE * 1000:.0f} ms")
+        return age

@@ -1,0 +1,287 @@
+"""The stop test: creep, say nothing more, and see whether the base stops by itself."""
+
+import pytest
+from gate_harness import KEY, ZERO, Bench, spec
+
+from webmap.gate import actions, events, messages
+from webmap.gate.events import StopRecord
+from webmap.geometry import Twist
+
+
+class Base:
+    """A base behind the bench that has, or has not, a timeout of its own."""
+
+    def __init__(self, bench, timeout=0.3):
+        self.bench = bench
+        self.timeout = timeout
+        self.speaks = True
+
+    @property
+    def speed(self):
+        last = self.bench.written[-1] if self.bench.written else None
+        if last is None or last.twist.is_zero:
+            return 0.0
+        stopped = self.timeout is not None and self.bench.now - last.at > self.timeout
+        return 0.0 if stopped else last.twist.vx
+
+    def run(self, seconds, x=0.0, who="a"):
+        def each():
+            if self.speaks:
+                self.bench.tell(events.Measured(KEY, Twist(self.speed)))
+            if x is not None:
+                self.bench.drive(who, x=x)
+
+        self.bench.run(seconds, each)
+
+
+@pytest.fixture
+def bench():
+    """A has the robot, its hands were seen, and nobody knows whether it stops."""
+    bench = Bench().begin(spec(odometry_topic="/odom", stops_within=None))
+    bench.take("a")
+    Base(bench).run(0.4)
+    return bench
+
+
+@pytest.fixture
+def base(bench):
+    return Base(bench)
+
+
+def begin(bench, who="a"):
+    bench.say(who, op="stop-test", robot="r1")
+
+
+def state(bench):
+    test = bench.report().test
+    return None if test is None else test.state
+
+
+class TestRunning:
+    def test_a_base_that_stops_is_measured_and_may_go_faster(self, bench, base):
+        assert bench.report().v == 0.3
+        assert bench.report().stop_source is None
+        begin(bench)
+        base.run(0.1)
+        crept = len(bench.written)
+        assert state(bench) == "waiting"
+        assert {w.twist for w in bench.written} == {Twist(0.1)}
+        base.run(0.15)
+        assert len(bench.written) == crept, "not even zero"
+        base.run(0.6)
+        report = bench.report()
+        assert report.test.state == "done"
+        assert "stopped by itself after 0.3" in report.test.text
+        assert report.stop_time == pytest.approx(0.35, abs=0.05)
+        assert (report.stop_source, report.stop_date) == ("tested", "2026-11-21")
+        assert report.v > 0.3
+        assert "unverified stop" not in report.why
+        assert bench.written[-1].twist == ZERO
+
+    def test_each_creeping_command_answers_one_of_the_drivers(self, bench, base):
+        begin(bench)
+        at = bench.now
+        base.run(0.15, x=None)
+        assert bench.since(at) == []
+        bench.drive(x=0.0)
+        assert len(bench.since(at - 0.01)) == 1
+
+    def test_a_base_that_moves_on_is_found_and_gets_zero(self, bench):
+        base = Base(bench, timeout=None)
+        begin(bench)
+        base.run(0.2)
+        left = bench.written[-1].at
+        base.run(2.7)
+        assert bench.written[-1].at == left
+        assert state(bench) == "waiting"
+        base.run(0.3)
+        assert bench.written[-1].twist == ZERO
+        report = bench.report()
+        assert report.test == messages.TestReport(
+            "failed", "it did not stop by itself within 3 s"
+        )
+        assert (report.stop_time, report.stop_source) == (None, "tested")
+        assert report.v == 0.3
+        assert report.why == ("did not stop by itself when tested on 2026-11-21",)
+
+    def test_a_base_that_stops_late_stays_slow(self, bench):
+        base = Base(bench, timeout=1.0)
+        begin(bench)
+        base.run(1.5)
+        assert state(bench) == "done"
+        assert bench.report().v <= 0.3
+        assert "stops by itself only after 1" in bench.report().why[0]
+
+    def test_a_base_that_does_not_move_proves_nothing(self, bench):
+        base = Base(bench, timeout=0.0)
+        begin(bench)
+        base.run(1.6)
+        assert bench.report().test.text == "it did not move within 1.5 s"
+        assert bench.did(actions.KeepStopTest) == []
+        assert bench.written[-1].twist == ZERO
+        assert bench.report().stop_source is None
+
+    def test_a_goal_that_may_run_is_cancelled_first(self, bench, base):
+        bench.tell(messages.Forget("r1"))
+        begin(bench)
+        assert bench.did(actions.CancelGoals) == []
+        bench.tell(spec(odometry_topic="/odom", stops_within=None))
+        bench.take("a")
+        base.run(0.4)
+        begin(bench)
+        base.run(0.2)
+        assert len(bench.did(actions.CancelGoals)) == 1
+
+    def test_it_can_be_done_again(self, bench, base):
+        begin(bench)
+        base.run(1.5)
+        begin(bench)
+        base.run(1.5)
+        assert len(bench.did(actions.KeepStopTest)) == 2
+
+    def test_a_machine_stays_marked_while_nothing_is_sent(self, bench, base):
+        begin(bench)
+        base.run(0.25)
+        assert state(bench) == "waiting"
+        assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
+        base.run(2.0)
+        assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
+
+    def test_odometry_without_a_velocity_tells_nothing(self, bench, base):
+        begin(bench)
+        base.run(0.2)
+        bench.tell(events.Measured(KEY, None))
+        assert state(bench) == "waiting"
+
+
+class TestDoubt:
+    @pytest.mark.parametrize("phase", ["creeping", "waiting"])
+    @pytest.mark.parametrize(
+        ("doubt", "text"),
+        [
+            ("key", "a key was pressed"),
+            ("silence", "the driver fell silent"),
+            ("stop", "STOP by B"),
+            ("release", "the driver let go of it"),
+            ("page", "the driver let go of it"),
+            ("blind", "no odometry for 1 s"),
+            ("goal", "a goal was sent"),
+            ("display", "the display process is silent"),
+            ("link", "no link to ws://robot:9090"),
+        ],
+    )
+    def test_ends_it_with_zero(self, bench, phase, doubt, text):
+        base = Base(bench, timeout=None)
+        begin(bench)
+        base.run(0.05)
+        if phase == "creeping":
+            base.speaks = False
+            base.run(0.05)
+        else:
+            base.run(0.2)
+        assert state(bench) == phase
+        at = bench.now
+        match doubt:
+            case "key":
+                bench.drive(x=1.0)
+            case "silence":
+                base.run(0.25, x=None)
+            case "stop":
+                bench.say("b", op="stop", robot="r1")
+            case "release":
+                bench.say("a", op="release", robot="r1")
+            case "page":
+                bench.tell(messages.Disconnect("a"))
+            case "blind":
+                base.speaks = False
+                base.run(1.2)
+            case "goal":
+                bench.goal()
+            case "display":
+                bench.beating = False
+                base.run(0.3)
+            case "link":
+                bench.break_links()
+                bench.connect_links()
+        assert bench.report().test == messages.TestReport("failed", text)
+        assert bench.written[-1].twist == ZERO
+        assert bench.did(actions.KeepStopTest) == []
+        base.run(0.5, x=1.0)
+        pressed = [w for w in bench.moving_since(at) if w.twist != Twist(0.1)]
+        assert pressed == []
+
+    def test_its_driver_must_let_go_again_after_pressing(self, bench, base):
+        begin(bench)
+        base.run(0.1)
+        base.run(0.5, x=1.0)
+        assert "release every input first" in bench.refusals()[-1].why
+        assert bench.written[-1].twist == ZERO
+        base.run(0.4)
+        base.run(0.1, x=1.0)
+        assert bench.written[-1].twist.vx == 0.3
+
+
+class TestRefused:
+    def why(self, bench, who="a"):
+        begin(bench, who)
+        assert state(bench) is None
+        refused = bench.refusals(who)[-1]
+        assert refused.what == "stop-test"
+        return refused.why
+
+    def test_without_the_lease(self, bench):
+        assert self.why(bench, "b") == "take it first"
+
+    def test_without_hands_that_were_seen_to_be_off(self, bench, base):
+        base.run(0.3, x=None)
+        assert self.why(bench) == "release every input first"
+
+    def test_while_it_is_driven(self, bench, base):
+        base.run(0.2, x=1.0)
+        assert self.why(bench) == "release every input first"
+
+    def test_while_something_else_moves_it(self, bench):
+        bench.tell(events.Measured(KEY, Twist(0.2)))
+        assert self.why(bench) == "it moves already"
+
+    def test_without_odometry(self):
+        bench = Bench().begin(spec(stops_within=None))
+        bench.take()
+        bench.hold(0.4)
+        assert "odometry" in self.why(bench)
+
+    def test_in_doubt(self, bench):
+        bench.break_links()
+        assert "no link" in self.why(bench)
+
+    def test_while_one_goes_on(self, bench, base):
+        begin(bench)
+        base.run(0.05)
+        begin(bench)
+        assert bench.refusals()[-1].why == "a stop test is going on"
+
+
+class TestKept:
+    def test_it_is_known_after_a_restart_and_counts_more_than_what_was_stated(self):
+        tests = {KEY: StopRecord(0.8, "2026-11-20")}
+        bench = Bench(tests=tests).begin(spec(stops_within=0.1))
+        report = bench.report()
+        assert (report.stop_time, report.stop_date) == (0.8, "2026-11-20")
+        assert report.v <= 0.3
+
+    def test_a_result_for_a_machine_that_is_gone_does_no_harm(self, bench):
+        bench.tell(messages.Forget("r1"))
+        bench.run(1.0)
+        bench.tell(events.StopTestKept(KEY, StopRecord(0.2, "2026-11-20")))
+
+    def test_what_was_stated_is_shown_as_that(self):
+        bench = Bench().begin(spec(stops_within=0.25))
+        report = bench.report()
+        assert (report.stop_time, report.stop_source) == (0.25, "stated")
+        assert report.stop_date is None
+
+    def test_of_two_robots_that_are_one_machine_the_worse_counts(self):
+        bench = Bench().begin(spec(stops_within=0.25), spec(id="r2", stops_within=0.4))
+        assert bench.report().stop_time == 0.4
+        bench.tell(spec(id="r2", stops_within=None))
+        assert bench.report().stop_time is None

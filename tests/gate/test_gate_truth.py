@@ -1,0 +1,160 @@
+"""What a page is told of a robot's obedience, and of how late everything is."""
+
+import pytest
+from gate_harness import KEY, ZERO, Bench, spec
+
+from webmap.gate import actions, events
+from webmap.gate.limits import Speed
+from webmap.gate.loopage import LoopAge, governed, reaction
+from webmap.gate.obedience import Obedience
+from webmap.geometry import Twist
+
+
+class TestAlarm:
+    @pytest.fixture
+    def bench(self):
+        bench = Bench().begin(spec(odometry_topic="/odom"))
+        bench.take("a")
+        self.run(bench, 0.4, 0.0, x=0.0)
+        self.run(bench, 0.3, 0.5, x=0.5)
+        return bench
+
+    def run(self, bench, seconds, speed, x=None):
+        def each():
+            bench.tell(events.Measured(KEY, Twist(speed)))
+            if x is not None:
+                bench.drive(x=x)
+
+        bench.run(seconds, each)
+
+    def test_a_robot_that_moves_on_a_second_after_zero_is_said(self, bench):
+        self.run(bench, 0.95, 0.31, x=0.0)
+        assert bench.report().alarm is None
+        self.run(bench, 0.2, 0.31, x=0.0)
+        assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
+        self.run(bench, 0.1, 0.01, x=0.0)
+        assert bench.report().alarm is None
+
+    def test_also_when_its_driver_has_gone(self, bench):
+        bench.say("a", op="release", robot="r1")
+        self.run(bench, 1.1, 0.31)
+        assert bench.report().alarm
+        self.run(bench, 0.2, 0.0)
+        assert bench.report().alarm is None
+        assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
+
+    def test_also_under_a_stop(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        self.run(bench, 1.1, 0.31)
+        assert bench.report().alarm
+
+    def test_a_robot_that_stood_and_is_moved_by_others_is_no_alarm(self, bench):
+        self.run(bench, 0.3, 0.0, x=0.0)
+        self.run(bench, 3.0, 0.4, x=0.0)
+        assert bench.report().alarm is None
+
+    def test_a_robot_that_was_sent_somewhere_is_no_alarm(self, bench):
+        bench.goal()
+        self.run(bench, 3.0, 0.4, x=0.0)
+        assert bench.report().alarm is None
+
+    def test_driving_on_is_no_alarm(self, bench):
+        self.run(bench, 0.1, 0.5, x=0.0)
+        self.run(bench, 3.0, 0.5, x=0.5)
+        assert bench.report().alarm is None
+
+    def test_without_odometry_nobody_is_listened_to_for_long(self, bench):
+        bench.say("a", op="release", robot="r1")
+        bench.run(3.0)
+        assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
+        assert bench.report().alarm is None
+
+    def test_odometry_after_a_long_silence_tells_nothing_of_that_zero(self):
+        obedience = Obedience()
+        obedience.wrote(ZERO, Twist(0.5), 0.0)
+        obedience.saw(None, 0.5)
+        assert obedience.alarm(1.5) is None
+        obedience.saw(Twist(0.5), 9.0)
+        assert obedience.alarm(9.5) is None
+        assert not obedience.watching(9.5)
+
+    def test_the_second_counts_from_the_first_zero(self):
+        obedience = Obedience()
+        obedience.wrote(ZERO, Twist(0.5), 0.0)
+        obedience.wrote(ZERO, ZERO, 0.5)
+        obedience.expect(0.6)
+        obedience.saw(Twist(0.2), 0.9)
+        assert obedience.alarm(0.95) is None
+        assert obedience.alarm(1.0) == "zero sent, still moving at 0.20 m/s"
+
+
+class TestLoopAge:
+    def test_is_what_most_commands_of_two_seconds_stay_below(self):
+        ages = LoopAge()
+        assert ages.p95 is None
+        for n in range(40):
+            ages.add(0.05 if n else 0.25, n * 0.05)
+        assert ages.p95 == 0.05
+        for n in range(4):
+            ages.add(0.2, 2.0 + n * 0.05)
+        ages.forget_old(2.2)
+        assert ages.p95 == 0.2
+        ages.forget_old(9.0)
+        assert ages.p95 is None
+        ages.add(0.1, 9.0)
+        ages.clear()
+        assert ages.p95 is None
+
+    def test_is_told_while_somebody_drives(self):
+        bench = Bench().begin()
+        bench.take()
+        assert bench.report().age is None
+        bench.hold(1.0)
+        assert 0 <= bench.report().age <= 50
+        bench.say("a", op="release", robot="r1")
+        assert bench.report().age is None
+
+    @pytest.mark.parametrize("ms", [0, 50, 100, 150, 200, 250, 300])
+    @pytest.mark.parametrize("stop", [None, 0.1, 0.25, 0.5])
+    def test_a_robot_goes_no_farther_than_a_quarter_of_a_metre_blind(self, ms, stop):
+        speed = governed(Speed(5.0, 1.0, ()), ms / 1000, stop)
+        assert speed.v * (ms / 1000 + 0.2 + (stop or 0.5 * (stop is None))) <= 0.25
+        assert speed.w == 1.0
+        assert len(speed.why) == 1
+
+    def test_a_robot_that_is_slow_enough_is_left_alone(self):
+        slow = Speed(0.3, 0.6, ("unverified stop",))
+        assert governed(slow, 0.05, None) is slow
+        assert governed(slow, None, None) is slow
+
+    def test_a_slow_link_is_said_even_if_it_takes_nothing(self):
+        slow = Speed(0.1, 0.6, ())
+        assert governed(slow, 0.15, 0.25) is slow
+        assert governed(slow, 0.172, 0.25) == Speed(0.1, 0.6, ("slow link: 180 ms",))
+
+    def test_reaction_counts_the_hand_the_loop_and_the_base(self):
+        assert reaction(None, None) == pytest.approx(0.7)
+        assert reaction(0.1, 0.25) == pytest.approx(0.55)
+
+    def test_a_late_driver_is_slowed_and_told(self):
+        bench = Bench().begin(spec(v_max=2.0, stops_within=0.25))
+        assert bench.report().v == 0.55
+        bench.take()
+        late = []
+
+        def each(x):
+            late.append(bench.tick)
+            bench.drive(x=x, tick=late[-5] if len(late) > 4 else late[0])
+
+        bench.run(0.5, lambda: each(0.0))
+        bench.run(0.5, lambda: each(1.0))
+        report = bench.report()
+        assert 200 <= report.age <= 250
+        assert any(why.startswith("slow link: 2") for why in report.why)
+        bound = 0.25 / (report.age / 1000 + 0.2 + 0.25)
+        assert bench.written[-1].twist.vx <= bound
+        assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
+
+    def test_brakes_are_what_was_stated_or_little(self):
+        assert Bench().begin().report().brake == 0.5
+        assert Bench().begin(spec(a_max=1.5)).report().brake == 1.5
