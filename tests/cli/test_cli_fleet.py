@@ -35,6 +35,7 @@ on_operator_loss = "cancel"
 name = "Ann"
 bridge = "south"
 base_link = "base_footprint"
+tf = { namespace = "/ann", map_frame = "world" }
 odometry = { topic = "/odom", type = "nav_msgs/msg/Odometry", throttle = 50 }
 twist = { topic = "/cmd_vel", type = "geometry_msgs/msg/TwistStamped" }
 modules = [
@@ -94,6 +95,8 @@ def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
     assert "Battery" in names
     assert ann.base_link == "base_footprint"
     assert ann.feed.throttle == 50
+    assert (ann.tf["namespace"], ann.tf["map_frame"]) == ("/ann", "world")
+    assert bob.tf is None
     assert "TwistStamped" in ann.motion.spec().twist_type
     scanner = next(m for m in ann.modules if type(m).__name__ == "LaserScanner")
     assert scanner is not None
@@ -166,22 +169,27 @@ def changed(old, new):
         (changed('"cancel"', '"cancle"'), 'did you mean "cancel"?'),
         (
             changed("throttle = 50", "throttle = 1.5"),
-            "FILE:30: robots[1].odometry.thro",
+            "FILE:31: robots[1].odometry.thro",
         ),
         (
             changed('"LaserScanner"', '"LaserScaner"'),
-            "FILE:33: robots[1].modules[0].name: there is no robot module "
+            "FILE:34: robots[1].modules[0].name: there is no robot module "
             "'LaserScaner'. Did you mean 'LaserScanner'?",
         ),
         (
             changed("{ x = 1 }", "{ colour = 1 }"),
-            "FILE:33: robots[1].modules[0]: Laser",
+            "FILE:34: robots[1].modules[0]: Laser",
         ),
         (
             changed('{ bridge = "north" }', '{ bridge = "east" }'),
-            "FILE:33: robots[1].modules[0].args[0].bridge: got the text",
+            "FILE:34: robots[1].modules[0].args[0].bridge: got the text",
         ),
         (changed("[[robots]]", "[robots]"), "this is not TOML"),
+        (changed("map_frame", "mapframe"), "FILE:30: robots[1].tf.mapframe: there is"),
+        (
+            changed('battery = "/bob/battery_state"', "tf = 1"),
+            "FILE:12: robots[0].tf: got the whole number 1, expected true, false or a",
+        ),
         (
             "title = 1\n[[robots]]\n",
             "FILE:1: title: got the whole number 1, expected a",

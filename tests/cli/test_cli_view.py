@@ -150,6 +150,15 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, opened, capsys):
     late.robots[0].destroy()
 
 
+def test_a_robot_with_frames_is_drawn_by_them_and_quietly(bridge, opened):
+    late = LateRobots()
+    late.add(RobotDescription(name="Bob", bridge=bridge, odometry="/odom"), "/bob")
+    (robot,) = late.robots
+    assert robot.tf["namespace"] == "/bob"
+    assert robot.tf["quiet"]
+    robot.destroy()
+
+
 def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
     topics = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics, "bob").robots

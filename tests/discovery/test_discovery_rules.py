@@ -165,6 +165,14 @@ def test_a_map_without_a_namespace_is_everybody_s_and_a_scan_is_not():
     assert [robot.topic("scan") for robot in found.robots] == ["", ""]
 
 
+def test_frames_are_everybody_s_unless_a_robot_has_its_own():
+    frames = "tf2_msgs/msg/TFMessage"
+    topics = {"/a/odom": ODOM, "/b/odom": ODOM, "/tf": frames, "/a/tf": frames}
+    found = discover(topics | {"/tf_static": frames})
+    assert [robot.tf_namespace for robot in found.robots] == ["/a", ""]
+    assert only({"/odom": ODOM}).tf_namespace is None
+
+
 def test_a_robot_s_own_map_comes_before_the_shared_one():
     grid = "nav_msgs/OccupancyGrid"
     robot = only({"/a/odom": ODOM, "/a/map": grid, "/map": grid})
@@ -239,6 +247,7 @@ def test_captured_systems_have_their_two_robots(file):
         for role in ("odometry", "pose", "velocity", "scan", "battery", "plan", "goal"):
             assert robot.topic(role).startswith(robot.namespace)
         assert robot.topic("map") == "/map"
+        assert robot.tf_namespace == ""
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def test_the_table_names_each_topic_with_its_rule():
     assert line.split() == [
         "velocity", "/cmd_vel", "geometry_msgs/Twist", "the", "usual", "name",
     ]  # fmt: skip
-    assert "not found: pose, battery, map, costmap, camera, cloud" in text
+    assert "not found: pose, battery, map, costmap, camera, cloud, tf" in text
     assert "--robot NAME:ODOM:CMD_VEL:SCAN" in text
 
 

@@ -18,21 +18,28 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class FoundFleet:
-    """What the console shows, and what is known already when it looks again."""
+    """The robots that were found, and what is known when it is looked again."""
 
-    robots: list[RobotDescription]
+    told: list[RobotDescription]
+    """Robots that were told by hand; the console has them already."""
+
+    stops_within: float | None = None
+    robots: list[tuple[RobotDescription, str | None]] = field(default_factory=list)
+    """Robots that were found, and the namespace of their frames if they have any."""
+
     known: list[tuple["Bridge", list[str]]] = field(default_factory=list)
     """For each bridge the namespaces in which robots were found."""
 
-    stops_within: float | None = None
-
-    def look_for_more(self) -> None:
-        """Show robots that come later; after the console was opened."""
+    def show(self) -> None:
+        """Show what was found and what comes later; after the console was opened."""
         from webmap.cli.latecomers import LateRobots, Looking, greet
 
-        came = greet(
-            LateRobots(), [about.name for about in self.robots], self.stops_within
-        )
+        late = LateRobots()
+        for about, namespace in self.robots:
+            late.add(about, namespace)
+        names = [about.name for about in self.told]
+        names += [about.name for about, _ in self.robots]
+        came = greet(late, names, self.stops_within)
         for bridge, namespaces in self.known:
             _services.append(Looking(bridge, namespaces, came))
 
@@ -58,7 +65,7 @@ def find_fleet(
 
     """
     found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
-    fleet = FoundFleet([*told], stops_within=stops_within)
+    fleet = FoundFleet([*told], stops_within)
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             click.echo(one.why, err=True)
@@ -67,7 +74,7 @@ def find_fleet(
             if any(overrules(other, about) for other in told):
                 continue
             click.echo(f"Found {in_one_line(robot)}", err=True)
-            fleet.robots.append(about)
+            fleet.robots.append((about, robot.tf_namespace))
         spaces = [robot.namespace for robot in one.findings.robots]
         fleet.known.append((bridge, spaces))
     return fleet

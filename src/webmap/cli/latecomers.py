@@ -52,10 +52,21 @@ class LateRobots:
 
         site.pages[path] = replace(entry, function=open_page)
 
-    def add(self, about: RobotDescription) -> None:
-        """Make one more robot and show it."""
+    def add(self, about: RobotDescription, tf_namespace: str | None = None) -> None:
+        """Make one more robot and show it.
+
+        Args:
+            about: The robot.
+            tf_namespace: Of the topics with its frames; None for a robot that is
+                drawn where its odometry has it.
+
+        """
         with no_scope():
-            self.show(make_robot(about))
+            robot = make_robot(about)
+            if tf_namespace is not None:
+                # Many robots have frames and no map: that is no mistake.
+                robot.set_tf(about.bridge, namespace=tf_namespace, quiet=True)
+        self.show(robot)
 
     def show(self, robot: "Robot") -> None:
         """Show a robot on the pages that are open and on those to come."""
@@ -144,6 +155,7 @@ def greet(
         click.echo(
             f"A robot appeared behind {bridge.url}: {in_one_line(robot)}", err=True
         )
-        late.add(describe(robot, bridge, stops_within=stops_within))
+        about = describe(robot, bridge, stops_within=stops_within)
+        late.add(about, robot.tf_namespace)
 
     return came

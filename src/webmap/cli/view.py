@@ -74,12 +74,12 @@ def view(
         console.parse_robot(text, bridges, stops_within=stops_within) for text in robots
     ]
     plan = Path(floor) if floor else None
-    if told and not discover:
-        console.open_console(bridges, told, floor=plan)
-    else:
+    fleet = None
+    if discover or not told:
         fleet = find_fleet(bridges, told, wait=wait, stops_within=stops_within)
-        console.open_console(bridges, fleet.robots, floor=plan)
-        fleet.look_for_more()
+    console.open_console(bridges, told, floor=plan)
+    if fleet is not None:
+        fleet.show()
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

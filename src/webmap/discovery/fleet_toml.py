@@ -49,6 +49,10 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
             f"odometry = {{ topic = {_text(where.topic)}, type = {_text(where.type)} }}"
             f" # {where.rule}"
         )
+    if robot.tf_namespace is not None:
+        lines.append("tf.quiet = true # drawn in the frame map, if frames lead there")
+        if robot.tf_namespace:
+            lines.append(f"tf.namespace = {_text(robot.tf_namespace)}")
     scans = robot.guesses.get("scan", ())
     if scans:
         listed = ", ".join(_text(guess.topic) for guess in scans)

@@ -17,6 +17,7 @@ Role: TypeAlias = Literal[
     "costmap",
     "camera",
     "cloud",
+    "tf",
 ]
 """What a topic is to a robot."""
 
@@ -33,6 +34,7 @@ ROLES: tuple[Role, ...] = (
     "costmap",
     "camera",
     "cloud",
+    "tf",
 )
 """Every role, in the order in which they are shown."""
 
@@ -72,6 +74,11 @@ class FoundRobot:
         """Return the best topic for a role, empty if nothing fits."""
         found = self.first(role)
         return "" if found is None else found.topic
+
+    @property
+    def tf_namespace(self) -> str | None:
+        """The namespace of the topics with its frames; None if there are none."""
+        return self.topic("tf").removesuffix("/tf") if self.topic("tf") else None
 
 
 @dataclass(frozen=True, slots=True)

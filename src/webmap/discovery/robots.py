@@ -12,7 +12,7 @@ from webmap.discovery.grouping import inside, nearest, robot_namespaces
 from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
 from webmap.ros.names import is_topic, is_type
 
-SHARED: tuple[Role, ...] = ("map",)
+SHARED: tuple[Role, ...] = ("map", "tf")
 """Roles that a topic without a namespace has for every robot."""
 
 DIRECTION = (

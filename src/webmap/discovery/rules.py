@@ -114,6 +114,7 @@ RULES: tuple[Rule, ...] = (
     Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", "depth"),
     Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not packed", "depth"),
     Rule("cloud", ("sensor_msgs/PointCloud2",), r"[^/]+", "its type alone"),
+    Rule("tf", ("tf2_msgs/TFMessage",), r"tf", "the frames of the robot"),
 )
 
 INNER_VELOCITY = re.compile(r"cmd_vel|velocity|teleop")

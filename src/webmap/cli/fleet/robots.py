@@ -46,6 +46,7 @@ def _robot(
         robot.svg.insert(1, scanner.svg)
     setters: dict[str, tuple[dict[str, Any] | None, Callable[..., None]]] = {
         "odometry": (line.odometry, robot.set_odometry_topic),
+        "tf": (line.tf, robot.set_tf),
         "twist": (line.twist, robot.set_twist_topic),
         "move": (line.move, robot.set_move_topic),
     }

@@ -31,6 +31,12 @@ TWIST: dict[str, Check] = {
     "a_max": checks.above_zero("metres per second squared"),
     "holonomic": checks.yes_or_no,
 }
+TF: dict[str, Check] = {
+    "map_frame": checks.text,
+    "base_frame": checks.text,
+    "namespace": checks.topic,
+    "quiet": checks.yes_or_no,
+}
 MOVE: dict[str, Check] = {
     "topic": checks.topic,
     "frame": checks.text,
@@ -42,6 +48,7 @@ ROBOT = (
     "bridge",
     "base_link",
     "odometry",
+    "tf",
     "twist",
     "move",
     "scan",
@@ -70,6 +77,7 @@ class RobotLine:
     path: Path
     base_link: str = "base_link"
     odometry: dict[str, Any] | None = None
+    tf: dict[str, Any] | None = None
     twist: dict[str, Any] | None = None
     move: dict[str, Any] | None = None
     scans: list[str] = field(default_factory=list)
@@ -158,6 +166,8 @@ def _robot(
     for key, fields in known.items():
         if key in value:
             setattr(robot, key, _topic(value[key], fields, (*path, key), mistakes))
+    if "tf" in value:
+        robot.tf = _frames(value["tf"], (*path, "tf"), mistakes)
     if "battery" in value:
         where = (*path, "battery")
         robot.battery = checks.one(checks.topic, value["battery"], where, mistakes)
@@ -199,6 +209,17 @@ def _topic(
     if isinstance(value, dict):
         return checks.table(value, fields, path, mistakes, needed=("topic",))
     return {"topic": checks.one(checks.topic, value, path, mistakes)}
+
+
+def _frames(value: Any, path: Path, mistakes: Mistakes) -> dict[str, Any] | None:
+    """Take true or false, or a table with more."""
+    if isinstance(value, bool):
+        return {} if value else None
+    if isinstance(value, dict):
+        return checks.table(value, TF, path, mistakes)
+    got = checks.show(value)
+    mistakes.add(path, f"got {got}, expected true, false or a table")
+    return None
 
 
 def _scans(value: Any, path: Path, mistakes: Mistakes) -> list[str]:
