@@ -43,7 +43,7 @@ def table(figures: list[Figure]) -> str:
         "---",
         "",
         "| what fails while W is held | stopped by | promised | worst measured "
-        "| worst jitter | trials |",
+        "| machine late by | trials |",
         "|---|---|---|---|---|---|",
     ]
     by = {"zero": "a zero", "itself": "its own timeout", "key": "a zero"}

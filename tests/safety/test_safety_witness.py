@@ -165,3 +165,4 @@ def test_the_sentinel_notes_how_late_the_machine_is():
         eventually(lambda: time.monotonic() > begin + 0.1, "a while")
         assert 0 < sentinel.worst(begin) < 5
         assert sentinel.worst(begin + 60) == 0
+        assert 0 <= sentinel.stolen(begin) <= time.monotonic() - begin + 0.1

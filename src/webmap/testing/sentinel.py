@@ -37,6 +37,20 @@ class Sentinel:
             default=0.0,
         )
 
+    def stolen(self, since: float, until: float | None = None) -> float:
+        """Return how long in a stretch a thread that was ready had to wait, in all.
+
+        What goes through several threads and processes waits in each of them, so this
+        is what a busy machine can add to a way from end to end. A wake that is up to
+        1 ms late is an idle machine's and does not count.
+        """
+        until = time.monotonic() if until is None else until
+        return sum(
+            late
+            for at, late in list(self._late)
+            if since <= at <= until + late and late > 0.001
+        )
+
     def _watch(self) -> None:
         while not self._end.is_set():
             due = time.monotonic() + self.PERIOD
