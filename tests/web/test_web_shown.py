@@ -58,6 +58,26 @@ def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
     bench.until(lambda: test.inner_text() == "Creeping at 0.1 m/s")
 
 
+def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
+    bench.drive()
+    bench.page.keyboard.up("w")
+    bench.gate.change("r1", stop_time=None, stop_source=None, stop_date=None)
+    button = bench.page.locator(".webmap-stop-test")
+    button.click()
+    bench.page.wait_for_timeout(450)
+    assert bench.gate.of("stop-test") == []
+    assert button.inner_text() == "It will creep: press again"
+    button.click()
+    bench.until(
+        lambda: bench.gate.of("stop-test") == [{"op": "stop-test", "robot": "r1"}]
+    )
+    bench.gate.change("r1", test={"state": "creeping", "text": "creeping"})
+    bench.until(lambda: not button.is_visible())
+    bench.gate.change("r1", test={"state": "done", "text": ""}, stop_time=0.3)
+    bench.until(lambda: "0.30 s" in bench.page.inner_text(".webmap-teleop-own"))
+    assert not button.is_visible()
+
+
 def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> None:
     bench = open_bench("?modules=stop,teleop")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")

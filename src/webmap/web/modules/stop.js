@@ -3,7 +3,7 @@ import { isLatched } from "../motion/report.js";
 import { Obedience, standingStops } from "../motion/stopping.js";
 import { button, html, say } from "./elements.js";
 import { lay } from "./overlay.js";
-import { ResetButton } from "./reset_button.js";
+import { TwiceButton } from "./twice_button.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -38,7 +38,12 @@ class Stop {
       this._show();
     });
     this._standing = html("p", "webmap-stop-standing", { role: "status" });
-    this._reset = new ResetButton(() => this._drive.reset("*"));
+    this._reset = new TwiceButton(
+      "webmap-reset",
+      "Reset",
+      "Press again to reset",
+      () => this._drive.reset("*"),
+    );
     const all = button("webmap-stop-button webmap-stop-all", "Stop all", () => {
       this._drive.stop("*");
     });
@@ -92,7 +97,7 @@ class Stop {
     const standing = standingStops(robots.values());
     say(this._standing, standing);
     const latched = [...robots.values()].filter(isLatched).length;
-    this._reset.show(latched > 1 ? "Reset all" : "Reset", latched > 0);
+    this._reset.show(latched > 0, latched > 1 ? "Reset all" : "Reset");
     this._close.hidden = verdicts.length === 0;
     this._list.hidden = verdicts.length === 0 && standing === "";
     this._showVerdicts(verdicts.sort(byName));

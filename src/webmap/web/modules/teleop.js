@@ -6,8 +6,8 @@ import { button, html, say } from "./elements.js";
 import { Halos } from "./halos.js";
 import { lay, overlayOf } from "./overlay.js";
 import { Requests } from "./requests.js";
-import { ResetButton } from "./reset_button.js";
 import { StickPad } from "./stick_pad.js";
+import { TwiceButton } from "./twice_button.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
@@ -49,6 +49,7 @@ class Teleop {
       lease: () => this._lease(),
       reset: () => this._reset(),
       stick: () => this._toggleStick(),
+      test: () => this._test(),
     });
     this._stick = new StickPad(this._drive, holonomic);
     this._halos = new Halos(map);
@@ -116,6 +117,11 @@ class Teleop {
     if (robot !== null) this._drive.reset(robot);
   }
 
+  _test() {
+    const robot = this._map.selected;
+    if (robot !== null && this._report?.mine) this._drive.stopTest(robot);
+  }
+
   _lease() {
     const robot = this._map.selected;
     if (robot === null) return;
@@ -163,7 +169,7 @@ class Teleop {
 
 /** The words, the shape and the buttons in the corner of the map. */
 class Panel {
-  /** @param {Record<'stop' | 'lease' | 'reset' | 'stick', () => void>} acts */
+  /** @param {Record<'stop' | 'lease' | 'reset' | 'stick' | 'test', () => void>} acts */
   constructor(acts) {
     this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
     this._title = html("strong", "webmap-teleop-title");
@@ -176,7 +182,19 @@ class Panel {
     this._values = new Map();
     this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
-    this._reset = new ResetButton(acts.reset);
+    this._reset = new TwiceButton(
+      "webmap-reset",
+      "Reset",
+      "Press again to reset",
+      acts.reset,
+    );
+    this._tester = new TwiceButton(
+      "webmap-stop-test",
+      "Test its stop",
+      "It will creep: press again",
+      acts.test,
+    );
+    this._tester.element.title = "Creeps, sends nothing any more, and sees when it stands";
     this._stick = button("webmap-teleop-stick", "Stick", acts.stick);
     this._stick.title = "A stick on the screen to drive with";
     const state = html(
@@ -187,13 +205,15 @@ class Panel {
       " ",
       this._detail,
     );
+    const twice = [this._reset.element, this._tester.element];
+    const buttons = [this._lease, ...twice, this._stick];
     this.element = html(
       "section",
       "webmap-panel webmap-teleop",
       { "aria-label": "Driving" },
       this._mark,
       html("div", "webmap-teleop-words", {}, state, this._test, this._cap, this._own),
-      html("div", "webmap-teleop-acts", {}, this._lease, this._reset.element, this._stick),
+      html("div", "webmap-teleop-acts", {}, ...buttons),
       this._stop,
       this._figures,
     );
@@ -261,7 +281,8 @@ class Panel {
       say(this._lease, act);
       label(this._lease, act.endsWith(" it") ? act.replace(/it$/, name) : `${act} ${name}`);
     }
-    this._reset.show("Reset", report !== null && isLatched(report));
+    this._reset.show(report !== null && isLatched(report));
+    this._tester.show(report !== null && mayTest(report));
     label(this._stop, name ? `Stop ${name}` : "Stop the selected robot");
     // Off only when there is nothing to stop, never because of doubt.
     this._stop.disabled = report === null;
@@ -283,6 +304,16 @@ function actOf(report, request, connection) {
   if (report.holder === null) return "Take";
   if (heldByProgram(report) || request?.by === connection) return null;
   return "Ask for it";
+}
+
+/**
+ * @param {import('../motion/report.js').RobotReport} report
+ * @returns {boolean} Whether this page may find out that the robot stops by itself, which
+ *     nobody knows yet.
+ */
+function mayTest({ mine, stop_time, test }) {
+  const running = test?.state === "creeping" || test?.state === "waiting";
+  return mine && stop_time === null && !running;
 }
 
 /** @param {number | null} delay */
