@@ -239,3 +239,21 @@ def test_the_card_shows_what_the_robot_s_camera_sees(open_console):
     row(page, "Robot 2").click()
     expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
     expect(picture).to_have_count(0)
+
+
+def test_a_length_is_measured_on_the_map(open_console):
+    page = open_console()
+    page.get_by_role("button", name="Measure").click()
+    box = page.locator("svg.webmap").bounding_box()
+    x, y = box["x"] + 300, box["y"] + 400
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 100, y)
+    page.mouse.up()
+    scale = page.locator("svg.webmap > .world").evaluate("e => e.getCTM().a")
+    expect(page.locator(".webmap-measure-word")).to_have_text(
+        f"{100 / scale:.2f} m, 0°"
+    )
+    assert page.locator(".robot.selected").count() == 0
+    page.keyboard.press("Escape")
+    expect(page.locator(".webmap-measure-drawing")).to_be_hidden()

@@ -1,6 +1,6 @@
 import { deskOf } from "../inputs/desk.js";
 import { attentive } from "../motion/attention.js";
-import { apply, undo } from "../view.js";
+import { apply, unapply } from "../view.js";
 import { button, html, say, svg } from "./elements.js";
 import { lay } from "./overlay.js";
 
@@ -156,15 +156,16 @@ class MeasureTool {
 
   /** @param {PointerEvent} event */
   _place(event) {
-    return undo(this._map.view, this._map.pointOf(event));
+    const { x, y } = this._map.pointOf(event);
+    return unapply(this._map.view, x, y);
   }
 
   _draw() {
     const line = this._line;
     this._drawing.toggleAttribute("hidden", line === null);
     if (line === null) return;
-    const from = apply(this._map.view, line.from);
-    const to = apply(this._map.view, line.to);
+    const from = apply(this._map.view, line.from.x, line.from.y);
+    const to = apply(this._map.view, line.to.x, line.to.y);
     this._path.setAttribute("d", `M${from.x} ${from.y}L${to.x} ${to.y}`);
     say(this._word, measured(line.from, line.to));
   }
