@@ -37,6 +37,7 @@ class TwistTopic:
     w_max: float | None
     a_max: float | None
     holonomic: bool
+    stop_hooks: tuple[dict[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +147,7 @@ class MotionRoad:
             w_max=twist.w_max if twist else None,
             a_max=twist.a_max if twist else None,
             holonomic=twist.holonomic if twist else False,
+            stop_hooks=twist.stop_hooks if twist else (),
             odometry_url=odometry[0].url if odometry else None,
             odometry_topic=odometry[1] if odometry else None,
             odometry_type=odometry[2] if odometry else None,

@@ -5,7 +5,7 @@ import logging
 import math
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap.core.extendable import Extendable
@@ -270,6 +270,7 @@ class Robot(Extendable):
         w_max: float | None = None,
         a_max: float | None = None,
         holonomic: bool = False,
+        stop_hooks: Sequence[Mapping[str, str]] = (),
     ) -> None:
         """Say where velocity goes, and what the base behind it does and can.
 
@@ -286,6 +287,10 @@ class Robot(Extendable):
             a_max: The highest acceleration, in metres per second squared. Slowing
                 down is never delayed by it.
             holonomic: Whether the base can move sideways.
+            stop_hooks: What else ``bridge`` is told on STOP:
+                ``{"topic": "/lock", "type": "std_msgs/Bool"}`` publishes true, and
+                false on reset; ``{"service": "/e_stop", "type": "std_srvs/Trigger"}``
+                calls the service.
 
         Raises:
             ConfigError: If ``type`` carries no velocity.
@@ -302,6 +307,7 @@ class Robot(Extendable):
                     w_max,
                     a_max,
                     holonomic,
+                    tuple(dict(hook) for hook in stop_hooks),
                 )
             )
 

@@ -1,0 +1,119 @@
+"""The files that outlive the gate: whatever befalls them, nothing moves by it."""
+
+import os
+
+import pytest
+
+from webmap.gate.events import Key, StopRecord
+from webmap.gate.records import UNKNOWN, Records, path_of
+
+KEY = Key("ws://robot:9090", "/cmd_vel")
+OTHER = Key("ws://robot:9090", "/other")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "deep" / "state"
+
+
+@pytest.fixture
+def records(folder):
+    return Records(folder)
+
+
+class TestLatch:
+    def test_stands_on_disk_until_it_is_taken_away(self, records, folder):
+        assert records.latch_of(KEY) is None
+        assert records.keep_latch(KEY, "Ann") is None
+        assert Records(folder).latch_of(KEY) == "Ann"
+        assert Records(folder).latch_of(OTHER) is None
+        assert records.keep_latch(KEY, None) is None
+        assert Records(folder).latch_of(KEY) is None
+        assert records.keep_latch(KEY, None) is None
+
+    def test_is_flushed_with_its_folder_before_it_counts(
+        self, records, folder, monkeypatch
+    ):
+        flushed = []
+        real = os.fsync
+
+        def fsync(file):
+            flushed.append(os.readlink(f"/proc/self/fd/{file}"))
+            real(file)
+
+        monkeypatch.setattr(os, "fsync", fsync)
+        records.keep_latch(KEY, "Ann")
+        assert flushed[0].startswith(str(folder / path_of(folder, KEY, "stop").stem))
+        assert flushed[1] == str(folder)
+        records.keep_latch(KEY, None)
+        assert flushed[2:] == [str(folder)]
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            b"",
+            b"{",
+            b"\xff\xfe",
+            b"null",
+            b"[]",
+            b"{}",
+            b'{"by": null}',
+            b'{"by": ""}',
+            b'{"by": "\\u001b[31m"}',
+            b"[" * 100_000,
+        ],
+    )
+    def test_that_cannot_be_read_stands(self, records, folder, content):
+        folder.mkdir(parents=True)
+        path_of(folder, KEY, "stop").write_bytes(content)
+        assert records.latch_of(KEY) == UNKNOWN
+
+    def test_that_is_no_file_stands(self, records, folder):
+        path_of(folder, KEY, "stop").mkdir(parents=True)
+        assert records.latch_of(KEY) == UNKNOWN
+        assert "cannot be written" in records.keep_latch(KEY, "Ann")
+
+    def test_a_name_that_is_too_long_is_cut(self, records):
+        records.keep_latch(KEY, "x" * 500)
+        assert len(records.latch_of(KEY)) == 80
+
+    def test_a_folder_that_cannot_be_made_is_said(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        records = Records(tmp_path / "file" / "state")
+        assert "cannot be written" in records.keep_latch(KEY, "Ann")
+        records.keep_stop_test(KEY, StopRecord(0.3, "2026-11-21"))
+
+    def test_what_a_crash_left_half_written_does_no_harm(self, records, folder):
+        folder.mkdir(parents=True)
+        path_of(folder, KEY, "stop.new").write_text('{"by": "A')
+        assert records.latch_of(KEY) is None
+        records.keep_latch(KEY, "Ben")
+        assert records.latch_of(KEY) == "Ben"
+
+
+class TestStopTest:
+    @pytest.mark.parametrize("seconds", [0.27, None])
+    def test_is_kept_with_its_date(self, records, folder, seconds):
+        assert records.stop_test_of(KEY) is None
+        record = StopRecord(seconds, "2026-11-21")
+        records.keep_stop_test(KEY, record)
+        assert Records(folder).stop_test_of(KEY) == record
+        assert Records(folder).stop_test_of(OTHER) is None
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            "",
+            "null",
+            '{"seconds": 0.3}',
+            '{"seconds": "fast", "date": "2026-11-21"}',
+            '{"seconds": [], "date": "2026-11-21"}',
+            '{"seconds": NaN, "date": "2026-11-21"}',
+            '{"seconds": -1, "date": "2026-11-21"}',
+            '{"seconds": 0.3, "date": 5}',
+        ],
+    )
+    def test_that_makes_no_sense_was_never_made(self, records, folder, content):
+        folder.mkdir(parents=True)
+        path_of(folder, KEY, "test").write_text(content)
+        assert records.stop_test_of(KEY) is None
