@@ -1,16 +1,15 @@
 """Maps and costmaps, as images."""
 
 import asyncio
-import io
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.grid_picture import check_palette, grid_png, place_grid
 from webmap.core.layer import Layer
 from webmap.core.pictures import Picture
 from webmap.core.refusals import refusing
 from webmap.core.tasks import spawn
-from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry import Affine
+from webmap.errors import ProtocolError
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import MapMetaDataMsg, OccupancyGridMsg
 from webmap.ros.messages_grid import OccupancyGridUpdateMsg
@@ -66,9 +65,7 @@ class OccupancyGrid:
         age_limit: float | None = None,
         order: float | None = None,
     ) -> None:
-        if palette not in PALETTES:
-            known = ", ".join(PALETTES)
-            raise ConfigError(f"a palette is one of {known}, got {palette!r}")
+        check_palette(palette)
         self.map = map
         self.layer = Grid.shared(bridge, topic, palette, throttle, age_limit)
         if order is None:
@@ -191,12 +188,8 @@ class Grid(Layer):
     def _show(self, png: bytes, info: MapMetaDataMsg | None) -> None:
         if info is None or self.scope.closed:
             return
-        width, height = info.width * info.resolution, info.height * info.resolution
-        at = info.origin.planar
-        cos, sin = math.cos(at.yaw), math.sin(at.yaw)
-        placed = Affine(cos, sin, -sin, cos, at.x, at.y)
-        upright = Affine(1, 0, 0, -1, 0, height)
-        self.picture.show(png, placed @ upright, width, height)
+        size = (info.width * info.resolution, info.height * info.resolution)
+        self.picture.show(png, place_grid(info.origin.planar, size[1]), *size)
 
 
 def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
@@ -215,61 +208,3 @@ def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
         raise ProtocolError(
             f"cells are -1 to 100, but {count} of {cells.size} are not: one is {wrong}"
         )
-
-
-def grid_png(cells: "NDArray[np.int8]", palette: str) -> bytes:
-    """Return a grid as a PNG of one pixel a cell, its highest row at the top.
-
-    Args:
-        cells: Of shape (height, width), the lowest row first.
-        palette: The name of one of :data:`PALETTES`.
-
-    """
-    import numpy as np
-    from PIL import Image
-
-    height, width = cells.shape
-    pixels = np.ascontiguousarray(cells[::-1]).view(np.uint8)
-    image = Image.frombytes("P", (width, height), pixels.tobytes())
-    colours = PALETTES[palette]
-    image.putpalette([part for colour in colours for part in colour[:3]])
-    out = io.BytesIO()
-    alpha = bytes(colour[3] for colour in colours)
-    image.save(out, "PNG", transparency=alpha, compress_level=1)
-    return out.getvalue()
-
-
-Colour = tuple[int, int, int, int]
-
-CLEAR: Colour = (0, 0, 0, 0)
-
-
-def _map_colour(value: int) -> Colour:
-    if value > 100:
-        return CLEAR
-    grey = 255 - 255 * value // 100
-    return (grey, grey, grey, 255)
-
-
-def _costmap_colour(value: int) -> Colour:
-    if value == 0 or value > 100:
-        return CLEAR
-    if value == 100:
-        return (255, 0, 255, 255)
-    if value == 99:
-        return (0, 255, 255, 255)
-    red = 255 * value // 98
-    return (red, 0, 255 - red, 255)
-
-
-def _raw_colour(value: int) -> Colour:
-    return (255 - value, 255 - value, 255 - value, 255)
-
-
-# By the value of a cell as a byte: -1, which is unknown, is 255.
-PALETTES: dict[str, list[Colour]] = {
-    "map": [_map_colour(value) for value in range(256)],
-    "costmap": [_costmap_colour(value) for value in range(256)],
-    "raw": [_raw_colour(value) for value in range(256)],
-}
-"""The colours of each palette, as RViz has them where it has any."""

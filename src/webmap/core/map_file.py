@@ -1,0 +1,192 @@
+"""Maps from disk, in the form of ROS's map_server: a YAML file and an image."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from webmap.errors import ConfigError
+from webmap.geometry import Pose
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MAX_YAML = 1 << 20
+MAX_PIXELS = 1 << 26
+FORMATS = ("PPM", "PNG", "BMP")
+"""What map_server writes, by its magic bytes; PPM includes PGM."""
+
+MODES = ("trinary", "scale", "raw")
+TRUTH = {"0": False, "1": True, "false": False, "true": True}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapImage:
+    """A map as ``nav_msgs/OccupancyGrid`` has it."""
+
+    cells: "NDArray[np.int8]"
+    """Of shape (height, width), the lowest row first: 0 to 100, or -1 unknown."""
+
+    resolution: float
+    """The side of a cell, in metres."""
+
+    origin: Pose
+    """The pose of the lower left corner of the first cell."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Settings:
+    image: Path
+    resolution: float
+    origin: Pose
+    negate: bool
+    occupied: float
+    free: float
+    mode: str
+
+
+def read_map(file: Path) -> MapImage:
+    """Read a map.
+
+    Args:
+        file: The YAML file; its image lies in the same folder or below.
+
+    Raises:
+        ConfigError: If a file cannot be read or makes no sense; it is named, with
+            what was got and what was expected.
+
+    """
+    settings = _settings(file)
+    light = _read_image(file, settings.image)
+    # An image has its first row at the top, a grid at the bottom.
+    cells = _cells(light, settings)[::-1]
+    return MapImage(cells, settings.resolution, settings.origin)
+
+
+def _settings(file: Path) -> _Settings:
+    said = _read_yaml(file)
+    resolution = _number(file, said, "resolution")
+    if resolution <= 0:
+        raise ConfigError(f"{file}: resolution must be above 0, got {resolution}")
+    origin = said.get("origin")
+    if not isinstance(origin, list) or len(origin) != 3:
+        raise ConfigError(f"{file}: origin must be [x, y, yaw], got {origin!r}")
+    pose = Pose(*(_number(file, {"origin": part}, "origin") for part in origin))
+    negate = TRUTH.get(str(said.get("negate", "0")).lower())
+    if negate is None:
+        raise ConfigError(f"{file}: negate must be 0 or 1, got {said['negate']!r}")
+    occupied = _number(file, said, "occupied_thresh", "0.65")
+    free = _number(file, said, "free_thresh", "0.196")
+    if not 0 <= free < occupied <= 1:
+        raise ConfigError(
+            f"{file}: needs 0 <= free_thresh < occupied_thresh <= 1, got {free} and "
+            f"{occupied}"
+        )
+    mode = said.get("mode", "trinary")
+    if mode not in MODES:
+        raise ConfigError(f"{file}: mode must be {', '.join(MODES)}, got {mode!r}")
+    image = _image_path(file, said.get("image"))
+    return _Settings(image, resolution, pose, negate, occupied, free, mode)
+
+
+def _read_yaml(file: Path) -> dict[str, Any]:
+    try:
+        if not file.is_file():
+            raise ConfigError(f"{file}: there is no such file")
+        with file.open("rb") as stream:
+            data = stream.read(MAX_YAML + 1)
+        if len(data) > MAX_YAML:
+            raise ConfigError(f"{file}: more than 1 MiB is no map's YAML")
+        # This loader makes nothing but text, so that "yes" is not taken for a 1.
+        said = yaml.load(data, yaml.BaseLoader)  # noqa: S506
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(f"{file}: {error}") from error
+    if not isinstance(said, dict):
+        raise ConfigError(f"{file}: needs image, resolution and origin")
+    return said
+
+
+def _number(
+    file: Path, said: dict[str, Any], key: str, default: str | None = None
+) -> float:
+    text = said.get(key, default)
+    try:
+        value = float(text) if isinstance(text, str) else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ConfigError(f"{file}: {key} must be a finite number, got {text!r}")
+    return value
+
+
+def _image_path(file: Path, name: object) -> Path:
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise ConfigError(f"{file}: image must be the name of a file, got {name!r}")
+    folder = file.resolve().parent
+    image = (folder / name).resolve()
+    if Path(name).is_absolute() or not image.is_relative_to(folder):
+        raise ConfigError(
+            f"{file}: the image {name!r} is not in the folder of the YAML file; put it "
+            "there and write its bare name"
+        )
+    # A pipe or a device would be waited for, or read without an end.
+    if not image.is_file():
+        raise ConfigError(f"{file}: there is no image file {name!r}")
+    return image
+
+
+def _read_image(file: Path, image: Path) -> "NDArray[np.float32]":
+    """Return how light each pixel is, 0 to 1, the upper row first; NaN if clear."""
+    import numpy as np
+    from PIL import Image
+
+    too_many = (Image.DecompressionBombError, Image.DecompressionBombWarning)
+    try:
+        with Image.open(image, formats=FORMATS) as opened:
+            if opened.width * opened.height > MAX_PIXELS:
+                raise ConfigError(
+                    f"{file}: the image has {opened.width} x {opened.height} pixels; "
+                    f"{MAX_PIXELS} in all are the limit"
+                )
+            deep = opened.mode.startswith("I")
+            pixels = np.asarray(opened if deep else opened.convert("RGBA"))
+    except too_many as error:
+        raise ConfigError(f"{file}: the image is too large: {error}") from error
+    except (OSError, ValueError, SyntaxError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(
+            f"{file}: the image must be PGM, PNG or BMP: {error}"
+        ) from error
+    if deep:
+        return np.asarray(pixels / 65535, np.float32)
+    # As map_server has it, colours count by their mean.
+    light: NDArray[np.float32] = pixels[..., :3].mean(axis=2, dtype=np.float32) / 255
+    light[pixels[..., 3] == 0] = np.nan
+    return light
+
+
+def _cells(light: "NDArray[np.float32]", settings: _Settings) -> "NDArray[np.int8]":
+    import numpy as np
+
+    clear = np.isnan(light)
+    light = np.nan_to_num(light)
+    if settings.mode == "raw":
+        values = np.rint(light * 255)
+        values[(values > 100) | clear] = -1
+        return values.astype(np.int8)
+    chance = light if settings.negate else 1 - light
+    low, high = settings.free, settings.occupied
+    cells = np.full(light.shape, -1, np.int8)
+    if settings.mode == "scale":
+        between = np.rint(99 * (chance - low) / (high - low)).clip(1, 99)
+        cells[:] = between.astype(np.int8)
+    cells[chance > high] = 100
+    cells[chance < low] = 0
+    cells[clear] = -1
+    return cells

@@ -1,0 +1,205 @@
+"""Maps from disk, in the form of map_server."""
+
+import asyncio
+import math
+import os
+import time
+
+import numpy as np
+import pytest
+from module_fakes import image_of, pixel
+from PIL import Image
+
+from webmap.core.layer import Layer
+from webmap.core.map_file import read_map
+from webmap.errors import ConfigError
+from webmap.geometry import Affine
+
+YAML = "image: {image}\nresolution: 0.05\norigin: [-1.25, 2.5, 0]\nnegate: 0\n"
+ENDS = "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+
+
+def pgm(folder, rows, *, name="map.pgm", most=255, kind="P5", comment=True):
+    """Write a PGM, its upper row first."""
+    rows = np.asarray(rows)
+    note = "# CREATOR: map_saver 0.050 m/pix\n" if comment else ""
+    head = f"{kind}\n{note}{rows.shape[1]} {rows.shape[0]}\n{most}\n".encode()
+    if kind == "P2":
+        body = " ".join(map(str, rows.ravel())).encode()
+    else:
+        body = rows.astype(">u2" if most > 255 else "u1").tobytes()
+    (folder / name).write_bytes(head + body)
+
+
+def described(folder, text="", *, image="map.pgm", **changed):
+    """Write the YAML, with keys changed, and return its path."""
+    lines = (YAML.format(image=image) + ENDS + text).splitlines()
+    known = dict(line.split(": ", 1) for line in lines)
+    known.update(changed, image=image)
+    file = folder / "map.yaml"
+    said = [f"{key}: {value}" for key, value in known.items() if value is not None]
+    file.write_text("\n".join(said) + "\n")
+    return file
+
+
+ROWS = [[0, 254, 254], [254, 205, 100]]
+"""A wall at the upper left, an unknown cell below, and something in between."""
+
+
+@pytest.mark.parametrize(
+    "form", [{}, {"kind": "P2"}, {"comment": False}, {"most": 65535}]
+)
+def test_the_lowest_row_of_the_image_is_the_first_of_the_grid(tmp_path, form):
+    rows = np.array(ROWS) * (257 if form.get("most") else 1)
+    pgm(tmp_path, rows, **form)
+    read = read_map(described(tmp_path))
+    assert read.cells.tolist() == [[0, -1, -1], [100, 0, 0]]
+    assert (read.origin.x, read.origin.y, read.resolution) == (-1.25, 2.5, 0.05)
+
+
+@pytest.mark.parametrize("suffix", ["png", "bmp"])
+def test_other_images_are_the_same_map(tmp_path, suffix):
+    Image.fromarray(np.array(ROWS, np.uint8)).save(tmp_path / f"map.{suffix}")
+    read = read_map(described(tmp_path, image=f"map.{suffix}"))
+    assert read.cells.tolist() == [[0, -1, -1], [100, 0, 0]]
+
+
+def test_what_is_clear_in_an_image_is_unknown(tmp_path):
+    Image.fromarray(np.array([[[0, 0, 0, 0], [0, 0, 0, 255]]], np.uint8)).save(
+        tmp_path / "map.png"
+    )
+    assert read_map(described(tmp_path, image="map.png")).cells.tolist() == [[-1, 100]]
+
+
+@pytest.mark.parametrize("word", ["1", "true"])
+def test_negate_takes_white_for_walls(tmp_path, word):
+    pgm(tmp_path, [[255, 0]])
+    assert read_map(described(tmp_path, negate=word)).cells.tolist() == [[100, 0]]
+
+
+def test_the_modes_are_those_of_map_server(tmp_path):
+    pgm(tmp_path, [[0, 60, 150, 254]])
+    shades = read_map(described(tmp_path, mode="scale")).cells[0]
+    assert (shades[0], shades[3]) == (100, 0)
+    assert 0 < shades[2] < 99
+    raw = read_map(described(tmp_path, mode="raw")).cells[0]
+    assert raw.tolist() == [0, 60, -1, -1]
+
+
+def in_a_page(scenario):
+    async def run():
+        module = scenario()
+        deadline = time.monotonic() + 20
+        while module.layer.image is None and not module.layer.problems:
+            assert time.monotonic() < deadline
+            await asyncio.sleep(0.005)
+        return module
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "yaw"), [(0, 0, 0), (-12.34, 7.89, 0), (3, -4, 1.1), (-1, -2, -math.pi)]
+)
+def test_every_pixel_is_where_the_origin_puts_it(map, tmp_path, x, y, yaw):
+    pgm(tmp_path, ROWS)
+    file = described(tmp_path, origin=f"[{x}, {y}, {yaw}]", resolution="0.2")
+    module = in_a_page(lambda: map.add_module("MapFile", file))
+    placed = Affine.translation(x, y) @ Affine.rotation(yaw)
+    wanted = [[(255,) * 4, (0,) * 4, (0,) * 4], [(0, 0, 0, 255), *[(255,) * 4] * 2]]
+    for row, colours in enumerate(wanted):
+        for column, colour in enumerate(colours):
+            at = placed.apply(0.2 * (column + 0.5), 0.2 * (row + 0.5))
+            got = pixel(module.layer.picture.element, *at)
+            assert got == colour, (row, column)
+
+
+def test_maps_share_what_was_read_and_what_is_wrong_is_said(map, tmp_path, channel):
+    pgm(tmp_path, ROWS)
+    file = described(tmp_path)
+    module = in_a_page(lambda: map.add_module("MapFile", str(file)))
+    other = map.__class__(map.page.element("other"), 10, 10)
+    assert other.add_module("MapFile", file).layer is module.layer
+    assert image_of(module.layer.picture.element).size == (3, 2)
+    broken = in_a_page(lambda: map.add_module("MapFile", tmp_path / "none.yaml"))
+    assert broken.layer.picture.element.get("href") is None
+    (error,) = channel.errors
+    assert "none.yaml: there is no such file" in error
+    map.page.close()
+    assert Layer._shared == {}
+
+
+WRONG = {
+    "resolution must be above 0, got 0.0": {"resolution": "0"},
+    "resolution must be above 0, got -0.05": {"resolution": "-0.05"},
+    "resolution must be a finite number, got 'nan'": {"resolution": "nan"},
+    "resolution must be a finite number, got '.inf'": {"resolution": ".inf"},
+    "resolution must be a finite number, got None": {"resolution": None},
+    "origin must be [x, y, yaw], got ['1', '2']": {"origin": "[1, 2]"},
+    "origin must be a finite number, got 'east'": {"origin": "[1, 2, east]"},
+    "negate must be 0 or 1, got 'yes'": {"negate": "yes"},
+    "needs 0 <= free_thresh < occupied_thresh <= 1": {"free_thresh": "0.9"},
+    "mode must be trinary, scale, raw, got 'odd'": {"mode": "odd"},
+    "image must be the name of a file, got None": {"image": None},
+    "image must be the name of a file, got ['a']": {"image": "[a]"},
+    "'/etc/passwd' is not in the folder": {"image": "/etc/passwd"},
+    "'../map.pgm' is not in the folder": {"image": "../map.pgm"},
+    "'out.pgm' is not in the folder": {"image": "out.pgm"},
+    "no image file 'http://x/map.pgm'": {"image": "http://x/map.pgm"},
+    "no image file 'folder'": {"image": "folder"},
+    "no image file 'pipe.pgm'": {"image": "pipe.pgm"},
+    "the image must be PGM, PNG or BMP": {"image": "map.yaml"},
+}
+
+
+@pytest.mark.parametrize("why", WRONG)
+def test_a_description_that_makes_no_sense_is_refused(tmp_path, why):
+    folder = tmp_path / "maps"
+    (folder / "folder").mkdir(parents=True)
+    pgm(tmp_path, ROWS)
+    pgm(folder, ROWS)
+    (folder / "out.pgm").symlink_to(tmp_path / "map.pgm")
+    os.mkfifo(folder / "pipe.pgm")
+    file = described(folder, **WRONG[why])
+    with pytest.raises(ConfigError) as refused:
+        read_map(file)
+    assert why in str(refused.value)
+    assert str(file) in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"P5\n3 2\n0\n" + bytes(6),
+        b"P5\n3 2\n255\n" + bytes(3),
+        b"P5\n2147483648 2147483648\n255\n",
+        b"P5\n8193 8193\n255\n",
+        b"P5\n12000 12000\n255\n",
+        b"GIF89a" + bytes(20),
+        b"<svg/>",
+    ],
+)
+def test_an_image_that_is_none_is_refused_before_it_costs_anything(tmp_path, data):
+    (tmp_path / "map.pgm").write_bytes(data)
+    with pytest.raises(ConfigError, match=r"map\.yaml: the image"):
+        read_map(described(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"", "needs image"),
+        (b"- 1", "needs image"),
+        (b"a: [", "map.yaml"),
+        (b"image: !!python/object/apply:os.system [ls]", "map.yaml"),
+        (b" " * ((1 << 20) + 1), "1 MiB"),
+        (b"\xff\xfe\xfa", "map.yaml"),
+        (b"[" * 100_000, "map.yaml"),
+    ],
+)
+def test_a_file_that_is_no_description_is_refused(tmp_path, data, why):
+    file = tmp_path / "map.yaml"
+    file.write_bytes(data)
+    with pytest.raises(ConfigError, match=why):
+        read_map(file)
