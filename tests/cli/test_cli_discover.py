@@ -37,7 +37,7 @@ def test_both_make_one_fleet_file(ros1, ros2):
 
 
 def test_a_bridge_that_is_away_is_waited_for_and_then_said():
-    said = discover("ws://127.0.0.1:1", "--wait", "0.2")
+    said = discover("ws://127.0.0.1:1", "--wait", "2")
     assert said.returncode == 1
     assert said.stdout == ""
     assert "Waiting for the rosbridge at ws://127.0.0.1:1" in said.stderr

@@ -21,6 +21,7 @@ from webmap.discovery import discover
 
 COMMAND = [sys.executable, "-m", "webmap", "view"]
 READY = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
+IMAGE = "sensor_msgs/CompressedImage"
 TOPICS = {"/odom": "nav_msgs/Odometry", "/cmd_vel": "geometry_msgs/Twist"}
 
 
@@ -87,7 +88,7 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-    with viewing(f"ws://127.0.0.1:{port}", "--wait", "0.1") as view:
+    with viewing(f"ws://127.0.0.1:{port}", "--wait", "3") as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for(r"Waiting for the rosbridge at ws://127\.0\.0\.1")
         view.wait_for("cannot reach the rosbridge")
@@ -113,7 +114,10 @@ def opened():
 
 class FakeMap:
     def __init__(self):
-        self.robots = []
+        self.robots, self.modules = [], []
+
+    def add_module(self, *arguments):
+        self.modules.append(arguments)
 
     def add_robot(self, robot):
         self.robots.append(robot.name)
@@ -124,15 +128,23 @@ class FakePage:
         self.maps = [FakeMap()]
 
 
+def found(name="bob", **more):
+    (robot,) = discover(TOPICS | more, name).robots
+    return robot
+
+
 def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge, opened):
     late = LateRobots()
     early = FakePage()
     site.pages["/"].function(early)
-    late.add(RobotDescription(name="Bob", bridge=bridge, odometry="/odom"))
-    assert early.maps[0].robots == ["Bob"]
+    late.add(found(), describe(found(), bridge))
+    late.show_grid(bridge, "/map")
+    late.show_grid(bridge, "/other/map")
     after = FakePage()
     site.pages["/"].function(after)
-    assert after.maps[0].robots == ["Bob"]
+    for page in (early, after):
+        assert page.maps[0].robots == ["bob"]
+        assert page.maps[0].modules == [("OccupancyGrid", bridge, "/map")]
     assert opened == [early, after]
     late.robots[0].destroy()
 
@@ -150,13 +162,19 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, opened, capsys):
     late.robots[0].destroy()
 
 
-def test_a_robot_with_frames_is_drawn_by_them_and_quietly(bridge, opened):
+def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge, opened):
     late = LateRobots()
-    late.add(RobotDescription(name="Bob", bridge=bridge, odometry="/odom"), "/bob")
-    (robot,) = late.robots
-    assert robot.tf["namespace"] == "/bob"
-    assert robot.tf["quiet"]
-    robot.destroy()
+    more = {"/tf": "tf2_msgs/TFMessage", "/plan": "nav_msgs/Path"}
+    more |= {f"/cam{n}/image_raw/compressed": IMAGE for n in range(6)}
+    robot = found(**more)
+    late.add(robot, describe(robot, bridge))
+    (made,) = late.robots
+    assert made.tf["namespace"] == ""
+    assert made.tf["quiet"]
+    names = [type(module).__name__ for module in made.modules]
+    assert names.count("Path") == 1
+    assert names.count("Camera") == 4
+    made.destroy()
 
 
 def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):

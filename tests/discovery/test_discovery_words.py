@@ -39,7 +39,7 @@ def test_one_line_has_what_is_used():
     (robot,) = discover(TOPICS, "bob").robots
     assert in_one_line(robot) == (
         "bob: odometry /odom, velocity /cmd_vel, scan /scan, "
-        "goal /move_base_simple/goal"
+        "goal /move_base_simple/goal, plan /plan"
     )
 
 

@@ -8,6 +8,9 @@ from webmap.discovery import FoundRobot
 if TYPE_CHECKING:
     from webmap import Bridge
 
+MOST_CAMERAS = 4
+"""Cameras of one robot that are shown; they are only asked while somebody looks."""
+
 
 def describe(
     robot: FoundRobot, bridge: "Bridge", *, stops_within: float | None = None
@@ -20,6 +23,7 @@ def describe(
         stops_within: Seconds within which the base stops by itself, if known.
 
     """
+    cameras = robot.guesses.get("camera", ())
     return RobotDescription(
         name=robot.name,
         bridge=bridge,
@@ -27,6 +31,7 @@ def describe(
         twist=robot.topic("velocity"),
         scan=robot.topic("scan"),
         battery=robot.topic("battery"),
+        cameras=tuple(guess.topic for guess in cameras[:MOST_CAMERAS]),
         goal=robot.topic("goal"),
         cancel=robot.topic("cancel"),
         stops_within=stops_within,

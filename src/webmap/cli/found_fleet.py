@@ -10,6 +10,7 @@ import click
 from webmap.cli.described import describe, overrules
 from webmap.cli.finding import find
 from webmap.console import RobotDescription
+from webmap.discovery import FoundRobot
 from webmap.discovery.words import in_one_line
 
 if TYPE_CHECKING:
@@ -24,22 +25,29 @@ class FoundFleet:
     """Robots that were told by hand; the console has them already."""
 
     stops_within: float | None = None
-    robots: list[tuple[RobotDescription, str | None]] = field(default_factory=list)
-    """Robots that were found, and the namespace of their frames if they have any."""
+    robots: list[tuple[FoundRobot, RobotDescription]] = field(default_factory=list)
+    """Robots that were found, and the same as the console takes them."""
 
     known: list[tuple["Bridge", list[str]]] = field(default_factory=list)
     """For each bridge the namespaces in which robots were found."""
 
-    def show(self) -> None:
-        """Show what was found and what comes later; after the console was opened."""
+    def show(self, *, grid: bool) -> None:
+        """Show what was found and what comes later; after the console was opened.
+
+        Args:
+            grid: Whether the robots' own map is shown under them.
+
+        """
         from webmap.cli.latecomers import LateRobots, Looking, greet
 
         late = LateRobots()
-        for about, namespace in self.robots:
-            late.add(about, namespace)
+        for robot, about in self.robots:
+            if grid:
+                late.show_grid(about.bridge, robot.topic("map"))
+            late.add(robot, about)
         names = [about.name for about in self.told]
-        names += [about.name for about, _ in self.robots]
-        came = greet(late, names, self.stops_within)
+        names += [robot.name for robot, _ in self.robots]
+        came = greet(late, names, self.stops_within, grid=grid)
         for bridge, namespaces in self.known:
             _services.append(Looking(bridge, namespaces, came))
 
@@ -74,7 +82,7 @@ def find_fleet(
             if any(overrules(other, about) for other in told):
                 continue
             click.echo(f"Found {in_one_line(robot)}", err=True)
-            fleet.robots.append((about, robot.tf_namespace))
+            fleet.robots.append((robot, about))
         spaces = [robot.namespace for robot in one.findings.robots]
         fleet.known.append((bridge, spaces))
     return fleet

@@ -31,7 +31,7 @@ LONGEST = 60.0
 
 
 class LateRobots:
-    """The robots that came after the console was opened, on every page of it.
+    """What came after the console was opened, on every page of it.
 
     Args:
         path: The page's path.
@@ -40,32 +40,37 @@ class LateRobots:
 
     def __init__(self, path: str = "/") -> None:
         self.robots: list[Robot] = []
+        self.grid: tuple[Bridge, str] | None = None
+        """The map under the robots: a bridge and a topic."""
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
         entry = site.pages[path]
 
         def open_page(page: Page) -> object:
             result = entry.function(page)
             self._pages.add(page)
+            if self.grid is not None:
+                _show_grid(self.grid, page)
             for robot in self.robots:
                 _show(robot, page)
             return result
 
         site.pages[path] = replace(entry, function=open_page)
 
-    def add(self, about: RobotDescription, tf_namespace: str | None = None) -> None:
-        """Make one more robot and show it.
+    def add(self, found: FoundRobot, about: RobotDescription) -> None:
+        """Make one more robot, with what was found of it, and show it.
 
         Args:
-            about: The robot.
-            tf_namespace: Of the topics with its frames; None for a robot that is
-                drawn where its odometry has it.
+            found: The robot as it was found.
+            about: The same as the console takes it.
 
         """
         with no_scope():
             robot = make_robot(about)
-            if tf_namespace is not None:
+            if found.tf_namespace is not None:
                 # Many robots have frames and no map: that is no mistake.
-                robot.set_tf(about.bridge, namespace=tf_namespace, quiet=True)
+                robot.set_tf(about.bridge, namespace=found.tf_namespace, quiet=True)
+            if found.topic("plan"):
+                robot.add_module("Path", about.bridge, found.topic("plan"))
         self.show(robot)
 
     def show(self, robot: "Robot") -> None:
@@ -74,10 +79,22 @@ class LateRobots:
         for page in list(self._pages):
             _show(robot, page)
 
+    def show_grid(self, bridge: "Bridge", topic: str) -> None:
+        """Show a map under the robots; the first one stays."""
+        if topic and self.grid is None:
+            self.grid = (bridge, topic)
+            for page in list(self._pages):
+                _show_grid(self.grid, page)
+
 
 def _show(robot: "Robot", page: Page) -> None:
     for map in page.maps:
         map.add_robot(robot)
+
+
+def _show_grid(grid: tuple["Bridge", str], page: Page) -> None:
+    for map in page.maps:
+        map.add_module("OccupancyGrid", *grid)
 
 
 class Looking:
@@ -131,7 +148,11 @@ class Looking:
 
 
 def greet(
-    late: LateRobots, taken: Iterable[str], stops_within: float | None
+    late: LateRobots,
+    taken: Iterable[str],
+    stops_within: float | None,
+    *,
+    grid: bool = True,
 ) -> Callable[[FoundRobot, "Bridge"], None]:
     """Return what shows a newcomer under a name that nobody has, and says so.
 
@@ -139,6 +160,7 @@ def greet(
         late: Where it is shown.
         taken: Names of the robots that are there.
         stops_within: Seconds within which every base stops by itself, if known.
+        grid: Whether the robots' own map is shown under them.
 
     """
     from webmap.cli.described import describe
@@ -155,7 +177,8 @@ def greet(
         click.echo(
             f"A robot appeared behind {bridge.url}: {in_one_line(robot)}", err=True
         )
-        about = describe(robot, bridge, stops_within=stops_within)
-        late.add(about, robot.tf_namespace)
+        if grid:
+            late.show_grid(bridge, robot.topic("map"))
+        late.add(robot, describe(robot, bridge, stops_within=stops_within))
 
     return came

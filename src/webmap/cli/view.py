@@ -79,7 +79,7 @@ def view(
         fleet = find_fleet(bridges, told, wait=wait, stops_within=stops_within)
     console.open_console(bridges, told, floor=plan)
     if fleet is not None:
-        fleet.show()
+        fleet.show(grid=plan is None)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

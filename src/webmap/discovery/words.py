@@ -4,7 +4,15 @@ from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
 
-USED: tuple[Role, ...] = ("odometry", "velocity", "scan", "battery", "goal")
+USED: tuple[Role, ...] = (
+    "odometry",
+    "velocity",
+    "scan",
+    "battery",
+    "goal",
+    "plan",
+    "map",
+)
 
 OVERRULE = (
     "Wrong? Say it with --robot NAME:ODOM:CMD_VEL:SCAN, which takes the place of the "
