@@ -24,7 +24,7 @@ def test_a_robot_that_is_clicked_on_the_map_has_its_card(open_console):
     page = open_console()
     page.locator('.robot[data-name="Robot 1"] .hit').click()
     expect(page.locator("#card h2")).to_have_text("Robot 1")
-    expect(page.locator("#card .age")).not_to_have_class(re.compile("stale"))
+    expect(page.locator("#card dd.age")).not_to_have_class(re.compile("stale"))
     page.get_by_role("button", name="Select no robot").click()
     expect(page.locator("#card")).to_be_hidden()
 
@@ -64,6 +64,11 @@ def test_stop_is_in_sight_and_large(open_console, size):
         assert stop.bounding_box()["width"] > 300
     stop.click()
     expect(page.locator(".webmap-stop-verdict").first).to_be_visible()
+    reset = page.get_by_role("button", name="Reset all")
+    reset.click()
+    page.wait_for_timeout(400)
+    page.get_by_role("button", name="Press again").click()
+    expect(page.locator("#robots .row .holder").first).to_have_text("Free")
 
 
 @pytest.mark.parametrize("size", ["desk", "phone"])
