@@ -12,6 +12,10 @@ title = "Two halls"
 north = "ws://north:9090"
 south = "wss://south/ros"
 
+[map]
+bridge = "north"
+topic = "/map"
+
 [[robots]]
 name = "Bob"
 bridge = "north"
@@ -81,6 +85,7 @@ def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
         "ws://north:9090",
         "wss://south/ros",
     ]
+    assert fleet.fleet.map == ("north", "/map")
     bob, ann = fleet.robots
     spec = bob.motion.spec()
     assert (bob.name, spec.twist_topic, spec.stops_within) == (
@@ -120,15 +125,15 @@ def changed(old, new):
     [
         (
             changed("stops_within", "stops_witin"),
-            'FILE:17: robots[0].twist.stops_witin: there is no key "stops_witin" here; '
+            'FILE:21: robots[0].twist.stops_witin: there is no key "stops_witin" here; '
             'did you mean "stops_within"?; there are topic, type,',
         ),
         (
             changed("v_max = 0.5", 'v_max = "0.5"'),
-            'FILE:18: robots[0].twist.v_max: got the text "0.5", expected a number of '
+            'FILE:22: robots[0].twist.v_max: got the text "0.5", expected a number of '
             "metres per second above 0",
         ),
-        (changed("0.25", "0"), "FILE:17: robots[0].twist.stops_within: got the whole"),
+        (changed("0.25", "0"), "FILE:21: robots[0].twist.stops_within: got the whole"),
         (changed("0.25", "-1.5"), "got the number -1.5, expected a number of seconds"),
         (changed("0.25", "inf"), "got the number inf, expected a number of seconds"),
         (changed("0.25", "nan"), "got the number nan, expected a number of seconds"),
@@ -140,15 +145,21 @@ def changed(old, new):
             'FILE:4: bridges.north: got the text "http://north", expected the address',
         ),
         (
-            changed('bridge = "north"', 'bridge = "nroth"'),
-            'FILE:9: robots[0].bridge: got the text "nroth", expected the name of a '
+            changed('"Bob"\nbridge = "north"', '"Bob"\nbridge = "nroth"'),
+            'FILE:13: robots[0].bridge: got the text "nroth", expected the name of a '
             'bridge (north, south); did you mean "north"?',
         ),
-        (changed('bridge = "north"\n', ""), 'FILE:7: robots[0]: the key "bridge" is'),
-        (changed('name = "Bob"\n', ""), 'FILE:7: robots[0]: the key "name" is missing'),
+        (
+            changed('"Bob"\nbridge = "north"\n', '"Bob"\n'),
+            'FILE:11: robots[0]: the key "bridge" is',
+        ),
+        (
+            changed('name = "Bob"\n', ""),
+            'FILE:11: robots[0]: the key "name" is missing',
+        ),
         (
             changed('"Ann"', '"BOB"'),
-            'FILE:27: robots[1].name: got the text "BOB", expected a name that differs',
+            'FILE:31: robots[1].name: got the text "BOB", expected a name that differs',
         ),
         (
             changed('"Ann"', '"\uff22ob"'),
@@ -156,39 +167,44 @@ def changed(old, new):
         ),
         (
             changed('"/bob/odom"', '"/bob odom"'),
-            'FILE:10: robots[0].odometry: got the text "/bob odom", expected the name',
+            'FILE:14: robots[0].odometry: got the text "/bob odom", expected the name',
         ),
         (
             changed('"/bob/rear/scan"', "7"),
-            "FILE:11: robots[0].scan[1]: got the whole number 7, expected the name of",
+            "FILE:15: robots[0].scan[1]: got the whole number 7, expected the name of",
         ),
         (
             changed('"geometry_msgs/Twist"', '"nav_msgs/Odometry"'),
-            "FILE:16: robots[0].twist.type: got",
+            "FILE:20: robots[0].twist.type: got",
         ),
         (changed('"cancel"', '"cancle"'), 'did you mean "cancel"?'),
         (
             changed("throttle = 50", "throttle = 1.5"),
-            "FILE:31: robots[1].odometry.thro",
+            "FILE:35: robots[1].odometry.thro",
         ),
         (
             changed('"LaserScanner"', '"LaserScaner"'),
-            "FILE:34: robots[1].modules[0].name: there is no robot module "
+            "FILE:38: robots[1].modules[0].name: there is no robot module "
             "'LaserScaner'. Did you mean 'LaserScanner'?",
         ),
         (
             changed("{ x = 1 }", "{ colour = 1 }"),
-            "FILE:34: robots[1].modules[0]: Laser",
+            "FILE:38: robots[1].modules[0]: Laser",
         ),
         (
             changed('{ bridge = "north" }', '{ bridge = "east" }'),
-            "FILE:34: robots[1].modules[0].args[0].bridge: got the text",
+            "FILE:38: robots[1].modules[0].args[0].bridge: got the text",
         ),
         (changed("[[robots]]", "[robots]"), "this is not TOML"),
-        (changed("map_frame", "mapframe"), "FILE:30: robots[1].tf.mapframe: there is"),
+        (changed('topic = "/map"\n', ""), 'FILE:7: map: the key "topic" is missing'),
+        (
+            changed('[map]\nbridge = "north"', '[map]\nbridge = "nort"'),
+            'FILE:8: map.bridge: got the text "nort", expected the name of a bridge',
+        ),
+        (changed("map_frame", "mapframe"), "FILE:34: robots[1].tf.mapframe: there is"),
         (
             changed('battery = "/bob/battery_state"', "tf = 1"),
-            "FILE:12: robots[0].tf: got the whole number 1, expected true, false or a",
+            "FILE:16: robots[0].tf: got the whole number 1, expected true, false or a",
         ),
         (
             "title = 1\n[[robots]]\n",
@@ -218,8 +234,8 @@ def test_every_mistake_is_named_at_once(write):
     text = changed("v_max", "vmax").replace("w_max = 1", "w_max = false")
     said = refused(write, text).splitlines()
     assert len(said) == 2
-    assert said[0].startswith("FILE:18: ")
-    assert said[1].startswith("FILE:19: ")
+    assert said[0].startswith("FILE:22: ")
+    assert said[1].startswith("FILE:23: ")
 
 
 def test_control_characters_of_a_file_do_not_reach_the_terminal(write):

@@ -52,7 +52,20 @@ def test_the_file_is_toml_with_every_topic_that_is_used():
     assert robot["twist"] == {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}
     assert robot["scan"] == ["/scan", "/rear/scan"]
     assert robot["move"]["cancel_topic"] == "/move_base/cancel"
-    assert "# found too: plan /plan" in text
+    assert robot["modules"] == [{"name": "Path", "args": [{"bridge": "bob"}, "/plan"]}]
+    assert "map" not in data
+
+
+def test_the_first_map_and_every_camera_are_in_the_file():
+    more = {"/map": "nav_msgs/OccupancyGrid", "/costmap": "nav_msgs/OccupancyGrid"}
+    more |= {"/cam/image_raw/compressed": "sensor_msgs/CompressedImage"}
+    found = discover(TOPICS | more, "bob")
+    text = fleet_toml([("al", "ws://al", discover({})), ("bob", "ws://bob", found)])
+    data = tomllib.loads(text)
+    assert data["map"] == {"bridge": "bob", "topic": "/map"}
+    names = [module["name"] for module in data["robots"][0]["modules"]]
+    assert names == ["Path", "Camera"]
+    assert "# found too: costmap /costmap" in text
 
 
 def test_an_address_as_a_name_is_a_quoted_key():

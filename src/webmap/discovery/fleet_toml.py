@@ -17,8 +17,8 @@ UNSURE = """\
 # twist.stops_within = 0.25
 """
 
-ALSO: tuple[Role, ...] = ("pose", "plan", "map", "costmap", "camera", "cloud")
-"""Roles that a fleet file has no key for; modules show some of them."""
+ALSO: tuple[Role, ...] = ("pose", "map", "costmap", "cloud")
+"""Roles that stay out of a page; modules show most of them."""
 
 
 def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
@@ -31,6 +31,7 @@ def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
     """
     parts = [HEAD, "[bridges]"]
     parts += [f"{_key(name)} = {_text(url)}" for name, url, _ in found]
+    parts += _map(found)
     for bridge, _, findings in found:
         for robot in findings.robots:
             parts += ["", *_robot(robot, bridge)]
@@ -62,6 +63,7 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
     if battery is not None:
         lines.append(f"battery = {_text(battery.topic)} # {battery.rule}")
     lines += _motion(robot)
+    lines += _modules(robot, bridge)
     for role in ALSO:
         if where in robot.guesses.get(role, ()):
             continue
@@ -70,6 +72,34 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
             for guess in robot.guesses.get(role, ())
         ]
     return lines + [f"# {note}" for note in robot.notes]
+
+
+def _map(found: Sequence[tuple[str, str, Findings]]) -> list[str]:
+    """Return the first map that there is."""
+    for bridge, _, findings in found:
+        for robot in findings.robots:
+            guess = robot.first("map")
+            if guess is not None:
+                return [
+                    "",
+                    "[map]",
+                    f"bridge = {_text(bridge)}",
+                    f"topic = {_text(guess.topic)} # {guess.rule}",
+                ]
+    return []
+
+
+def _modules(robot: FoundRobot, bridge: str) -> list[str]:
+    """Return what is shown of a robot besides."""
+    wanted = [("Path", guess) for guess in robot.guesses.get("plan", ())[:1]]
+    wanted += [("Camera", guess) for guess in robot.guesses.get("camera", ())]
+    link = f"{{ bridge = {_text(bridge)} }}"
+    lines = [
+        f'  {{ name = "{module}", args = [{link}, {_text(guess.topic)}] }}, '
+        f"# {guess.rule}"
+        for module, guess in wanted
+    ]
+    return ["modules = [", *lines, "]"] if lines else []
 
 
 def _motion(robot: FoundRobot) -> list[str]:

@@ -10,7 +10,7 @@ from webmap.discovery.naming import same_name
 from webmap.errors import ConfigError
 from webmap.ros.names import normalise_url
 
-TOP = ("title", "floor", "bridges", "robots")
+TOP = ("title", "floor", "map", "bridges", "robots")
 ODOMETRY: dict[str, Check] = {
     "topic": checks.topic,
     "type": checks.message_type(
@@ -95,6 +95,8 @@ class Fleet:
     robots: list[RobotLine] = field(default_factory=list)
     title: str = ""
     floor: str = ""
+    map: tuple[str, str] | None = None
+    """The map under the robots: the name of a bridge, and a topic."""
 
 
 def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
@@ -113,6 +115,8 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
         if key in data:
             setattr(fleet, key, checks.one(checks.text, data[key], (key,), mistakes))
     fleet.bridges = _bridges(data.get("bridges"), mistakes)
+    if "map" in data:
+        fleet.map = _map(data["map"], fleet.bridges, mistakes)
     robots = data.get("robots")
     if not isinstance(robots, list) or not robots:
         got = "nothing" if robots is None else checks.show(robots)
@@ -134,6 +138,20 @@ def _bridges(value: Any, mistakes: Mistakes) -> dict[str, str]:
         name: checks.one(_address, url, ("bridges", name), mistakes) or ""
         for name, url in value.items()
     }
+
+
+def _map(
+    value: Any, bridges: dict[str, str], mistakes: Mistakes
+) -> tuple[str, str] | None:
+    path: Path = ("map",)
+    known: dict[str, Check] = {
+        "bridge": lambda name: _known_bridge(name, bridges),
+        "topic": checks.topic,
+    }
+    if isinstance(value, dict) and "bridge" not in value and len(bridges) == 1:
+        value = {"bridge": next(iter(bridges)), **value}
+    meant = checks.table(value, known, path, mistakes, needed=("bridge", "topic"))
+    return (str(meant.get("bridge")), str(meant.get("topic")))
 
 
 def _address(value: Any) -> str:

@@ -59,5 +59,8 @@ def open_fleet(ready: ReadyFleet) -> None:
     options = {"title": ready.fleet.title} if ready.fleet.title else {}
     console.open_console(list(ready.bridges.values()), [], floor=ready.floor, **options)
     shown = LateRobots()
+    if ready.fleet.map is not None:
+        bridge, topic = ready.fleet.map
+        shown.show_grid(ready.bridges[bridge], topic)
     for robot in ready.robots:
         shown.show(robot)
