@@ -22,6 +22,7 @@ def test_robots_of_ros_1_are_ready(ros1):
     assert said.returncode == 0, said.stdout
     assert "0 wrong" in said.stdout
     assert re.search(r"/robot_1/odom: 1\d\.\d|20\.\d messages a second", said.stdout)
+    assert "Frames lead from map to robot_1/odom" in said.stdout
     assert "each call in a thread of its own" in said.stdout
     assert "/robot_0/cmd_vel takes Twist," in said.stdout
 

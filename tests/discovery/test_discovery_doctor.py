@@ -7,8 +7,9 @@ import pytest
 
 from webmap.discovery import discover
 from webmap.discovery.doctor import Heard, Observed, is_ready, judge
+from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
-from webmap.discovery.doctor.observed import Clock
+from webmap.discovery.doctor.observed import Clock, Way
 from webmap.discovery.doctor.verdict import report
 from webmap.ros.events import Publish
 
@@ -192,6 +193,56 @@ def test_the_report_counts_and_lets_no_control_character_through():
     text = report(odd.url, judge(odd))
     assert "\x1b" not in text
     assert text.endswith("0 wrong, 1 warning, 1 note, 9 good")
+
+
+def test_a_way_from_the_map_is_good_and_a_missing_one_a_note():
+    seen = replace(GOOD, ways={"bob": Way("odom")})
+    assert said(seen, "Frames lead from map to odom") == "good"
+    seen = replace(GOOD, ways={"bob": Way("odom", "there is no frame 'map'")})
+    assert said(seen, "where odometry has it: there is no frame 'map'") == "note"
+
+
+def test_odd_frames_are_a_warning():
+    seen = replace(GOOD, ways={"bob": Way("odom", "", ("'a' -> 'a' would close",))})
+    assert said(seen, "would close") == "warning"
+
+
+def frames(*transforms, topic="/tf"):
+    listening = FrameListening()
+    told = [
+        {
+            "header": {"stamp": {"sec": 5}, "frame_id": parent},
+            "child_frame_id": child,
+            "transform": {
+                "translation": {"x": 1.0, "y": 0.0, "z": 0.0},
+                "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": w},
+            },
+        }
+        for parent, child, w in transforms
+    ]
+    operation = {"op": "publish", "topic": topic, "msg": {"transforms": told}}
+    listening.received(Publish(topic, json.dumps(operation).encode()))
+    return listening
+
+
+def test_frames_are_followed_from_the_map():
+    whole = frames(("map", "odom", 1.0), ("odom", "base", 1.0))
+    assert whole.missing("", "odom") == ""
+    assert whole.missing("", "map") == ""
+    assert "there is no frame 'lidar'" in whole.missing("", "lidar")
+    assert whole.missing("/bob", "odom") == "nothing came on /bob/tf"
+    own = frames(("map", "odom", 1.0), topic="/bob/tf")
+    assert own.missing("/bob", "odom") == ""
+
+
+def test_what_is_wrong_with_frames_is_kept_once():
+    odd = frames(("a", "b", 0.0), ("a", "b", 0.0), ("b", "b", 1.0)).oddities("")
+    assert len(odd) == 2
+    assert "norm of 0" in odd[0]
+    assert "loop" in odd[1]
+    listening = FrameListening()
+    listening.received(Publish("/tf", b'{"op":"publish","topic":"/tf","msg":[}'))
+    assert "cannot be read" in listening.oddities("")[0]
 
 
 def message(topic, stamp=(5, 250_000_000), frame="odom"):

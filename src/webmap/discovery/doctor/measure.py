@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from webmap.discovery.asking import ask_topics
+from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
-from webmap.discovery.doctor.observed import Clock, Heard, Observed
+from webmap.discovery.doctor.observed import Clock, Heard, Observed, Way
 from webmap.discovery.found import Findings
 from webmap.discovery.robots import discover, host_name
 from webmap.errors import BridgeClosed, BridgeError
@@ -65,7 +66,11 @@ async def observe(
     finally:
         await calls.stop()
     try:
-        peer, deflate, heard = await listen(url, _worth_hearing(findings), seconds)
+        topics = _worth_hearing(findings)
+        frames = FrameListening()
+        spaces = {one.tf_namespace for one in findings.robots[:MOST_ROBOTS]} - {None}
+        tf = [f"{space}/{name}" for space in spaces for name in ("tf", "tf_static")]
+        peer, deflate, heard = await listen(url, topics, seconds, tf, frames)
     except (OSError, TimeoutError) as error:
         return Observed(url, trouble=str(error) or type(error).__name__)
     return Observed(
@@ -78,6 +83,7 @@ async def observe(
         publishers=writers,
         subscribers=listeners,
         heard=heard,
+        ways=_ways(findings, heard, frames),
         calls_in_threads=threads,
     )
 
@@ -92,6 +98,21 @@ def _worth_hearing(findings: Findings) -> dict[str, str]:
         if robot.topic("scan"):
             topics[robot.topic("scan")] = "cbor"
     return topics
+
+
+def _ways(
+    findings: Findings, heard: Mapping[str, Heard], frames: FrameListening
+) -> dict[str, Way]:
+    """Return what the frames say of each robot whose odometry names its frame."""
+    ways = {}
+    for robot in findings.robots:
+        namespace = robot.tf_namespace
+        where = heard.get(robot.topic("odometry") or robot.topic("pose"))
+        if namespace is not None and where is not None and where.frame:
+            missing = frames.missing(namespace, where.frame)
+            oddities = frames.oddities(namespace)
+            ways[robot.name] = Way(where.frame, missing, oddities)
+    return ways
 
 
 class _Asking:
@@ -154,7 +175,11 @@ class _Asking:
 
 
 async def listen(
-    url: str, topics: Mapping[str, str], seconds: float
+    url: str,
+    topics: Mapping[str, str],
+    seconds: float,
+    tf: Sequence[str] = (),
+    frames: FrameListening | None = None,
 ) -> tuple[str, bool, dict[str, Heard]]:
     """Listen to topics for a while.
 
@@ -162,6 +187,8 @@ async def listen(
         url: The bridge's address.
         topics: How each is to be packed: ``none`` or ``cbor``.
         seconds: How long.
+        tf: Topics with frames.
+        frames: What takes those.
 
     Returns:
         The address that answered, whether the socket could be compressed, and what
@@ -184,13 +211,21 @@ async def listen(
                 await socket.send(
                     ops.subscribe(topic, id=topic, compression=packing).decode()
                 )
+            for topic in tf:
+                await socket.send(
+                    ops.subscribe(topic, id=topic, queue_length=100).decode()
+                )
             listening, protocol = Listening(topics, time.monotonic()), Protocol()
             try:
                 async with asyncio.timeout(seconds if topics else 0):
                     while True:
                         frame = await socket.recv(decode=False)
                         event = protocol.receive(frame, time.monotonic())
-                        if isinstance(event, Publish):
+                        if not isinstance(event, Publish):
+                            continue
+                        if frames is not None and event.topic in tf:
+                            frames.received(event)
+                        else:
                             listening.received(event, time.monotonic(), time.time())
             except (TimeoutError, ConnectionClosed):
                 pass

@@ -73,6 +73,20 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True)
+class Way:
+    """The frames between the map and a robot's odometry."""
+
+    frame: str
+    """The frame of the odometry."""
+
+    missing: str = ""
+    """Why nothing leads there from the map, empty if it does."""
+
+    oddities: tuple[str, ...] = ()
+    """What was odd in these frames, in sentences."""
+
+
+@dataclass(frozen=True, slots=True)
 class Observed:
     """All that was seen of one bridge and the robots behind it."""
 
@@ -98,5 +112,8 @@ class Observed:
     """The nodes that listen to a topic, where rosapi said so."""
 
     heard: Mapping[str, Heard] = field(default_factory=dict)
+    ways: Mapping[str, Way] = field(default_factory=dict)
+    """What the frames say of each robot that has some, by its name."""
+
     calls_in_threads: bool | None = None
     """Whether the bridge makes calls in threads of their own, if it said so."""

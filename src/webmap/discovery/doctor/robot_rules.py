@@ -14,6 +14,7 @@ SLOW = 5.0
 
 AGED = 0.5
 AHEAD = 0.1
+MOST_ODDITIES = 3
 BRIDGES = ("rosbridge", "webmap")
 """What is in the names of nodes that publish for their clients, ourselves too."""
 
@@ -34,6 +35,7 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     scan = robot.first("scan")
     if scan is not None and scan.topic in seen.heard:
         yield _heard(robot.name, scan, seen, needed=False)
+    yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
         yield Finding(
             "note",
@@ -41,6 +43,30 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             "Whether the base stops by itself when commands cease cannot be seen from "
             "here.",
             "Set its timeout, try it with raised wheels, and state it as stops_within.",
+        )
+
+
+def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+    way = seen.ways.get(robot.name)
+    if way is None:
+        return
+    if way.missing:
+        yield Finding(
+            "note",
+            robot.name,
+            f"It is drawn in the frame {way.frame}, where odometry has it: "
+            f"{way.missing}.",
+            "To see it on the map, start what tells of the frame map: amcl, "
+            "slam_toolbox, or a static transform.",
+        )
+    else:
+        yield Finding("good", robot.name, f"Frames lead from map to {way.frame}.")
+    for oddity in way.oddities[:MOST_ODDITIES]:
+        yield Finding(
+            "warning",
+            robot.name,
+            f"A frame is odd: {oddity}.",
+            "Look which node tells of it, and whether two do.",
         )
 
 

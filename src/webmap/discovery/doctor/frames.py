@@ -1,0 +1,66 @@
+"""Whether the frames lead from the map to a robot; without I/O."""
+
+from webmap.errors import ProtocolError
+from webmap.geometry import Quaternion, Vector3
+from webmap.ros.events import Publish
+from webmap.ros.messages import TFMessage
+from webmap.tf import Buffer, Transform, TransformError
+
+MAP = "map"
+"""The frame that robots are drawn in."""
+
+
+class FrameListening:
+    """Takes what comes on the topics with frames, of all namespaces."""
+
+    def __init__(self) -> None:
+        self._buffers: dict[str, Buffer] = {}
+        self._refused: dict[str, list[str]] = {}
+
+    def received(self, message: Publish) -> None:
+        """Take a message of ``tf`` or ``tf_static``."""
+        namespace, _, name = message.topic.rpartition("/")
+        buffer = self._buffers.setdefault(namespace, Buffer())
+        refused = self._refused.setdefault(namespace, [])
+        try:
+            transforms = message.decode(TFMessage).transforms
+        except ProtocolError as error:
+            refused.append(f"{message.topic} cannot be read: {error}")
+            return
+        for each in transforms:
+            place, turn = each.transform.translation, each.transform.rotation
+            transform = Transform(
+                Vector3(place.x, place.y, place.z),
+                Quaternion(turn.x, turn.y, turn.z, turn.w),
+            )
+            try:
+                buffer.add(
+                    each.frame_id,
+                    each.child_frame_id,
+                    transform,
+                    each.stamp,
+                    static=name == "tf_static",
+                    namespace=namespace,
+                )
+            except TransformError as error:
+                refused.append(str(error))
+
+    def oddities(self, namespace: str) -> tuple[str, ...]:
+        """Return what was odd in the frames of a namespace, each once."""
+        buffer = self._buffers.get(namespace)
+        notes = [] if buffer is None else list(buffer.notes)
+        return tuple(dict.fromkeys([*self._refused.get(namespace, ()), *notes]))
+
+    def missing(self, namespace: str, frame: str) -> str:
+        """Return why nothing leads from the map to a frame; empty if it does."""
+        buffer = self._buffers.get(namespace)
+        if buffer is None:
+            return f"nothing came on {namespace}/tf"
+        name = buffer.name(frame, namespace)
+        if name == MAP:
+            return ""
+        try:
+            buffer.lookup(MAP, name)
+        except TransformError as error:
+            return str(error)
+        return ""
