@@ -14,7 +14,7 @@ def loaded_by(statement: str) -> set[str]:
 
 
 def modules_after(statement: str) -> list[str]:
-    program = f"{statement}; import sys; print(*sys.modules)"
+    program = f"{statement}\nimport sys; print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
@@ -32,6 +32,19 @@ def test_importing_webmap_loads_no_heavy_package() -> None:
 @pytest.mark.parametrize("module", ["webmap.gate.__main__", "webmap.gate.client"])
 def test_the_gate_loads_no_heavy_package(module: str) -> None:
     assert not loaded_by(f"import {module}") & HEAVY
+
+
+def test_a_scan_costs_the_gate_cbor_and_nothing_else_that_is_heavy() -> None:
+    loaded = loaded_by(
+        "import webmap.gate.__main__, cbor2\n"
+        "from webmap.gate.scans import hear_scan\n"
+        "fields = ('angle_min', 'angle_increment', 'range_min', 'range_max')\n"
+        "scan = dict.fromkeys(fields, 1.0)\n"
+        "scan['ranges'] = cbor2.CBORTag(85, bytes(8))\n"
+        "frame = cbor2.dumps({'op': 'publish', 'topic': '/s', 'msg': scan})\n"
+        "assert hear_scan(frame, 0.0)[1].ranges == [0.0, 0.0]\n"
+    )
+    assert loaded & HEAVY == {"cbor2"}
 
 
 def test_the_gate_process_loads_nothing_of_the_display() -> None:
