@@ -3,11 +3,13 @@
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.frames import frames_of
 from webmap.errors import ConfigError, ProtocolError
 from webmap.geometry import Pose
 from webmap.scene import svg
 from webmap.scene.element import Child
 from webmap.scope import Removal, keep
+from webmap.tf import Buffer, NotKnownThen, TransformError
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -22,6 +24,10 @@ class Placed:
     CSS finds it below ``.robot``; it ends with the scope that it was made in. A group
     in the map's frame lies under the robot's model, and its module has to call
     :meth:`follow` in ``on_odometry_update``.
+
+    A message whose frame is another is taken there by the frames that the robot was
+    given with ``set_tf``: see :meth:`stand_in`. Without them its numbers are taken to
+    be in the group's frame.
 
     Args:
         robot: The robot.
@@ -55,13 +61,53 @@ class Placed:
         self.robot = robot
         self.frame = frame
         self._offset = Pose(x, y, math.radians(angle))
+        self._mounted = self._offset != Pose()
+        self._known: dict[str, Pose] = {}
+        self._class = class_
         self.svg = svg.g(*children, class_=class_, pointer_events="none")
         if frame == "map":
             robot.svg.insert(robot.svg.children.index(robot.model), self.svg)
         else:
             robot.svg.append(self.svg)
         self.follow(always=True)
-        keep(Removal(self.svg.remove))
+        keep(Removal(self._end))
+
+    def stand_in(self, frame_id: str, stamp: float) -> None:
+        """Take the group's own coordinates to be in a frame that a message names.
+
+        It is looked up as it was at the stamp. Without frames, or where the module was
+        told a place on the robot, nothing changes; a frame that nobody tells of is
+        taken to be where it was last, or the group's own, and that is said.
+
+        Args:
+            frame_id: The frame of the message; empty if it does not say.
+            stamp: When it was measured, in seconds of the robot's clock; 0 if not said.
+
+        """
+        tf = self.robot.tf
+        if tf is None or self._mounted or not frame_id:
+            return
+        buffer = frames_of(tf["bridge"], tf["namespace"]).buffer
+        source = buffer.name(frame_id, tf["namespace"])
+        target = tf["map_frame"] if self.frame == "map" else tf["base_frame"]
+        try:
+            pose = (
+                Pose() if source == target else _lookup(buffer, target, source, stamp)
+            )
+            self._known[source] = pose
+            self.robot.clear_problem(self)
+        except TransformError as error:
+            pose = self._known.get(source, Pose())
+            if not tf["quiet"]:
+                self.robot.set_problem(
+                    self, f"{self._class}: it is not known where {source!r} is: {error}"
+                )
+        self._offset = pose
+        self.follow(always=True)
+
+    def _end(self) -> None:
+        self.svg.remove()
+        self.robot.clear_problem(self)
 
     def follow(self, *, always: bool = False) -> None:
         """Stay in place on the map: undo how the robot has moved."""
@@ -72,6 +118,16 @@ class Placed:
         elif not always:
             return
         self.svg.set_pose(place.x, place.y, place.yaw)
+
+
+def _lookup(buffer: Buffer, target: str, source: str, stamp: float) -> Pose:
+    """Return the pose of a frame in another, at a time or at the newest one known."""
+    if stamp:
+        try:
+            return buffer.lookup(target, source, stamp).planar
+        except NotKnownThen:
+            pass
+    return buffer.lookup(target, source).planar
 
 
 def rounded(value: float) -> float:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 class Path:
     """Draws a ``nav_msgs/Path`` as a line, and fires ``on_path_update``.
 
-    The poses are taken to be in the map's frame, whatever the robot's. A path without
-    poses takes the line away.
+    The poses are in the map's frame, or in the frame that the message names if the
+    robot knows frames. A path without poses takes the line away.
 
     Style it by CSS: ``.path > polyline``; a second path can be told by its ``name``,
     which is a class too: ``.path.local > polyline { stroke: orange }``.
@@ -88,6 +88,7 @@ class Path:
         points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
         check_finite(points, "a path")
         self.points = points
+        self._placed.stand_in(path.frame_id, path.stamp)
         drawn = (points[index] for index in thinned(len(points), self.max_points))
         self.line.set(points=[(rounded(x), rounded(y)) for x, y in drawn])
         self.svg.set_age(0.0, limit=self.age_limit)

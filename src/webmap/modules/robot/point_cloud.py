@@ -130,6 +130,7 @@ class PointCloud:
         """
         points, values = self._flat(cloud)
         bands = self._bands(values)
+        self._placed.stand_in(cloud.frame_id, cloud.stamp)
         center, unit = (0.0, 0.0), UNIT
         if len(points):
             middle = (points.min(axis=0) + points.max(axis=0)) / 2

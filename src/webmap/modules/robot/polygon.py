@@ -84,6 +84,7 @@ class Polygon:
             )
         check_finite(points, "a polygon")
         self.points = points
+        self._placed.stand_in(message.frame_id, message.stamp)
         self.outline.set(points=[(rounded(x), rounded(y)) for x, y in points])
         self.svg.set_age(0.0, limit=self.age_limit)
 

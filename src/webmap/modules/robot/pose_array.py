@@ -88,6 +88,7 @@ class PoseArray:
 
         """
         self.poses = [pose.usable for pose in message.poses]
+        self._placed.stand_in(message.frame_id, message.stamp)
         kept = thinned(len(self.poses), self.max_poses)
         arrows = [arrow(self.poses[index], self.length) for index in kept]
         self.arrows.set(d="".join(arrows) or None)

@@ -83,6 +83,7 @@ class PoseWithCovariance:
         place, ellipse = message.place, message.ellipse
         turn = self.deviations * message.heading_deviation
         n = self.deviations
+        self._placed.stand_in(message.frame_id, message.stamp)
         self.ellipse.set(rx=n * ellipse.major, ry=n * ellipse.minor)
         self.ellipse.set_pose(place.x, place.y, ellipse.yaw)
         self.heading.set(d=sector(max(0.4, n * ellipse.major), turn))

@@ -81,6 +81,7 @@ class Range:
             raise ProtocolError(
                 f"field_of_view must be radians from 0 to a whole turn, got {view}"
             )
+        self._placed.stand_in(message.frame_id, message.stamp)
         measured = message.range
         low = nearest if math.isfinite(nearest) else 0.0
         if math.isnan(measured):
