@@ -1,0 +1,81 @@
+"""Many viewers of one page, some of whom read nothing, until standard input ends.
+
+Started as ``safety_crowd.py URL VIEWERS SILENT``; says ``ready`` when all are there.
+"""
+
+import asyncio
+import contextlib
+import http.client
+import json
+import sys
+from urllib.parse import urlsplit
+
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+
+def sign_in(url: str) -> str:
+    """Exchange the token in a URL for a cookie, as a browser does."""
+    parts = urlsplit(url)
+    link = http.client.HTTPConnection(parts.hostname, parts.port)
+    link.request("GET", f"{parts.path}?{parts.query}")
+    cookie = link.getresponse().headers["set-cookie"].split(";")[0]
+    link.close()
+    return cookie
+
+
+async def view(url: str, cookie: str, number: int, silent: bool, there) -> None:
+    """Be one page: say hello, and acknowledge each frame or none."""
+    address = urlsplit(url).netloc
+    name = f"viewer{number:04d}"
+    socket = await connect(
+        f"ws://{address}/_webmap/scene?page=%2F&id={name}",
+        origin=f"http://{address}",
+        additional_headers={"cookie": cookie},
+        compression=None,
+        max_size=None,
+        ping_interval=None,
+    )
+    hello = {
+        "op": "hello",
+        "page": name,
+        "url": "/",
+        "width": 800,
+        "height": 600,
+        "containers": {"webmap_container": [700, 500]},
+    }
+    await socket.send(json.dumps(hello))
+    there()
+    if silent:
+        socket.transport.pause_reading()
+        await asyncio.Event().wait()
+    with contextlib.suppress(ConnectionClosed):
+        frame = 0
+        async for _ in socket:
+            frame += 1
+            await socket.send(json.dumps({"op": "seen", "frame": frame}))
+
+
+async def main(url: str, viewers: int, silent: int) -> None:
+    """Have all come, then wait for the end."""
+    cookie = sign_in(url)
+    there = 0
+
+    def arrived() -> None:
+        nonlocal there
+        there += 1
+        if there == viewers:
+            print("ready", flush=True)
+
+    tasks = [
+        asyncio.create_task(view(url, cookie, n, n < silent, arrived))
+        for n in range(viewers)
+    ]
+    await asyncio.to_thread(sys.stdin.read)
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+if __name__ == "__main__":
+    asyncio.run(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))
