@@ -494,6 +494,24 @@ class TestStopStands:
         fake.at_rest = True
         eventually(confirmed, "the word that it stands")
 
+    def test_it_is_there_again_for_a_robot_that_was_forgotten(
+        self, page, client, robot_spec, fake
+    ):
+        page.drive_off(fake)
+        pid = client.pid
+        client.stop_robot("r1")
+        eventually(lambda: page.robot().get("latched"), "the word that STOP stands")
+        at = time.monotonic()  # so that it is dropped at once, while it is watched
+        eventually(lambda: fake.velocities[-1][0] - at > 0.6, "zeros that go on")
+        client.forget("r1")
+        eventually(lambda: page.of("gone"), "the end of the robot")
+        page.robots.clear()
+        client.declare(robot_spec)
+        eventually(lambda: page.robot().get("latched"), "the STOP of before")
+        fake.at_rest = True
+        eventually(lambda: (page.robot()["stop"] or {}).get("confirmed"), "standstill")
+        assert client.pid == pid
+
     def test_a_gate_that_does_not_run_resets_nothing(self):
         GateClient().reset(None)
 

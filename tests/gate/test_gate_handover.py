@@ -197,6 +197,13 @@ class TestChanging:
         seen.run(0.2)
         assert holder(seen) == "b"
 
+    def test_a_goal_is_cancelled_for_what_follows_one_does_not_stand(self, seen):
+        seen.goal()
+        ask(seen)
+        cancels = len(seen.did(actions.CancelGoals))
+        grant(seen)
+        assert len(seen.did(actions.CancelGoals)) == cancels + 1
+
     def test_others_do_not_get_between(self, bench):
         bench.join("c")
         ask(bench)

@@ -2,7 +2,7 @@
 
 1. A velocity is written only in answer to a command of the lease's holder that was
    accepted just now, and when the newest such command is older than the limit, what is
-   written is zero, or nothing.
+   written is zero, or nothing. (The stop test creeps in answer to released inputs.)
 2. Between two epochs in the log of a robot there is a zero.
 3. No velocity of an old epoch comes after one of a newer epoch.
 4. No velocity exceeds the limit in force.
@@ -102,6 +102,27 @@ class Motion(RuleBasedStateMachine):
         self._doubt()
         if speed or not self.odometry:
             assert self.bench.report().holder is None, "nobody has what moves"
+
+    @rule(who=st.sampled_from(PEOPLE), stops=st.booleans(), lets_go=st.booleans())
+    def tests_the_stop(self, who, stops, lets_go):
+        """A base that creeps, and then stops by itself, or does not."""
+        if not self.odometry or not self.seeing:
+            return
+        bench = self.bench
+
+        def each():
+            last = bench.written[-1] if bench.written else None
+            moves = last is not None and not (stops and bench.now - last.at > 0.2)
+            twist = last.twist if moves else Twist()
+            bench.tell(events.Measured(self.bench_key, twist))
+            if not lets_go:
+                self._command(who, 0.0)
+
+        self.take(who)
+        self._run(0.4, lambda: self._command(who, 0.0))
+        bench.say(who, op="stop-test", robot="r1")
+        self.creeping = bench.report().test is not None
+        bench.run(1.0, each)
 
     @rule(who=st.sampled_from(PEOPLE))
     def release(self, who):
@@ -297,6 +318,8 @@ class Motion(RuleBasedStateMachine):
             self._doubt()
 
     silent_for = 0.0
+    creeping = False
+    """Whether there was a stop test, which creeps while every input is released."""
     epoch = 0
     """The newest epoch that was seen."""
     stands = False
@@ -374,7 +397,7 @@ class Motion(RuleBasedStateMachine):
                 if s.valid
                 and s.who == write.by
                 and s.epoch == write.epoch
-                and not s.neutral
+                and (not s.neutral or (self.creeping and write.twist.vx <= 0.1))
                 and write.at - 0.02 - LATE <= s.at <= write.at
             ]
             assert causes, "nobody asked for this"

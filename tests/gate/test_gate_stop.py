@@ -179,6 +179,24 @@ class TestLatch:
         reset(bench)
         assert bench.take()
 
+    def test_a_robot_that_is_forgotten_while_it_is_watched_is_watched_no_more(self):
+        bench = Bench().begin(spec(odometry_topic="/odom"))
+        stop(bench)
+        bench.run(0.6)
+        assert bench.did(actions.Watch)[-1].on
+        bench.tell(messages.Forget("r1"))
+        kept = (actions.Watch, actions.Detach)
+        last = [a for a in bench.done if isinstance(a, kept)][-2:]
+        assert last == [actions.Watch(KEY, False), actions.Detach(KEY, "r1")]
+
+    def test_one_that_another_gate_has_is_not_looked_at_anew_every_second(self):
+        bench = Bench(lock_held=False).begin(spec(odometry_topic="/odom"))
+        stop(bench)
+        watch_it(bench, 0.5, 0.0)
+        assert bench.report().stop.confirmed
+        bench.tell(events.LockState(KEY, held=False, why="another has it"))
+        assert bench.report().stop.confirmed
+
     def test_two_robots_that_are_one_machine_share_it(self):
         bench = Bench().begin(spec(), spec(id="r2"))
         stop(bench, robot="r1")

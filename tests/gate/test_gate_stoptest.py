@@ -210,6 +210,16 @@ class TestDoubt:
         pressed = [w for w in bench.moving_since(at) if w.twist != Twist(0.1)]
         assert pressed == []
 
+    def test_a_gate_that_stood_still_ends_it_at_the_next_command(self, bench, base):
+        begin(bench)
+        base.run(0.05)
+        bench.now += 0.25
+        bench.tell(messages.Heartbeat())
+        bench.tell(events.Alive(bench.gate._fleet._bases[KEY].key.url))
+        bench.drive(x=0.0)
+        assert bench.report().test.text == "the driver fell silent"
+        assert bench.written[-1].twist == ZERO
+
     def test_its_driver_must_let_go_again_after_pressing(self, bench, base):
         begin(bench)
         base.run(0.1)

@@ -18,30 +18,27 @@ until a reset, which leads to *free*.
 
 from typing import Literal
 
-from webmap.gate.actions import Detach, Emit, KeepStopTest, Say
-from webmap.gate.confirm import Confirmation
+from webmap.gate.actions import Emit, KeepStopTest, Say
+from webmap.gate.arming import Arming
 from webmap.gate.connection import Connection
 from webmap.gate.deadman import DeadMan
 from webmap.gate.events import Key, LatchKept, LockState, StopRecord, Wrote, WroteGoal
-from webmap.gate.goals import Goals
 from webmap.gate.handover import HandOver
 from webmap.gate.health import Health, Pulse
-from webmap.gate.hooks import Hooks
 from webmap.gate.latch import Latch
 from webmap.gate.lease import Epochs, Lease
 from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
 from webmap.gate.loopage import LoopAge, governed
-from webmap.gate.messages import Refused, RobotSpec, SentTwist
+from webmap.gate.messages import RobotSpec, SentTwist
 from webmap.gate.motion import Bounds, Motion
 from webmap.gate.obedience import Obedience
 from webmap.gate.refusal import Refusal
+from webmap.gate.robots import Robots
 from webmap.gate.sight import Sight
+from webmap.gate.standing import StandingStop
 from webmap.gate.standstill import STILL_V, speed_of
 from webmap.gate.stoptest import CREEP, StopTest
 from webmap.geometry import Twist
-
-BLIND_LIMIT = 1.0
-"""The oldest odometry with which a machine is driven, in seconds (S16)."""
 
 State = Literal["free", "held", "driving", "stopping", "stopped"]
 
@@ -71,11 +68,8 @@ class Base:
         self.key = key
         self.control = control
         self.latch = latch
-        self.confirmation = Confirmation()
-        self.specs: dict[str, RobotSpec] = {}
-        """The robots that this machine goes by; the newest is the last."""
-        self.goals: dict[str, Goals] = {}
-        self.hooks: dict[str, Hooks] = {}
+        self.robots = Robots(key, emit)
+        """The robots that this machine goes by."""
         self.lease: Lease | None = None
         self.handover = HandOver()
         self.deadman = DeadMan()
@@ -86,20 +80,14 @@ class Base:
         self.tested: StopRecord | None = None
         """What the last stop test that came to an end found, whenever that was."""
         self.motion = Motion(key, control, self._bounds, emit)
+        self.standing = StandingStop(key, latch, self.robots, control, self.motion)
         self.sight = Sight(key, emit)
+        self.arming = Arming(key, self.robots, latch, control, pulse, self.sight)
         self.known = False
         """Whether it was asked if this gate alone has it, and if STOP stands."""
-        self._pulse = pulse
         self._epochs = epochs
         self._emit = emit
-        self._lock = LockState(key, held=False)
         self._page_cap: Cap | None = None
-        self._leaving: set[str] = set()
-
-    @property
-    def spec(self) -> RobotSpec:
-        """The newest of the robots that share this machine."""
-        return next(reversed(self.specs.values()))
 
     @property
     def state(self) -> State:
@@ -115,36 +103,21 @@ class Base:
     @property
     def speed(self) -> Speed:
         """The speeds in force now."""
-        caps = [cap for spec in self.specs.values() for cap in self._caps(spec)]
+        specs = self.robots.specs.values()
+        caps = [cap for spec in specs for cap in caps_of(spec, self.tested)]
         if self._page_cap is not None:
             caps.append(self._page_cap)
         return governed(speed_in_force(caps), self.ages.p95, self.stop_time)
-
-    def _caps(self, spec: RobotSpec) -> list[Cap]:
-        return caps_of(spec, self.tested)
 
     @property
     def stop_time(self) -> float | None:
         """Seconds within which the machine stops by itself, if that is known."""
         if self.tested is not None:
             return self.tested.seconds
-        stated = [spec.stops_within for spec in self.specs.values()]
-        known = [seconds for seconds in stated if seconds is not None]
-        return max(known) if len(known) == len(stated) else None
-
-    @property
-    def a_max(self) -> float | None:
-        """The greatest growth of its speed, in m/s², if one was stated."""
-        return min((s.a_max for s in self.specs.values() if s.a_max), default=None)
+        return self.robots.stops_within
 
     def _bounds(self) -> Bounds:
-        holonomic = all(spec.holonomic for spec in self.specs.values())
-        return Bounds(self.speed, self.a_max, holonomic)
-
-    @property
-    def drivable(self) -> bool:
-        """Whether velocity can be sent to it at all, not goals only."""
-        return self.spec.twist_topic is not None
+        return Bounds(self.speed, self.robots.a_max, self.robots.holonomic)
 
     @property
     def silent(self) -> bool:
@@ -163,16 +136,11 @@ class Base:
             self.lease is not None
             or not self.silent
             or self.motion.owes_zero
-            or self._confirming
+            or self.standing.confirming
             or self.motion.held
             or self.handover.going_on
             or self.sight.on
         )
-
-    @property
-    def _confirming(self) -> bool:
-        """Whether STOP stands and nobody knows yet that the machine does as well."""
-        return self.latch.on and not self.confirmation.confirmed
 
     # The robots that it is.
 
@@ -181,36 +149,27 @@ class Base:
     ) -> None:
         """Take in a robot, or what changed of it; a change ends the lease."""
         self.end_lease("the robot was declared anew", now)
-        self._leaving.discard(spec.id)
-        self.specs.pop(spec.id, None)
-        self.specs[spec.id] = spec
-        goals = self.goals.get(spec.id)
-        if goals is None:
-            self.goals[spec.id] = Goals(self.key, spec, tasks, self._emit)
-        else:
-            goals.spec, goals.link = spec, tasks
-        self.hooks[spec.id] = Hooks(self.key, spec, hooks, self._emit)
+        self.robots.declare(spec, tasks, hooks)
 
     def attached(self, now: float) -> None:
         """Note that the robot can be spoken to, as soon as there are links."""
         if self.latch.on:
-            self._stand_by_stop(now)
+            self._say_stop(now)
 
     def forget(self, robot: str, now: float) -> None:
         """Drop a robot; the last one stays until its machine has stopped."""
-        self._leaving.add(robot)
-        if len(self.specs) == len(self._leaving):
+        self.robots.leaving.add(robot)
+        if len(self.robots.specs) == len(self.robots.leaving):
             self.end_lease("the robot was removed", now)
         self._drop_leaving()
 
     def _drop_leaving(self) -> None:
-        for robot in list(self._leaving):
-            if len(self.specs) == 1 and not self.silent:
-                return
-            self._leaving.discard(robot)
-            del self.specs[robot]
-            del self.goals[robot], self.hooks[robot]
-            self._emit(Detach(self.key, robot))
+        for robot in list(self.robots.leaving):
+            if len(self.robots.specs) == 1:
+                if not self.silent:
+                    return
+                self.sight.update(False)
+            self.robots.drop(robot)
 
     # Whether it may move.
 
@@ -219,37 +178,11 @@ class Base:
         heir = self.handover.heir
         if heir is not None and not self.latch.on:
             return f"it goes to {heir.name or heir.id} as soon as it stands"
-        return self._obstacle(now)
-
-    def _obstacle(self, now: float) -> str | None:
-        if self.latch.on:
-            return f"STOP by {self.latch.by} stands: reset it first"
-        if not self._lock.held:
-            return self._lock.why
-        if doubt := self._pulse.doubt(now):
-            return doubt
-        if self.drivable:
-            return None if self.control.up else f"no link to {self.key.url}"
-        goals = self.goals[self.spec.id]
-        if not goals.can_send:
-            return "it has neither a velocity topic nor a goal topic"
-        return None if goals.link.up else "no link to where its goals go"
+        return self.arming.obstacle(now)
 
     def doubt(self, now: float) -> str | None:
         """Return why the machine must not be driven now, in words."""
-        if reason := self._obstacle(now):
-            return reason
-        if not self.drivable:
-            return "it has no velocity topic"
-        if not self.control.fresh(now):
-            return f"{self.key.url} does not answer"
-        if not self._has_odometry:
-            return None
-        if self.sight.seen_at is None:
-            return "no odometry yet"
-        if now - self.sight.seen_at > BLIND_LIMIT:
-            return f"no odometry for {BLIND_LIMIT:g} s"
-        return None
+        return self.arming.doubt(now)
 
     # Leases.
 
@@ -282,7 +215,7 @@ class Base:
         """
         disappointed = self.handover.end()
         if disappointed is not None:
-            self._refuse(disappointed.id, "ask", why or "it is gone")
+            self.robots.refuse(disappointed.id, "ask", why or "it is gone")
         self._end_lease(why, now)
 
     def _end_lease(self, why: str | None, now: float) -> None:
@@ -295,11 +228,7 @@ class Base:
         self.ages.clear()
         self._update_watch(now)
         if why is not None:
-            self._refuse(lease.connection, "lease", why)
-
-    def _refuse(self, connection: str, what: str, why: str) -> None:
-        for robot in self.specs:
-            self._emit(Say(Refused(connection, robot, what, why)))
+            self.robots.refuse(lease.connection, "lease", why)
 
     def release(self, connection: str, now: float) -> None:
         """Give the machine back, or ask for it no longer."""
@@ -314,7 +243,7 @@ class Base:
     def lost(self, connection: str, now: float) -> None:
         """A page is gone: what it drove stops."""
         self.release(connection, now)
-        for goals in self.goals.values():
+        for goals in self.robots.goals.values():
             goals.lost(connection)
 
     def ask(self, who: Connection, now: float) -> None:
@@ -333,14 +262,15 @@ class Base:
     def deny(self, why: str) -> None:
         """Have the holder keep it."""
         asker = self.handover.end()
-        if asker is not None:
-            self._refuse(asker.id, "ask", why)
+        assert asker is not None  # only then is there anything to deny
+        self.robots.refuse(asker.id, "ask", why)
 
     def hand_over(self, heir: Connection, now: float) -> None:
         """Zero first; ``heir`` gets the machine when it stands (S5)."""
         self._end_lease(f"{heir.name or heir.id} gets it", now)
-        if self.drivable:
+        if self.robots.drivable:
             self.motion.zero(now)
+        self.robots.make_way()  # what follows a goal does not come to stand
         self.handover.begin(heir, now)
         self._update_watch(now)
 
@@ -352,12 +282,12 @@ class Base:
         heir = handover.heir
         if heir is None:
             return
-        if reason := self._obstacle(now):
+        if reason := self.arming.obstacle(now):
             self.end_lease(reason, now)
         elif handover.stands(now):
             handover.end()
             self.give(heir, now)
-        elif self.drivable and not self.motion.stopping:
+        elif self.robots.drivable and not self.motion.stopping:
             self.motion.zero(now)
 
     # Motion.
@@ -390,8 +320,7 @@ class Base:
 
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         if not self.motion.driving:
-            for goals in self.goals.values():
-                goals.make_way()
+            self.robots.make_way()
         self.motion.drive(wanted, lease, now)
 
     def begin_test(self, now: float) -> None:
@@ -420,6 +349,8 @@ class Base:
         if not neutral:
             self._lapse("a key was pressed", now)
             return "a stop test was going on: release every input first"
+        if not self.deadman.armed:
+            self._lapse("the driver fell silent", now)
         if test.state == "creeping":
             self._drive(CREEP, lease, now)
         return None
@@ -428,7 +359,7 @@ class Base:
         """Do what the stop test has come to."""
         if test.state == "waiting":
             self.motion.leave_alone()
-        elif not test.running:
+        else:
             self.motion.zero(now)
             if test.concluded:
                 self._emit(KeepStopTest(self.key, test.seconds))
@@ -452,32 +383,25 @@ class Base:
         if reason := self.unarmable(now):
             raise Refusal(reason)
         self._lapse("a goal was sent", now)
-        self.goals[robot].send(*pose, by)
+        self.robots.goals[robot].send(*pose, by)
 
     def wrote_goal(self, write: WroteGoal) -> None:
         """Note that a goal went out: what moves from here on moves by itself."""
-        self.goals[write.robot].wrote(write)
+        self.robots.goals[write.robot].wrote(write)
         self.obedience.excuse()
 
     def stop(self, by: str, now: float) -> None:
         """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
         self.end_lease(f"STOP by {by}", now)
-        if self.drivable:
-            self.motion.zero(now)
-        self.latch.set(by)
-        self._stand_by_stop(now)
+        self.standing.press(by, now)
+        self._expect_standstill(now)
 
-    def _stand_by_stop(self, now: float) -> None:
-        """Say everything that STOP has to say, as far as there are links."""
-        if self.drivable:
-            self.motion.hold(now)
-        for goals in self.goals.values():
-            goals.stop()
-        for hooks in self.hooks.values():
-            hooks.say(stopped=True)
+    def _say_stop(self, now: float) -> None:
+        self.standing.say_all(now)
+        self._expect_standstill(now)
+
+    def _expect_standstill(self, now: float) -> None:
         self.obedience.expect(now)
-        self.confirmation.begin(now)
-        self._confirm(now)
         self._update_watch(now)
 
     def reset(self, now: float) -> None:
@@ -487,27 +411,8 @@ class Base:
             Refusal: If none stands.
 
         """
-        if not self.latch.on:
-            raise Refusal("no STOP stands")
-        self.latch.reset()
-        self.motion.let_go()
-        for hooks in self.hooks.values():
-            hooks.say(stopped=False)
+        self.standing.reset()
         self._update_watch(now)
-
-    def _confirm(self, now: float) -> None:
-        since = self.confirmation.since
-        delivered = not self.drivable or self.control.answered_since(since)
-        self.confirmation.judge(self._cannot_confirm(), delivered, now)
-
-    def _cannot_confirm(self) -> str | None:
-        """Return why nobody can tell whether the machine stands, in words."""
-        link = self.control if self.drivable else self.goals[self.spec.id].link
-        if not link.up:
-            return f"no link to {self.key.url}"
-        if not self._has_odometry:
-            return "no odometry"
-        return None
 
     def step(self, now: float) -> None:
         """Let time have its say."""
@@ -523,8 +428,8 @@ class Base:
         self.ages.forget_old(now)
         self._change_hands(now)
         self.motion.step(now)
-        if self._confirming:
-            self._confirm(now)
+        if self.standing.confirming:
+            self.standing.confirm(now)
         self._update_watch(now)
         self._drop_leaving()
 
@@ -549,7 +454,7 @@ class Base:
         self.obedience.wrote(write.twist, self.motion.sent, now)
         self.motion.wrote(write, now)
         twist = write.twist
-        for robot in self.specs:
+        for robot in self.robots.specs:
             sent = SentTwist(robot, twist.vx, twist.vy, twist.wz, write.by)
             self._emit(Say(sent))
 
@@ -558,8 +463,8 @@ class Base:
         if not self.sight.on:
             return
         self.sight.saw(measured, now)
-        if self._confirming:
-            self.confirmation.saw(measured, now)
+        if self.standing.confirming:
+            self.standing.confirmation.saw(measured, now)
         if self.handover.heir is not None:
             self.handover.saw(measured, now)
         self.obedience.saw(measured, now)
@@ -577,14 +482,13 @@ class Base:
 
     def locked(self, lock: LockState, now: float) -> None:
         """Note whether this gate alone has the machine."""
-        self._lock, self.known = lock, True
+        self.arming.lock, self.known, self.tested = lock, True, lock.tested
         if lock.driven:
             self.motion.owe_from_before()
-        self.tested = lock.tested
+            self.link_up(now)
         if lock.held and lock.latched_by is not None and not self.latch.on:
             self.latch.found(lock.latched_by)
-            self._stand_by_stop(now)
-        self.link_up(now)
+            self._say_stop(now)
 
     def latch_kept(self, event: LatchKept) -> None:
         """Note that the disk knows whether STOP stands."""
@@ -600,20 +504,11 @@ class Base:
             return
         self.motion.pay(now)
         if self.latch.on:
-            self._stand_by_stop(now)
+            self._say_stop(now)
 
     def tasks_up(self, link: Health) -> None:
         """Say what could not be said for want of this link."""
-        for goals in self.goals.values():
-            if goals.link is link and self.latch.on:
-                goals.stop()
-            elif goals.link is link:
-                goals.link_up()
-        for hooks in self.hooks.values():
-            if hooks.link is link and self.latch.on:
-                hooks.say(stopped=True)
-            elif hooks.link is link:
-                hooks.link_up()
+        self.standing.tasks_up(link)
 
     def link_down(self, now: float) -> None:
         """The control link is gone."""
@@ -624,11 +519,7 @@ class Base:
         self.sight.update(
             self.lease is not None
             or not self.silent
-            or self._confirming
+            or self.standing.confirming
             or self.handover.heir is not None
-            or (self._has_odometry and self.obedience.watching(now))
+            or (self.robots.has_odometry and self.obedience.watching(now))
         )
-
-    @property
-    def _has_odometry(self) -> bool:
-        return any(spec.odometry_topic is not None for spec in self.specs.values())

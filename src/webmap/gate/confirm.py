@@ -35,8 +35,6 @@ class Confirmation:
             now: The time.
 
         """
-        if self.confirmed:
-            return
         if trouble is not None:
             self.confirmed, self.why = False, trouble
         elif self._still.reached and delivered:

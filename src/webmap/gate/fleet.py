@@ -109,7 +109,7 @@ class Fleet:
             base = self._bases.get(key)
             # Before it is known whether STOP stands, nothing true can be said of it.
             if base is not None and base.known:
-                for spec in list(base.specs.values()):
+                for spec in list(base.robots.specs.values()):
                     self._report(base, spec, now)
 
     def _report(self, base: Base, spec: RobotSpec, now: float) -> None:
@@ -134,7 +134,7 @@ class Fleet:
         key, earlier = key_of(spec), self._by_robot.get(spec.id)
         if earlier is not None and earlier.key != key:
             self._forget(Forget(spec.id), now)
-        elif earlier is not None and earlier.specs[spec.id] == spec:
+        elif earlier is not None and earlier.robots.specs[spec.id] == spec:
             return
         base = self._bases.get(key) or self._new_base(key)
         tasks = self._link(spec.goal_url or key.url, "tasks")
@@ -166,7 +166,7 @@ class Fleet:
         self._drop_if_empty(base)
 
     def _drop_if_empty(self, base: Base) -> None:
-        if not base.specs:
+        if not base.robots.specs:
             del self._bases[base.key]
             self._emit(Unlock(base.key))
 
@@ -200,7 +200,7 @@ class Fleet:
         base.wrote(event, now)
         if event.by is not None and not event.done:
             why = "the link is backed up: a command was dropped"
-            self._refuse(event.by, base.spec.id, "drive", why, now)
+            self._refuse(event.by, base.robots.newest.id, "drive", why, now)
 
     def _wrote_goal(self, event: events.WroteGoal, now: float) -> None:
         base = self._by_robot.get(event.robot)
@@ -217,7 +217,7 @@ class Fleet:
     def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
         base = self._by_robot.get(event.robot)
         if base is not None:
-            base.goals[event.robot].ended(event.id)
+            base.robots.goals[event.robot].ended(event.id)
 
     def _echoed(self, event: events.Echoed, now: float) -> None:
         base = self._of_key(event.key)

@@ -130,7 +130,7 @@ class Gate:
     def _goals_lost(self) -> None:
         """Nobody is left who could look after a goal."""
         for base in self._fleet:
-            for goals in base.goals.values():
+            for goals in base.robots.goals.values():
                 goals.lost()
 
     def _connect(self, message: messages.Connect, now: float) -> None:
@@ -221,7 +221,7 @@ class Gate:
 
     def _cancel(self, connection: Connection, robot: str) -> None:
         check_role(connection.role)
-        self._fleet.find(robot).goals[robot].cancel()
+        self._fleet.find(robot).robots.goals[robot].cancel()
 
     def _stop(self, robot: str | None, by: Connection, now: float) -> None:
         for base in self._fleet if robot is None else [self._fleet.find(robot)]:
@@ -344,7 +344,7 @@ class Gate:
             except Refusal as refusal:
                 self._reply(take, None, refusal.why)
                 continue
-            if now < until and base.drivable and base.doubt(now):
+            if now < until and base.robots.drivable and base.doubt(now):
                 self._takes.append((take, epoch, until))
             else:
                 self._reply(take, epoch, None)

@@ -46,8 +46,7 @@ class Latch:
 
     def found(self, by: str) -> None:
         """Take over what an earlier gate left on disk."""
-        if not self.on:
-            self.by = by
+        self.by = by
 
     def reset(self) -> None:
         """Let STOP stand no longer."""

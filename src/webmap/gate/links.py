@@ -53,7 +53,11 @@ class Links:
             case actions.Attach(key, spec):
                 self._attach(key, spec)
             case actions.Detach(key, robot):
+                watched = key in self._watched
+                self._unwatch(key)
                 self._detach(key, self._robots[key].pop(robot))
+                if watched and self._robots[key]:
+                    self._watch(key)
                 self._close_unwanted()
         return None
 

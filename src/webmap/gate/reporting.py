@@ -33,7 +33,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     age, test = base.ages.p95, base.test
     unarmable = base.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
-    link = base.control if spec.twist_topic else base.goals[spec.id].link
+    link = base.control if spec.twist_topic else base.robots.goals[spec.id].link
     return RobotReport(
         robot=spec.id,
         name=spec.name,
@@ -55,7 +55,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         alarm=base.obedience.alarm(now),
         age=None if age is None else round(age * 1000, 0),
         reaction=round(reaction(age, base.stop_time), 3),
-        brake=base.a_max or BRAKE,
+        brake=base.robots.a_max or BRAKE,
         stop_time=base.stop_time,
         stop_source=_stop_source(base),
         stop_date=None if base.tested is None else base.tested.date,
@@ -81,7 +81,7 @@ def _asker(base: Base, now: float) -> AskerReport | None:
 def _stop(base: Base) -> StopReport | None:
     if not base.latch.acknowledged:
         return None
-    seen = base.confirmation
+    seen = base.standing.confirmation
     why = seen.why
     if base.latch.trouble is not None:
         why = f"{why}; a restart would forget this STOP: {base.latch.trouble}"
