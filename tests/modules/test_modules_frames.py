@@ -3,11 +3,13 @@
 import math
 
 import pytest
-from module_fakes import dots, header, numbers, pose, to_root
+from module_fakes import dots, header, image_of, numbers, pose, to_root
 from test_modules_cloud import cloud
+from test_modules_grid import BLACK, CORNERS, grid
 from test_modules_poses import sonar
 from test_modules_ways import in_world, near, path
 
+from webmap.core.frames import _heard
 from webmap.geometry import Affine
 
 
@@ -106,3 +108,55 @@ def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, robot):
     assert len(robot.problems) == 1
     robot.remove_module(module)
     assert robot.problems == {}
+
+
+def colour(image, x: float, y: float) -> tuple[int, ...]:
+    """The colour of a place of the world, in a picture whose group may be placed."""
+    u, v = to_root(image).inverse.apply(x, y)
+    picture = image_of(image)
+    width, height = float(image.get("width")), float(image.get("height"))
+    return picture.getpixel(
+        (int(u / width * picture.width), int(v / height * picture.height))
+    )
+
+
+def local(**info) -> dict:
+    return {**grid(CORNERS, 1.0, pose(2, 3), **info), "header": header("odom")}
+
+
+def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel):
+    module = map.add_module("OccupancyGrid", link, "/local", map_frame="map")
+    link.say("/local", {**local(), "header": header("map")})
+    assert "/tf" not in link.listeners, "nobody needs frames yet"
+    link.say("/local", local())
+    (error,) = channel.errors
+    assert "it is not known where 'odom' is on the map" in error
+    image = module.layer.picture.element
+    for at in [ODOM, (0.0, 0.0, -1.0)]:
+        tell(link, transform("map", "odom", *at, secs=4 + int(at != ODOM)))
+        there = Affine.translation(*at[:2]) @ Affine.rotation(at[2])
+        # The occupied cell is the lower left one of the grid, at (2, 3) of odom.
+        assert colour(image, *there.apply(2.5, 3.5)) == BLACK
+        assert colour(image, *there.apply(3.5, 3.5)) != BLACK
+    assert module.layer.problems == {}
+    map.remove_module(module)
+    assert link.listeners == {}
+    assert _heard == {}
+
+
+def test_a_costmap_of_one_of_many_robots_is_placed_by_that_ones_frames(map, link):
+    module = map.add_module(
+        "OccupancyGrid", link, "/r1/local", map_frame="map", namespace="/r1"
+    )
+    link.say("/r1/local", local())
+    link.say("/r1/tf", {"transforms": [transform("map", "odom", *ODOM)]})
+    image = module.layer.picture.element
+    assert colour(image, *IN_ODOM.apply(2.5, 3.5)) == BLACK
+    assert "/tf" not in link.listeners
+
+
+def test_without_a_frame_of_the_map_a_grid_is_drawn_as_it_comes(map, link):
+    module = map.add_module("OccupancyGrid", link, "/local")
+    link.say("/local", local())
+    assert colour(module.layer.picture.element, 2.5, 3.5) == BLACK
+    assert set(link.listeners) == {"/local", "/local_updates"}

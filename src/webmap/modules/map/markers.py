@@ -49,7 +49,7 @@ class Markers:
     ``data-ns``: ``.marker[data-ns="goals"] { display: none }``.
 
     Args:
-        map: The map. The markers' frame is taken for the map's.
+        map: The map. Markers are drawn as they come, in its frame.
         bridge: The link to the ROS system that has the topic.
         topic: The topic.
         type: ``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``.

@@ -4,6 +4,7 @@ import asyncio
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.anchored import Anchored
 from webmap.core.grid_picture import check_palette, grid_png, place_grid
 from webmap.core.layer import Layer
 from webmap.core.pictures import Picture
@@ -38,7 +39,7 @@ class OccupancyGrid:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
 
     Args:
-        map: The map. The grid's frame is taken for the map's.
+        map: The map.
         bridge: The link to the ROS system that has the topic.
         topic: The topic; its updates come on the same with ``_updates`` behind.
         palette: ``"map"``: free is white and occupied black. ``"costmap"``: free is
@@ -47,6 +48,10 @@ class OccupancyGrid:
         throttle: The least time between two whole grids, in milliseconds.
         age_limit: Seconds after which the grid is drawn as old; None for a map that
             is sent but once.
+        map_frame: The map's frame, for data that is in another: it is taken there by
+            the frames of the bridge's ``/tf``. If not given, data is drawn as it
+            comes.
+        namespace: ``/robot_0`` where the frames are on ``/robot_0/tf``.
         order: What lies over what: greater is nearer; robots have 100.
 
     Raises:
@@ -63,11 +68,15 @@ class OccupancyGrid:
         palette: str = "map",
         throttle: int = 0,
         age_limit: float | None = None,
+        map_frame: str | None = None,
+        namespace: str = "",
         order: float | None = None,
     ) -> None:
         check_palette(palette)
         self.map = map
-        self.layer = Grid.shared(bridge, topic, palette, throttle, age_limit)
+        self.layer = Grid.shared(
+            bridge, topic, palette, throttle, age_limit, map_frame, namespace
+        )
         if order is None:
             order = 20.0 if palette == "costmap" else 10.0
         self.layer.show_on(map, order=order)
@@ -83,8 +92,11 @@ class Grid(Layer):
         palette: str,
         throttle: int,
         age_limit: float | None,
+        map_frame: str | None,
+        namespace: str,
     ) -> None:
         super().__init__()
+        self.anchor = Anchored(self, bridge, map_frame, namespace)
         self.bridge = bridge
         self.topic = topic
         self.palette = palette
@@ -140,6 +152,7 @@ class Grid(Layer):
         cells = grid.cells
         check_values(cells, self.palette)
         self.info, self.cells = grid.info, cells
+        self.anchor.stand_in(grid.frame_id, grid.stamp)
         self._draw()
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
