@@ -96,6 +96,22 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later():
             view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
 
 
+@pytest.mark.parametrize("sig", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_waiting_with_exit_code_0(sig):
+    with subprocess.Popen(
+        [*COMMAND, "ws://127.0.0.1:1", "--no-browser", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        view = View(process)
+        view.wait_for("Waiting for the rosbridge")
+        process.send_signal(sig)
+        assert process.wait(15) == 0
+        assert process.stdout.read() == ""
+    assert "Traceback" not in view.said
+
+
 @pytest.fixture
 def bridge():
     return Bridge("ws://bob:9090")

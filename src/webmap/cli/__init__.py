@@ -1,6 +1,8 @@
 """The command line: ``webmap demo``, ``view``, ``discover``, ``run`` and ``sim``."""
 
+import signal
 import sys
+from types import FrameType
 
 import click
 
@@ -59,8 +61,14 @@ def cli() -> None:
     """
 
 
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Take SIGTERM for Ctrl+C, until a server takes both for itself."""
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """Run the command line; what is wrong is said in one sentence, with exit code 2."""
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         cli(standalone_mode=False)
     except click.exceptions.Exit as done:
