@@ -18,6 +18,8 @@ from webmap.cli.latecomers import LateRobots, greet
 from webmap.console import RobotDescription
 from webmap.core.page import PageEntry, site
 from webmap.discovery import discover
+from webmap.discovery.found import ROLES
+from webmap.discovery.newcomers import News
 
 COMMAND = [sys.executable, "-m", "webmap", "view"]
 READY = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
@@ -169,7 +171,7 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, opened, capsys):
     late = LateRobots()
     came = greet(late, ["BOB"], 0.25)
     (robot,) = discover(TOPICS, "bob").robots
-    came(robot, bridge)
+    came(News(robot), bridge)
     assert late.robots[0].name == "bob 2"
     assert late.robots[0].motion.spec().stops_within == 0.25
     said = capsys.readouterr()
@@ -197,6 +199,39 @@ def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
     topics = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics, "bob").robots
     assert describe(robot, bridge).odometry == "/amcl_pose"
+
+
+def test_a_robot_that_gets_more_topics_uses_them(bridge, opened, capsys):
+    late = LateRobots()
+    came = greet(late, [], 0.25)
+    (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
+    came(News(bare), bridge)
+    more = {"/scan": "sensor_msgs/LaserScan", "/tf": "tf2_msgs/TFMessage"}
+    more |= {"/battery": "sensor_msgs/BatteryState", "/plan": "nav_msgs/Path"}
+    more |= {"/goal_pose": "geometry_msgs/PoseStamped"}
+    more |= {"/map": "nav_msgs/OccupancyGrid"}
+    whole = found(**more)
+    roles = tuple(
+        role for role in ROLES if role in whole.guesses and role != "odometry"
+    )
+    came(News(whole, roles), bridge)
+    (robot,) = late.robots
+    spec = robot.motion.spec()
+    assert (spec.twist_topic, spec.goal_topic) == ("/cmd_vel", "/goal_pose")
+    assert spec.stops_within == 0.25
+    assert robot.tf is not None
+    names = {type(module).__name__ for module in robot.modules}
+    assert {"LaserScanner", "Battery", "Path"} <= names
+    assert late.grid == (bridge, "/map")
+    assert "bob has more now: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
+    robot.destroy()
+
+
+def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, opened, capsys):
+    late = LateRobots()
+    greet(late, ["Al"], None)(News(found(), ("velocity",)), bridge)
+    assert late.robots == []
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

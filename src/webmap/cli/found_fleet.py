@@ -28,8 +28,8 @@ class FoundFleet:
     robots: list[tuple[FoundRobot, RobotDescription]] = field(default_factory=list)
     """Robots that were found, and the same as the console takes them."""
 
-    known: list[tuple["Bridge", list[str]]] = field(default_factory=list)
-    """For each bridge the namespaces in which robots were found."""
+    known: list[tuple["Bridge", tuple[FoundRobot, ...]]] = field(default_factory=list)
+    """For each bridge the robots that were found, also those told by hand."""
 
     def show(self, *, grid: bool) -> None:
         """Show what was found and what comes later; after the console was opened.
@@ -48,8 +48,8 @@ class FoundFleet:
         names = [about.name for about in self.told]
         names += [robot.name for robot, _ in self.robots]
         came = greet(late, names, self.stops_within, grid=grid)
-        for bridge, namespaces in self.known:
-            _services.append(Looking(bridge, namespaces, came))
+        for bridge, robots in self.known:
+            _services.append(Looking(bridge, robots, came))
 
 
 _services: list[object] = []
@@ -83,6 +83,5 @@ def find_fleet(
                 continue
             click.echo(f"Found {in_one_line(robot)}", err=True)
             fleet.robots.append((robot, about))
-        spaces = [robot.namespace for robot in one.findings.robots]
-        fleet.known.append((bridge, spaces))
+        fleet.known.append((bridge, one.findings.robots))
     return fleet

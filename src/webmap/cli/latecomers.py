@@ -13,7 +13,7 @@ from webmap.console.fleet import make_robot
 from webmap.core.page import Page, site
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.naming import same_name
-from webmap.discovery.newcomers import Newcomers
+from webmap.discovery.newcomers import Newcomers, News
 from webmap.discovery.robots import host_name
 from webmap.discovery.words import in_one_line
 from webmap.errors import BridgeError
@@ -42,6 +42,7 @@ class LateRobots:
         self.robots: list[Robot] = []
         self.grid: tuple[Bridge, str] | None = None
         """The map under the robots: a bridge and a topic."""
+        self._places: dict[tuple[Bridge, str], Robot] = {}
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
         entry = site.pages[path]
 
@@ -71,7 +72,12 @@ class LateRobots:
                 robot.set_tf(about.bridge, namespace=found.tf_namespace, quiet=True)
             if found.topic("plan"):
                 robot.add_module("Path", about.bridge, found.topic("plan"))
+        self._places[about.bridge, found.namespace] = robot
         self.show(robot)
+
+    def at(self, bridge: "Bridge", namespace: str) -> "Robot | None":
+        """Return the robot that was found in a namespace, None if none was."""
+        return self._places.get((bridge, namespace))
 
     def show(self, robot: "Robot") -> None:
         """Show a robot on the pages that are open and on those to come."""
@@ -102,16 +108,16 @@ class Looking:
 
     Args:
         bridge: The bridge.
-        known: Namespaces of the robots that are shown already.
-        came: Called with each robot that is new.
+        known: The robots that are shown already.
+        came: Called with what is new.
 
     """
 
     def __init__(
         self,
         bridge: "Bridge",
-        known: Iterable[str],
-        came: Callable[[FoundRobot, "Bridge"], object],
+        known: Iterable[FoundRobot],
+        came: Callable[[News, "Bridge"], object],
     ) -> None:
         self.bridge = bridge
         self._newcomers = Newcomers(known)
@@ -143,8 +149,8 @@ class Looking:
                 continue
             pause = PERIOD
             found = discover(topics, host_name(self.bridge.url))
-            for robot in self._newcomers.look(found):
-                self._came(robot, self.bridge)
+            for news in self._newcomers.look(found):
+                self._came(news, self.bridge)
 
 
 def greet(
@@ -153,8 +159,10 @@ def greet(
     stops_within: float | None,
     *,
     grid: bool = True,
-) -> Callable[[FoundRobot, "Bridge"], None]:
-    """Return what shows a newcomer under a name that nobody has, and says so.
+) -> Callable[[News, "Bridge"], None]:
+    """Return what shows news, and says so on standard error.
+
+    A newcomer gets a name that nobody has.
 
     Args:
         late: Where it is shown.
@@ -164,21 +172,35 @@ def greet(
 
     """
     from webmap.cli.described import describe
+    from webmap.cli.growing import grow
 
     names = {same_name(name) for name in taken}
 
-    def came(robot: FoundRobot, bridge: "Bridge") -> None:
-        name, number = robot.name, 1
-        while same_name(name) in names:
-            number += 1
-            name = f"{robot.name} {number}"
-        names.add(same_name(name))
-        robot = replace(robot, name=name)
-        click.echo(
-            f"A robot appeared behind {bridge.url}: {in_one_line(robot)}", err=True
-        )
+    def came(news: News, bridge: "Bridge") -> None:
+        robot = news.robot
         if grid:
             late.show_grid(bridge, robot.topic("map"))
+        if news.roles:
+            shown = late.at(bridge, robot.namespace)
+            if shown is None:  # it was told by hand, with all that it has
+                return
+            used = grow(shown, bridge, robot, news.roles, stops_within=stops_within)
+            if used:
+                click.echo(f"{shown.name} has more now: {', '.join(used)}", err=True)
+            return
+        robot = replace(robot, name=_free(robot.name, names))
+        said = in_one_line(robot)
+        click.echo(f"A robot appeared behind {bridge.url}: {said}", err=True)
         late.add(robot, describe(robot, bridge, stops_within=stops_within))
 
     return came
+
+
+def _free(wanted: str, names: set[str]) -> str:
+    """Return a name that nobody has, and take it."""
+    name, number = wanted, 1
+    while same_name(name) in names:
+        number += 1
+        name = f"{wanted} {number}"
+    names.add(same_name(name))
+    return name

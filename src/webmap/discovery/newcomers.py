@@ -1,35 +1,57 @@
-"""Which robots are new since the last look."""
+"""What is new since the last look: robots, and topics of robots."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from webmap.discovery.found import Findings, FoundRobot
+from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """A robot that is new, or one that has more than before."""
+
+    robot: FoundRobot
+    """All that is known of it now."""
+
+    roles: tuple[Role, ...] = ()
+    """What it has more than before; empty for a robot that is new."""
 
 
 class Newcomers:
-    """Says of each robot once that it is new, when it has settled.
+    """Says once what is new, when it has settled.
 
-    The topics of a robot that is being switched on come one by one. So a robot is
-    told when two looks in a row say the same of it, and not before.
+    The topics of a robot that is being switched on come one by one. So news is told
+    when two looks in a row say the same of the robot, and not before. A topic that
+    goes, or a better one that comes, is no news: what is in use stays in use.
 
     Args:
-        known: Namespaces of robots that are there already.
+        known: Robots that are there already.
 
     """
 
-    def __init__(self, known: Iterable[str] = ()) -> None:
-        self._known = set(known)
+    def __init__(self, known: Iterable[FoundRobot] = ()) -> None:
+        self._known = {robot.namespace: robot for robot in known}
         self._seen: dict[str, FoundRobot] = {}
 
-    def look(self, findings: Findings) -> list[FoundRobot]:
-        """Take what is there now, and return the robots that are new and settled."""
+    def look(self, findings: Findings) -> list[News]:
+        """Take what is there now, and return what is new and settled."""
         before, self._seen = self._seen, {}
-        settled = []
+        news = []
         for robot in findings.robots:
-            if robot.namespace in self._known:
+            known = self._known.get(robot.namespace)
+            roles = () if known is None else _more(robot, known)
+            if known is not None and not roles:
                 continue
-            if before.get(robot.namespace) == robot:
-                self._known.add(robot.namespace)
-                settled.append(robot)
-            else:
+            if before.get(robot.namespace) != robot:
                 self._seen[robot.namespace] = robot
-        return settled
+                continue
+            guesses = {**robot.guesses, **(known.guesses if known else {})}
+            self._known[robot.namespace] = replace(robot, guesses=guesses)
+            news.append(News(robot, roles))
+        return news
+
+
+def _more(robot: FoundRobot, known: FoundRobot) -> tuple[Role, ...]:
+    return tuple(
+        role for role in ROLES if role in robot.guesses and role not in known.guesses
+    )

@@ -1,0 +1,63 @@
+"""Giving a robot that is shown already what it has more than before."""
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from webmap.discovery import FoundRobot
+from webmap.discovery.found import Role
+from webmap.scope import no_scope
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+
+def grow(
+    robot: "Robot",
+    bridge: "Bridge",
+    found: FoundRobot,
+    roles: Iterable[Role],
+    *,
+    stops_within: float | None = None,
+) -> list[str]:
+    """Let a robot use topics that came later.
+
+    Args:
+        robot: The robot that is shown.
+        bridge: The bridge that it is behind.
+        found: The robot as it is found now.
+        roles: What is new of it.
+        stops_within: Seconds within which the base stops by itself, if known.
+
+    Returns:
+        What it uses now, such as ``velocity /cmd_vel``.
+
+    """
+
+    def use_scan() -> None:
+        scanner = robot.add_module(
+            "LaserScanner", bridge, found.topic("scan"), max_dots=None, throttle=100
+        )
+        robot.svg.insert(1, scanner.svg)  # after the title, under the body
+
+    uses: dict[Role, Callable[[], object]] = {
+        "odometry": lambda: robot.set_odometry_topic(bridge, found.topic("odometry")),
+        "velocity": lambda: robot.set_twist_topic(
+            bridge, found.topic("velocity"), stops_within=stops_within
+        ),
+        "goal": lambda: robot.set_move_topic(
+            bridge, found.topic("goal"), cancel_topic=found.topic("cancel") or None
+        ),
+        "scan": use_scan,
+        "battery": lambda: robot.add_module("Battery", bridge, found.topic("battery")),
+        "plan": lambda: robot.add_module("Path", bridge, found.topic("plan")),
+        "tf": lambda: robot.set_tf(
+            bridge, namespace=found.tf_namespace or "", quiet=True
+        ),
+    }
+    used = []
+    with no_scope():
+        for role in roles:
+            if role in uses:
+                uses[role]()
+                used.append(f"{role} {found.topic(role)}")
+    return used
