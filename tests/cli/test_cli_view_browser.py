@@ -1,0 +1,79 @@
+"""What was found, and what comes later, in a real browser."""
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+from cli_simulator import simulator
+from playwright.sync_api import expect
+
+from real_browser import Complaints
+
+pytestmark = pytest.mark.browser
+
+
+@contextmanager
+def shown(chromium, *arguments):
+    """Run a command that opens the console, and open its page."""
+    command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
+    with subprocess.Popen(
+        [*command, "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as process:
+        context, complaints = chromium.new_context(), Complaints()
+        try:
+            url = re.search(r"ready at (\S+)", process.stdout.readline())[1]
+            page = context.new_page()
+            complaints.listen(page)
+            page.goto(url)
+            yield page
+        finally:
+            context.close()
+            process.send_signal(signal.SIGINT)
+            process.wait(15)
+    assert not complaints.unexpected, complaints.unexpected
+
+
+def expect_two_robots_on_their_map(page, within=15_000):
+    expect(page.locator("#robots .row")).to_have_count(2, timeout=within)
+    expect(page.locator(".robot:not(.unplaced)")).to_have_count(2, timeout=within)
+    expect(page.locator(".occupancy-grid image")).to_have_count(1, timeout=within)
+    expect(page.locator(".laserscan > .dot").first).to_be_attached(timeout=within)
+
+
+def test_everything_that_is_found_is_on_the_page(chromium, ros1):
+    with shown(chromium, "view", ros1) as page:
+        expect_two_robots_on_their_map(page)
+        names = page.locator("#robots .row .name").all_inner_texts()
+        assert names == ["robot_0", "robot_1"]
+
+
+def test_a_bridge_that_comes_later_brings_its_robots_to_the_open_page(chromium):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = str(taken.getsockname()[1])
+    url = f"ws://127.0.0.1:{port}"
+    with shown(chromium, "view", url, "--wait", "0") as page:
+        expect(page.locator("#robots .row")).to_have_count(0)
+        with simulator("--port", port):
+            expect_two_robots_on_their_map(page, 40_000)
+
+
+def test_a_fleet_file_is_on_the_page(chromium, ros1, tmp_path):
+    file = tmp_path / "fleet.toml"
+    found = subprocess.run(
+        [sys.executable, "-m", "webmap", "discover", "--toml", ros1],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    file.write_text('title = "Two halls"\n' + found.stdout)
+    with shown(chromium, "run", str(file)) as page:
+        expect_two_robots_on_their_map(page)
+        expect(page.locator("#title")).to_have_text("Two halls")
