@@ -78,7 +78,7 @@ def first() -> None:
 
 
 async def go_on() -> None:
-    """Say the map anew all the time, and move the robot to and fro."""
+    """Say the map anew all the time, and move the robot there and back."""
     for number in range(10_000):
         await asyncio.sleep(0.05)
         link.say("/map", plan(number % 100))
