@@ -1,6 +1,7 @@
 """From topics with types to robots."""
 
 import json
+import time
 from pathlib import Path
 
 import pytest
@@ -261,6 +262,18 @@ def test_captured_systems_have_their_two_robots(file):
 )
 def test_a_host_has_a_short_name(url, name):
     assert host_name(url) == name
+
+
+def test_a_thousand_robots_are_found_in_a_moment():
+    kinds = {"odom": ODOM, "cmd_vel": TWIST, "scan": SCAN, "x": "std_msgs/String"}
+    topics = {
+        f"/fleet/robot_{n}/{name}": type
+        for n in range(1000)
+        for name, type in kinds.items()
+    }
+    began = time.process_time()
+    assert len(discover(topics).robots) == 1000
+    assert time.process_time() - began < 10.0, "0.3 s; minutes if it were quadratic"
 
 
 TYPES = st.sampled_from([ODOM, TWIST, STAMPED, SCAN, POSE, "", "x", "std_msgs/String"])

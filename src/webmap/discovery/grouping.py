@@ -5,7 +5,8 @@ namespace with only one of the two inside another robot's is a part of that one:
 camera with odometry of its own, or an input of a velocity mux.
 """
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Container, Iterable
 
 from webmap.discovery.rules import Match
 
@@ -20,34 +21,32 @@ def robot_namespaces(matches: Iterable[Match]) -> tuple[str, ...]:
         if each.role in MOVING:
             half = "velocity" if each.role == "velocity" else "place"
             halves.setdefault(each.namespace, set()).add(half)
+    outer = {space: nearest(space, halves) for space in halves}
+    # How many have the same half and nothing else in the same robot.
+    alike = Counter((outer[space], *sorted(has)) for space, has in halves.items())
     kept = set(halves)
     for space in sorted(halves, key=_depth, reverse=True):
-        outer = nearest(space, kept - {space})
-        if outer is not None and _belongs_to(space, outer, halves):
+        around, has = outer[space], halves[space]
+        if around is None or len(has) == 2:
+            continue
+        alone = alike[(around, *sorted(has))] == 1
+        # Several that only take velocity are inputs; several places may be a fleet.
+        if alone or (len(halves[around]) == 2 and has == {"velocity"}):
             kept.discard(space)
-            halves[outer] |= halves[space]
+            halves[around] |= has
     return tuple(sorted(kept))
 
 
-def _belongs_to(space: str, outer: str, halves: dict[str, set[str]]) -> bool:
-    """Tell whether an inner namespace is a part of the robot around it."""
-    if len(halves[space]) == 2:
-        return False
-    alike = [
-        other
-        for other, has in halves.items()
-        if has == halves[space] and other != outer and inside(other, outer)
-    ]
-    if len(alike) == 1:
-        return True
-    # Several that only take velocity are inputs; several places may be a fleet.
-    return len(halves[outer]) == 2 and halves[space] == {"velocity"}
+def nearest(name: str, namespaces: Container[str]) -> str | None:
+    """Return the innermost of the namespaces that a name is in, None if none.
 
-
-def nearest(topic: str, namespaces: Iterable[str]) -> str | None:
-    """Return the innermost of the namespaces that a name is in, None if none."""
-    around = [space for space in namespaces if inside(topic, space)]
-    return max(around, key=_depth, default=None)
+    All names are in the empty namespace, but for the empty one itself.
+    """
+    while name:
+        name = name.rpartition("/")[0]
+        if name in namespaces:
+            return name
+    return None
 
 
 def inside(name: str, namespace: str) -> bool:

@@ -34,10 +34,10 @@ def discover(topics: Mapping[str, str], host: str = "robot") -> Findings:
     found = (match(name, type) for name, type in sorted(topics.items()))
     matches = [each for each in found if each is not None]
     spaces = robot_namespaces(matches)
-    names = _names(spaces, host)
+    mine, twists = _owned(spaces, matches), _twists(spaces, topics)
     robots = tuple(
-        _robot(name, space, _of(space, spaces, matches), _twists(space, spaces, topics))
-        for name, space in zip(names, spaces, strict=True)
+        _robot(name, space, mine[space], twists[space])
+        for name, space in zip(_names(spaces, host), spaces, strict=True)
     )
     return Findings(robots, _dialect(topics.values()), _notes(topics, robots))
 
@@ -55,16 +55,22 @@ def host_name(url: str) -> str:
     return host
 
 
-def _of(space: str, spaces: Sequence[str], matches: Iterable[Match]) -> list[Match]:
-    """Return what belongs to one robot, the best first."""
-    mine = []
+def _owned(spaces: Sequence[str], matches: Iterable[Match]) -> dict[str, list[Match]]:
+    """Return what belongs to each robot, the best first."""
+    mine: dict[str, list[Match]] = {space: [] for space in spaces}
+    shared = []
     for each in matches:
-        owner = nearest(each.topic, spaces)
-        only = owner is None and len(spaces) == 1
-        shared = each.role in SHARED and each.namespace == ""
-        if owner == space or only or shared:
-            mine.append(each)
-    return sorted(mine, key=lambda each: _rank(each, space))
+        owner = nearest(each.topic, mine)
+        if each.role in SHARED and each.namespace == "":
+            shared.append(each)
+        elif owner is not None:
+            mine[owner].append(each)
+        elif len(spaces) == 1:
+            mine[spaces[0]].append(each)
+    return {
+        space: sorted([*own, *shared], key=lambda each: _rank(each, space))
+        for space, own in mine.items()
+    }
 
 
 def _rank(each: Match, space: str) -> tuple[int, int, int, str]:
@@ -74,15 +80,15 @@ def _rank(each: Match, space: str) -> tuple[int, int, int, str]:
     return (strange, place, parts, name)
 
 
-def _twists(space: str, spaces: Sequence[str], topics: Mapping[str, str]) -> list[str]:
-    """Return what in a robot may be a step of velocity on its way to the base."""
-    return [
-        name
-        for name, type in sorted(topics.items())
-        if is_type(type, *VELOCITY)
-        and INNER_VELOCITY.search(name)
-        and nearest(name, spaces) == space
-    ]
+def _twists(spaces: Sequence[str], topics: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return what in each robot may be a step of velocity on its way to the base."""
+    found: dict[str, list[str]] = {space: [] for space in spaces}
+    for name, type in sorted(topics.items()):
+        if is_type(type, *VELOCITY) and INNER_VELOCITY.search(name):
+            owner = nearest(name, found)
+            if owner is not None:
+                found[owner].append(name)
+    return found
 
 
 def _robot(
