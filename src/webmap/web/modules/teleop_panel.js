@@ -1,0 +1,170 @@
+import { motions, ownStop, timings } from "../motion/figures.js";
+import { heldByProgram, isLatched } from "../motion/report.js";
+import { capOf } from "../motion/status.js";
+import { button, html, say } from "./elements.js";
+import { TwiceButton } from "./twice_button.js";
+
+/** @typedef {import('../motion/report.js').RobotReport} RobotReport */
+
+/** From this loop age on it is said aloud, in ms. */
+const SLOW = 150;
+
+const ASK = "Ask for it";
+
+/** The words, the shape and the buttons in the corner of the map. */
+export class Panel {
+  /** @param {Record<'stop' | 'lease' | 'reset' | 'stick' | 'test', () => void>} acts */
+  constructor(acts) {
+    this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
+    this._title = html("strong", "webmap-teleop-title");
+    this._detail = html("span", "webmap-teleop-detail");
+    this._cap = html("p", "webmap-teleop-cap");
+    this._own = html("p", "webmap-teleop-own");
+    this._test = html("p", "webmap-teleop-test", { role: "status" });
+    this._figures = html("dl", "webmap-teleop-figures");
+    /** @type {Map<string, HTMLElement>} */
+    this._values = new Map();
+    this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
+    this._lease = button("webmap-teleop-lease", "Take", acts.lease);
+    this._reset = new TwiceButton(
+      "webmap-reset",
+      "Reset",
+      "Press again to reset",
+      acts.reset,
+    );
+    this._tester = new TwiceButton(
+      "webmap-stop-test",
+      "Test its stop",
+      "It will creep: press again",
+      acts.test,
+    );
+    this._tester.element.title = "Creeps, sends nothing any more, and sees when it stands";
+    this._stick = button("webmap-teleop-stick", "Stick", acts.stick);
+    this._stick.title = "A stick on the screen to drive with";
+    const state = html(
+      "p",
+      "webmap-teleop-state",
+      { role: "status" },
+      this._title,
+      " ",
+      this._detail,
+    );
+    const twice = [this._reset.element, this._tester.element];
+    const buttons = [this._lease, ...twice, this._stick];
+    this.element = html(
+      "section",
+      "webmap-panel webmap-teleop",
+      { "aria-label": "Driving" },
+      this._mark,
+      html("div", "webmap-teleop-words", {}, state, this._test, this._cap, this._own),
+      html("div", "webmap-teleop-acts", {}, ...buttons),
+      this._stop,
+      this._figures,
+    );
+  }
+
+  /**
+   * @param {import('../motion/status.js').Description} description
+   * @param {RobotReport | null} report
+   * @param {number | null} delay
+   */
+  showState({ state, title, detail }, report, delay) {
+    if (this.element.dataset.state !== state) this.element.dataset.state = state;
+    say(this._title, title);
+    say(this._detail, detail);
+    say(this._cap, report ? capOf(report) + slowness(delay) : "");
+  }
+
+  /**
+   * @param {RobotReport | null} report
+   * @param {number | null} loop
+   * @param {number | null} moving
+   */
+  showFigures(report, loop, moving) {
+    say(this._own, report ? ownStop(report) : "");
+    say(this._test, report?.test ? report.test.text : "");
+    this._figures.hidden = report === null || isLatched(report);
+    this._figures.classList.toggle("idle", !report?.mine);
+    if (report === null) return;
+    const all = [...motions(report), ...timings(report, loop, moving)];
+    for (const { name, kind, text, more = "" } of all) {
+      const [value, rest] = this._figure(name, kind).children;
+      say(value, text);
+      say(rest, more);
+    }
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} kind
+   */
+  _figure(name, kind) {
+    const known = this._values.get(name);
+    if (known) return known;
+    const value = html("dd", "", {}, html("span", ""), html("span", "more"));
+    this._figures.append(html("div", kind, {}, html("dt", "", {}, name), value));
+    this._values.set(name, value);
+    return value;
+  }
+
+  /**
+   * @param {RobotReport | null} report
+   * @param {boolean} asking Whether this page has asked for the robot.
+   * @param {boolean | null} stick Whether the stick is wanted; null when it is no use.
+   */
+  showButtons(report, asking, stick) {
+    const name = report?.name ?? "";
+    const act = actOf(report, asking);
+    this._lease.hidden = act === null;
+    if (act !== null) {
+      say(this._lease, act);
+      set(this._lease, "aria-label", act === ASK ? `Ask for ${name}` : `${act} ${name}`);
+    }
+    this._reset.show(report !== null && isLatched(report));
+    this._tester.show(report !== null && mayTest(report));
+    this._stick.hidden = stick === null;
+    set(this._stick, "aria-pressed", String(stick === true));
+    set(this._stop, "aria-label", name ? `Stop ${name}` : "Stop the selected robot");
+    // Off only when there is nothing to stop, never because of doubt.
+    this._stop.disabled = report === null;
+  }
+}
+
+/**
+ * Return what the operator can do about a robot's lease.
+ *
+ * @param {RobotReport | null} report
+ * @param {boolean} asking Whether this page has asked for it.
+ * @returns {string | null}
+ */
+function actOf(report, asking) {
+  if (report === null || report.changing) return null;
+  if (report.mine) return "Hand back";
+  if (!report.armable || isLatched(report)) return null;
+  if (report.holder === null) return "Take";
+  return heldByProgram(report) || asking ? null : ASK;
+}
+
+/**
+ * @param {RobotReport} report
+ * @returns {boolean} Whether this page may find out that the robot stops by itself, which
+ *     nobody knows yet.
+ */
+function mayTest({ mine, stop_time, test }) {
+  const running = test?.state === "creeping" || test?.state === "waiting";
+  return mine && stop_time === null && !running;
+}
+
+/** @param {number | null} delay */
+function slowness(delay) {
+  return delay !== null && delay >= SLOW ? `. Slow: ${Math.round(delay)} ms` : "";
+}
+
+/**
+ * @param {Element} element
+ * @param {string} name
+ * @param {string} value
+ */
+function set(element, name, value) {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
