@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
     """A robot, a display and a browser, with a proxy on each hop."""
-    from safety_bench import Bench
+    from safety_proof import ProvingBench
 
-    with Bench(tmp_path_factory.mktemp("safety")) as bench:
+    with ProvingBench(tmp_path_factory.mktemp("safety")) as bench:
         yield bench

@@ -7,7 +7,6 @@
 """
 
 import json
-import math
 import os
 import signal
 import time
@@ -17,17 +16,8 @@ from pathlib import Path
 import psutil
 from devtools import Chromium, Tab
 from processes import WEB, Process
-from safety_figures import Figure, note
 
-from webmap.testing import (
-    Bounds,
-    FaultProxy,
-    Quiet,
-    Sentinel,
-    Shape,
-    WitnessRobot,
-    check_invariants,
-)
+from webmap.testing import FaultProxy, Sentinel, Shape, WitnessRobot
 
 SITE = Path(__file__).with_name("safety_site.py")
 TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "1"))
@@ -58,7 +48,8 @@ class Bench:
         self._folder = folder
         self._open = ExitStack()
         self.browser = self.tab = self.display = None
-        self.quiet, self.unreachable, self.causes = [], [], []
+        self.causes = []
+        """When zeros may begin, as at each release of the key."""
 
     def __enter__(self):
         enter = self._open.enter_context
@@ -208,117 +199,6 @@ class Bench:
             and now - recent[-1].at < 0.1
             and not any(told.is_zero for told in recent)
         )
-
-    # The proof.
-
-    def prove(
-        self,
-        name,
-        inflict,
-        *,
-        within,
-        back=lambda: None,
-        stops_by="zero",
-        held_after=True,
-        watch=0.5,
-        few_late=0,
-        before=lambda: None,
-    ):
-        """Inflict a fault on a robot that is driven, as often as is asked for.
-
-        Args:
-            name: What fails, for the table.
-            inflict: Makes it fail.
-            within: Seconds in which the robot is promised to be stopped.
-            back: Mends it.
-            stops_by: ``zero``: a zero must come; ``itself``: nobody can send one, and
-                the robot's own timeout must stop it.
-            held_after: Whether the key is still down when it is mended.
-            watch: Seconds for which nothing may move after it is mended.
-            few_late: How many moving velocities may still come when it is mended, if
-                the robot is driven through a link that keeps what it cannot pass on.
-            before: Happens while the robot moves, before the fault.
-
-        """
-        begin, figures = time.monotonic(), []
-        self.quiet, self.unreachable, self.causes = [], [], []
-        for _ in range(TRIALS):
-            try:
-                self.drive_off()
-            except (AssertionError, OSError, EOFError):
-                # The test before may have left a page that is beyond repair.
-                self.end_browser()
-                self.drive_off()
-            before()
-            self.fault_at = time.monotonic()
-            inflict()
-            figure = self._measure(within, stops_by)
-            self._mend(figure, back, held_after, watch, few_late)
-            figures.append(figure)
-        pass_time(0.7)
-        log = [told for told in self.robot.log.told if told.at >= begin]
-        wrong = check_invariants(
-            log,
-            Bounds(V_MAX, W_MAX, late=few_late, slack=0.1 + self.sentinel.worst(begin)),
-            quiet=self.quiet,
-            unreachable=self.unreachable,
-            causes=self.causes,
-        )
-        assert not wrong, (name, wrong)
-        worst = max(figures, key=lambda figure: figure["late"] - figure["jitter"])
-        note(
-            Figure(
-                name=name,
-                stops_by=stops_by,
-                promised=within,
-                worst=max(figure["late"] for figure in figures),
-                jitter=max(figure["jitter"] for figure in figures),
-                trials=len(figures),
-            )
-        )
-        for figure in figures:
-            assert figure["late"] <= within + figure["jitter"], (name, worst, figures)
-
-    def _measure(self, within, stops_by):
-        """Wait until the robot is stopped, and say how long that took."""
-        stopped = self._stopped_after(self.fault_at, stops_by)
-        # The dead-man's time began with a command that may have been under way.
-        jitter = self.sentinel.stolen(self.fault_at - 0.1, stopped)
-        if stops_by == "itself":
-            # From the last word before the fault until the first one after it.
-            self.unreachable.append((self.fault_at - 0.5, math.inf))
-        return {"late": stopped - self.fault_at, "jitter": jitter, "within": within}
-
-    def _mend(self, figure, back, held_after, watch, few_late):
-        """Mend what failed, with the key held on, and see that nothing resumes."""
-        still = self.fault_at + figure["within"] + figure["jitter"] + 0.001
-        mending = time.monotonic()
-        back()
-        # While a part comes back, zeros may begin anew at any time.
-        while mending < time.monotonic():
-            self.causes.append(mending)
-            mending += 0.1
-        if self.tab is not None and held_after:
-            self.repeat_press()
-        pass_time(watch)
-        if self.unreachable and self.unreachable[-1][1] == math.inf:
-            self.unreachable[-1] = (self.unreachable[-1][0], time.monotonic())
-        late = self.robot.log.moving_since(still)
-        if few_late and late:
-            # TCP delivers what it had taken; then a zero must come, and nothing else.
-            assert len(late) <= few_late, f"{len(late)} late velocities"
-            still = late[-1].at
-        self.quiet.append(Quiet(still, time.monotonic(), "after a fault, W held on"))
-        if self.tab is not None:
-            self.let_go()
-
-    def _stopped_after(self, begun, stops_by):
-        log = self.robot.log
-        if stops_by == "zero":
-            wait_for(lambda: log.first_zero(begun), "a zero")
-            # A moving command that was on its way may come first, never after.
-            return log.first_zero(begun)
-        return wait_for(lambda: log.standstill(begun + 0.02), "standing still")
 
 
 SLOW = Shape(latency=0.4)

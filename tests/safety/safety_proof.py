@@ -1,0 +1,131 @@
+"""The proof: a fault is inflicted on a robot that is driven, and its log is judged."""
+
+import math
+import time
+
+from safety_bench import TRIALS, V_MAX, W_MAX, Bench, pass_time, wait_for
+from safety_figures import Figure, note
+
+from webmap.testing import Bounds, Quiet, check_invariants
+
+
+class ProvingBench(Bench):
+    """A bench on which faults are inflicted and measured."""
+
+    def prove(
+        self,
+        name,
+        inflict,
+        *,
+        within,
+        back=lambda: None,
+        stops_by="zero",
+        held_after=True,
+        watch=0.5,
+        few_late=0,
+        before=lambda: None,
+    ):
+        """Inflict a fault on a robot that is driven, as often as is asked for.
+
+        Args:
+            name: What fails, for the table.
+            inflict: Makes it fail.
+            within: Seconds in which the robot is promised to be stopped.
+            back: Mends it.
+            stops_by: ``zero``: a zero must come; ``itself``: nobody can send one, and
+                the robot's own timeout must stop it.
+            held_after: Whether the key is still down when it is mended.
+            watch: Seconds for which nothing may move after it is mended.
+            few_late: How many moving velocities may still come when it is mended, if
+                the robot is driven through a link that keeps what it cannot pass on.
+            before: Happens while the robot moves, before the fault.
+
+        """
+        begin, figures = time.monotonic(), []
+        self.quiet, self.unreachable, self.causes = [], [], []
+        for _ in range(TRIALS):
+            self._get_under_way(before)
+            self.fault_at = time.monotonic()
+            inflict()
+            figure = self._measure(within, stops_by)
+            self._mend(figure, back, held_after, watch, few_late)
+            figures.append(figure)
+        pass_time(0.7)
+        log = [told for told in self.robot.log.told if told.at >= begin]
+        wrong = check_invariants(
+            log,
+            Bounds(V_MAX, W_MAX, late=few_late, slack=0.1 + self.sentinel.worst(begin)),
+            quiet=self.quiet,
+            unreachable=self.unreachable,
+            causes=self.causes,
+        )
+        assert not wrong, (name, wrong)
+        worst = max(figures, key=lambda figure: figure["late"] - figure["jitter"])
+        note(
+            Figure(
+                name=name,
+                stops_by=stops_by,
+                promised=within,
+                worst=max(figure["late"] for figure in figures),
+                jitter=max(figure["jitter"] for figure in figures),
+                trials=len(figures),
+            )
+        )
+        for figure in figures:
+            assert figure["late"] <= within + figure["jitter"], (name, worst, figures)
+
+    def _get_under_way(self, before):
+        """Drive, so that it is the fault that stops the robot and nothing else."""
+        for _ in range(5):
+            try:
+                self.drive_off()
+            except (AssertionError, OSError, EOFError):
+                # The test before may have left a page that is beyond repair.
+                self.end_browser()
+                self.drive_off()
+            before()
+            if not self.robot.log.told[-1].is_zero:
+                return
+            self.let_go()
+        raise AssertionError("a busy machine stops the robot again and again")
+
+    def _measure(self, within, stops_by):
+        """Wait until the robot is stopped, and say how long that took."""
+        stopped = self._stopped_after(self.fault_at, stops_by)
+        # The dead-man's time began with a command that may have been under way.
+        jitter = self.sentinel.stolen(self.fault_at - 0.1, stopped)
+        if stops_by == "itself":
+            # From the last word before the fault until the first one after it.
+            self.unreachable.append((self.fault_at - 0.5, math.inf))
+        return {"late": stopped - self.fault_at, "jitter": jitter, "within": within}
+
+    def _mend(self, figure, back, held_after, watch, few_late):
+        """Mend what failed, with the key held on, and see that nothing resumes."""
+        still = self.fault_at + figure["within"] + figure["jitter"] + 0.001
+        mending = time.monotonic()
+        back()
+        # While a part comes back, zeros may begin anew at any time.
+        while mending < time.monotonic():
+            self.causes.append(mending)
+            mending += 0.1
+        if self.tab is not None and held_after:
+            self.repeat_press()
+        pass_time(watch)
+        if self.unreachable and self.unreachable[-1][1] == math.inf:
+            self.unreachable[-1] = (self.unreachable[-1][0], time.monotonic())
+        late = self.robot.log.moving_since(still)
+        if few_late and late:
+            # TCP delivers what it had taken; then a zero must come, and nothing else.
+            assert len(late) <= few_late, f"{len(late)} late velocities"
+            still = late[-1].at
+        self.quiet.append(Quiet(still, time.monotonic(), "after a fault, W held on"))
+        if self.tab is not None:
+            self.let_go()
+
+    def _stopped_after(self, begun, stops_by):
+        log = self.robot.log
+        if stops_by == "zero":
+            wait_for(lambda: log.first_zero(begun), "a zero")
+            # A moving command that was on its way may come first, never after.
+            return log.first_zero(begun)
+        return wait_for(lambda: log.standstill(begun + 0.02), "standing still")
