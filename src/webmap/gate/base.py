@@ -23,11 +23,12 @@ from webmap.gate.arming import Arming
 from webmap.gate.connection import Connection
 from webmap.gate.deadman import DeadMan
 from webmap.gate.events import Key, LatchKept, LockState, StopRecord, Wrote, WroteGoal
+from webmap.gate.guard import Guard
 from webmap.gate.handover import HandOver
 from webmap.gate.health import Health, Pulse
 from webmap.gate.latch import Latch
 from webmap.gate.lease import Epochs, Lease
-from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
+from webmap.gate.limits import Cap, Speed, caps_of, fit, speed_in_force
 from webmap.gate.loopage import LoopAge, governed
 from webmap.gate.messages import RobotSpec, SentTwist
 from webmap.gate.motion import Bounds, Motion
@@ -82,6 +83,7 @@ class Base:
         self.motion = Motion(key, control, self._bounds, emit)
         self.standing = StandingStop(key, latch, self.robots, control, self.motion)
         self.sight = Sight(key, emit)
+        self.guard = Guard(self.robots)
         self.arming = Arming(key, self.robots, latch, control, pulse, self.sight)
         self.known = False
         """Whether it was asked if this gate alone has it, and if STOP stands."""
@@ -321,7 +323,9 @@ class Base:
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         if not self.motion.driving:
             self.robots.make_way()
-        self.motion.drive(wanted, lease, now)
+        bounds = self._bounds()
+        fitted = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
+        self.motion.drive(self.guard.limit(fitted, now), lease, now)
 
     def begin_test(self, now: float) -> None:
         """Begin the stop test for the holder of the lease.
@@ -523,3 +527,5 @@ class Base:
             or self.handover.heir is not None
             or (self.robots.has_odometry and self.obedience.watching(now))
         )
+        if not self.sight.on:
+            self.guard.forget()

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from webmap.gate.assist import Sweep
 from webmap.geometry import Twist
 
 Lane = Literal["control", "witness", "tasks"]
@@ -88,6 +89,15 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
+class Scanned:
+    """A laser scan came."""
+
+    key: Key
+    topic: str
+    sweep: Sweep
+
+
+@dataclass(frozen=True, slots=True)
 class StopRecord:
     """What a stop test found."""
 
@@ -146,6 +156,7 @@ Event = (
     | GoalEnded
     | Echoed
     | Measured
+    | Scanned
     | LockState
     | LatchKept
     | StopTestKept

@@ -56,6 +56,7 @@ class Fleet:
             events.GoalEnded: self._goal_ended,
             events.Echoed: self._echoed,
             events.Measured: self._measured,
+            events.Scanned: self._scanned,
             events.LockState: self._locked,
             events.LatchKept: self._latch_kept,
             events.StopTestKept: self._stop_test_kept,
@@ -228,6 +229,11 @@ class Fleet:
         base = self._of_key(event.key)
         if base is not None:
             base.saw(event.twist, now)
+
+    def _scanned(self, event: events.Scanned, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None and base.sight.on:
+            base.guard.saw(event.topic, event.sweep)
 
     def _locked(self, event: events.LockState, now: float) -> None:
         base = self._of_key(event.key)

@@ -101,8 +101,8 @@ class Links:
                 control = ControlLane(spec.bridge_url, self._tell)
                 self._control[spec.bridge_url] = control
             control.attach(spec.twist_topic, spec.twist_type)
-        if spec.odometry_topic is not None:
-            self._witness_of(spec).lane.hold("robots")
+        for url in _witnesses_of(spec):
+            self._witness_at(url).lane.hold("robots")
         for url, topics in _tasks_of(spec).items():
             tasks = self._tasks.get(url)
             if tasks is None:
@@ -116,8 +116,8 @@ class Links:
     def _detach(self, key: Key, spec: RobotSpec) -> None:
         if spec.twist_topic is not None:
             self._control[spec.bridge_url].detach(spec.twist_topic, spec.twist_type)
-        if spec.odometry_topic is not None:
-            self._witness_of(spec).lane.let_go("robots")
+        for url in _witnesses_of(spec):
+            self._witness_at(url).lane.let_go("robots")
         for url, topics in _tasks_of(spec).items():
             self._tasks[url].detach(topics)
             self._tasks[url].lane.let_go("robots")
@@ -129,9 +129,11 @@ class Links:
             self._control[key.url].listen(key.topic)
         for spec in specs:
             if spec.odometry_topic is not None:
-                self._witness_of(spec).watch(
+                self._witness_at(_odometry_url(spec)).watch(
                     spec.odometry_topic, spec.odometry_type, key
                 )
+            if spec.assist is not None:
+                self._witness_at(spec.bridge_url).watch_scan(spec.assist.topic, key)
 
     def _unwatch(self, key: Key) -> None:
         specs = self._watched.pop(key, [])
@@ -139,10 +141,12 @@ class Links:
             self._control[key.url].ignore(key.topic)
         for spec in specs:
             if spec.odometry_topic is not None:
-                self._witness_of(spec).unwatch(spec.odometry_topic, key)
+                witness = self._witness_at(_odometry_url(spec))
+                witness.unwatch(spec.odometry_topic, key)
+            if spec.assist is not None:
+                self._witness_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
 
-    def _witness_of(self, spec: RobotSpec) -> WitnessLane:
-        url = spec.odometry_url or spec.bridge_url
+    def _witness_at(self, url: str) -> WitnessLane:
         if url not in self._witness:
             self._witness[url] = WitnessLane(url, self._tell)
         return self._witness[url]
@@ -157,6 +161,16 @@ class Links:
         for url, tasks in list(self._tasks.items()):
             if not tasks.lane.wanted:
                 self._tasks.pop(url).close()
+
+
+def _odometry_url(spec: RobotSpec) -> str:
+    return spec.odometry_url or spec.bridge_url
+
+
+def _witnesses_of(spec: RobotSpec) -> list[str]:
+    """Return the bridges that odometry and scans of a robot come from."""
+    urls = [] if spec.odometry_topic is None else [_odometry_url(spec)]
+    return urls if spec.assist is None else [*urls, spec.bridge_url]
 
 
 def _goal_url(spec: RobotSpec) -> str:

@@ -9,6 +9,8 @@ from typing import Literal
 
 import msgspec
 
+from webmap.gate.assist import AssistSpec
+
 PROGRAM = "program"
 """The connection of the display's own Python code."""
 
@@ -59,6 +61,8 @@ class RobotSpec(
     action_type: str = "nav2_msgs/action/NavigateToPose"
     on_operator_loss: Literal["continue", "cancel"] = "continue"
     """What becomes of a goal when the page (or program) that gave it is lost."""
+    assist: AssistSpec | None = None
+    """How the robot is slowed down before what its scanner sees; off without it."""
     stop_hooks: tuple[dict[str, str], ...] = ()
     """What else the robot's bridge is told on STOP: ``{"topic": "/lock", "type":
     "std_msgs/Bool"}`` publishes true (and false on reset), ``{"service": "/e_stop",

@@ -47,7 +47,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         armed=lease is not None and base.deadman.armed,
         v=speed.v,
         w=speed.w,
-        why=speed.why,
+        why=speed.why + base.guard.why,
         link="up" if link.up else "down",
         sent=_velocity(base.motion.sent) or _REST,
         echoed=_velocity(base.sight.echoed),

@@ -5,6 +5,7 @@ import math
 import msgspec
 
 from webmap.errors import ConfigError
+from webmap.gate.assist import AssistSpec
 from webmap.gate.events import Key
 from webmap.gate.messages import RobotSpec
 from webmap.ros.names import is_type, normalise_topic, normalise_url, split_type
@@ -48,6 +49,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
         w_max=_number(spec, "w_max", least=0.0),
         a_max=_number(spec, "a_max", least=1e-3),
         stops_within=_number(spec, "stops_within", least=0.0),
+        assist=None if spec.assist is None else _assist(spec, spec.assist),
         stop_hooks=tuple(_hook(spec, hook) for hook in spec.stop_hooks),
     )
 
@@ -73,6 +75,25 @@ def _number(spec: RobotSpec, field: str, least: float) -> float | None:
             f"{least:g} on"
         )
     return float(value)
+
+
+def _assist(spec: RobotSpec, assist: AssistSpec) -> AssistSpec:
+    """Return how a robot is assisted, with its topic resolved."""
+    numbers = [n for corner in assist.footprint for n in corner]
+    numbers += [*assist.sensor, assist.stop_distance, assist.brake, assist.creep]
+    if not all(map(math.isfinite, numbers)):
+        raise ConfigError(f"robot {spec.name!r}: scan assist needs finite numbers")
+    if len(assist.footprint) < 3:
+        raise ConfigError(
+            f"robot {spec.name!r}: the footprint for scan assist has 3 corners or "
+            f"more, got {len(assist.footprint)}"
+        )
+    if assist.stop_distance < 0 or assist.brake <= 0 or assist.creep < 0:
+        raise ConfigError(
+            f"robot {spec.name!r}: scan assist needs a stop distance and a creep speed "
+            "from 0 on, and a brake above 0"
+        )
+    return msgspec.structs.replace(assist, topic=normalise_topic(assist.topic))
 
 
 def _hook(spec: RobotSpec, hook: dict[str, str]) -> dict[str, str]:

@@ -1,0 +1,119 @@
+"""Scan assist within the gate: commands are slowed, and people are told why."""
+
+import math
+
+import pytest
+from gate_harness import KEY, Bench, spec
+
+from webmap.errors import ConfigError
+from webmap.gate import events
+from webmap.gate.assist import AssistSpec, Sweep
+from webmap.gate.specs import checked
+
+BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
+ASSIST = AssistSpec(topic="/scan", footprint=BOX)
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin(spec(assist=ASSIST))
+
+
+def scan(bench, reach):
+    step = math.tau / 72
+    ranges = [reach] * 72
+    sweep = Sweep(-math.pi, step, 0.05, 8.0, ranges, bench.now)
+    bench.tell(events.Scanned(KEY, "/scan", sweep))
+
+
+def hold_seeing(bench, reach, seconds, **axes):
+    def each():
+        scan(bench, reach)
+        bench.drive(**axes)
+
+    bench.run(seconds, each)
+
+
+def speeds(bench, at):
+    return [w.twist.vx for w in bench.since(at)]
+
+
+def under_way(bench):
+    """Take the robot, let go of everything, press, with nothing in sight."""
+    bench.take()
+    hold_seeing(bench, math.inf, 0.3)
+    hold_seeing(bench, math.inf, 0.3, x=1.0)
+    assert bench.state == "driving"
+
+
+def test_with_nothing_in_the_way_the_robot_goes_as_told(bench):
+    under_way(bench)
+    assert speeds(bench, 0)[-1] == 1.0
+    assert bench.report().why == ("limit of the robot",)
+
+
+def test_the_robot_slows_down_before_a_wall_and_says_why(bench):
+    under_way(bench)
+    hold_seeing(bench, 0.9, 0.3, x=1.0)
+    slower = speeds(bench, 0)[-1]
+    assert 0 < slower < 0.8
+    assert any("scan assist" in why for why in bench.report().why)
+    hold_seeing(bench, 0.4, 0.3, x=1.0)
+    assert speeds(bench, 0)[-1] == 0.0
+    hold_seeing(bench, math.inf, 0.2, x=1.0)
+    assert speeds(bench, 0)[-1] == 1.0
+    assert bench.report().why == ("limit of the robot",)
+
+
+def test_a_robot_without_a_scan_does_not_move(bench):
+    bench.take()
+    bench.hold(0.3)
+    bench.hold(0.3, x=1.0)
+    assert not bench.moving_since(0)
+    assert "scan assist: no scan yet" in bench.report().why
+
+
+def test_a_scan_that_stops_coming_stops_the_robot(bench):
+    under_way(bench)
+    since = bench.now
+    bench.hold(1.0, x=1.0)
+    assert max(w.at for w in bench.moving_since(since)) <= since + 0.31
+    assert any("s old" in why for why in bench.report().why)
+
+
+def test_a_scan_of_before_counts_for_nobody_after(bench):
+    under_way(bench)
+    bench.say("a", op="release", robot="r1")
+    bench.run(1.0)
+    scan(bench, math.inf)  # nobody listens any more
+    bench.take()
+    bench.hold(0.3)
+    since = bench.now
+    bench.hold(0.1, x=1.0)
+    assert not bench.moving_since(since)
+
+
+def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):
+    key = events.Key("ws://other:9090", "/cmd_vel")
+    bench.tell(events.Scanned(key, "/scan", Sweep(0.0, 0.1, 0.1, 8.0, [], bench.now)))
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"footprint": ((0.0, 0.0), (1.0, 0.0))}, "3 corners"),
+        ({"brake": 0.0}, "above 0"),
+        ({"stop_distance": -1.0}, "from 0 on"),
+        ({"creep": math.nan}, "finite"),
+        ({"sensor": (math.inf, 0.0, 0.0)}, "finite"),
+    ],
+)
+def test_an_assist_that_makes_no_sense_is_refused(changed, said):
+    about = {"topic": "/scan", "footprint": BOX, **changed}
+    with pytest.raises(ConfigError, match=said):
+        checked(spec(assist=AssistSpec(**about)))
+
+
+def test_the_topic_of_an_assist_is_resolved():
+    checked_spec = checked(spec(assist=AssistSpec(topic="scan", footprint=BOX)))
+    assert checked_spec.assist.topic == "/scan"
