@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.assist import AssistSpec, Sweep, assist, free_way, inside, points_of
+from webmap.gate.assist import (
+    AssistSpec,
+    Sweep,
+    assist,
+    free_way,
+    inside,
+    points_of,
+    polygon_around,
+)
 from webmap.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
@@ -162,3 +170,18 @@ def test_a_robot_that_is_assisted_never_touches_a_wall(distance, speed, facing, 
 def test_inside_is_inside_the_box(x, y):
     if abs(abs(x) - 0.3) > 1e-9 and abs(abs(y) - 0.2) > 1e-9:
         assert inside(BOX, (x, y)) == (abs(x) < 0.3 and abs(y) < 0.2)
+
+
+@given(st.floats(0.05, 2.0), st.floats(0, math.tau))
+def test_a_polygon_around_a_disc_holds_all_of_it(radius, angle):
+    edge = (0.999 * radius * math.cos(angle), 0.999 * radius * math.sin(angle))
+    assert inside(polygon_around(radius), edge)
+
+
+def test_an_edge_along_the_motion_is_never_crossed_by_it():
+    assert free_way(BOX, [(2.0, 0.2)], Twist(1.0, 0.0, 0.0)) == pytest.approx(1.7)
+
+
+def test_a_point_that_touches_a_corner_now_is_met_now():
+    corner = (0.3, 0.2)
+    assert free_way(BOX, [corner], Twist(0.5, 0.0, 0.5)) == pytest.approx(0, abs=1e-6)
