@@ -98,6 +98,19 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later():
             view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
 
 
+def test_without_rosapi_the_page_opens_and_says_what_to_give():
+    from websockets.sync.client import connect
+
+    with simulator("--port", "0", "--dialect", "ros2") as url:
+        with connect(url, proxy=None) as other:  # as ROS 2 has it, this ends rosapi
+            other.send('{"op":"call_service","service":"/rosapi/message_details",'
+                       '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
+        with viewing(url) as view:
+            assert re.fullmatch(READY, view.process.stdout.readline())
+            view.wait_for(r"it has no rosapi that says its topics: .*")
+            view.wait_for(r"Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN")
+
+
 @pytest.mark.parametrize("sig", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_waiting_with_exit_code_0(sig):
     with subprocess.Popen(
