@@ -315,3 +315,19 @@ def test_a_robot_is_plain_data_and_back():
 def test_plain_data_that_is_wrong_is_named(data, said):
     with pytest.raises(ConfigError, match=said):
         Robot.from_dict(data)
+
+
+def test_scan_assist_is_told_to_the_gate_and_off_without_a_word():
+    link = Link()
+    robot = Robot("Bob")
+    robot.set_twist_topic(link, "/cmd_vel", type="geometry_msgs/Twist")
+    assert robot.motion.spec().assist is None
+    robot.set_scan_assist("scan", 0.3, x=0.1, angle=90)
+    told = robot.motion.spec().assist
+    assert told.topic == "/scan"
+    assert told.sensor == pytest.approx((0.1, 0.0, math.pi / 2))
+    assert all(math.hypot(x, y) >= 0.3 for x, y in told.footprint)
+    with pytest.raises(ConfigError, match="3 corners"):
+        robot.set_scan_assist("scan", [(0, 0), (1, 0)])
+    robot.clear_scan_assist()
+    assert robot.motion.spec().assist is None

@@ -182,6 +182,14 @@ def test_an_edge_along_the_motion_is_never_crossed_by_it():
     assert free_way(BOX, [(2.0, 0.2)], Twist(1.0, 0.0, 0.0)) == pytest.approx(1.7)
 
 
-def test_a_point_that_touches_a_corner_now_is_met_now():
-    corner = (0.3, 0.2)
-    assert free_way(BOX, [corner], Twist(0.5, 0.0, 0.5)) == pytest.approx(0, abs=1e-6)
+def test_a_point_on_an_edge_is_met_now_and_not_after_a_whole_turn():
+    on_edge = [(0.3, y / 100) for y in range(-19, 20)]
+    for point in on_edge:
+        met = free_way(BOX, [point], Twist(0.5, 0.0, 0.5))
+        assert met == pytest.approx(0, abs=1e-6)
+
+
+def test_turning_on_the_spot_looks_at_the_whole_scan():
+    blind = sweep_of(lambda bearing: math.nan if abs(bearing) > 1 else math.inf)
+    assert assist(SPEC, blind, Twist(0.0, 0.0, 0.5), 0.1).scale == 0.0
+    assert assist(SPEC, blind, Twist(0.3, 0.0, 0.0), 0.1).scale == 1.0

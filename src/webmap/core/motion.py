@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError, MotionError
+from webmap.gate.assist import AssistSpec
 from webmap.gate.messages import RobotSpec
+from webmap.gate.specs import checked_assist
 from webmap.geometry import Twist
 from webmap.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
@@ -67,6 +69,7 @@ class MotionRoad:
         self._twist: TwistTopic | None = None
         self._move: MoveTopic | None = None
         self._odometry: tuple[Bridge, str, str] | None = None
+        self._assist: AssistSpec | None = None
         self._opening: Removable | None = None
         roads.add(self)
 
@@ -114,6 +117,16 @@ class MotionRoad:
             self._odometry = (bridge, topic, type)
             self.declare()
 
+    def set_assist(self, assist: AssistSpec | None) -> None:
+        """Set how the robot is slowed down before what its scanner sees.
+
+        Raises:
+            ConfigError: If something in it cannot be meant.
+
+        """
+        self._assist = assist and checked_assist(self._name, assist)
+        self.declare()
+
     def clear_odometry(self) -> None:
         """Tell that there is no such topic any more."""
         self._odometry = None
@@ -147,6 +160,7 @@ class MotionRoad:
             w_max=twist.w_max if twist else None,
             a_max=twist.a_max if twist else None,
             holonomic=twist.holonomic if twist else False,
+            assist=self._assist if twist else None,
             stop_hooks=twist.stop_hooks if twist else (),
             odometry_url=odometry[0].url if odometry else None,
             odometry_topic=odometry[1] if odometry else None,
@@ -190,6 +204,10 @@ class MotionRoad:
     def stop(self) -> None:
         """Have the gate stop the robot, whoever drives it."""
         self._gate().stop_robot(self.id)
+
+    def reset_stop(self) -> None:
+        """Have the gate end a STOP that stands."""
+        self._gate().reset(self.id)
 
     def _gate(self) -> "GateClient":
         if self.gate is None or not lifecycle.running:

@@ -6,7 +6,7 @@ import math
 import time
 import weakref
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from webmap.core.extendable import Extendable
 from webmap.core.frames import Frames, frames_of
@@ -15,6 +15,7 @@ from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.placing import Placing
 from webmap.core.registry import Namespace, robot_modules
 from webmap.errors import MotionError
+from webmap.gate.assist import AssistSpec, polygon_around
 from webmap.gate.messages import RobotReport
 from webmap.geometry import Quaternion, Twist, Vector3
 from webmap.ros.bridge import Bridge
@@ -311,6 +312,62 @@ class Robot(Extendable):
                 )
             )
 
+    def set_scan_assist(
+        self,
+        topic: str,
+        footprint: Sequence[tuple[float, float]] | float,
+        *,
+        x: float = 0.0,
+        y: float = 0.0,
+        angle: float = 0.0,
+        stop_distance: float = 0.15,
+        brake: float = 0.5,
+        blind: Literal["stop", "creep"] = "stop",
+        creep: float = 0.1,
+    ) -> None:
+        """Have the robot slowed down, when driven, before what a laser scan sees.
+
+        It assists a driver and is no safety function: a planar scanner does not see
+        glass, stairs or a table's edge, and what it says comes over a network.
+
+        Args:
+            topic: Of ``sensor_msgs/LaserScan``, on the bridge of the twist topic.
+            footprint: The robot's corners in its own frame, in order, or its radius,
+                in metres.
+            x: Where the scanner is on the robot, in metres forward.
+            y: In metres to the left.
+            angle: Where it looks, in degrees from the robot's x, counter-clockwise.
+            stop_distance: What stays free before the robot, in metres.
+            brake: How hard the robot slows down, in metres per second squared.
+            blind: Whether it stops or creeps while the scan is older than 0.3 s, is
+                empty or mostly unknown.
+            creep: How fast it creeps, in metres per second.
+
+        Raises:
+            ConfigError: If something of that cannot be meant.
+
+        """
+        corners = (
+            polygon_around(footprint)
+            if isinstance(footprint, int | float)
+            else tuple((float(cx), float(cy)) for cx, cy in footprint)
+        )
+        self.motion.set_assist(
+            AssistSpec(
+                topic=topic,
+                footprint=corners,
+                sensor=(x, y, math.radians(angle)),
+                stop_distance=stop_distance,
+                brake=brake,
+                blind=blind,
+                creep=creep,
+            )
+        )
+
+    def clear_scan_assist(self) -> None:
+        """Let the robot be driven as before; nothing happens if nothing was set."""
+        self.motion.set_assist(None)
+
     def unadvertise_twist_topic(self) -> None:
         """Give up the twist topic; does nothing if there is none."""
         self.motion.set_twist(None)
@@ -428,8 +485,16 @@ class Robot(Extendable):
         self.motion.cancel()
 
     def stop(self) -> None:
-        """Stop the robot, whoever drives it, and call off its goals."""
+        """Stop the robot, whoever drives it, and call off its goals.
+
+        It stays stopped, for everybody and also after a restart, until
+        :meth:`reset_stop` or a person's reset.
+        """
         self.motion.stop()
+
+    def reset_stop(self) -> None:
+        """End a STOP that stands; moves nothing and gives nobody the robot."""
+        self.motion.reset_stop()
 
     # Plain data.
 

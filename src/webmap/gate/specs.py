@@ -49,7 +49,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
         w_max=_number(spec, "w_max", least=0.0),
         a_max=_number(spec, "a_max", least=1e-3),
         stops_within=_number(spec, "stops_within", least=0.0),
-        assist=None if spec.assist is None else _assist(spec, spec.assist),
+        assist=spec.assist and checked_assist(spec.name, spec.assist),
         stop_hooks=tuple(_hook(spec, hook) for hook in spec.stop_hooks),
     )
 
@@ -77,21 +77,31 @@ def _number(spec: RobotSpec, field: str, least: float) -> float | None:
     return float(value)
 
 
-def _assist(spec: RobotSpec, assist: AssistSpec) -> AssistSpec:
-    """Return how a robot is assisted, with its topic resolved."""
+def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
+    """Return how the robot called ``name`` is assisted, with its topic resolved.
+
+    Raises:
+        ConfigError: If something in it cannot be meant.
+
+    """
     numbers = [n for corner in assist.footprint for n in corner]
     numbers += [*assist.sensor, assist.stop_distance, assist.brake, assist.creep]
     if not all(map(math.isfinite, numbers)):
-        raise ConfigError(f"robot {spec.name!r}: scan assist needs finite numbers")
+        raise ConfigError(f"robot {name!r}: scan assist needs finite numbers")
     if len(assist.footprint) < 3:
         raise ConfigError(
-            f"robot {spec.name!r}: the footprint for scan assist has 3 corners or "
-            f"more, got {len(assist.footprint)}"
+            f"robot {name!r}: the footprint for scan assist has 3 corners or more, "
+            f"got {len(assist.footprint)}"
         )
     if assist.stop_distance < 0 or assist.brake <= 0 or assist.creep < 0:
         raise ConfigError(
-            f"robot {spec.name!r}: scan assist needs a stop distance and a creep speed "
+            f"robot {name!r}: scan assist needs a stop distance and a creep speed "
             "from 0 on, and a brake above 0"
+        )
+    if assist.blind not in ("stop", "creep"):
+        raise ConfigError(
+            f"robot {name!r}: while it is blind a robot is to 'stop' or to 'creep', "
+            f"got {assist.blind!r}"
         )
     return msgspec.structs.replace(assist, topic=normalise_topic(assist.topic))
 

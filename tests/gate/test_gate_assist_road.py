@@ -1,0 +1,105 @@
+"""Scan assist on its whole way: a simulated scanner, the gate's process, the wheels."""
+
+import math
+import re
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from gate_robot import eventually
+
+from webmap.gate.assist import AssistSpec, polygon_around
+from webmap.gate.client import GateClient
+from webmap.gate.messages import RobotReport, RobotSpec
+from webmap.geometry import Twist
+
+RADIUS = 0.25
+
+
+@pytest.fixture
+def bridge():
+    """One robot that looks along a corridor."""
+    command = [sys.executable, "-m", "webmap", "sim", "--flat", "--seed", "7"]
+    with subprocess.Popen(
+        [*command, "--port", "0"], stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            yield re.search(r"ready at (\S+)", process.stdout.readline())[1]
+        finally:
+            process.terminate()
+
+
+@pytest.fixture
+def gate(tmp_path, monkeypatch):
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
+    client = GateClient()
+    client.start()
+    yield client
+    client.stop()
+
+
+def ranges_seen(bridge):
+    """What the scanner sees now, by a client of its own."""
+    from websockets.sync.client import connect
+
+    from webmap.gate.scans import hear_scan, subscribe
+
+    with connect(bridge, max_size=None) as link:
+        link.send(subscribe("/base_scan", "t").decode())
+        heard = None
+        while heard is None:
+            frame = link.recv(timeout=10)
+            heard = hear_scan(frame if isinstance(frame, bytes) else b"", 0.0)
+    return [reach for reach in heard[1].ranges if math.isfinite(reach)]
+
+
+def test_a_robot_that_is_driven_at_a_wall_comes_to_stand_before_it(gate, bridge):
+    newest = {}
+    reports = gate.on_report(
+        lambda report: isinstance(report, RobotReport) and newest.update(report=report)
+    )
+    gate.declare(
+        RobotSpec(
+            id="r1",
+            name="Bob",
+            bridge_url=bridge,
+            twist_topic="/cmd_vel",
+            stops_within=0.25,
+            v_max=1.0,
+            w_max=1.5,
+            odometry_topic="/odom",
+            odometry_type="nav_msgs/Odometry",
+            assist=AssistSpec(topic="/base_scan", footprint=polygon_around(RADIUS)),
+        )
+    )
+    eventually(lambda: "report" in newest and newest["report"].armable, "a link")
+    gate.take("r1").result(10)
+    over = threading.Event()
+    wanted = [Twist(0.0, 0.0, 1.5)]
+
+    def drive():
+        while not over.wait(0.05):
+            gate.twist("r1", wanted[0])
+
+    hands = threading.Thread(target=drive)
+    hands.start()
+    try:
+        time.sleep(1.05)  # a quarter of a turn: towards the corridor's wall
+        wanted[0] = Twist(0.8, 0.0, 0.0)
+        eventually(lambda: newest["report"].measured[0] > 0.1, "driving")
+        eventually(
+            lambda: (
+                newest["report"].measured[0] == 0.0
+                and any("scan assist" in why for why in newest["report"].why)
+            ),
+            "standing before the wall",
+            seconds=20,
+        )
+        gap = min(ranges_seen(bridge)) - RADIUS
+        assert 0.05 < gap < 0.5
+    finally:
+        over.set()
+        hands.join()
+        reports.remove()
