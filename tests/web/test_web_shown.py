@@ -53,9 +53,9 @@ def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
     own = bench.page.locator(".webmap-teleop-own")
     words = "Stops by itself within 0.31 s (tested 2026-11-21)."
     bench.until(lambda: own.inner_text() == words)
-    bench.gate.change("r1", test={"state": "creeping", "text": "Creeping at 0.1 m/s"})
+    bench.gate.change("r1", test={"state": "creeping", "text": "creeping at 0.1 m/s"})
     test = bench.page.locator(".webmap-teleop-test")
-    bench.until(lambda: test.inner_text() == "Creeping at 0.1 m/s")
+    bench.until(lambda: test.inner_text() == "Stop test: creeping at 0.1 m/s")
 
 
 def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
@@ -73,6 +73,8 @@ def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
     )
     bench.gate.change("r1", test={"state": "creeping", "text": "creeping"})
     bench.until(lambda: not button.is_visible())
+    words = bench.page.locator(".webmap-teleop-state")
+    bench.until(lambda: "Testing its stop" in words.inner_text())
     bench.gate.change("r1", test={"state": "done", "text": ""}, stop_time=0.3)
     bench.until(lambda: "0.30 s" in bench.page.inner_text(".webmap-teleop-own"))
     assert not button.is_visible()

@@ -7,6 +7,7 @@ import {
   speedAlong,
   speedNow,
   stoppingDistance,
+  testWords,
   timings,
 } from "../../../src/webmap/web/motion/figures.js";
 
@@ -73,11 +74,23 @@ test("times are the gate's own where it gives them", () => {
   assert.deepEqual(texts(standing, null, null), ["not known", "not known", "stands"]);
 });
 
+test("the test of its own stop is told while it goes on, and when it failed", () => {
+  const said = (state) => testWords({ test: { state, text: "creeping" } });
+  assert.equal(said("creeping"), "Stop test: creeping");
+  assert.equal(said("failed"), "Stop test: creeping");
+  assert.equal(said("done"), "");
+  assert.equal(testWords({ test: null }), "");
+  assert.equal(testWords({}), "");
+});
+
 test("how a robot stops by itself is said with where that is known from", () => {
-  const said = (stop_time, stop_source, stop_date) =>
-    ownStop({ stop_time, stop_source, stop_date });
+  const said = (stop_time, stop_source, stop_date, why = []) =>
+    ownStop({ stop_time, stop_source, stop_date, why });
   assert.equal(said(undefined), "");
   assert.equal(said(null, null, null), "Nobody knows whether it stops by itself.");
+  const failed = "Does not stop by itself (tested 2026-11-21).";
+  assert.equal(said(null, "tested", "2026-11-21"), failed);
+  assert.equal(said(null, null, null, ["did not stop by itself when tested"]), "");
   assert.equal(said(0.25, "stated", null), "Stops by itself within 0.25 s (stated).");
   const tested = "Stops by itself within 0.31 s (tested 2026-11-21).";
   assert.equal(said(0.31, "tested", "2026-11-21"), tested);

@@ -1,4 +1,4 @@
-import { motions, ownStop, timings } from "../motion/figures.js";
+import { isTested, motions, ownStop, testWords, timings } from "../motion/figures.js";
 import { heldByProgram, isLatched } from "../motion/report.js";
 import { capOf } from "../motion/status.js";
 import { button, html, say } from "./elements.js";
@@ -72,7 +72,8 @@ export class Panel {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
     say(this._title, title);
     say(this._detail, detail);
-    say(this._cap, report ? capOf(report) + slowness(delay) : "");
+    const told = report?.why.some((why) => why.startsWith("slow link"));
+    say(this._cap, report ? capOf(report) + (told ? "" : slowness(delay)) : "");
   }
 
   /**
@@ -82,7 +83,7 @@ export class Panel {
    */
   showFigures(report, loop, moving) {
     say(this._own, report ? ownStop(report) : "");
-    say(this._test, report?.test ? report.test.text : "");
+    say(this._test, report ? testWords(report) : "");
     this._figures.hidden = report === null || isLatched(report);
     this._figures.classList.toggle("idle", !report?.mine);
     if (report === null) return;
@@ -150,9 +151,8 @@ function actOf(report, asking) {
  * @returns {boolean} Whether this page may find out that the robot stops by itself, which
  *     nobody knows yet.
  */
-function mayTest({ mine, stop_time, test }) {
-  const running = test?.state === "creeping" || test?.state === "waiting";
-  return mine && stop_time === null && !running;
+function mayTest(report) {
+  return report.mine && report.stop_time === null && !isTested(report);
 }
 
 /** @param {number | null} delay */

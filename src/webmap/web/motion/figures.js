@@ -98,11 +98,35 @@ export function timings(report, loop, motion) {
  * @param {RobotReport} report
  * @returns {string} "" when an older gate does not say.
  */
-export function ownStop({ stop_time, stop_source, stop_date }) {
+export function ownStop({ stop_time, stop_source, stop_date, why }) {
   if (stop_time === undefined) return "";
-  if (stop_time === null) return "Nobody knows whether it stops by itself.";
-  const how = stop_source === "tested" ? `tested ${stop_date ?? ""}`.trim() : "stated";
+  const tested = `tested ${stop_date ?? ""}`.trim();
+  if (stop_time === null && stop_source === "tested") {
+    return `Does not stop by itself (${tested}).`;
+  }
+  // Else what limits the speed says it already.
+  const failed = why.some((reason) => reason.startsWith("did not stop"));
+  if (stop_time === null) return failed ? "" : "Nobody knows whether it stops by itself.";
+  const how = stop_source === "tested" ? tested : "stated";
   return `Stops by itself within ${stop_time.toFixed(2)} s (${how}).`;
+}
+
+/**
+ * Say how the test of its own stopping goes, or why it failed.
+ *
+ * @param {RobotReport} report
+ * @returns {string} "" when there is nothing to say that {@link ownStop} does not.
+ */
+export function testWords({ test }) {
+  return test && test.state !== "done" ? `Stop test: ${test.text}` : "";
+}
+
+/**
+ * @param {RobotReport} report
+ * @returns {boolean} Whether the robot is left to itself just now to see if it stops.
+ */
+export function isTested({ test }) {
+  return test?.state === "creeping" || test?.state === "waiting";
 }
 
 /** @param {number | null} ms */

@@ -1,3 +1,4 @@
+import { isTested } from "./figures.js";
 import { heldByAnother, isLatched } from "./report.js";
 import { stopWords } from "./stopping.js";
 
@@ -151,6 +152,7 @@ function ofOther(status, report, request) {
  * @param {string} inputs
  */
 function ofMine(status, report, inputs) {
+  if (isTested(report)) return say("driving", "Testing its stop", "Touch nothing.");
   if (report.state === "driving") return say("driving", "Driving", speedOf(report));
   if (report.reason) return say("fixed", "Cannot move", sentence(report.reason));
   if (status.pressed && status.dead) return handsOff();
