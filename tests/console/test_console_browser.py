@@ -262,3 +262,20 @@ def test_a_length_is_measured_on_the_map(open_console):
     assert page.locator(".robot.selected").count() == 0
     page.keyboard.press("Escape")
     expect(page.locator(".webmap-measure-drawing")).to_be_hidden()
+
+
+def test_a_layer_is_switched_off_for_one_viewer_and_stays_off(open_console):
+    page, other = open_console(), open_console()
+    scans = page.locator(".robot .laserscan")
+    expect(scans.first).to_be_visible()
+    page.locator(".webmap-layers summary").click()
+    page.get_by_role("checkbox", name="Scans").uncheck()
+    expect(scans.first).to_be_hidden()
+    expect(other.locator(".robot .laserscan").first).to_be_visible()
+    page.reload()
+    expect(page.locator(".robot:not(.unplaced)")).to_have_count(10)
+    expect(scans.first).to_be_hidden()
+    page.locator(".webmap-layers summary").click()
+    page.get_by_role("checkbox", name="Scans").check()
+    expect(scans.first).to_be_visible()
+    expect(page.get_by_role("checkbox", name="Costmaps")).to_have_count(0)

@@ -77,6 +77,7 @@ def build(
     map.add_module("Teleop", SPEED, ROTATION_SPEED)
     goals = map.add_module("GoalTool")
     map.add_module("StopButton")
+    map.add_module("LayerSwitches", off=["Costmaps"])
     map.add_module("MeasureTool")
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")

@@ -1,0 +1,67 @@
+"""What is drawn on the map, switched on and off by each viewer."""
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+LAYERS = {
+    "Maps": ".floor, .map-file, .occupancy-grid:not(.costmap)",
+    "Costmaps": ".occupancy-grid.costmap",
+    "Scans": ".laserscan",
+    "Clouds": ".pointcloud",
+    "Plans": ".path",
+    "Trails": ".trail",
+    "Poses": ".posearray",
+    "Uncertainty": ".covariance",
+    "Footprints": ".polygon",
+    "Ranges": ".range",
+    "Markers": ".markers",
+    "Satellite fixes": ".navsatfix",
+    "Health": ".diagnostics",
+}
+"""What the built-in modules draw: what people call it, and its CSS selector."""
+
+
+class LayerSwitches:
+    """A list of what the map shows, each to be switched on and off.
+
+    Only what is there at the time is listed. The choice is the viewer's own and is kept
+    in that browser; what is switched off still comes from the robot.
+
+    Args:
+        map: The map.
+        layers: A CSS selector for each name, in the order of the list; what the
+            built-in modules draw if not given.
+        off: Names of those that are off until the viewer switches them on.
+
+    Raises:
+        ConfigError: If ``off`` has a name that is not in ``layers``.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        layers: Mapping[str, str] | None = None,
+        *,
+        off: Iterable[str] = (),
+    ) -> None:
+        chosen = dict(LAYERS if layers is None else layers)
+        hidden = list(off)
+        for name in hidden:
+            if name not in chosen:
+                known = ", ".join(chosen)
+                raise ConfigError(
+                    f"LayerSwitches: no layer {name!r}; there are {known}"
+                )
+        self.map = map
+        self.half = map.add_browser_half(
+            self,
+            "modules/layer_switches.js",
+            {"layers": [list(item) for item in chosen.items()], "off": hidden},
+            "modules/layer_switches.css",
+        )
