@@ -66,7 +66,7 @@ class LayerSwitches {
     );
     this._details.addEventListener("toggle", () => this._look());
     this._timer = setInterval(() => this._look(), PERIOD);
-    this._take = lay(map, this._details, "bottom-right");
+    this._take = lay(map, this._details, "top-left");
     /** @type {Map<string, HTMLElement>} */
     this._rows = new Map();
     this._apply();

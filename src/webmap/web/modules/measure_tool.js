@@ -56,8 +56,8 @@ class MeasureTool {
       "section",
       "webmap-panel webmap-measure",
       { "aria-label": "Measure" },
-      this._word,
       this._button,
+      this._word,
     );
     this._path = svg("path", { class: "webmap-measure-line" });
     this._drawing = svg(
@@ -69,7 +69,7 @@ class MeasureTool {
     this._listen();
     this._offs = [
       lay(map, this._drawing),
-      lay(map, panel, "bottom-right"),
+      lay(map, panel, "top-left"),
       deskOf(map.drive).claimEscape(() => this._leave()),
       map.onView(() => this._draw()),
     ];
