@@ -169,7 +169,8 @@ steps = st.lists(
         st.integers(0, 40),
         st.integers(0, 40),
         st.floats(-9000, 9000, width=32),
-        st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=8),
+        # Without a bracket there is no url(), which a scene refuses.
+        st.text(st.characters(codec="utf-8", exclude_characters="\0("), max_size=8),
     ),
     max_size=20,
 )
