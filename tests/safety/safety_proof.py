@@ -59,7 +59,7 @@ class ProvingBench(Bench):
             unreachable=self.unreachable,
             causes=self.causes,
         )
-        assert not wrong, (name, wrong)
+        assert not wrong, (name, wrong, figures)
         worst = max(figures, key=lambda figure: figure["late"] - figure["jitter"])
         note(
             Figure(

@@ -16,6 +16,10 @@ BLIND = 0.55
 """The same when commands still come but the browser hears nothing any more: the age
 limit of 300 ms has to pass before the dead-man's time begins (S1, worst case)."""
 
+LATE = 7
+"""Velocities that a stalled link may have taken: what is written at 20 Hz in the 300 ms
+until it is in doubt, and one that was on its way."""
+
 BY_ITSELF = ROBOT_TIMEOUT + 0.05
 """Seconds until a robot stands that no zero reaches: its own timeout and its brakes."""
 
@@ -83,7 +87,7 @@ def test_a_stall_between_gate_and_robot_ends_with_few_late_words_and_a_zero(
         within=BY_ITSELF,
         back=back,
         stops_by="itself",
-        few_late=6,
+        few_late=LATE,
         watch=1.0,
     )
 

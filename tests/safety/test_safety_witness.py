@@ -108,8 +108,8 @@ def test_a_service_that_hangs_holds_up_what_comes_behind_it(robot, link):
     robot.answers_services(False)
     link.send(call("/e_stop"))
     link.send(twist(0.5))
-    link.ping().wait(5)
-    assert robot.log.of("call_service")
+    eventually(lambda: robot.log.of("call_service"), "the call")
+    assert link.ping().wait(5), "pings are not answered while it hangs"
     assert robot.log.told == []
     with connect(robot.url) as other:
         other.send(twist(0.25))
@@ -123,8 +123,8 @@ def test_a_goal_can_run_on_the_input_thread():
     with WitnessRobot(goals_block=True) as robot, connect(robot.url) as link:
         link.send(json.dumps({"op": "send_action_goal", "action": "/go", "id": "g"}))
         link.send(twist(0.5))
-        link.ping().wait(5)
-        assert robot.log.of("send_action_goal")
+        eventually(lambda: robot.log.of("send_action_goal"), "the goal")
+        assert link.ping().wait(5), "pings are not answered while it runs"
         assert robot.log.told == []
         robot.unblock()
         eventually(lambda: robot.log.told, "what had to wait")

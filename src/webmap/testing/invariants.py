@@ -136,7 +136,7 @@ def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Fin
     """
     for index, told in enumerate(log):
         following = log[index + 1] if index + 1 < len(log) else None
-        over = following is None or following.at - told.at > BREATH
+        over = following is None or following.at - told.at > BREATH + bounds.slack
         if told.is_zero or not over:
             continue
         until = math.inf if following is None else following.at

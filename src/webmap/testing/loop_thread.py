@@ -51,6 +51,13 @@ class LoopThread:
             for task in left:
                 task.cancel()
             self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+            self._loop.run_until_complete(_settle())
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())
         finally:
             self._loop.close()
+
+
+async def _settle() -> None:
+    """Let transports that were closed say so and close their sockets."""
+    for _ in range(5):
+        await asyncio.sleep(0)

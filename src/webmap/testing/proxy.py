@@ -139,12 +139,11 @@ class FaultProxy:
     async def _serve(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        if self._refusing:
-            _reset(writer)
-            return
         try:
+            if self._refusing:
+                raise ConnectionRefusedError
             far = await asyncio.open_connection("127.0.0.1", self.target)
-        except OSError:
+        except (OSError, asyncio.CancelledError):
             _reset(writer)
             return
         link = _Link((reader, writer), far, self._ways)

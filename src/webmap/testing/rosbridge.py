@@ -67,6 +67,7 @@ class WitnessBridge:
         server.close(close_connections=False)
         for socket in list(self._sockets.values()):
             socket.connection.transport.abort()
+        self.unblock()
         await server.wait_closed()
 
     def unblock(self) -> None:
