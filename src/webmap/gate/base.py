@@ -109,7 +109,7 @@ class Base:
         caps = [cap for spec in specs for cap in caps_of(spec, self.tested)]
         if self._page_cap is not None:
             caps.append(self._page_cap)
-        return governed(speed_in_force(caps), self.ages.p95, self.stop_time)
+        return governed(speed_in_force(caps), self.ages.slow, self.stop_time)
 
     @property
     def stop_time(self) -> float | None:

@@ -1,8 +1,9 @@
 """How old the driver's picture of the robot is, and what that leaves of its speed.
 
-Nobody can react to what has not been seen yet. So a robot is never let go faster than
-what carries it a quarter of a metre in the time from a finger to its wheels, at worst:
-the age of the loop, the dead-man, and the base's own time to stop (S15).
+Nobody can react to what has not been seen yet. So over a slow link a robot is let go
+no faster than what carries it a quarter of a metre in the time from a finger to its
+wheels, at worst: the age of the loop, the dead-man, and the base's own time to stop
+(S15). Over a quick link the robot's own limits are in force and nothing else.
 """
 
 import math
@@ -15,7 +16,10 @@ WINDOW = 2.0
 """Seconds over which the age of the loop is looked at."""
 
 SLOW = 0.15
-"""The age of a loop in seconds from which people are told that it is slow."""
+"""The age of a loop in seconds above which it is slow: it is told, and it counts."""
+
+QUICK = 0.13
+"""The age below which it is so no more; between the two nothing changes."""
 
 BLIND = 0.25
 """Metres that a robot may go before anything that anybody does can take effect."""
@@ -27,6 +31,7 @@ class LoopAge:
     def __init__(self) -> None:
         self._ages: deque[tuple[float, float]] = deque()
         self._p95: float | None = None
+        self._slow = False
         self._stale = False
 
     def add(self, age: float, now: float) -> None:
@@ -54,6 +59,13 @@ class LoopAge:
             self._stale = False
         return self._p95
 
+    @property
+    def slow(self) -> float | None:
+        """The same if the loop is slow, else None."""
+        age = self.p95
+        self._slow = age is not None and age > (QUICK if self._slow else SLOW)
+        return age if self._slow else None
+
 
 def reaction(age: float | None, stop_time: float | None) -> float:
     """Return the seconds from a finger to the robot, at worst.
@@ -67,15 +79,18 @@ def reaction(age: float | None, stop_time: float | None) -> float:
     return (age or 0.0) + DEADMAN + own
 
 
-def governed(speed: Speed, age: float | None, stop_time: float | None) -> Speed:
-    """Return ``speed``, or what a loop as old as that leaves of it."""
-    # Rounded down, so that the speed in force does not tremble with every command.
-    v = math.floor(100 * BLIND / reaction(age, stop_time)) / 100
-    if age is not None and age > SLOW:
-        # In steps of 10 ms, for the same reason.
-        why = f"slow link: {math.ceil(age * 100) * 10} ms"
-    elif v < speed.v:
-        why = f"at most {BLIND:g} m before a hand has an effect"
-    else:
+def governed(speed: Speed, slow: float | None, stop_time: float | None) -> Speed:
+    """Return ``speed``, or what a slow loop leaves of it.
+
+    Args:
+        speed: The speeds in force on a quick link.
+        slow: The age of the loop in seconds, if it is slow.
+        stop_time: Seconds within which the base stops by itself, if that is known.
+
+    """
+    if slow is None:
         return speed
+    # Rounded, so that the speed in force does not tremble with every command.
+    v = math.floor(100 * BLIND / reaction(slow, stop_time)) / 100
+    why = f"slow link: {math.ceil(slow * 100) * 10} ms"
     return Speed(min(v, speed.v), speed.w, (*speed.why, why))
