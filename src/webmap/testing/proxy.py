@@ -43,6 +43,7 @@ class FaultProxy:
         self._thread = LoopThread("fault-proxy")
         self._links: set[_Link] = set()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._writers: list[asyncio.StreamWriter] = []
         self._refusing = False
         self._ways, self._server, self.port = self._thread.call(self._listen())
 
@@ -57,8 +58,12 @@ class FaultProxy:
 
         async def end() -> None:
             self._server.close()
+            await asyncio.sleep(0.01)  # for what was accepted in this very moment
             for link in list(self._links):
                 link.reset()
+            for writer in self._writers:
+                writer.transport.abort()
+            await asyncio.sleep(0.01)
 
         self._thread.call(end())
         self._thread.end()
@@ -132,6 +137,7 @@ class FaultProxy:
     def _accept(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
+        self._writers.append(writer)
         task = asyncio.get_running_loop().create_task(self._serve(reader, writer))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -146,6 +152,7 @@ class FaultProxy:
         except (OSError, asyncio.CancelledError):
             _reset(writer)
             return
+        self._writers.append(far[1])
         link = _Link((reader, writer), far, self._ways)
         self._links.add(link)
         try:
