@@ -32,7 +32,7 @@ demo: $(INSTALLED)
 
 ## test: everything: lint, types, contracts, unit, property, browser and peer tests, docs
 .PHONY: test
-test: check test-web test-python docs
+test: check test-web test-gate test-python docs
 
 ## check: lint, types, import contracts, generated files
 .PHONY: check
@@ -68,6 +68,14 @@ test-fast: $(DEV)
 .PHONY: test-web
 test-web: $(NODE)
 	node --test $$(find tests/web -name '*.test.js' | sort)
+
+## test-gate: every branch of what the gate decides is taken by a test
+.PHONY: test-gate
+test-gate: $(DEV)
+	$(BIN)/pytest -q -n $(JOBS) tests/gate --ignore tests/gate/test_gate_client.py \
+	  --ignore tests/gate/test_gate_assist_road.py \
+	  --ignore tests/gate/test_gate_machine.py --cov=webmap.gate \
+	  --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
 ## test-python: pytest; what measures time runs alone at the end
 .PHONY: test-python test-parallel test-serial
