@@ -69,6 +69,8 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 def main() -> None:
     """Run the command line; what is wrong is said in one sentence, with exit code 2."""
     signal.signal(signal.SIGTERM, _interrupt)
+    # A shell has what it starts in the background ignore this one.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         cli(standalone_mode=False)
     except click.exceptions.Exit as done:
