@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -92,6 +93,12 @@ def test_away_from_a_wall_that_is_too_near_is_allowed():
     assert assist(SPEC, near, Twist(-0.5, 0.0, 0.0), 0.1).scale == 1.0
 
 
+@pytest.mark.parametrize("stated", [math.nan, 0.0, 0.1, -1.0])
+def test_a_reach_that_is_stated_wrongly_makes_no_wall_vanish(stated):
+    near = msgspec.structs.replace(sweep_of(wall(0.35)), range_max=stated)
+    assert assist(SPEC, near, Twist(0.5, 0.0, 0.0), 0.1).scale == 0.0
+
+
 def test_the_robot_s_own_body_is_not_in_its_way():
     body = sweep_of(lambda bearing: 0.15 if abs(bearing) < 0.3 else math.inf)
     assert assist(SPEC, body, Twist(1.0, 0.0, 0.0), 0.1).scale == 1.0
@@ -113,6 +120,7 @@ def test_too_near_to_measure_is_an_obstacle():
         (sweep_of(lambda b: 0.0), "unknown"),
         (sweep_of(lambda b: math.nan if abs(b) < 0.6 else math.inf), "unknown"),
         (Sweep(math.nan, 0.1, 0.1, 8.0, [1.0] * 10, 0.0), "no angles"),
+        (Sweep(0.0, 0.0, 0.1, 8.0, [math.inf] * 10, 0.0), "no angles"),
         (Sweep(0.0, 0.1, 0.1, 8.0, [], 0.0), "does not look"),
         (Sweep(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not look"),
     ],

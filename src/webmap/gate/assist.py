@@ -108,7 +108,8 @@ def points_of(spec: AssistSpec, sweep: Sweep) -> list[Point]:
     for ray, reach in enumerate(sweep.ranges):
         if reach == -math.inf:
             reach = max(sweep.range_min, 0.0)
-        elif not (sweep.range_min <= reach <= sweep.range_max):
+        elif not (sweep.range_min <= reach < math.inf):
+            # What is beyond the stated reach counts: that may be wrong, or not stated.
             continue
         bearing = yaw0 + sweep.angle_min + ray * sweep.angle_increment
         point = (x0 + reach * math.cos(bearing), y0 + reach * math.sin(bearing))
@@ -177,7 +178,8 @@ def _blindness(
     age = now - sweep.arrived
     if not 0 <= age <= FRESH:
         return f"the scan is {age:.1f} s old"
-    if not (math.isfinite(sweep.angle_min) and math.isfinite(sweep.angle_increment)):
+    step = sweep.angle_increment
+    if not (math.isfinite(sweep.angle_min) and math.isfinite(step) and step != 0.0):
         return "the scan has no angles"
     towards = _rays_towards(spec, sweep, wanted)
     if not towards:
