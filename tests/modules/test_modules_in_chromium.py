@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,6 +55,10 @@ def tab(chromium: Browser, url: str) -> Iterator[Page]:
         page.goto(url)
         page.wait_for_selector(".occupancy-grid.map > image[href]", state="attached")
         page.wait_for_selector(".path > polyline[points]", state="attached")
+        # An image has its address before it has its pixels.
+        deadline = time.monotonic() + 10
+        while colours(page, floor(0.5, 0.5)) != [WALL]:
+            assert time.monotonic() < deadline, "the map is never drawn"
         yield page
 
 

@@ -12,6 +12,12 @@ from webmap.wire import ElementEvent, Trouble
 
 pytestmark = pytest.mark.browser
 
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
+    "0000000a49444154789c6360000000020001e221bc330000000049454e44ae426082"
+)
+"""A PNG of one black pixel."""
+
 
 def matrix(tab, selector):
     """Return the matrix that an element has in its parent."""
@@ -118,6 +124,48 @@ def test_addresses_lead_to_this_server_only(host, tab):
     assert tab.get_attribute("image[href]", "href") == f"{prefix}images/x.png"
     assert tab.locator("image:not([href])").count() == 1
     host.until(lambda: "evil" in str(host.events(Trouble)), tab=tab)
+
+
+def test_an_image_that_changes_more_quickly_than_it_loads_is_drawn_all_the_same(
+    host, tab
+):
+    def build(shown):
+        shown.root, _, _ = shown.add_map()
+        shown.image = svg.image(href="/_webmap/images/1.png")
+        shown.root.append(shown.image)
+
+    def shows(number):
+        wait(
+            tab,
+            "document.querySelector('image').getAttribute('href')"
+            f".endsWith('/{number}.png')",
+        )
+
+    host.build = build
+    asked = []
+    tab.route("**/_webmap/images/*", lambda route: asked.append(route))
+    tab.goto(host.url)
+    host.until(lambda: len(asked) == 1, tab=tab)
+    for number in 2, 3, 4:
+        host.call(host.one.image.set, href=f"/_webmap/images/{number}.png")
+        host.call(host.one.root.set, data_at=str(number))
+        tab.wait_for_selector(f"svg[data-at='{number}']")
+    shows(1)
+    asked[0].fulfill(body=PIXEL, content_type="image/png")
+    shows(4)
+    host.until(lambda: len(asked) == 2, tab=tab)
+    asked[1].fulfill(body="no image", content_type="image/png")
+    host.call(host.one.image.set, href="/_webmap/images/5.png")
+    shows(5)  # what is no image holds up nothing
+    host.until(lambda: len(asked) == 3, tab=tab)
+    host.call(host.one.image.unset, "href")
+    tab.wait_for_selector("image:not([href])", state="attached")
+    asked[2].fulfill(body=PIXEL, content_type="image/png")
+    assert [address.request.url.rsplit("/", 1)[1] for address in asked] == [
+        "1.png",
+        "4.png",
+        "5.png",
+    ]
 
 
 def test_dots_are_squares_as_large_as_the_style_says(host, tab):

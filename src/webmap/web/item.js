@@ -1,4 +1,5 @@
 import { resolve } from "./addresses.js";
+import { Loading } from "./loading.js";
 import { BOOLEAN_ATTRIBUTES } from "./opcodes.js";
 
 /** @typedef {import('./wire.js').Matrix} Matrix */
@@ -49,6 +50,8 @@ export class Item {
     this._dots = null;
     /** @type {number | null} */
     this._dotSize = null;
+    /** @type {Loading | null} */
+    this._loading = null;
   }
 
   /**
@@ -58,8 +61,8 @@ export class Item {
   setAttribute(name, value) {
     const { element } = this;
     if (name === "transform") this._setTransform(value);
-    else if (value === null) element.removeAttribute(name);
     else if (name === "href" || name === "src") this._setAddress(name, value);
+    else if (value === null) element.removeAttribute(name);
     else element.setAttribute(name, value);
     if (PROPERTIES.has(name) && name in element) {
       const property = BOOLEANS.has(name) ? value !== null : (value ?? "");
@@ -69,12 +72,23 @@ export class Item {
 
   /**
    * @param {string} name
-   * @param {string} value
+   * @param {string | null} value
    */
   _setAddress(name, value) {
+    const { element } = this;
+    if (value === null) {
+      element.removeAttribute(name);
+      this._loading?.cancel();
+      return;
+    }
     const address = value.startsWith("#") ? value : resolve(value, document.baseURI);
-    if (address !== null) this.element.setAttribute(name, address);
-    else throw new Error(`${value} leads to another server and is not followed`);
+    if (address === null) {
+      throw new Error(`${value} leads to another server and is not followed`);
+    }
+    if (element instanceof SVGImageElement || element instanceof HTMLImageElement) {
+      this._loading ??= new Loading(element);
+      this._loading.show(name, address);
+    } else element.setAttribute(name, address);
   }
 
   /** @param {string} names What Python gave; what a page added itself stays. */
