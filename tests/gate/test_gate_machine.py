@@ -16,9 +16,11 @@ And, of hands: after any doubt nothing moves before they were seen to be off.
 """
 
 import os
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
-from gate_harness import KEY, URL, Bench, spec
+import pytest
+from gate_harness import KEY, URL, spec
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -28,17 +30,19 @@ from hypothesis.stateful import (
     precondition,
     rule,
 )
+from machine_bench import PacedBench
 
 from webmap.gate import actions, events, messages
 from webmap.gate.gate import Gate
 from webmap.gate.lease import Epochs
 from webmap.gate.messages import PROGRAM
+from webmap.gate.process import STEP
 from webmap.gate.ticks import Ticks
 from webmap.geometry import Twist
 
 PEOPLE = ("a", "b")
-LATE = 0.0101
-"""One step of the gate's loop."""
+LATE = STEP + 1e-4
+"""One step of the gate's loop, in seconds."""
 
 
 @dataclass
@@ -56,7 +60,7 @@ class Motion(RuleBasedStateMachine):
         self.odometry = "/odom" if odometry else None
         self.a_max = a_max
         self.v_max = 1.0
-        self.bench = Bench()
+        self.bench = PacedBench()
         self.bench.begin(self._spec())
         self.sent: list[Sent] = []
         self.doubts = [self.bench.now]
@@ -238,7 +242,7 @@ class Motion(RuleBasedStateMachine):
         old = self.bench
         driven = [a.driven for a in old.did(actions.MarkDriven)]
         ticks, epochs = Ticks(old.tick + 1000), Epochs(old.gate._fleet._epochs.next())
-        self.bench = Bench(
+        self.bench = PacedBench(
             now=old.now,
             beating=old.beating,
             answering=old.answering,
@@ -248,6 +252,7 @@ class Motion(RuleBasedStateMachine):
             gate=Gate(ticks, epochs),
         )
         self.checked, self.sent, self.silent_for = 0, [], 0.0
+        self.parted, self.moved_by, self.zero_since = 0, None, True
         self.speeds = dict.fromkeys((*PEOPLE, PROGRAM), 9.0)
         self.last_seq = dict.fromkeys(PEOPLE, -1)
         self.bench.begin(self._spec())
@@ -297,20 +302,31 @@ class Motion(RuleBasedStateMachine):
 
     # The world.
 
-    def _run(self, seconds, each=None):
+    def _run(self, seconds, each=None, step=STEP):
+        sees = self.odometry is not None and self.seeing
+
         def fiftieth():
-            if self.odometry and self.seeing:
+            if sees:
                 self.bench.tell(events.Measured(self.bench_key, Twist()))
             if each is not None:
                 each()
 
-        self.bench.run(seconds, fiftieth)
+        self.bench.run(seconds, fiftieth if sees or each else None, step)
         if not self.bench.beating or not self.bench.answering:
             self._doubt_if_silent(seconds)
 
     @property
     def bench_key(self):
         return next(iter(self.bench.gate._fleet._bases))
+
+    def _rest(self, seconds):
+        """Let time pass in which nobody does anything, and the gate is looked at less.
+
+        What somebody did before still comes to its end at the usual pace.
+        """
+        self._run(0.6)
+        self._run(seconds - 1.3, step=0.05)
+        self._run(0.7)
 
     def _doubt_if_silent(self, seconds):
         self.silent_for += seconds
@@ -324,6 +340,10 @@ class Motion(RuleBasedStateMachine):
     """The newest epoch that was seen."""
     stands = False
     """Whether somebody said STOP, and nobody has reset it since."""
+    moved_by, zero_since = None, True
+    """The epoch that the robot was moved by last, and whether a zero came since."""
+    parted = 0
+    """How many writes were looked at for that."""
 
     @rule(seconds=st.sampled_from([0.01, 0.05, 0.15, 0.25, 0.5]))
     def time_passes(self, seconds):
@@ -339,8 +359,8 @@ class Motion(RuleBasedStateMachine):
     @rule()
     def everybody_rests(self):
         if self.bench.report().asker is not None:
-            self._run(10.0)  # it is granted by itself
-        self._run(3.0)
+            self._rest(10.0)  # it is granted by itself
+        self._rest(3.0)
         assert not self.bench.report().changing or not self.bench.up
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
         if self.stands:
@@ -391,34 +411,36 @@ class Motion(RuleBasedStateMachine):
         for write in self.bench.written[self.checked :]:
             if write.twist.is_zero:
                 continue
-            causes = [
-                s
-                for s in self.sent
-                if s.valid
-                and s.who == write.by
-                and s.epoch == write.epoch
-                and (not s.neutral or (self.creeping and write.twist.vx <= 0.1))
-                and write.at - 0.02 - LATE <= s.at <= write.at
-            ]
-            assert causes, "nobody asked for this"
+            cause = self._cause_of(write)
+            assert cause is not None, "nobody asked for this"
             assert write.twist.vy == 0
             limit = max(self.v_max, 0.0)
             assert abs(write.twist.vx) <= limit + 1e-9
             if write.by != PROGRAM:
-                self._check_hands(write, causes[-1])
+                self._check_hands(write, cause)
         self.checked = len(self.bench.written)
+
+    def _mine(self, write, begin, end):
+        """Return what the one who is written for sent in a time and was accepted."""
+        first = bisect_left(self.sent, begin, key=lambda s: s.at)
+        last = bisect_right(self.sent, end, key=lambda s: s.at)
+        return [
+            s
+            for s in self.sent[first:last]
+            if s.valid and s.who == write.by and s.epoch == write.epoch
+        ]
+
+    def _cause_of(self, write):
+        """Return the newest command that a velocity may answer."""
+        for s in reversed(self._mine(write, write.at - 0.02 - LATE, write.at)):
+            if not s.neutral or (self.creeping and write.twist.vx <= 0.1):
+                return s
+        return None
 
     def _check_hands(self, write, cause):
         """Since the last doubt the hands were off for 200 ms."""
-        since = max(at for at in self.doubts if at <= write.at)
-        mine = [
-            s
-            for s in self.sent
-            if s.valid
-            and s.who == write.by
-            and s.epoch == write.epoch
-            and since <= s.at <= cause.at
-        ]
+        since = self.doubts[bisect_right(self.doubts, write.at) - 1]
+        mine = self._mine(write, since, cause.at)
         run_start = last = None
         seen = False
         for s in mine:
@@ -459,7 +481,7 @@ class Motion(RuleBasedStateMachine):
         attempts = self._attempts()
         if not attempts or attempts[-1].twist.is_zero:
             return
-        newest = max(s.at for s in self.sent if s.valid)
+        newest = next(s.at for s in reversed(self.sent) if s.valid)
         assert self.bench.now - newest <= 0.2 + LATE or self._stood_still(newest)
 
     def _stood_still(self, since):
@@ -469,15 +491,15 @@ class Motion(RuleBasedStateMachine):
 
     @invariant()
     def epochs_are_parted_by_zeros_and_only_grow(self):
-        epoch, zero_since = None, True
-        for write in self.bench.written:
+        for write in self.bench.written[self.parted :]:
             if write.twist.is_zero:
-                zero_since = True
+                self.zero_since = True
                 continue
-            if epoch is not None and write.epoch != epoch:
-                assert zero_since, "no zero between two epochs"
-                assert write.epoch > epoch, "an old epoch came back"
-            epoch, zero_since = write.epoch, False
+            if self.moved_by is not None and write.epoch != self.moved_by:
+                assert self.zero_since, "no zero between two epochs"
+                assert write.epoch > self.moved_by, "an old epoch came back"
+            self.moved_by, self.zero_since = write.epoch, False
+        self.parted = len(self.bench.written)
 
     @invariant()
     def reports_can_be_believed(self):
@@ -489,8 +511,12 @@ class Motion(RuleBasedStateMachine):
             assert self.bench_key.url == URL
 
 
-full = os.environ.get("WEBMAP_FULL") == "1"
+TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "1"))
+"""As for the tests of whole processes: fifty are the full run."""
+
 Motion.TestCase.settings = settings(
-    max_examples=10_000 if full else 120, stateful_step_count=50, deadline=None
+    max_examples=10_000 if TRIALS >= 50 else 1000,
+    stateful_step_count=50,
+    deadline=None,
 )
-TestMotion = Motion.TestCase
+TestMotion = pytest.mark.timeout(1800)(Motion.TestCase)

@@ -1,0 +1,57 @@
+"""The bench of the state machine: as the gate's own, with the pace of the real shell.
+
+Thousands of schedules run on it, so it keeps what is asked for again and again instead
+of looking for it: the newest report, the writes of this instant.
+"""
+
+from dataclasses import dataclass, field
+
+from gate_harness import Bench
+
+from webmap.gate import events, messages
+from webmap.gate.process import IDLE_STEP, STEP
+
+BEAT = 0.05
+"""Seconds between two heartbeats of the display, and between two answers of a link."""
+
+
+@dataclass
+class PacedBench(Bench):
+    """A bench whose clock ticks as the shell's does: slower where nothing is driven."""
+
+    beat_at: float = float("-inf")
+    each_at: float = float("-inf")
+    newest: dict[str, messages.RobotReport] = field(default_factory=dict)
+    """The newest report of each robot."""
+
+    def run(self, seconds, each=None, step=STEP):
+        """Let time pass; ``each`` is called every 50 ms, before the gate's own step."""
+        end, self.each_at = self.now + seconds - 1e-6, float("-inf")
+        while self.now < end:
+            idle = each is None and not self.gate.busy
+            pace = max(step, IDLE_STEP) if idle else step
+            self.now += min(pace, end + 2e-6 - self.now)
+            if self.now >= self.beat_at + BEAT - 1e-6:
+                self.beat_at = self.now
+                if self.beating:
+                    self.tell(messages.Heartbeat())
+                if self.answering and self.up:
+                    self.tell(events.Alive(next(iter(self.gate._fleet._bases)).url))
+            if each is not None and self.now >= self.each_at + BEAT - 1e-6:
+                self.each_at = self.now
+                each()
+            self._do(self.gate.step(self.now))
+            while self.to_keep:
+                self.keep(self.to_keep.pop(0))
+
+    def _do(self, todo):
+        if todo:
+            super()._do(todo)
+
+    def report(self, robot="r1"):
+        """Return the newest report of a robot, of all that were said."""
+        for message in self.said:
+            if isinstance(message, messages.RobotReport):
+                self.newest[message.robot] = message
+        self.said.clear()
+        return self.newest[robot]
