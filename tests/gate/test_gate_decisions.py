@@ -232,13 +232,47 @@ class TestFreshness:
         assert bench.since(self.at) == []
         assert why in bench.refusals()[-1].why
 
-    def test_an_old_tick_is_refused(self, driving):
-        driving.drive(x=0.5, tick=driving.tick - 7)
-        self.refused(driving, "older than 300 ms")
+    @pytest.mark.parametrize("x", [0.5, 0.0])
+    @pytest.mark.parametrize(
+        ("tick", "why"), [(-7, "older than 300 ms"), (-4000, "another session")]
+    )
+    def test_an_old_tick_is_refused_and_zero_goes_at_once(self, driving, x, tick, why):
+        driving.drive(x=x, tick=driving.tick + tick)
+        assert [w.twist for w in driving.since(self.at - 0.001)] == [ZERO]
+        assert why in driving.refusals()[-1].why
+        assert driving.report().holder.connection == "a"
 
-    def test_a_tick_of_another_session_is_refused(self, driving):
-        driving.drive(x=0.5, tick=1)
-        self.refused(driving, "another session")
+    def test_after_an_old_tick_hands_must_be_seen_to_be_off(self, driving):
+        driving.drive(x=0.5, tick=driving.tick - 7)
+        driving.hold(1.0, x=1.0)
+        assert driving.moving_since(self.at) == []
+        driving.hold(0.3)
+        driving.hold(0.1, x=1.0)
+        assert driving.moving_since(self.at)
+
+    @pytest.mark.parametrize("stale", [{}, {"tick": 1}])
+    def test_no_stranger_stops_it_by_being_late(self, driving, stale):
+        old = driving.report().epoch - 1
+        driving.drive("b", x=0.5, **stale)
+        driving.drive("a", x=0.5, epoch=old, **stale)
+        driving.tell(messages.ProgramTwist("r1", old + 1, 1, (0.0, 0.0, 0.0)))
+        assert driving.since(self.at) == []
+        assert driving.state == "driving"
+
+    def test_a_goal_that_comes_late_stops_it_as_well(self, driving):
+        driving.goal(tick=driving.tick - 7)
+        assert driving.written[-1].twist == ZERO
+        assert driving.did(actions.SendGoal) == []
+
+    def test_hands_that_send_but_hear_nothing_are_stopped_like_silent_ones(
+        self, driving
+    ):
+        heard = driving.tick
+        driving.run(0.5, lambda: driving.drive(x=1.0, tick=heard))
+        zero = next(w for w in driving.since(self.at) if w.twist == ZERO)
+        # 200 ms from the last command that told of a new tick, which is the first.
+        assert zero.at - self.at <= 0.2 + 2 * 0.01 + 1e-9
+        assert driving.moving_since(zero.at) == []
 
     def test_a_seq_that_does_not_grow_is_refused(self, driving):
         driving.drive(x=0.5, seq=driving.seq)

@@ -1,5 +1,6 @@
 """The small parts that decide: ticks, leases, limits, dead-man, zeros, links."""
 
+import itertools
 import math
 
 import pytest
@@ -173,14 +174,16 @@ class TestLimits:
 
 
 class TestDeadMan:
+    ticks = itertools.count()
+
     def neutral_for(self, deadman, seconds, since=0.0):
         for n in range(round(seconds / 0.05) + 1):
-            deadman.accept(True, since + n * 0.05)
+            deadman.accept(True, next(self.ticks), since + n * 0.05)
 
     def test_holds_for_200_ms(self):
         deadman = DeadMan()
         assert deadman.expired(0.0)
-        deadman.accept(True, 1.0)
+        deadman.accept(True, next(self.ticks), 1.0)
         assert not deadman.expired(1.0 + DEADMAN - 1e-9)
         assert deadman.expired(1.0 + DEADMAN)
 
@@ -194,30 +197,43 @@ class TestDeadMan:
     def test_a_press_begins_the_200_ms_anew(self):
         deadman = DeadMan()
         self.neutral_for(deadman, 0.15)
-        deadman.accept(False, 0.2)
-        deadman.accept(True, 0.25)
+        deadman.accept(False, next(self.ticks), 0.2)
+        deadman.accept(True, next(self.ticks), 0.25)
         assert not deadman.armed
 
     def test_a_gap_begins_the_200_ms_anew(self):
         deadman = DeadMan()
-        deadman.accept(True, 0.0)
-        deadman.accept(True, 0.5)
+        deadman.accept(True, next(self.ticks), 0.0)
+        deadman.accept(True, next(self.ticks), 0.5)
         assert not deadman.armed
 
     def test_a_gap_disarms(self):
         deadman = DeadMan()
         self.neutral_for(deadman, 0.3)
         assert deadman.armed
-        deadman.accept(False, 1.0)
+        deadman.accept(False, next(self.ticks), 1.0)
         assert not deadman.armed
 
     def test_a_program_needs_no_neutral(self):
         deadman = DeadMan(needs_neutral=False)
-        deadman.accept(False, 0.0)
+        deadman.accept(False, next(self.ticks), 0.0)
         assert deadman.armed
         deadman.disarm()
-        deadman.accept(False, 1.0)
+        deadman.accept(False, next(self.ticks), 1.0)
         assert deadman.armed
+
+    def test_a_command_that_echoes_no_newer_tick_holds_no_longer(self):
+        deadman, tick = DeadMan(), next(self.ticks)
+        deadman.accept(True, tick, 1.0)
+        deadman.accept(True, tick, 1.1)
+        deadman.accept(True, tick - 1, 1.15)
+        assert deadman.expired(1.0 + DEADMAN)
+
+    def test_hands_that_hear_nothing_are_never_seen_to_be_off(self):
+        deadman, tick = DeadMan(), next(self.ticks)
+        for n in range(40):
+            deadman.accept(True, tick, n * 0.05)
+        assert not deadman.armed
 
 
 class TestBurst:

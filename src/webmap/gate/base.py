@@ -294,12 +294,13 @@ class Base:
 
     # Motion.
 
-    def drive(self, wanted: Twist, neutral: bool, now: float) -> str | None:
+    def drive(self, wanted: Twist, neutral: bool, tick: int, now: float) -> str | None:
         """Take in an accepted command of the lease's holder.
 
         Args:
             wanted: The velocity asked for, not yet limited.
             neutral: Whether every input is released.
+            tick: The tick that it echoes.
             now: The time.
 
         Returns:
@@ -311,7 +312,10 @@ class Base:
         if reason := self.doubt(now):
             self._fault(reason, now)
             return None if neutral else reason
-        self.deadman.accept(neutral, now)
+        self.deadman.accept(neutral, tick, now)
+        if self.deadman.expired(now):
+            self._lapse("the driver hears nothing", now)
+            return None if neutral else "no new tick has come to the driver"
         if self.test is not None and self.test.running:
             return self._go_on_with_test(self.test, lease, neutral, now)
         if neutral or not self.deadman.armed:
@@ -326,6 +330,13 @@ class Base:
         bounds = self._bounds()
         fitted = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
         self.motion.drive(self.guard.limit(fitted, now), lease, now)
+
+    def late(self, now: float) -> None:
+        """A command of the lease's holder came too late: that is doubt, so zero (S1).
+
+        Whatever it says, its way takes too long for anybody to drive by.
+        """
+        self._lapse("the driver's commands come too late", now)
 
     def begin_test(self, now: float) -> None:
         """Begin the stop test for the holder of the lease.

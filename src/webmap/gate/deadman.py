@@ -13,6 +13,9 @@ class DeadMan:
     A new dead-man is disarmed. It arms when every input was seen released for
     ``NEUTRAL`` seconds without a gap, and disarms on any doubt.
 
+    A command holds if it echoes a newer tick than the one before it did. So it is fed
+    by the whole loop: a hand that still sends but hears nothing feeds it no longer.
+
     Args:
         needs_neutral: A hand on a stick or a key may be held through an outage, so it
             must be seen released. A program's call is an act of its own each time;
@@ -25,6 +28,7 @@ class DeadMan:
         self._needs_neutral = needs_neutral
         self._neutral_since: float | None = None
         self._accepted_at: float | None = None
+        self._tick = -1
 
     @property
     def expires_at(self) -> float:
@@ -39,11 +43,19 @@ class DeadMan:
         """Return whether no accepted command holds at ``now``."""
         return now >= self.expires_at
 
-    def accept(self, neutral: bool, now: float) -> None:
-        """Count an accepted command; ``neutral`` says that every input is released."""
+    def accept(self, neutral: bool, tick: int, now: float) -> None:
+        """Count an accepted command.
+
+        Args:
+            neutral: Whether every input is released.
+            tick: The tick that it echoes.
+            now: The time.
+
+        """
         if self.expired(now) and self._needs_neutral:
             self.disarm()
-        self._accepted_at = now
+        if tick > self._tick:
+            self._tick, self._accepted_at = tick, now
         if not neutral:
             self._neutral_since = None
         elif self._neutral_since is None:

@@ -94,6 +94,7 @@ class Gate:
             self._goals_lost()
         self._fleet.step(now)
         self._answer_takes(now)
+        self._people.count(now)
         tick = self._ticks.issue(now)
         if tick is not None:
             self._out.append(Say(messages.Tick(tick, self._people.acks)))
@@ -282,7 +283,11 @@ class Gate:
         """
         base = self._fleet.find(robot)
         check_lease(base.lease, connection.id, epoch)
-        return base, self._ticks.check(tick, now)
+        try:
+            return base, self._ticks.check(tick, now)
+        except Refusal:
+            base.late(now)  # after the lease was checked: no stranger's word stops it
+            raise
 
     def _licensed(
         self, connection: Connection, command: Drive | Goal, now: float
@@ -303,7 +308,7 @@ class Gate:
             log.warning("connection %s asks for more than full speed", connection.id)
         speed = base.speed
         wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
-        if reason := base.drive(wanted, drive.neutral, now):
+        if reason := base.drive(wanted, drive.neutral, drive.tick, now):
             raise Refusal(reason)
 
     # The program's road.
@@ -367,7 +372,7 @@ class Gate:
             base, age = self._checked(program, robot, message.epoch, message.tick, now)
             base.ages.add(age, now)
             twist = Twist(*_finite(message.velocity))
-            if reason := base.drive(twist, twist.is_zero, now):
+            if reason := base.drive(twist, twist.is_zero, message.tick, now):
                 raise Refusal(reason)
 
         self._attempt(program, robot, "drive", drive, now)
