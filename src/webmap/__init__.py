@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from webmap.core.layer import Layer
     from webmap.core.map import Map
     from webmap.core.page import Page
+    from webmap.core.refused import refusals
     from webmap.core.registry import Namespace
     from webmap.core.robot import Robot
     from webmap.errors import WebMapError
@@ -55,6 +56,7 @@ __all__ = [
     "html",
     "modules",
     "page",
+    "refusals",
     "run",
     "start",
     "stop",
@@ -80,6 +82,7 @@ _HOMES = {
     "html": "webmap.scene.html",
     "modules": "webmap.modules",
     "page": "webmap.server.application:page",
+    "refusals": "webmap.core.refused:refusals",
     "run": "webmap.server.application:run",
     "start": "webmap.server.application:start",
     "stop": "webmap.server.application:stop",

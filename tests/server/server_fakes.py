@@ -59,6 +59,7 @@ class FakeModel:
     def __init__(self) -> None:
         self.scenes: list[FakeScene] = []
         self.drives: list[tuple[str, str, DriveConnection]] = []
+        self.refusals: list[tuple[str, str]] = []
 
     def open_scene(
         self, entry_path: str, page_id: str, viewer: Viewer, outbox: Outbox
@@ -72,6 +73,9 @@ class FakeModel:
 
     def drive_closed(self, page_id, viewer, connection) -> None:
         self.drives.append(("closed", page_id, connection))
+
+    def refused(self, viewer, why) -> None:
+        self.refusals.append((viewer.name, why))
 
 
 @dataclass

@@ -13,6 +13,7 @@ from webmap.console.bridge_list import BridgeList
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
+from webmap.console.refused import RefusedList
 from webmap.console.robot_card import RobotCard
 from webmap.console.robot_list import RobotList
 
@@ -85,8 +86,9 @@ def build(
     listed = map.add_module(RobotList, page.element("robots"))
     card = map.add_module(RobotCard, page.element("card"), goals)
     links = BridgeList(page.element("bridges"), bridges)
+    refused = RefusedList(page.element("refused"), page.viewer.role)
     task = asyncio.get_running_loop().create_task(
-        poll_on([frame.place, listed.poll, card.poll, links.poll])
+        poll_on([frame.place, listed.poll, card.poll, links.poll, refused.poll])
     )
     page.on_close(task.cancel)
 

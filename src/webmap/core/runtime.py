@@ -8,12 +8,14 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap.core.motion import MotionRoad, roads
+from webmap.core.refused import refusals
 from webmap.core.robot import robots
 from webmap.core.tasks import spawn
-from webmap.gate.messages import Report, RobotReport, SentGoal, SentTwist
+from webmap.gate.messages import RefusedCount, Report, RobotReport, SentGoal, SentTwist
 from webmap.geometry import Quaternion
 from webmap.lifecycle import lifecycle
 from webmap.scope import Removal
@@ -161,6 +163,10 @@ class Runtime:
             await asyncio.sleep(max(0.0, due - loop.time()))
 
     def _heard(self, report: Report) -> None:
+        if isinstance(report, RefusedCount):
+            now = datetime.now(UTC)
+            refusals.note(report.by, report.count, report.last, now)
+            return
         name = getattr(report, "robot", None)
         robot = None if name is None else robots.get(name)
         if robot is None:

@@ -338,7 +338,9 @@ class GateClient:
             case messages.Ready():
                 self._ready = True
                 self._report(messages.GateUp())
-            case messages.SentTwist() | messages.SentGoal():
+            case (
+                messages.SentTwist() | messages.SentGoal() | messages.RefusedCount()
+            ):
                 self._report(message)
 
     def _hear_robot(self, report: messages.RobotReport) -> None:

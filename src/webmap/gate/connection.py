@@ -3,7 +3,7 @@
 from collections import deque
 
 from webmap.gate.limits import Cap
-from webmap.gate.messages import PROGRAM, Role
+from webmap.gate.messages import PROGRAM, RefusedCount, Role
 
 GARBAGE_LIMIT = 20
 """Senseless messages in a second at which a connection is closed (S10)."""
@@ -13,6 +13,9 @@ FLOOD_LIMIT = 400
 
 A page that was cut off for some seconds may rightly deliver a few hundred at once.
 """
+
+COUNT_EVERY = 1.0
+"""Seconds between two counts of what was refused."""
 
 QUIET = 1.0
 """Seconds for which the same refusal is not said again."""
@@ -58,6 +61,9 @@ class Connection:
         self.closing = False
         self.flagged = False
         """Whether it was logged that this page asks for more than full speed."""
+        self._refused = 0
+        self._last_refused = ""
+        self._counted_at = float("-inf")
         self._told: dict[tuple[str | None, str, str], float] = {}
 
     @property
@@ -68,6 +74,24 @@ class Connection:
     def set_speeds(self, v: float, w: float) -> None:
         """Take over what the page's ``Teleop`` asks for; nonsense means standstill."""
         self.cap = Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, self.cap.why)
+
+    def note_refused(self, what: str, why: str) -> None:
+        """Count a message that was refused."""
+        self._refused += 1
+        self._last_refused = f"{what}: {why}"
+
+    def count_refused(self, now: float) -> RefusedCount | None:
+        """Return what was refused since the last count, if there is something to say.
+
+        Args:
+            now: Seconds, monotonic; infinity for the last count of all.
+
+        """
+        if not self._refused or now - self._counted_at < COUNT_EVERY:
+            return None
+        count = RefusedCount(self.name, self._refused, self._last_refused)
+        self._refused, self._counted_at = 0, now
+        return count
 
     def news(self, robot: str | None, what: str, why: str, now: float) -> bool:
         """Return whether a refusal is worth saying, or was said just now."""

@@ -18,6 +18,10 @@ Role = Literal["viewer", "operator", "admin"]
 Velocity = tuple[float, float, float]
 """Forward, left and counter-clockwise."""
 
+Way = Literal["topic", "navigate_to_pose", "move_base"]
+"""How goals are sent: as PoseStamped on a topic, by the action of ROS 2, or by that of
+ROS 1."""
+
 
 class RobotSpec(
     msgspec.Struct, frozen=True, kw_only=True, tag="declare", omit_defaults=True
@@ -56,11 +60,18 @@ class RobotSpec(
     cancel_topic: str | None = None
     """Where an empty ``actionlib_msgs/GoalID`` cancels every goal."""
     action: str | None = None
-    """A ``NavigateToPose`` action: goals go to it if there is no ``goal_topic``,
-    and its cancel service is called in any case."""
+    """An action of the type below: it gets the goals, and is told to cancel them. The
+    ``goal_topic`` is then for bridges that take no goals of actions."""
     action_type: str = "nav2_msgs/action/NavigateToPose"
+    """``NavigateToPose`` of ``nav2_msgs``, or ``move_base_msgs/MoveBaseAction``."""
     on_operator_loss: Literal["continue", "cancel"] = "continue"
     """What becomes of a goal when the page (or program) that gave it is lost."""
+    pose_topic: str | None = None
+    """Where a ``PoseWithCovarianceStamped`` tells the robot where it is; on the bridge
+    of the goals, in their frame."""
+    pose_type: str = "geometry_msgs/PoseWithCovarianceStamped"
+    pose_covariance: tuple[float, float, float] = (0.25, 0.25, 0.068)
+    """How sure a person is of it: the variances of x and y in m², of yaw in rad²."""
     assist: AssistSpec | None = None
     """How the robot is slowed down before what its scanner sees; off without it."""
     stop_hooks: tuple[dict[str, str], ...] = ()
@@ -151,6 +162,15 @@ class ProgramMove(msgspec.Struct, frozen=True, tag="program-move"):
     pose: tuple[float, float, float]
 
 
+class ProgramLocate(msgspec.Struct, frozen=True, tag="program-locate"):
+    """From Python: where the robot is, in metres and radians in its goal frame."""
+
+    robot: str
+    epoch: int
+    tick: int
+    pose: tuple[float, float, float]
+
+
 class ProgramCancel(msgspec.Struct, frozen=True, tag="program-cancel"):
     """Python cancels the robot's goals; needs no lease."""
 
@@ -171,6 +191,7 @@ ToGate = (
     | ProgramRelease
     | ProgramTwist
     | ProgramMove
+    | ProgramLocate
     | ProgramCancel
 )
 
@@ -229,6 +250,39 @@ class TestReport(msgspec.Struct, frozen=True):
     text: str
 
 
+class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
+    """How it stands with the newest goal; what the robot does not say is ``None``."""
+
+    id: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+    """The connection that sent it."""
+    way: Way
+    state: Literal[
+        "sent",
+        "accepted",
+        "under way",
+        "cancelling",
+        "unknown",
+        "reached",
+        "failed",
+        "cancelled",
+    ]
+    """``unknown``: what told how it goes was lost, and the robot may go on."""
+    why: str = ""
+    """Why it is so, in words."""
+    left: float | None = None
+    """Metres to go; along the path, or as the crow flies where move_base tells."""
+    time: float | None = None
+    """Seconds under way."""
+    eta: float | None = None
+    """Seconds to go."""
+    recoveries: int | None = None
+    """How often the robot had to free itself."""
+
+
 class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Everything a page shows about a robot's motion."""
 
@@ -276,6 +330,14 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     armable: bool
     reason: str | None
     """Why the robot cannot be taken or moved now, in words."""
+    way: Way | None = None
+    """How goals are sent to it, ``None`` if none can be."""
+    cancels: bool = False
+    """Whether they can be called off."""
+    locates: bool = False
+    """Whether it can be told where it is."""
+    goal: GoalReport | None = None
+    """The newest goal of this gate, also when it has ended."""
 
 
 class RobotGone(msgspec.Struct, frozen=True, tag="gone"):
@@ -291,6 +353,17 @@ class Refused(msgspec.Struct, frozen=True, tag="refused"):
     robot: str | None
     what: str
     why: str
+
+
+class RefusedCount(msgspec.Struct, frozen=True, tag="refused-count"):
+    """How much of what somebody sent was refused since that was last counted."""
+
+    by: str
+    """Who sent it, for people."""
+
+    count: int
+    last: str
+    """What was refused last, and why."""
 
 
 class CloseConnection(msgspec.Struct, frozen=True, tag="close"):
@@ -330,6 +403,16 @@ class SentGoal(msgspec.Struct, frozen=True, tag="sent-goal"):
     by: str
 
 
+class SentPose(msgspec.Struct, frozen=True, tag="sent-pose"):
+    """The robot was told where it is."""
+
+    robot: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+
+
 class GateUp(msgspec.Struct, frozen=True, tag="up"):
     """The gate's process runs (made by the client)."""
 
@@ -347,10 +430,21 @@ FromGate = (
     | RobotReport
     | RobotGone
     | Refused
+    | RefusedCount
     | CloseConnection
     | TakeReply
     | SentTwist
     | SentGoal
+    | SentPose
 )
 
-Report = RobotReport | RobotGone | Refused | SentTwist | SentGoal | GateUp | GateDown
+Report = (
+    RobotReport
+    | RobotGone
+    | Refused
+    | RefusedCount
+    | SentTwist
+    | SentGoal
+    | GateUp
+    | GateDown
+)

@@ -46,14 +46,31 @@ class People:
 
     def remove(self, id: str) -> bool:
         """Forget a page; return whether there was one."""
-        return self._all.pop(id, None) is not None
+        connection = self._all.pop(id, None)
+        if connection is None:
+            return False
+        self._count(connection, float("inf"))
+        return True
+
+    def count(self, now: float) -> None:
+        """Tell the display how much was refused; now and then is enough."""
+        for connection in self._all.values():
+            self._count(connection, now)
+
+    def _count(self, connection: Connection, now: float) -> None:
+        count = connection.count_refused(now)
+        if count is not None:
+            self._emit(Say(count))
 
     def refuse(
         self, id: str, robot: str | None, what: str, why: str, now: float
     ) -> None:
         """Tell somebody that a command was not taken; not twice in a second."""
         connection = self._all.get(id)
-        if connection is not None and connection.news(robot, what, why, now):
+        if connection is None:
+            return
+        connection.note_refused(what, why)
+        if connection.news(robot, what, why, now):
             self._emit(Say(Refused(id, robot, what, why)))
 
     def close(self, connection: Connection, why: str) -> None:

@@ -58,7 +58,9 @@ class DriveSockets:
             return
         try:
             self._model.drive_opened(page_id, viewer, connection)
-            await line.run(connection.receive)
+            await line.run(
+                connection.receive, lambda why: self._model.refused(viewer, why)
+            )
         finally:
             # The gate first: with the connection its leases end and robots stop.
             connection.close()

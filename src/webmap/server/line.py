@@ -68,16 +68,19 @@ class Line:
             COME_BACK, "this server takes no more pages now: close one, or come back"
         )
 
-    async def run(self, on_text: Callable[[str], None]) -> None:
+    async def run(
+        self, on_text: Callable[[str], None], on_broken: Callable[[str], None]
+    ) -> None:
         """Carry messages both ways until either side ends the socket.
 
         Args:
             on_text: Called with each text message that is within the bounds.
+            on_broken: Called with what is wrong with one that is not; it is the last.
 
         """
         # The third waits for an end that comes while the other two are stuck.
         tasks = [
-            asyncio.create_task(self._read(on_text)),
+            asyncio.create_task(self._read(on_text, on_broken)),
             asyncio.create_task(self._write()),
             asyncio.create_task(self._over.wait()),
         ]
@@ -105,21 +108,26 @@ class Line:
             self._ended = (code, reason)
             self._over.set()
 
-    async def _read(self, on_text: Callable[[str], None]) -> None:
+    async def _read(
+        self, on_text: Callable[[str], None], on_broken: Callable[[str], None]
+    ) -> None:
         while self._ended is None:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":
                 self._gone = True
                 return
             text = message.get("text")
-            if text is None:
-                self._end(BROKEN_RULE, "a binary message; only text is taken")
-                return
-            broken = self._allowance.spend(text, time.monotonic())
+            broken = self._broken(text)
             if broken is not None:
+                on_broken(broken)
                 self._end(BROKEN_RULE, broken)
                 return
             on_text(text)
+
+    def _broken(self, text: str | None) -> str | None:
+        if text is None:
+            return "a binary message; only text is taken"
+        return self._allowance.spend(text, time.monotonic())
 
     async def _write(self) -> None:
         while True:

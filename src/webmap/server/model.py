@@ -9,9 +9,11 @@ import inspect
 import logging
 import time
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from typing import Any, Protocol
 
 from webmap.core.page import Page, PageEntry, Publisher
+from webmap.core.refused import refusals
 from webmap.core.runtime import Runtime
 from webmap.core.tasks import spawn
 from webmap.core.view import Rect
@@ -99,6 +101,7 @@ class PageHost:
             events = self._session.receive(text)
         except WireError as error:
             log.warning("%r: %s", self, error)
+            self._model.count_refused(self.viewer, f"page: {error}")
             return
         for event in events:
             self._hear(event)
@@ -289,7 +292,16 @@ class Model:
         if self.runtime.running:
             self.runtime.call(self._drive_closed, (page_id, viewer.id), connection)
 
+    def refused(self, viewer: Viewer, why: str) -> None:
+        """Count a message whose socket is ended for it."""
+        if self.runtime.running:
+            self.runtime.call(self.count_refused, viewer, f"socket: {why}")
+
     # In the model's thread.
+
+    def count_refused(self, viewer: Viewer, last: str) -> None:
+        """Count a message of a page that was not taken."""
+        refusals.note(viewer.name, 1, last, datetime.now(UTC))
 
     def host(self, key: tuple[str, str, str], viewer: Viewer) -> PageHost:
         """Return the page of that key: the one that was kept, or a new one."""

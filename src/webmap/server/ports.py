@@ -87,6 +87,9 @@ class Model(Protocol):
     ) -> None:
         """Note that this connection is gone; another may have replaced it before."""
 
+    def refused(self, viewer: Viewer, why: str) -> None:
+        """Count a message whose socket is ended for it."""
+
 
 class Gate(Protocol):
     """What takes commands to the process that alone may move robots."""

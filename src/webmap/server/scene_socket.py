@@ -71,6 +71,6 @@ class SceneSockets:
             await line.refuse(FAILED, "the page could not be opened; the log says why")
             return
         try:
-            await line.run(handle.receive)
+            await line.run(handle.receive, lambda why: self._model.refused(viewer, why))
         finally:
             handle.closed()

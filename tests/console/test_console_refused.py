@@ -1,0 +1,35 @@
+"""What was refused is there to be seen."""
+
+import pytest
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.browser
+
+SEND = """([path, texts]) => new Promise((resolve) => {
+  const socket = new WebSocket(new URL(path, location.href.replace(/^http/, "ws")));
+  socket.onopen = () => {
+    for (const text of texts) socket.send(text);
+    socket.close();
+  };
+  socket.onclose = ({ code }) => resolve(code);
+})"""
+
+
+def test_refused_messages_are_counted_with_who_sent_them_and_why(open_console):
+    page = open_console()
+    refused = page.locator("#refused")
+    expect(refused.locator("summary")).to_be_hidden()
+    page.evaluate(SEND, ["_webmap/drive", ['{"op":"drive","v":NaN}'] * 9])
+    expect(refused.locator("summary")).to_have_text("9 refused")
+    refused.locator("summary").click()
+    line = refused.locator("li")
+    expect(line).to_have_count(1)
+    expect(line).to_contain_text("9, last at")
+    expect(line.locator(".refused-last")).to_contain_text("NaN")
+    binary = (
+        "(path) => { const s = new WebSocket(new URL(path, location.href"
+        ".replace(/^http/, 'ws'))); s.onopen = () => s.send(new Uint8Array(3)); }"
+    )
+    page.evaluate(binary, "_webmap/drive")
+    expect(refused.locator("summary")).to_have_text("10 refused")
+    expect(line.locator(".refused-last")).to_contain_text("a binary message")

@@ -1,0 +1,28 @@
+"""Refused messages, counted for people."""
+
+from datetime import UTC, datetime
+
+from webmap.core.refused import MOST, Refusals
+
+AT = datetime(2026, 11, 21, 17, 0, tzinfo=UTC)
+
+
+def test_everybody_has_one_line_the_last_first():
+    refusals = Refusals()
+    refusals.note("Ann", 3, "drive: too old", AT)
+    refusals.note("Ben", 1, "command: no JSON", AT)
+    refusals.note("Ann", 2, "take: Ben drives it", AT)
+    assert [(row.by, row.count, row.last) for row in refusals.rows] == [
+        ("Ann", 5, "take: Ben drives it"),
+        ("Ben", 1, "command: no JSON"),
+    ]
+    assert refusals.total == 6
+
+
+def test_many_people_are_counted_and_a_part_of_them_remembered():
+    refusals = Refusals()
+    for number in range(MOST + 7):
+        refusals.note(f"viewer {number}", 1, "command: no JSON", AT)
+    assert refusals.total == MOST + 7
+    assert len(refusals.rows) == MOST
+    assert refusals.rows[0].by == f"viewer {MOST + 6}"
