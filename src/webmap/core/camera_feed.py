@@ -1,0 +1,96 @@
+"""What everything has that shows the pictures of a camera to whoever watches."""
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from webmap.core.pictures import pictures
+from webmap.scope import Removable, Removal, keep
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+AGE_LIMIT = 1.0
+"""Seconds after which a picture is old."""
+
+_KEPT = 3
+"""Pictures that may be asked for: pages that lag still ask for the ones before."""
+
+
+class CameraFeed:
+    """The newest picture of one camera, and who watches it.
+
+    One that is derived from this says in ``begin`` and ``end`` how its pictures come,
+    and hands each to :meth:`show`. They come only while somebody watches, and once
+    for all who do.
+
+    Args:
+        robot: The robot that carries the camera.
+        name: What people call the camera.
+
+    """
+
+    def __init__(self, robot: "Robot", name: str) -> None:
+        self.robot = robot
+        self.name = name
+        self.url: str | None = None
+        """Where pages find the newest picture; None until there is one."""
+        self.stamp: float | None = None
+        """When it came, in monotonic seconds."""
+        self._watchers: dict[object, Callable[[], None]] = {}
+        self._urls: list[str] = []
+
+    def begin(self) -> None:
+        """Have pictures come: somebody watches now."""
+        raise NotImplementedError
+
+    def end(self) -> None:
+        """Have no more pictures come: nobody watches any more."""
+        raise NotImplementedError
+
+    def destroy(self) -> None:
+        """Take the pictures away."""
+        if self._watchers:
+            self._watchers.clear()
+            self._finish()
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody watches, so that pictures come."""
+        return bool(self._watchers)
+
+    def watch(self, fn: Callable[[], None]) -> Removable:
+        """Call ``fn`` whenever there is another picture.
+
+        Returns:
+            What ends it; the end of the current scope does, too.
+
+        """
+        key = object()
+        first = not self._watchers
+        self._watchers[key] = fn
+        if first:
+            self.begin()
+
+        def undo() -> None:
+            if self._watchers.pop(key, None) is not None and not self._watchers:
+                self._finish()
+
+        return keep(Removal(undo))
+
+    def show(self, data: bytes, media_type: str) -> None:
+        """Show a picture to everybody who watches, in place of the one before."""
+        self.url = pictures.publish(data, media_type)
+        self.stamp = time.monotonic()
+        self._urls.append(self.url)
+        while len(self._urls) > _KEPT:
+            pictures.withdraw(self._urls.pop(0))
+        for fn in tuple(self._watchers.values()):
+            fn()
+
+    def _finish(self) -> None:
+        self.end()
+        self.robot.clear_problem(self)
+        while self._urls:
+            pictures.withdraw(self._urls.pop())
+        self.url = self.stamp = None

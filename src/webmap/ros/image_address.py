@@ -1,0 +1,88 @@
+"""Where a camera is on the web, as a person wrote it."""
+
+import base64
+from dataclasses import dataclass
+from urllib.parse import unquote, urlsplit
+
+from webmap.errors import ConfigError
+
+EXAMPLE = "http://robot.local:8080/stream?topic=/camera/image_raw&type=mjpeg"
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A checked address: where to connect to, and what to ask for."""
+
+    host: str
+    port: int
+    tls: bool
+    target: str
+    """The path and the query, as they stand in a request."""
+    shown: str
+    """The address as people may see it: without what may be secret in it."""
+    authorization: str = ""
+    """The value of the header of that name, if a user was given."""
+
+    @property
+    def request(self) -> bytes:
+        """The request for it.
+
+        It is one of HTTP/1.0, to which no server answers in chunks.
+        """
+        name = f"[{self.host}]" if ":" in self.host else self.host
+        lines = [
+            f"GET {self.target} HTTP/1.0",
+            f"Host: {name}:{self.port}",
+            "Accept: multipart/x-mixed-replace, image/*",
+            "User-Agent: WebMap",
+            "Connection: close",
+        ]
+        if self.authorization:
+            lines.append(f"Authorization: {self.authorization}")
+        return "\r\n".join([*lines, "", ""]).encode("ascii")
+
+
+def parse_address(text: str) -> Address:
+    """Return the address of a camera.
+
+    Args:
+        text: ``http://`` or ``https://``, a host, and what follows; a user and a
+            password may stand before the host.
+
+    Raises:
+        ConfigError: If it is anything else.
+
+    """
+    if not isinstance(text, str) or not text.isascii() or not text.isprintable():
+        raise ConfigError(f"{_MEANT}; write what is not ASCII with %, got {text!r}")
+    try:
+        parts = urlsplit(text)
+        port = parts.port
+    except ValueError:
+        raise ConfigError(f"{_MEANT}, got {_without_user(text)!r}") from None
+    tls = parts.scheme == "https"
+    if parts.scheme not in ("http", "https") or not parts.hostname or " " in text:
+        raise ConfigError(f"{_MEANT}, got {_without_user(text)!r}")
+    target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+    authorization = ""
+    if parts.username is not None:
+        pair = f"{unquote(parts.username)}:{unquote(parts.password or '')}"
+        authorization = f"Basic {base64.b64encode(pair.encode()).decode()}"
+    return Address(
+        parts.hostname,
+        port if port is not None else (443 if tls else 80),
+        tls,
+        target,
+        _without_user(text).partition("?")[0].partition("#")[0],
+        authorization,
+    )
+
+
+_MEANT = f"the address of a camera begins with http:// or https://, as {EXAMPLE}"
+
+
+def _without_user(text: str) -> str:
+    """Return an address without what stands before the host."""
+    scheme, slashes, rest = text.partition("://")
+    host, slash, path = rest.partition("/")
+    return scheme + slashes + host.rpartition("@")[2] + slash + path
