@@ -30,14 +30,31 @@ from webmap.cli.options import verbose_option
     help="Ask rosapi for a parameter of rosbridge too, which tells whether a service "
     "that hangs blocks its socket.",
 )
+@click.option(
+    "--stop-test",
+    metavar="ROBOT",
+    help="Instead, have this robot creep and see whether it stops by itself: it MOVES. "
+    "The exit code is 0 if it stops, 1 if not, 2 if nothing was found out.",
+)
+@click.option("--yes", is_flag=True, help="With --stop-test: move without asking.")
 @verbose_option
 def doctor(
-    url: tuple[str, ...], seconds: float, wait: float, ask_parameters: bool
+    url: tuple[str, ...],
+    seconds: float,
+    wait: float,
+    ask_parameters: bool,
+    stop_test: str | None,
+    yes: bool,
 ) -> None:
     """Look at a rosbridge and the robots behind it, and say what to do.
 
-    Nothing is driven, published or changed. The exit code is 1 if anything is wrong.
+    Nothing is driven, published or changed, unless --stop-test is given. The exit code
+    is 1 if anything is wrong.
     """
+    if stop_test is not None:
+        from webmap.cli.stop_test import find_out
+
+        sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
     from webmap.discovery.doctor import is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report

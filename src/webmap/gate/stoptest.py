@@ -30,6 +30,9 @@ MOVES = 0.05
 WAIT_FOR = 3.0
 """Seconds after the last command for which a base is waited for."""
 
+MOVES_ON = f"it did not stop by itself within {WAIT_FOR:g} s"
+"""What is said of a base that has no timeout of its own."""
+
 State = Literal["creeping", "waiting", "done", "failed"]
 
 
@@ -81,7 +84,7 @@ class StopTest:
         if self.state == "creeping" and now - self._began_at >= CREEP_FOR:
             self.abort(f"it did not move within {CREEP_FOR:g} s")
         elif self.state == "waiting" and now - self._left_alone_at >= WAIT_FOR:
-            self.abort(f"it did not stop by itself within {WAIT_FOR:g} s")
+            self.abort(MOVES_ON)
             self.concluded = True
 
     def abort(self, why: str) -> None:
