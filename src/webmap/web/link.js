@@ -9,6 +9,7 @@ const FOR_GOOD = new Set([1008, 4001]);
  * @property {() => void} opened
  * @property {(data: ArrayBuffer) => void} received
  * @property {(reason: string, forGood: boolean) => void} closed
+ * @property {() => void} refused It was not even opened; `closed` has been called.
  */
 
 /** A WebSocket that comes back by itself; what cannot be sent now is not sent. */
@@ -65,13 +66,21 @@ export class Link {
     const socket = new WebSocket(this._address());
     this._socket = socket;
     socket.binaryType = "arraybuffer";
-    socket.addEventListener("open", () => this._events.opened());
+    let opened = false;
+    socket.addEventListener("open", () => {
+      opened = true;
+      this._events.opened();
+    });
     socket.addEventListener("message", ({ data }) => {
       if (this._socket === socket && data instanceof ArrayBuffer) {
         this._events.received(data);
       }
     });
-    socket.addEventListener("close", ({ code, reason }) => this._lost(socket, reason, code));
+    socket.addEventListener("close", ({ code, reason }) => {
+      const current = this._socket === socket;
+      this._lost(socket, reason, code);
+      if (current && !opened) this._events.refused();
+    });
   }
 
   /**

@@ -57,6 +57,7 @@ export class Page {
       opened: () => this._opened(),
       received: (data) => this._received(data),
       closed: (reason, forGood) => this._closed(reason, forGood),
+      refused: () => void this._askWhy(),
     });
     setInterval(() => this._look(), LOOK_PERIOD);
   }
@@ -134,6 +135,20 @@ export class Page {
     this._frames = [];
     const what = reason ? `No connection to the server: ${reason}.` : "No connection to the server.";
     this._disconnected(`${what} ${forGood ? "Reload the page." : "Trying again…"}`);
+  }
+
+  /** A browser does not tell a page why its socket was refused; the page's own address does. */
+  async _askWhy() {
+    try {
+      const { status } = await fetch(location.href, { method: "HEAD", cache: "no-store" });
+      if (status !== 401 || this._link.isOpen) return;
+      this._disconnected(
+        "WebMap was started anew and does not know this browser any more. " +
+          "Open the address that it printed when it started.",
+      );
+    } catch {
+      // There is no server, which is what the notice says already.
+    }
   }
 
   /** @param {string} text */

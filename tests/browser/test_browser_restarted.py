@@ -1,0 +1,37 @@
+"""A page that is open while WebMap is started anew says what has become of it."""
+
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import expect
+from processes import WEB, running
+
+pytestmark = pytest.mark.browser
+
+SCRIPT = """
+import webmap
+
+@webmap.page("/")
+def main(page):
+    webmap.Map(page.element("webmap_container"))
+
+webmap.run()
+"""
+
+
+def test_a_page_whose_token_is_of_the_past_is_told_to_open_the_new_address(
+    tab, tmp_path
+):
+    tab.allowed += ["WebSocket", "ERR_CONNECTION", "401", "403"]
+    script = tmp_path / "page.py"
+    script.write_text(SCRIPT)
+    command = ("run", script, "--no-browser", "--port")
+    status = tab.get_by_role("status")
+    with running(*command, 0, pattern=WEB) as first:
+        tab.goto(first.url)
+        tab.wait_for_selector("svg.webmap")
+    expect(status).to_contain_text("No connection to the server")
+    with running(*command, urlsplit(first.url).port, pattern=WEB) as second:
+        expect(status).to_contain_text("Open the address that it printed")
+        tab.goto(second.url)
+        expect(status).to_be_hidden()
