@@ -1,0 +1,30 @@
+"""A real ROS 2 graph for the tests, where one can be installed."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import real_ros
+from playwright.sync_api import Browser, Page
+
+from real_browser import watched_tab
+
+# The helpers that run our commands and read what is drawn are shared.
+sys.path.append(str(Path(__file__).parents[1] / "browser"))
+
+
+@pytest.fixture(scope="module")
+def ros() -> Iterator[real_ros.Ros]:
+    """A robot, and a rosbridge without rosapi in front of it."""
+    about, why = real_ros.installed()
+    if about is None:
+        pytest.skip(f"no real ROS here: {why}")
+    with real_ros.running(about) as graph:
+        yield graph
+
+
+@pytest.fixture
+def tab(chromium: Browser) -> Iterator[Page]:
+    with watched_tab(chromium, 1200, 800) as page:
+        yield page

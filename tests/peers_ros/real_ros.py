@@ -1,0 +1,146 @@
+"""Starts a real ROS 2 graph, and in front of it a rosbridge that is not ours."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+FOLDER = Path(sys.prefix) / "ros"
+"""Beside the tests' own environment, with which it goes."""
+
+CANNOT = 3
+
+
+def installed():
+    """Install ROS unless it is there; return what is where, or why it cannot be."""
+    done = subprocess.run(
+        [sys.executable, ROOT / "tools" / "make_ros.py", FOLDER],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode == CANNOT:
+        return None, done.stdout.strip()
+    assert done.returncode == 0, done.stderr
+    return json.loads((FOLDER / "about.json").read_text()), ""
+
+
+class Twist(NamedTuple):
+    """A velocity that reached the robot."""
+
+    speed: float
+    turn: float
+    at: float
+    """When, on the monotonic clock, which all processes here share."""
+
+    pose: tuple[float, float, float]
+    """Where the robot was then: x, y, yaw."""
+
+    @property
+    def is_zero(self):
+        return (self.speed, self.turn) == (0.0, 0.0)
+
+
+class Program:
+    """A program of ROS, and each line that it said."""
+
+    def __init__(self, command, environment):
+        self.lines = []
+        self.popen = subprocess.Popen(
+            [str(part) for part in command],
+            env={**os.environ, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self):
+        for line in self.popen.stdout:
+            self.lines.append(line)
+
+    def wait_for(self, pattern, within=20.0):
+        """Return the match in the first line that has one."""
+        deadline = time.monotonic() + within
+        while time.monotonic() < deadline:
+            for line in list(self.lines):
+                if match := re.search(pattern, line):
+                    return match
+            assert self.popen.poll() is None, "".join(self.lines)
+            time.sleep(0.02)
+        raise AssertionError(f"never said {pattern!r}, but:\n{''.join(self.lines)}")
+
+    def end(self, sig=signal.SIGINT):
+        self.popen.send_signal(sig)
+        try:
+            self.popen.wait(10)
+        except subprocess.TimeoutExpired:
+            self.popen.kill()
+            self.popen.wait()
+        self._reader.join(10)
+        self.popen.stdout.close()
+
+
+class Ros:
+    """One ROS graph with a robot, and its rosbridge."""
+
+    def __init__(self, about):
+        self._about = about
+        # Another domain for each process, so that runs side by side stay apart.
+        domain = str(os.getpid() % 100 + 1)
+        self._environment = {**about["environment"], "ROS_DOMAIN_ID": domain}
+        python = FOLDER / "bin" / "python"
+        self.graph = Program([python, HERE / "ros_graph.py"], self._environment)
+        self.bridge = None
+        self._port = 0
+
+    @property
+    def url(self):
+        return f"ws://127.0.0.1:{self._port}"
+
+    def start_bridge(self):
+        """Start the rosbridge; again at the port that it had."""
+        self.graph.wait_for("ready")
+        self.bridge = Program(
+            [self._about["bridge"], "--bind", f"127.0.0.1:{self._port}", "--no-rosapi",
+             "--log-ansi", "false", "--log-directory", FOLDER / "log"],
+            # ROS's libraries expect to be loaded by a Python.
+            {**self._environment, "LD_PRELOAD": self._about["library"]},
+        )  # fmt: skip
+        found = self.bridge.wait_for(r"listening address=127\.0\.0\.1:(\d+)")
+        self._port = int(found[1])
+
+    def kill_bridge(self):
+        self.bridge.end(signal.SIGKILL)
+        self.bridge = None
+
+    def twists(self):
+        """Each velocity that reached the robot, in order."""
+        told = [json.loads(line) for line in list(self.graph.lines) if "twist" in line]
+        return [Twist(*each["twist"], each["at"], each["pose"]) for each in told]
+
+    def end(self):
+        for program in (self.bridge, self.graph):
+            if program is not None:
+                program.end()
+
+
+@contextmanager
+def running(about):
+    """Run a graph and its rosbridge."""
+    ros = Ros(about)
+    try:
+        ros.start_bridge()
+        yield ros
+    finally:
+        ros.end()

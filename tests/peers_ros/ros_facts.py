@@ -1,0 +1,17 @@
+"""What the robot of the real graph has; its tests and its nodes read it."""
+
+import math
+
+ROBOT = "/robot_0"
+START = (2.0, 1.5, 0.5)
+"""Where it begins, by its odometry: x, y, yaw."""
+
+ANGLE_MIN, ANGLE_STEP = -0.35, 0.1
+RANGES = (1.0, math.nan, 2.0, math.inf, -math.inf, 0.01, 3.0, 99.0)
+DRAWN = {0: 1.0, 2: 2.0, 6: 3.0}
+"""The rays that hit something within limits, and where."""
+
+CELL = 0.1
+CELLS = (60, 40)
+CORNER = (-1.0, -0.5)
+"""The south-west corner of the map."""

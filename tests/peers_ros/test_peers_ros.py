@@ -1,0 +1,137 @@
+"""A real ROS 2 graph behind a rosbridge that this project did not write."""
+
+import math
+import time
+
+import pytest
+from playwright.sync_api import expect
+from processes import WEB, hold, matrix, running, wait_until
+from ros_facts import ANGLE_MIN, ANGLE_STEP, DRAWN, START
+
+# Installing what is real may take its time, once.
+pytestmark = [pytest.mark.peer, pytest.mark.browser, pytest.mark.timeout(300)]
+
+ROBOT = "Bob:/robot_0/odom:/robot_0/cmd_vel:/robot_0/scan"
+BOB = '.robot[data-name="Bob"]'
+
+SOON = 1.0
+"""Seconds; the gate takes 0.25 at the most, and the machine may be busy."""
+
+
+@pytest.fixture(scope="module")
+def server(ros):
+    command = ("view", ros.url, "--robot", ROBOT, "--port", 0, "--no-browser")
+    with running(*command, pattern=WEB) as process:
+        yield process
+
+
+@pytest.fixture
+def opened(server, tab):
+    tab.goto(server.url)
+    drawn_now(tab).wait_for(state="attached")
+    tab.locator(f"{BOB} > .laserscan:not(.stale) > .dot[d]").wait_for(state="attached")
+    return tab
+
+
+def drawn_now(tab):
+    return tab.locator(f"{BOB}:not(.unplaced):not(.stale)")
+
+
+def dots(tab):
+    """The middle of each dot that the browser draws, in metres of the world."""
+    return tab.locator(f"{BOB} > .laserscan > .dot").evaluate(
+        """dot => {
+            const world = dot.closest(".world");
+            const tf = world.getCTM().inverse().multiply(dot.getCTM());
+            const squares = /M(-?\\d+) (-?\\d+)h(\\d+)/g;
+            const found = [...dot.getAttribute("d").matchAll(squares)];
+            return found.map(([, x, y, size]) => {
+                const half = Number(size) / 2;
+                const middle = new DOMPoint(Number(x) + half, Number(y) + half);
+                const at = middle.matrixTransform(tf);
+                return [at.x, at.y];
+            });
+        }"""
+    )
+
+
+def drive(tab, ros):
+    """Hold the key that drives forward until the robot's own node hears of it."""
+    tab.locator("#robots .row button").click()
+    tab.locator("svg.webmap").focus()
+    before = len(ros.twists())
+    hold(tab.keyboard, "w", lambda: any(t.speed > 0.05 for t in ros.twists()[before:]))
+
+
+def stands(ros):
+    twists = ros.twists()
+    return bool(twists) and twists[-1].is_zero
+
+
+def expect_drawn_where_it_is(tab, ros):
+    """Check the drawn pose of a standing robot against its own, and wait for it."""
+    x, y, yaw = ros.twists()[-1].pose
+    here = pytest.approx([math.cos(yaw), math.sin(yaw), x, y], abs=0.002)
+
+    def drawn():
+        m = matrix(tab, BOB)
+        return [m[0], m[1], m[4], m[5]]
+
+    wait_until(lambda: drawn() == here, what=f"drawing it at {x:.3f}, {y:.3f}")
+
+
+def test_the_robot_and_what_it_scans_are_drawn_where_its_own_nodes_say(opened):
+    x, y, yaw = START
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    assert matrix(opened, BOB) == pytest.approx([cos, sin, -sin, cos, x, y], abs=1e-5)
+    bearings = {ray: yaw + ANGLE_MIN + ANGLE_STEP * ray for ray in DRAWN}
+    expected = [
+        (x + reach * math.cos(bearings[ray]), y + reach * math.sin(bearings[ray]))
+        for ray, reach in DRAWN.items()
+    ]
+    drawn = dots(opened)
+    assert len(drawn) == len(expected), "what is NaN, infinite or out of range is not"
+    for dot, place in zip(drawn, expected, strict=True):
+        assert dot == pytest.approx(place, abs=0.003)
+
+
+def test_keys_reach_the_robot_and_zero_does_when_they_are_released(opened, ros):
+    drive(opened, ros)
+    opened.wait_for_timeout(500)
+    opened.keyboard.up("w")
+    released = time.monotonic()
+    wait_until(lambda: stands(ros), what="zero")
+    speeds = {t.speed for t in ros.twists() if not t.is_zero}
+    assert 0.05 < max(speeds) <= 0.3 + 1e-9, "a base that nobody vouches for is slow"
+    assert min(speeds) > 0
+    zero = next(t for t in ros.twists() if t.is_zero and t.at > released - SOON)
+    assert zero.at - released < SOON
+    x, y, _ = ros.twists()[-1].pose
+    assert math.dist((x, y), START[:2]) > 0.05, "it came forward"
+    expect_drawn_where_it_is(opened, ros)
+    wait_until(
+        lambda: time.monotonic() - ros.twists()[-1].at > SOON,
+        what="silence, which leaves other writers in peace,",
+    )
+    assert stands(ros)
+
+
+def test_a_bridge_that_is_killed_under_way_says_zero_first_when_it_is_back(opened, ros):
+    drive(opened, ros)
+    ros.kill_bridge()
+    killed = len(ros.twists())
+    assert not stands(ros), "nothing can tell the robot to stop now"
+    row = opened.locator("#robots > li")
+    expect(row).to_contain_text("No bridge")
+    opened.wait_for_timeout(500)  # the key is still held
+    ros.start_bridge()
+    wait_until(lambda: len(ros.twists()) > killed, within=20.0, what="the next word")
+    wait_until(lambda: stands(ros), what="zero")
+    assert all(t.is_zero for t in ros.twists()[killed:]), "the held key drove on"
+    opened.keyboard.up("w")
+    drawn_now(opened).wait_for(state="attached")
+    expect(opened.locator(f"{BOB} > .laserscan:not(.stale)")).to_be_attached()
+    expect_drawn_where_it_is(opened, ros)
+    drive(opened, ros)
+    opened.keyboard.up("w")
+    wait_until(lambda: stands(ros), what="zero after it drove again")
