@@ -71,6 +71,12 @@ from webmap.cli.options import PORT, verbose_option
     help="Topics of the only robot without a prefix: /odom, /cmd_vel, /base_scan.",
 )
 @click.option(
+    "--extras/--no-extras",
+    default=True,
+    show_default=True,
+    help="Costmaps, clouds, sonars, markers, health and the like, for who subscribes.",
+)
+@click.option(
     "--polite",
     is_flag=True,
     help="A rosbridge that says what is wrong; real ones are silent.",
@@ -89,6 +95,7 @@ def sim(
     nan: bool,
     wander: bool,
     flat: bool,
+    extras: bool,
     polite: bool,
     with_parent: bool,
 ) -> None:
@@ -115,6 +122,7 @@ def sim(
             nan=nan,
             wander=wander,
             flat=flat,
+            extras=extras,
             quirks="polite" if polite else "real",
             on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),
         )

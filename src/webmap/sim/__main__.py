@@ -63,6 +63,12 @@ def _parser() -> argparse.ArgumentParser:
     add("--quirks", default="real", help="'real', 'polite', or 'polite,NAME,-NAME'")
     add("--wander", action="store_true", help="idle robots drive to random places")
     add(
+        "--no-extras",
+        dest="extras",
+        action="store_false",
+        help="robots without costmaps, clouds, sonars, health and the like",
+    )
+    add(
         "--take-nan",
         dest="refuse_nan",
         action="store_false",

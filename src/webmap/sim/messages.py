@@ -33,6 +33,8 @@ class Messages:
 
     def __init__(self, dialect: Dialect, *, nan: bool = False) -> None:
         self.dialect = dialect
+        self.mounted: dict[str, tuple[Pose, float]] = {}
+        """Frames of further sensors: where on the base, and how high, in metres."""
         self._covariance = _COVARIANCE.copy()
         if nan:
             self._covariance[1] = math.nan
@@ -46,8 +48,8 @@ class Messages:
             "pose": {"pose": pose(robot.odometry), "covariance": self._covariance},
             "twist": {
                 "twist": {
-                    "linear": _vector(robot.twist.vx),
-                    "angular": _vector(z=robot.twist.wz),
+                    "linear": vector(robot.twist.vx),
+                    "angular": vector(z=robot.twist.wz),
                 },
                 "covariance": self._covariance,
             },
@@ -65,13 +67,13 @@ class Messages:
         increment = math.tau / options.beams
         return {
             "header": self.dialect.header(topic, stamp, f"{robot.frames}base_laser"),
-            "angle_min": _float32(-math.pi),
-            "angle_max": _float32(-math.pi + (options.beams - 1) * increment),
-            "angle_increment": _float32(increment),
+            "angle_min": float32(-math.pi),
+            "angle_max": float32(-math.pi + (options.beams - 1) * increment),
+            "angle_increment": float32(increment),
             "time_increment": 0.0,
-            "scan_time": _float32(0.1),
-            "range_min": _float32(options.range_min),
-            "range_max": _float32(options.range_max),
+            "scan_time": float32(0.1),
+            "range_min": float32(options.range_min),
+            "range_max": float32(options.range_max),
             "ranges": ranges,
             "intensities": np.empty(0, np.float32),
         }
@@ -89,13 +91,13 @@ class Messages:
         nothing = np.empty(0, np.float32)
         return {
             "header": self.dialect.header(topic, stamp, f"{robot.frames}base_link"),
-            "voltage": _float32(_EMPTY + (_FULL - _EMPTY) * robot.charge),
+            "voltage": float32(_EMPTY + (_FULL - _EMPTY) * robot.charge),
             "temperature": math.nan,
-            "current": _float32(-0.8 - 2.5 * abs(robot.twist.vx)),
+            "current": float32(-0.8 - 2.5 * abs(robot.twist.vx)),
             "charge": math.nan,
             "capacity": math.nan,
             "design_capacity": math.nan,
-            "percentage": _float32(robot.charge),
+            "percentage": float32(robot.charge),
             "power_supply_status": _DISCHARGING,
             "power_supply_health": _GOOD,
             "power_supply_technology": _LITHIUM_ION,
@@ -120,12 +122,22 @@ class Messages:
         """Return ``geometry_msgs/PoseStamped`` in the map's frame."""
         return {"header": self.dialect.header("", stamp, "map"), "pose": pose(at)}
 
-    def transforms(self, topic: str, stamp: float, robots: list[Robot]) -> Message:
-        """Return ``tf2_msgs/TFMessage`` with each robot's map to odom to base."""
+    def transforms(
+        self, topic: str, stamp: float, robots: list[Robot], believed: list[Pose]
+    ) -> Message:
+        """Return ``tf2_msgs/TFMessage`` with each robot's map to odom to base.
+
+        Args:
+            topic: It goes out on.
+            stamp: In seconds.
+            robots: The robots.
+            believed: Where each takes itself to be on the map.
+
+        """
         found = []
-        for robot in robots:
+        for robot, at in zip(robots, believed, strict=True):
             odom, base = f"{robot.frames}odom", f"{robot.frames}base_link"
-            map_from_odom = robot.pose @ robot.odometry.inverse
+            map_from_odom = at @ robot.odometry.inverse
             found.append(self._transform(topic, stamp, "map", odom, map_from_odom))
             found.append(self._transform(topic, stamp, odom, base, robot.odometry))
         return {"transforms": found}
@@ -133,34 +145,59 @@ class Messages:
     def static_transforms(
         self, topic: str, stamp: float, robots: list[Robot]
     ) -> Message:
-        """Return where the scanners sit: above the middle of the base."""
+        """Return where the sensors sit on the base."""
+        mounted = {"base_laser": (Pose(), 0.2), **self.mounted}
         return {
             "transforms": [
                 self._transform(
                     topic,
                     stamp,
                     f"{robot.frames}base_link",
-                    f"{robot.frames}base_laser",
-                    Pose(),
-                    z=0.2,
+                    f"{robot.frames}{name}",
+                    at,
+                    z=height,
                 )
                 for robot in robots
+                for name, (at, height) in mounted.items()
             ]
         }
 
     def grid(self, topic: str, stamp: float, plan: FloorPlan) -> Message:
-        """Return ``nav_msgs/OccupancyGrid``."""
-        rows, columns = plan.occupancy.shape
+        """Return ``nav_msgs/OccupancyGrid`` of a floor."""
+        place = (plan.x, plan.y)
+        return self.cells(topic, stamp, "map", plan.occupancy, plan.resolution, place)
+
+    def cells(
+        self,
+        topic: str,
+        stamp: float,
+        frame: str,
+        cells: NDArray[np.int8],
+        resolution: float,
+        place: tuple[float, float],
+    ) -> Message:
+        """Return ``nav_msgs/OccupancyGrid``.
+
+        Args:
+            topic: It goes out on.
+            stamp: In seconds.
+            frame: That it lies in.
+            cells: Of shape (rows, columns), the lowest row first.
+            resolution: The side of a cell, in metres.
+            place: Its lower left corner, in metres.
+
+        """
+        rows, columns = cells.shape
         return {
-            "header": self.dialect.header(topic, stamp, "map"),
+            "header": self.dialect.header(topic, stamp, frame),
             "info": {
                 "map_load_time": self.dialect.time(stamp),
-                "resolution": _float32(plan.resolution),
+                "resolution": float32(resolution),
                 "width": columns,
                 "height": rows,
-                "origin": pose(Pose(plan.x, plan.y)),
+                "origin": pose(Pose(*place)),
             },
-            "data": plan.occupancy.ravel(),
+            "data": cells.ravel(),
         }
 
     def _transform(
@@ -177,15 +214,15 @@ class Messages:
             "header": header,
             "child_frame_id": child,
             "transform": {
-                "translation": _vector(at.x, at.y, z),
-                "rotation": _quaternion(at.yaw),
+                "translation": vector(at.x, at.y, z),
+                "rotation": quaternion(at.yaw),
             },
         }
 
 
 def pose(at: Pose) -> Message:
     """Return ``geometry_msgs/Pose``."""
-    return {"position": _vector(at.x, at.y), "orientation": _quaternion(at.yaw)}
+    return {"position": vector(at.x, at.y), "orientation": quaternion(at.yaw)}
 
 
 def read_pose(message: Message) -> Pose | None:
@@ -196,15 +233,17 @@ def read_pose(message: Message) -> Pose | None:
     return at if all(map(math.isfinite, (at.x, at.y, at.yaw))) else None
 
 
-def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
+def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
+    """Return ``geometry_msgs/Vector3``, which ``Point`` is like."""
     return {"x": x, "y": y, "z": z}
 
 
-def _quaternion(yaw: float) -> Message:
+def quaternion(yaw: float) -> Message:
+    """Return ``geometry_msgs/Quaternion`` of a turn about z, in radians."""
     turn = Quaternion.from_yaw(yaw)
     return {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w}
 
 
-def _float32(value: float) -> float:
+def float32(value: float) -> float:
     """Return the nearest value that the message's field can hold."""
     return float(np.float32(value))

@@ -7,11 +7,12 @@ from typing import Any
 
 from webmap.geometry import Pose, Twist
 from webmap.sim.actionlib import ActionlibServer
+from webmap.sim.feeds import Feeds, sonar
 from webmap.sim.messages import Messages, read_pose
 from webmap.sim.nav2 import NavigateToPose
 from webmap.sim.navigator import Goal
 from webmap.sim.rosbridge.encode import Publication
-from webmap.sim.rosbridge.graph import Graph, Respond
+from webmap.sim.rosbridge.graph import Deliver, Graph, Respond
 from webmap.sim.rosbridge.quirks import Quirks
 from webmap.sim.world import World
 
@@ -38,10 +39,20 @@ class RobotsNode:
         graph: Where their topics are.
         twist: ``Twist`` or ``TwistStamped``, what ``cmd_vel`` takes.
         quirks: Of the server, for the services that may hang.
+        extras: Whether robots have more than odometry, a scan, a battery, a camera
+            and plans.
 
     """
 
-    def __init__(self, world: World, graph: Graph, twist: str, quirks: Quirks) -> None:
+    def __init__(
+        self,
+        world: World,
+        graph: Graph,
+        twist: str,
+        quirks: Quirks,
+        *,
+        extras: bool = True,
+    ) -> None:
         self.world = world
         self.graph = graph
         self.messages = Messages(graph.schema.dialect, nan=world.options.scanner.nan)
@@ -51,21 +62,26 @@ class RobotsNode:
         self.on_step: list[Callable[[], None]] = []
         """Called five times a second: the actions say how their goals go."""
         self._paths_seen = [0 for _ in world.robots]
+        self._feeds = Feeds(self, STEP) if extras else None
+        if self._feeds is not None:
+            self.messages.mounted[sonar.FRAME] = (sonar.MOUNTED, 0.15)
 
     def start(self) -> None:
         """Advertise, subscribe and serve everything."""
         self._publish_fixed()
-        self._advertise("/tf", "tf2_msgs/TFMessage")
+        self.advertise("/tf", "tf2_msgs/TFMessage")
         for index, robot in enumerate(self.world.robots):
             self._start_robot(index, robot.topics)
+        if self._feeds is not None:
+            self._feeds.start()
 
     def _start_robot(self, index: int, prefix: str) -> None:
-        self._advertise(f"{prefix}/odom", "nav_msgs/Odometry")
-        self._advertise(f"{prefix}/base_scan", "sensor_msgs/LaserScan")
-        self._advertise(f"{prefix}/battery_state", "sensor_msgs/BatteryState")
-        self._advertise(f"{prefix}/plan", "nav_msgs/Path")
-        self._advertise(f"{prefix}/{CAMERA}", "sensor_msgs/CompressedImage")
-        self._subscribe(
+        self.advertise(f"{prefix}/odom", "nav_msgs/Odometry")
+        self.advertise(f"{prefix}/base_scan", "sensor_msgs/LaserScan")
+        self.advertise(f"{prefix}/battery_state", "sensor_msgs/BatteryState")
+        self.advertise(f"{prefix}/plan", "nav_msgs/Path")
+        self.advertise(f"{prefix}/{CAMERA}", "sensor_msgs/CompressedImage")
+        self.subscribe(
             f"{prefix}/cmd_vel",
             f"geometry_msgs/{self._twist}",
             partial(self._on_twist, index),
@@ -77,7 +93,7 @@ class RobotsNode:
         else:
             ActionlibServer(self, index, prefix).start()
         for name in goals:
-            self._subscribe(
+            self.subscribe(
                 f"{prefix}/{name}",
                 "geometry_msgs/PoseStamped",
                 partial(self._on_simple_goal, index),
@@ -106,6 +122,14 @@ class RobotsNode:
         if slow:
             self._publish_batteries()
         self._publish_paths(all_of_them=slow)
+        if self._feeds is not None:
+            self._feeds.publish(self._steps)
+
+    def believed(self, index: int) -> Pose:
+        """Return where a robot takes itself to be on the map."""
+        if self._feeds is None:
+            return self.world.robots[index].pose
+        return self._feeds.localizations.believed(index)
 
     def target(self, pose_stamped: dict[str, Any], index: int) -> Pose | None:
         """Return a goal in the map's frame; None if it is in no frame we know."""
@@ -144,9 +168,9 @@ class RobotsNode:
 
     def _publish_fixed(self) -> None:
         now = self.graph.clock()
-        self._advertise("/map", "nav_msgs/OccupancyGrid", latch=True)
+        self.advertise("/map", "nav_msgs/OccupancyGrid", latch=True)
         self.publish("/map", self.messages.grid("/map", now, self.world.plan))
-        self._advertise("/tf_static", "tf2_msgs/TFMessage", latch=True)
+        self.advertise("/tf_static", "tf2_msgs/TFMessage", latch=True)
         transforms = self.messages.static_transforms(
             "/tf_static", now, self.world.robots
         )
@@ -159,7 +183,10 @@ class RobotsNode:
             if self.graph.is_wanted(topic):
                 self.publish(topic, self.messages.odometry(topic, now, robot))
         if self.graph.is_wanted("/tf"):
-            self.publish("/tf", self.messages.transforms("/tf", now, self.world.robots))
+            robots = self.world.robots
+            believed = [self.believed(index) for index in range(len(robots))]
+            message = self.messages.transforms("/tf", now, robots, believed)
+            self.publish("/tf", message)
 
     def _publish_scans(self) -> None:
         robots = self.world.robots
@@ -207,8 +234,10 @@ class RobotsNode:
         """Publish on a topic of this node."""
         self.graph.publish(self, topic, message)
 
-    def _advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
+    def advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
+        """Let this node publish on a topic."""
         self.graph.advertise(self, topic, type_name, node=NODE, latch=latch)
 
-    def _subscribe(self, topic: str, type_name: str, callback: Any) -> None:
+    def subscribe(self, topic: str, type_name: str, callback: Deliver) -> None:
+        """Let this node hear a topic."""
         self.graph.subscribe(self, topic, callback, type_name, node=NODE)

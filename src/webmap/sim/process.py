@@ -34,6 +34,7 @@ async def run_simulator(
     quirks: str = "real",
     wander: bool = False,
     flat: bool = False,
+    extras: bool = True,
     host: str = "127.0.0.1",
     refuse_nan: bool = True,
     on_ready: Callable[[str], None] | None = None,
@@ -56,6 +57,9 @@ async def run_simulator(
             :func:`webmap.sim.rosbridge.quirks.parse_quirks`.
         wander: Whether robots that nobody commands drive to random places.
         flat: Whether the only robot has its topics without a prefix: ``/odom``.
+        extras: Whether robots have costmaps, clouds, footprints, particles, sonars,
+            fixes, markers, diagnostics and logs too. They cost nothing while nobody
+            subscribes.
         host: The address to listen on.
         refuse_nan: Whether the bases ignore a twist with NaN or infinity.
         on_ready: Called with the URL once clients can connect.
@@ -96,7 +100,7 @@ async def run_simulator(
     schema = Schema(Dialect(dialect))
     graph = Graph(schema)
     Rosapi(graph, behaviour).start()
-    node = RobotsNode(world, graph, twist, behaviour)
+    node = RobotsNode(world, graph, twist, behaviour, extras=extras)
     node.start()
     server = RosbridgeServer(graph, Encoder(schema, behaviour))
     stop = stop or asyncio.Event()

@@ -79,7 +79,7 @@ class Scanner:
         ).reshape(angles.shape)
         for i, round_things in enumerate(discs):
             for x, y, radius in round_things:
-                _shade(ranges[i], along_x[i], along_y[i], poses[i], x, y, radius)
+                shade(ranges[i], along_x[i], along_y[i], poses[i], x, y, radius)
         return self._as_measured(ranges)
 
     def _as_measured(self, ranges: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -151,7 +151,7 @@ def cast_rays(
     return np.asarray(result * plan.resolution)
 
 
-def _shade(
+def shade(
     ranges: NDArray[np.float64],
     along_x: NDArray[np.float64],
     along_y: NDArray[np.float64],
@@ -160,7 +160,18 @@ def _shade(
     y: float,
     radius: float,
 ) -> None:
-    """Shorten the ranges that meet a disc first."""
+    """Shorten the ranges that meet a disc first.
+
+    Args:
+        ranges: In metres, of shape (rays,); changed in place.
+        along_x: The rays' directions, of length 1.
+        along_y: The same, along y.
+        pose: Where the rays begin.
+        x: The disc's middle, in metres.
+        y: The same, along y.
+        radius: Of the disc, in metres.
+
+    """
     to_x, to_y = x - pose.x, y - pose.y
     ahead = to_x * along_x + to_y * along_y
     aside = to_x * along_y - to_y * along_x

@@ -85,6 +85,52 @@ MESSAGES = {
     "sensor_msgs/CompressedImage": (
         "std_msgs/Header header; string format; uint8[] data"
     ),
+    "sensor_msgs/PointField": (
+        "string name; uint32 offset; uint8 datatype; uint32 count"
+    ),
+    "sensor_msgs/PointCloud2": (
+        "std_msgs/Header header; uint32 height; uint32 width;"
+        " sensor_msgs/PointField[] fields; bool is_bigendian; uint32 point_step;"
+        " uint32 row_step; uint8[] data; bool is_dense"
+    ),
+    "sensor_msgs/Range": (
+        "std_msgs/Header header; uint8 radiation_type; float32 field_of_view;"
+        " float32 min_range; float32 max_range; float32 range"
+    ),
+    "sensor_msgs/NavSatStatus": "int8 status; uint16 service",
+    "sensor_msgs/NavSatFix": (
+        "std_msgs/Header header; sensor_msgs/NavSatStatus status; float64 latitude;"
+        " float64 longitude; float64 altitude; float64[9] position_covariance;"
+        " uint8 position_covariance_type"
+    ),
+    "map_msgs/OccupancyGridUpdate": (
+        "std_msgs/Header header; int32 x; int32 y; uint32 width; uint32 height;"
+        " int8[] data"
+    ),
+    "visualization_msgs/Marker": (
+        "std_msgs/Header header; string ns; int32 id; int32 type; int32 action;"
+        " geometry_msgs/Pose pose; geometry_msgs/Vector3 scale;"
+        " std_msgs/ColorRGBA color; duration lifetime; bool frame_locked;"
+        " geometry_msgs/Point[] points; std_msgs/ColorRGBA[] colors; string text;"
+        " string mesh_resource; bool mesh_use_embedded_materials"
+    ),
+    "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers",
+    "diagnostic_msgs/KeyValue": "string key; string value",
+    "diagnostic_msgs/DiagnosticStatus": (
+        "uint8 level; string name; string message; string hardware_id;"
+        " diagnostic_msgs/KeyValue[] values"
+    ),
+    "diagnostic_msgs/DiagnosticArray": (
+        "std_msgs/Header header; diagnostic_msgs/DiagnosticStatus[] status"
+    ),
+    "rosgraph_msgs/Log": (
+        "std_msgs/Header header; uint8 level; string name; string msg; string file;"
+        " string function; uint32 line; string[] topics"
+    ),
+    "rcl_interfaces/Log": (
+        "time stamp; uint8 level; string name; string msg; string file;"
+        " string function; uint32 line"
+    ),
     "actionlib_msgs/GoalID": "time stamp; string id",
     "actionlib_msgs/GoalStatus": (
         "actionlib_msgs/GoalID goal_id; uint8 status; string text"

@@ -1,0 +1,9 @@
+"""What robots say beside odometry and scans, worked out only while somebody listens.
+
+Costmaps, clouds, footprints, particles, doubts, sonars, fixes, markers, health and
+logs, under the names that Nav2 and move_base give them.
+"""
+
+from webmap.sim.feeds.all import Feeds
+
+__all__ = ["Feeds"]

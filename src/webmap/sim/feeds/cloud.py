@@ -1,0 +1,103 @@
+"""A lidar of several rings, whose cloud has walls, robots and the floor."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from webmap.sim.feeds.feed import Feed
+from webmap.sim.messages import Message
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+RINGS = np.radians([-6.0, 0.0, 6.0, 12.0])
+"""How far each ring looks up from level."""
+
+MOUNTED = 0.2
+"""The lidar's height above the floor, in metres."""
+
+ROBOT_TOP = 0.3
+"""How far robots reach above the lidar, in metres; walls are taller than it sees."""
+
+POINT = np.dtype(
+    {
+        "names": ["x", "y", "z", "intensity", "ring"],
+        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
+        # As the drivers of spinning lidars lay it out: for SSE, with a gap after z.
+        "offsets": [0, 4, 8, 16, 20],
+        "itemsize": 32,
+    }
+)
+_DATATYPES = {"<f4": 7, "<u2": 4}
+
+
+class Clouds:
+    """Makes ``sensor_msgs/PointCloud2``, in the frame of the scanner."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+        self.feed = Feed("points", "sensor_msgs/PointCloud2", 0.2, self._make)
+
+    def _make(self, index: int, topic: str, stamp: float) -> Message:
+        world = self._node.world
+        robot = world.robots[index]
+        whole = world.sweep([index])[0]
+        walls = world.scanner.sweep([robot.pose])[0]
+        points = cloud_points(whole, walls)
+        return {
+            "header": self._node.messages.dialect.header(
+                topic, stamp, f"{robot.frames}base_laser"
+            ),
+            "height": 1,
+            "width": len(points),
+            "fields": [
+                {
+                    "name": name,
+                    "offset": POINT.fields[name][1] if POINT.fields else 0,
+                    "datatype": _DATATYPES[POINT[name].str],
+                    "count": 1,
+                }
+                for name in POINT.names or ()
+            ],
+            "is_bigendian": False,
+            "point_step": POINT.itemsize,
+            "row_step": POINT.itemsize * len(points),
+            "data": points.tobytes(),
+            "is_dense": True,
+        }
+
+
+def cloud_points(
+    whole: NDArray[np.float32], walls: NDArray[np.float32]
+) -> NDArray[np.void]:
+    """Return what the rings see, ring by ring, of the type :data:`POINT`.
+
+    Args:
+        whole: The ranges of a level sweep all around, from -pi on.
+        walls: The same as if there were no other robots.
+
+    """
+    bearings = -math.pi + np.arange(len(whole)) * (math.tau / len(whole))
+    parts = []
+    for number, rise in enumerate(np.tan(RINGS)):
+        over = whole > (ROBOT_TOP / rise if rise > 0 else np.inf)
+        reach = np.where(over, walls, whole).astype(np.float64)
+        if rise < 0:
+            reach = np.minimum(reach, MOUNTED / -rise)
+        hit = np.isfinite(reach) & (reach > 0)
+        ring = np.zeros(int(hit.sum()), POINT)
+        ring["x"] = reach[hit] * np.cos(bearings[hit])
+        ring["y"] = reach[hit] * np.sin(bearings[hit])
+        ring["z"] = reach[hit] * rise
+        ring["intensity"] = 100 / (1 + reach[hit])
+        ring["ring"] = number
+        parts.append(ring)
+    # Not concatenate, which closes the gaps.
+    points = np.empty(sum(map(len, parts)), POINT)
+    begin = 0
+    for part in parts:
+        points[begin : begin + len(part)] = part
+        begin += len(part)
+    return points

@@ -1,0 +1,75 @@
+"""What the parts of the robots say of their health, on one topic for all."""
+
+from typing import TYPE_CHECKING
+
+from webmap.sim.messages import Message
+from webmap.sim.robot import Robot
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+TOPIC = "/diagnostics"
+OK, WARN, ERROR = 0, 1, 2
+LOW, EMPTY = 0.3, 0.1
+"""Charges below which the battery warns, and below which it has failed."""
+
+
+class Health:
+    """Publishes ``diagnostic_msgs/DiagnosticArray``, a message for each robot."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+
+    def start(self) -> None:
+        """Advertise the topic."""
+        self._node.advertise(TOPIC, "diagnostic_msgs/DiagnosticArray")
+
+    def publish(self) -> None:
+        """Publish what every part says, if somebody listens."""
+        graph = self._node.graph
+        if not graph.is_wanted(TOPIC):
+            return
+        for robot in self._node.world.robots:
+            header = self._node.messages.dialect.header(TOPIC, graph.clock(), "")
+            self._node.publish(TOPIC, {"header": header, "status": parts(robot)})
+
+
+def parts(robot: Robot) -> list[Message]:
+    """Return ``diagnostic_msgs/DiagnosticStatus`` of a robot's parts."""
+    charge = robot.charge
+    battery = ERROR if charge < EMPTY else WARN if charge < LOW else OK
+    blocked = robot.bumped
+    return [
+        _part(
+            robot,
+            "base: Motors",
+            WARN if blocked else OK,
+            "blocked" if blocked else "running" if robot.twist.vx else "standing",
+            {
+                "linear velocity (m/s)": f"{robot.twist.vx:.2f}",
+                "angular velocity (rad/s)": f"{robot.twist.wz:.2f}",
+                "travelled (m)": f"{robot.travelled:.1f}",
+            },
+        ),
+        _part(
+            robot,
+            "base: Battery",
+            battery,
+            f"{100 * charge:.0f} %{'' if battery == OK else ', charge it'}",
+            {"charge": f"{charge:.3f}"},
+        ),
+        _part(robot, "laser: Frequency", OK, "10 Hz", {}),
+    ]
+
+
+def _part(
+    robot: Robot, name: str, level: int, message: str, values: dict[str, str]
+) -> Message:
+    # Updaters put the name of their node in front, and of its namespace.
+    return {
+        "level": level,
+        "name": f"{robot.frames}{name}",
+        "message": message,
+        "hardware_id": robot.name or "robot",
+        "values": [{"key": key, "value": value} for key, value in values.items()],
+    }

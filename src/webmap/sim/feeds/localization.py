@@ -1,0 +1,150 @@
+"""Where robots believe to be: a pose, how sure of it, and particles."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from webmap.geometry import Pose, normalize_angle
+from webmap.sim.feeds.feed import Feed
+from webmap.sim.messages import Message, pose, read_pose
+from webmap.sim.rosbridge.encode import Publication
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+PARTICLES = 150
+SURE = (0.12, 0.05, 0.06)
+"""Standard deviations ahead and aside in metres and of the heading in radians, of a
+robot that has driven about."""
+
+HALVED = 0.5
+"""Metres of way in which a doubt, and an error, gets half as large."""
+
+
+class Belief:
+    """What one robot's localisation takes for true."""
+
+    def __init__(self) -> None:
+        self.error = Pose()
+        """Where it takes itself to be, seen from where it is."""
+        self.doubt = SURE
+        self._travelled = 0.0
+
+    def reset(self, true: Pose, given: Pose, doubt: tuple[float, float, float]) -> None:
+        """Believe what a person says: a pose and its standard deviations."""
+        self.error = true.inverse @ given
+        self.doubt = doubt
+
+    def travel(self, travelled: float) -> None:
+        """Come closer to the truth on the way.
+
+        Args:
+            travelled: Metres on the wheels since the start.
+
+        """
+        share = 0.5 ** ((travelled - self._travelled) / HALVED)
+        self._travelled = travelled
+        if share == 1:
+            return
+        error = self.error
+        self.error = Pose(error.x * share, error.y * share, error.yaw * share)
+        self.doubt = (
+            SURE[0] + (self.doubt[0] - SURE[0]) * share,
+            SURE[1] + (self.doubt[1] - SURE[1]) * share,
+            SURE[2] + (self.doubt[2] - SURE[2]) * share,
+        )
+
+    def covariance(self, yaw: float) -> list[float]:
+        """Return the 36 numbers of a message, in the map's frame.
+
+        Args:
+            yaw: The heading that is believed in, in radians.
+
+        """
+        ahead, aside, turn = (deviation**2 for deviation in self.doubt)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        found = [0.0] * 36
+        found[0] = cos * cos * ahead + sin * sin * aside
+        found[7] = sin * sin * ahead + cos * cos * aside
+        found[1] = found[6] = cos * sin * (ahead - aside)
+        found[35] = turn
+        return found
+
+    def particles(
+        self, believed: Pose, random: np.random.Generator
+    ) -> list[tuple[float, float, float]]:
+        """Return particles as x, y and yaw that are spread as the doubt says."""
+        spread: NDArray[np.float64] = random.normal(size=(PARTICLES, 3)) * self.doubt
+        cos, sin = math.cos(believed.yaw), math.sin(believed.yaw)
+        return [
+            (
+                believed.x + cos * ahead - sin * aside,
+                believed.y + sin * ahead + cos * aside,
+                normalize_angle(believed.yaw + turn),
+            )
+            for ahead, aside, turn in spread.tolist()
+        ]
+
+
+class Localizations:
+    """Publishes ``amcl_pose`` and ``particlecloud``, and takes ``initialpose``."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+        self._beliefs = [Belief() for _ in node.world.robots]
+        self._random = np.random.default_rng(node.world.options.seed)
+        doubtful = "geometry_msgs/PoseWithCovarianceStamped"
+        self.feeds = (
+            Feed("amcl_pose", doubtful, 0.5, self._make_pose),
+            Feed("particlecloud", "geometry_msgs/PoseArray", 1.0, self._make_cloud),
+        )
+
+    def start(self) -> None:
+        """Take poses from people."""
+        for index, robot in enumerate(self._node.world.robots):
+
+            def take(publication: Publication, index: int = index) -> None:
+                self._on_initial_pose(index, publication.message)
+
+            self._node.subscribe(
+                f"{robot.topics}/initialpose",
+                "geometry_msgs/PoseWithCovarianceStamped",
+                take,
+            )
+
+    def believed(self, index: int) -> Pose:
+        """Return where a robot takes itself to be on the map."""
+        robot, belief = self._node.world.robots[index], self._beliefs[index]
+        belief.travel(robot.travelled)
+        return robot.pose if belief.error == Pose() else robot.pose @ belief.error
+
+    def _on_initial_pose(self, index: int, message: dict[str, Any]) -> None:
+        given = read_pose(message["pose"]["pose"])
+        if given is None or message["header"]["frame_id"].strip("/") not in ("", "map"):
+            return
+        found = message["pose"]["covariance"]
+        variances = [max(float(found[i]), 0.0) for i in (0, 7, 35)]
+        if not all(map(math.isfinite, variances)):
+            return
+        x, y, yaw = map(math.sqrt, variances)
+        self._beliefs[index].reset(
+            self._node.world.robots[index].pose, given, (x, y, yaw)
+        )
+
+    def _make_pose(self, index: int, topic: str, stamp: float) -> Message:
+        believed = self.believed(index)
+        covariance = self._beliefs[index].covariance(believed.yaw)
+        return {
+            "header": self._node.messages.dialect.header(topic, stamp, "map"),
+            "pose": {"pose": pose(believed), "covariance": covariance},
+        }
+
+    def _make_cloud(self, index: int, topic: str, stamp: float) -> Message:
+        belief = self._beliefs[index]
+        places = belief.particles(self.believed(index), self._random)
+        return {
+            "header": self._node.messages.dialect.header(topic, stamp, "map"),
+            "poses": [pose(Pose(*place)) for place in places],
+        }

@@ -1,0 +1,106 @@
+"""What the nodes of the robots log: goals, plans, bumps and the battery."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from webmap.sim.feeds.health import LOW
+from webmap.sim.navigator import Goal, GoalState
+from webmap.sim.robot import Robot
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+TOPIC = "/rosout"
+INFO, WARN, ERROR = "info", "warn", "error"
+_ROS1 = {INFO: 2, WARN: 4, ERROR: 8}
+_ROS2 = {INFO: 20, WARN: 30, ERROR: 40}
+
+Said = tuple[str, str, str]
+"""A level, the last part of a node's name, and what it says."""
+
+
+@dataclass(slots=True)
+class _Before:
+    goal: Goal | None = None
+    paths: int = 0
+    bumped: bool = False
+    low: bool = False
+
+
+class Logs:
+    """Publishes ``rosgraph_msgs/Log``, which ROS 2 calls ``rcl_interfaces/Log``."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+        self._before = [_Before() for _ in node.world.robots]
+
+    def start(self) -> None:
+        """Advertise the topic."""
+        ros2 = self._node.messages.dialect.is_ros2
+        self._node.advertise(
+            TOPIC, "rcl_interfaces/Log" if ros2 else "rosgraph_msgs/Log"
+        )
+
+    def publish(self) -> None:
+        """Publish what happened since, if somebody listens."""
+        world = self._node.world
+        wanted = self._node.graph.is_wanted(TOPIC)
+        pairs = zip(world.navigators, self._before, strict=True)
+        for navigator, before in pairs:
+            robot = navigator.robot
+            said = _news(robot, navigator.goal, navigator.path_changes, before)
+            for each in said if wanted else ():
+                self._say(robot, *each)
+
+    def _say(self, robot: Robot, level: str, node: str, text: str) -> None:
+        messages = self._node.messages
+        now = self._node.graph.clock()
+        if messages.dialect.is_ros2:
+            name = f"{robot.name}.{node}".lstrip(".")
+            where = {"file": "simulator", "function": "step", "line": 1}
+            message = {
+                "stamp": messages.dialect.time(now),
+                "level": _ROS2[level],
+                "name": name,
+                "msg": text,
+                **where,
+            }
+        else:
+            message = {
+                "header": messages.dialect.header(TOPIC, now, ""),
+                "level": _ROS1[level],
+                "name": f"{robot.topics}/{node}",
+                "msg": text,
+                "file": "simulator",
+                "function": "step",
+                "line": 1,
+                "topics": [],
+            }
+        self._node.publish(TOPIC, message)
+
+
+def _news(robot: Robot, goal: Goal | None, paths: int, before: _Before) -> list[Said]:
+    """Return what is worth a line, and remember that it was said."""
+    said: list[Said] = []
+    if goal is not before.goal:
+        if before.goal is not None:
+            state, why = before.goal.state, before.goal.text
+            level = ERROR if state is GoalState.ABORTED else INFO
+            said.append((level, "navigator", f"the goal {state.value}: {why}"))
+        if goal is not None:
+            at = f"({goal.pose.x:.2f}, {goal.pose.y:.2f})"
+            said.append((INFO, "navigator", f"a goal at {at}"))
+    if paths != before.paths and goal is not None and goal is before.goal:
+        said.append((INFO, "planner", "a new path"))
+    if robot.bumped and not before.bumped:
+        said.append((WARN, "base", "the way is blocked"))
+    low = robot.charge < LOW
+    if low and not before.low:
+        said.append((WARN, "base", f"the battery is at {100 * robot.charge:.0f} %"))
+    before.goal, before.paths, before.bumped, before.low = (
+        goal,
+        paths,
+        robot.bumped,
+        low,
+    )
+    return said

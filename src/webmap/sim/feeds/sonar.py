@@ -1,0 +1,61 @@
+"""A sonar in front, which measures one distance."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from webmap.geometry import Pose
+from webmap.sim.feeds.feed import Feed
+from webmap.sim.messages import Message, float32
+from webmap.sim.scanner import cast_rays, shade
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+FRAME = "sonar"
+MOUNTED = Pose(0.25)
+"""Where it sits on the base."""
+
+FIELD = math.radians(25)
+NEAREST, FARTHEST = 0.02, 4.0
+_RAYS = 13
+_ULTRASOUND = 0
+
+
+class Sonars:
+    """Makes ``sensor_msgs/Range``: how near the nearest thing in its cone is."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+        self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, self._make)
+
+    def distance(self, index: int) -> float:
+        """Return the way to the nearest thing in a robot's cone; inf if none is."""
+        world = self._node.world
+        at = world.robots[index].pose @ MOUNTED
+        turns = at.yaw + np.linspace(-FIELD / 2, FIELD / 2, _RAYS)
+        along_x, along_y = np.cos(turns), np.sin(turns)
+        ones = np.ones(_RAYS)
+        ways = cast_rays(
+            world.obstacles, at.x * ones, at.y * ones, along_x, along_y, FARTHEST
+        )
+        for disc in world.others(index):
+            shade(ways, along_x, along_y, at, *disc)
+        nearest = float(ways.min())
+        if nearest > FARTHEST:
+            return math.inf
+        return nearest if nearest >= NEAREST else -math.inf
+
+    def _make(self, index: int, topic: str, stamp: float) -> Message:
+        robot = self._node.world.robots[index]
+        return {
+            "header": self._node.messages.dialect.header(
+                topic, stamp, f"{robot.frames}{FRAME}"
+            ),
+            "radiation_type": _ULTRASOUND,
+            "field_of_view": float32(FIELD),
+            "min_range": float32(NEAREST),
+            "max_range": float32(FARTHEST),
+            "range": float32(self.distance(index)),
+        }

@@ -1,0 +1,380 @@
+"""What simulated robots say beside odometry and scans, against where they truly are."""
+
+import base64
+import math
+
+import numpy as np
+import pytest
+from simulated import Bench, room
+
+from webmap.geometry import Pose, Twist
+from webmap.sim.feeds.cloud import POINT, cloud_points
+from webmap.sim.feeds.costmap import Costs, distances
+from webmap.sim.feeds.localization import SURE, Belief
+from webmap.sim.maps import UNKNOWN
+from webmap.sim.navigator import Goal
+from webmap.sim.obstacles import Obstacles
+
+DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+LOCAL = {
+    "ros1": "/robot_0/move_base/local_costmap/costmap",
+    "ros2": "/robot_0/local_costmap/costmap",
+}
+
+
+def heard(bench, topic, seconds=1.2, **asked):
+    """The messages of a topic from now on."""
+    client = bench.client()
+    client.send(op="subscribe", topic=topic, **asked)
+    bench.run(seconds)
+    return [operation["msg"] for operation in client.operations("publish", topic)]
+
+
+def cells_of(message):
+    info = message["info"]
+    return np.array(message["data"], np.int8).reshape(info["height"], info["width"])
+
+
+def place_of(message):
+    at = message["info"]["origin"]["position"]
+    return at["x"], at["y"]
+
+
+@DIALECTS
+def test_every_topic_has_a_type_of_its_dialect_and_speaks_when_heard(dialect):
+    bench = Bench(dialect)
+    between = "msg/" if dialect == "ros2" else ""
+    above = "" if dialect == "ros2" else "move_base/"
+    foot = "published_footprint" if dialect == "ros2" else "footprint"
+    expected = {
+        f"/robot_1/{above}local_costmap/costmap": "nav_msgs/OccupancyGrid",
+        f"/robot_1/{above}global_costmap/costmap": "nav_msgs/OccupancyGrid",
+        f"/robot_1/{above}local_costmap/{foot}": "geometry_msgs/PolygonStamped",
+        "/robot_1/points": "sensor_msgs/PointCloud2",
+        "/robot_1/particlecloud": "geometry_msgs/PoseArray",
+        "/robot_1/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped",
+        "/robot_1/sonar": "sensor_msgs/Range",
+        "/robot_1/fix": "sensor_msgs/NavSatFix",
+        "/robot_1/markers": "visualization_msgs/MarkerArray",
+        "/diagnostics": "diagnostic_msgs/DiagnosticArray",
+    }
+    for topic, type in expected.items():
+        package, _, name = type.partition("/")
+        known = bench.client().call("/rosapi/topic_type", {"topic": topic})
+        assert known["values"]["type"] == f"{package}/{between}{name}"
+        assert heard(bench, topic), topic
+
+
+def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
+    bench = Bench()
+    for name in ("window", "whole"):
+        monkeypatch.setattr(Costs, name, lambda *_: pytest.fail("costs"))
+    monkeypatch.setattr(Belief, "particles", lambda *_: pytest.fail("particles"))
+    heard(bench, "/robot_0/odom")
+    assert "costs" not in bench.node._feeds._costmaps.__dict__
+
+
+def test_without_extras_there_are_none(monkeypatch):
+    from webmap.sim.node import RobotsNode
+    from webmap.sim.rosbridge.graph import Graph
+    from webmap.sim.rosbridge.quirks import parse_quirks
+
+    bench = Bench()
+    graph = Graph(bench.graph.schema)
+    node = RobotsNode(
+        bench.world, graph, "Twist", parse_quirks("real", "ros1"), extras=False
+    )
+    node.start()
+    assert "/robot_0/odom" in graph.topics
+    assert "/robot_0/points" not in graph.topics
+    assert node.believed(0) == bench.world.robots[0].pose
+
+
+@DIALECTS
+def test_a_local_costmap_is_around_the_robot_and_grown_about_the_wall(dialect):
+    bench = Bench(dialect, robots=1, drift=0.2)
+    robot = bench.world.robots[0]
+    for _ in range(20):
+        bench.world.command(0, Twist(vx=0.4, wz=0.3))
+        bench.run(0.05)
+    bench.run(1)
+    assert robot.odometry != robot.pose, "the frame of odometry is not the map's"
+    grid = heard(bench, LOCAL[dialect])[0]
+    assert grid["header"]["frame_id"] == "robot_0/odom"
+    cells, (x, y) = cells_of(grid), place_of(grid)
+    assert cells.shape == (100, 100)
+    assert math.hypot(x + 2.5 - robot.odometry.x, y + 2.5 - robot.odometry.y) < 0.1
+    map_from_odom = robot.pose @ robot.odometry.inverse
+    obstacles, seen = bench.world.obstacles, set()
+    for row in range(0, 100, 3):
+        for column in range(0, 100, 3):
+            local = Pose(x + (column + 0.5) * 0.05, y + (row + 0.5) * 0.05)
+            at = map_from_odom @ local
+            r, c = bench.world.plan.cell(at.x, at.y)
+            if not (0 <= r < 120 and 0 <= c < 200):
+                continue
+            cost = cells[row, column]
+            if obstacles.solid[r, c]:
+                assert cost == 100
+            elif obstacles.touches(at.x, at.y, 0.18):
+                assert cost >= 99
+            elif not obstacles.touches(at.x, at.y, 0.62):
+                assert cost == 0
+            seen.add(int(cost))
+    assert {0, 99, 100} <= seen
+    assert any(0 < cost < 99 for cost in seen)
+
+
+@DIALECTS
+def test_while_a_robot_stands_only_what_changed_comes(dialect):
+    bench = Bench(dialect)
+    one, other = bench.world.robots
+    one.pose = one.odometry = Pose(3, 3)
+    other.pose = other.odometry = Pose(4.2, 3, math.pi / 2)
+    client = bench.client()
+    topic = LOCAL[dialect]
+    client.send(op="subscribe", topic=topic)
+    client.send(op="subscribe", topic=f"{topic}_updates", compression="cbor")
+    bench.run(0.6)
+    (whole,) = client.operations("publish")
+    cells, (x, y) = cells_of(whole["msg"]), place_of(whole["msg"])
+    for _ in range(20):
+        bench.world.command(1, Twist(vx=0.5))
+        bench.run(0.05)
+    bench.run(0.4)
+    changes = client.operations("publish")
+    assert changes
+    assert {change["topic"] for change in changes} == {f"{topic}_updates"}
+    for change in (change["msg"] for change in changes):
+        assert change["data"].tag == 72
+        patch = np.frombuffer(change["data"].value, np.int8)
+        assert patch.size < cells.size / 4
+        height, width = change["height"], change["width"]
+        rows = slice(change["y"], change["y"] + height)
+        columns = slice(change["x"], change["x"] + width)
+        cells[rows, columns] = patch.reshape(height, width)
+    # The last one came within a fifth of a second of the end, in which it stood.
+    now = bench.node._feeds._costmaps.costs.window(
+        x, y, 100, Pose(), bench.world.others(0)
+    )
+    assert (cells == now).all()
+    row, column = int((other.pose.y - y) / 0.05), int((other.pose.x - x) / 0.05)
+    assert cells[row, column] == 100
+
+
+def test_who_comes_later_gets_a_whole_costmap_too():
+    bench = Bench(robots=1)
+    assert len(heard(bench, LOCAL["ros1"])) == 1
+    assert len(heard(bench, LOCAL["ros1"])) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_distances_are_those_of_a_search_through_all_cells(seed):
+    solid = np.random.default_rng(seed).random((20, 30)) < 0.02
+    found = distances(solid, 7)
+    rows, columns = np.nonzero(solid)
+    for row in range(20):
+        for column in range(30):
+            true = np.hypot(rows - row, columns - column).min(initial=np.inf)
+            if true <= 7:
+                assert found[row, column] == pytest.approx(true)
+            else:
+                assert found[row, column] >= 7
+
+
+def test_a_whole_costmap_knows_the_others_and_what_is_unknown():
+    plan = room(4, 3)
+    plan.occupancy[-20:, -20:] = UNKNOWN
+    costs = Costs(Obstacles(plan), 0.25)
+    cells = costs.whole([(1.5, 1.5, 0.25), (-9.0, 50.0, 0.25)])
+    assert cells[30, 30] == 100
+    assert costs.whole([])[30, 30] == 0
+    assert cells[0, 0] == 100
+    assert cells[45, 65] == UNKNOWN
+
+
+@DIALECTS
+@pytest.mark.parametrize("compression", ["none", "cbor"])
+def test_a_cloud_holds_walls_with_their_height_and_the_floor(dialect, compression):
+    bench = Bench(dialect, robots=1)
+    cloud = heard(bench, "/robot_0/points", compression=compression)[0]
+    data = cloud["data"]
+    if compression == "none":
+        data = base64.b64decode(data, validate=True)
+    assert cloud["row_step"] == len(data) == cloud["width"] * cloud["point_step"]
+    named = {field["name"]: field for field in cloud["fields"]}
+    assert [named[name]["offset"] for name in ("x", "y", "z")] == [0, 4, 8]
+    points = np.frombuffer(data, POINT)
+    assert set(points["ring"].tolist()) == {0, 1, 2, 3}
+    assert points["z"].max() > 0.3
+    at = bench.world.robots[0].pose
+    xs = at.x + math.cos(at.yaw) * points["x"] - math.sin(at.yaw) * points["y"]
+    ys = at.y + math.sin(at.yaw) * points["x"] + math.cos(at.yaw) * points["y"]
+    walls = points["ring"] > 0
+    edge = np.minimum(np.minimum(xs, 10 - xs), np.minimum(ys, 6 - ys))
+    assert abs(edge[walls] - 0.05).max() < 0.01
+    floor = ~walls & (edge > 0.1)
+    assert abs(points["z"][floor] + 0.2).max() < 1e-3
+
+
+def test_a_ring_that_looks_over_a_robot_sees_the_wall_behind():
+    whole, walls = np.full(8, 2.0, np.float32), np.full(8, 5.0, np.float32)
+    points = cloud_points(whole, walls)
+    reach = np.hypot(points["x"], points["y"])
+    assert reach[points["ring"] == 1] == pytest.approx(2)
+    assert reach[points["ring"] == 2] == pytest.approx(2)
+    assert reach[points["ring"] == 3] == pytest.approx(5)
+
+
+@DIALECTS
+def test_a_footprint_is_the_base_in_the_frame_of_odometry(dialect):
+    bench = Bench(dialect, robots=1)
+    robot = bench.world.robots[0]
+    topic = LOCAL[dialect].replace(
+        "costmap/costmap",
+        "costmap/published_footprint" if dialect == "ros2" else "costmap/footprint",
+    )
+    message = heard(bench, topic)[-1]
+    assert message["header"]["frame_id"] == "robot_0/odom"
+    points = message["polygon"]["points"]
+    ways = [math.hypot(p["x"] - robot.pose.x, p["y"] - robot.pose.y) for p in points]
+    assert ways == pytest.approx([0.25] * 16, abs=1e-5)
+
+
+@DIALECTS
+def test_particles_are_spread_as_the_covariance_says(dialect):
+    bench = Bench(dialect, robots=1)
+    robot = bench.world.robots[0]
+    cloud = heard(bench, "/robot_0/particlecloud")[0]
+    doubtful = heard(bench, "/robot_0/amcl_pose")[0]["pose"]
+    assert doubtful["pose"]["position"]["x"] == robot.pose.x
+    spots = np.array([[p["position"][k] for k in "xy"] for p in cloud["poses"]])
+    assert len(spots) == 150
+    assert np.hypot(*(spots.mean(axis=0) - (robot.pose.x, robot.pose.y))) < 0.05
+    covariance = np.array(doubtful["covariance"]).reshape(6, 6)
+    assert np.cov(spots.T) == pytest.approx(covariance[:2, :2], abs=0.008)
+    assert covariance[5, 5] == pytest.approx(SURE[2] ** 2)
+
+
+def test_a_pose_that_a_person_gives_is_believed_and_mended_on_the_way():
+    bench = Bench(robots=1)
+    robot = bench.world.robots[0]
+    client = bench.client()
+    given = robot.pose @ Pose(0.6, 0.3, 0.2)
+    half = given.yaw / 2
+    covariance = [0.0] * 36
+    covariance[0] = covariance[7] = 0.25
+    covariance[35] = 0.07
+    message = {
+        "header": {"frame_id": "map"},
+        "pose": {
+            "pose": {
+                "position": {"x": given.x, "y": given.y},
+                "orientation": {"z": math.sin(half), "w": math.cos(half)},
+            },
+            "covariance": covariance,
+        },
+    }
+    client.send(op="publish", topic="/robot_0/initialpose", msg=message)
+    said = heard(bench, "/robot_0/amcl_pose")[-1]["pose"]
+    assert said["pose"]["position"]["x"] == pytest.approx(given.x)
+    assert said["covariance"][0] == pytest.approx(0.25)
+    bench.world.send_goal(0, Goal(Pose(8.5 if robot.pose.x < 5 else 1.5, 3.0)))
+    bench.run(20)
+    said = heard(bench, "/robot_0/amcl_pose")[-1]["pose"]
+    at = said["pose"]["position"]
+    assert math.hypot(at["x"] - robot.pose.x, at["y"] - robot.pose.y) < 0.05
+    assert said["covariance"][35] == pytest.approx(SURE[2] ** 2, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"header": {"frame_id": "moon"}},
+        {"pose": {"covariance": [math.inf] * 36}},
+        {"pose": {"pose": {"position": {"x": math.inf}}}},
+    ],
+)
+def test_a_pose_from_nowhere_is_not_believed(wrong):
+    bench = Bench(robots=1, quirks="real")
+    client = bench.client()
+    client.send(op="publish", topic="/robot_0/initialpose", msg=wrong)
+    assert bench.node.believed(0) == bench.world.robots[0].pose
+
+
+def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
+    bench = Bench()
+    one, other = bench.world.robots
+    one.pose = Pose(2.0, 3.0, math.pi)
+    other.pose = Pose(6.0, 3.0)
+    (near, *_) = heard(bench, "/robot_0/sonar")
+    assert near["range"] == pytest.approx(2.0 - 0.25 - 0.05, abs=0.01)
+    one.pose = Pose(4.0, 3.0, 0.0)
+    assert heard(bench, "/robot_0/sonar")[0]["range"] == pytest.approx(1.5, abs=0.01)
+    other.pose = Pose(4.0, 1.0)
+    binary = heard(bench, "/robot_0/sonar", compression="cbor")
+    assert binary[0]["range"] == math.inf, "nothing in reach"
+    assert heard(bench, "/robot_0/sonar")[0]["range"] is None, "as JSON has it"
+    one.pose = Pose(0.29, 3.0, math.pi)
+    assert heard(bench, "/robot_0/sonar", compression="cbor")[0]["range"] == -math.inf
+
+
+def test_a_fix_is_where_the_robot_is_on_the_globe():
+    from webmap.modules.robot.nav_sat_fix import metres_from
+    from webmap.sim.feeds.satellites import DATUM
+
+    bench = Bench(robots=1)
+    robot = bench.world.robots[0]
+    fix = heard(bench, "/robot_0/fix")[0]
+    east, north = metres_from(DATUM, (fix["latitude"], fix["longitude"]))
+    assert (east, north) == pytest.approx((robot.pose.x, robot.pose.y), abs=1e-3)
+
+
+def test_markers_show_the_goal_and_who_is_seen():
+    bench = Bench()
+    one, other = bench.world.robots
+    one.pose, other.pose = Pose(2, 3), Pose(5, 3)
+    marks = heard(bench, "/robot_0/markers")[-1]["markers"]
+    assert [mark["action"] for mark in marks if mark["ns"] == "goal"] == [2, 2]
+    (seen,) = [mark for mark in marks if mark["ns"] == "seen"]
+    assert seen["pose"]["position"]["x"] == 5
+    bench.world.send_goal(0, Goal(Pose(8, 2, 1)))
+    arrow, text, _ = heard(bench, "/robot_0/markers")[-1]["markers"]
+    assert (arrow["pose"]["position"]["x"], arrow["action"]) == (8, 0)
+    assert text["text"].endswith(" m")
+
+
+@DIALECTS
+def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
+    bench = Bench(dialect, robots=1)
+    log = bench.client()
+    log.send(op="subscribe", topic="/rosout")
+    bench.world.robots[0].charge = 0.2
+    parts = heard(bench, "/diagnostics")[-1]["status"]
+    levels = {part["name"]: part["level"] for part in parts}
+    assert levels == {
+        "robot_0/base: Motors": 0,
+        "robot_0/base: Battery": 1,
+        "robot_0/laser: Frequency": 0,
+    }
+    bench.world.send_goal(0, Goal(Pose(2.0, 3.0)))
+    bench.run(1)
+    bench.world.stop(0)
+    bench.run(1)
+    said = [operation["msg"] for operation in log.operations("publish", "/rosout")]
+    warn, info = (30, 20) if dialect == "ros2" else (4, 2)
+    lines = [(line["level"], line["msg"]) for line in said]
+    assert lines[0] == (warn, "the battery is at 20 %")
+    assert (info, "a goal at (2.00, 3.00)") in lines
+    assert (info, "the goal canceled: stopped") in lines
+    name = "robot_0.base" if dialect == "ros2" else "/robot_0/base"
+    assert said[0]["name"] == name
+
+
+@DIALECTS
+@pytest.mark.parametrize("part", ["points", "markers", "sonar", "fix", "amcl_pose"])
+def test_what_is_said_can_be_sent_raw_too(dialect, part):
+    bench = Bench(dialect, robots=1)
+    (message, *_) = heard(bench, f"/robot_0/{part}", compression="cbor-raw")
+    frame = "map" if part in ("markers", "amcl_pose") else "robot_0/"
+    assert frame.encode() in message["bytes"]
