@@ -1,11 +1,11 @@
 """The control lane: velocity out, its echo back, and nothing else."""
 
-from collections import deque
 from collections.abc import Callable
 
 from webmap.gate import words
 from webmap.gate.events import Alive, Echoed, Event, Key, LinkDown, LinkUp
 from webmap.gate.lanes import Lane
+from webmap.gate.unproven import Unproven
 from webmap.geometry import Twist
 from webmap.ros import ops
 
@@ -29,13 +29,15 @@ class ControlLane:
         self._url = url
         self._tell = tell
         self._types: dict[str, str] = {}
-        self._listened: dict[str, deque[Twist]] = {}
+        self._listened: set[str] = set()
+        self._unproven = Unproven()
         self.lane = Lane(
             url,
-            up=lambda: tell(LinkUp(url, "control")),
+            up=self._open,
             down=lambda: tell(LinkDown(url, "control")),
             text=self._hear,
-            pong=lambda: tell(Alive(url)),
+            pinged=self._unproven.pinged,
+            pong=self._answer,
         )
         self.lane.hurry(IDLE_PING)
 
@@ -53,7 +55,7 @@ class ControlLane:
 
     def listen(self, topic: str) -> None:
         """Hear what is said on ``topic``, ours and others'."""
-        self._listened[topic] = deque(maxlen=16)
+        self._listened.add(topic)
         id = f"webmap-gate echo {topic}"
         self.lane.hold(
             id,
@@ -64,7 +66,7 @@ class ControlLane:
 
     def ignore(self, topic: str) -> None:
         """Undo :meth:`listen`."""
-        del self._listened[topic]
+        self._listened.remove(topic)
         self.lane.let_go(f"webmap-gate echo {topic}")
         if not self._listened:
             self.lane.hurry(IDLE_PING)
@@ -72,18 +74,29 @@ class ControlLane:
     def write(self, topic: str, twist: Twist) -> bool:
         """Write a velocity now or drop it; return whether it went out.
 
-        Zero may wait behind other bytes, anything else may not.
+        Zero may wait behind other bytes, anything else may not, nor may it be one
+        more than may lie on the way.
         """
+        if not (twist.is_zero or self._unproven.room(topic)):
+            return False
         data = words.velocity(topic, self._types[topic], twist)
         done = self.lane.write(data, only_if_clear=not twist.is_zero)
-        if done and topic in self._listened:
-            self._listened[topic].append(twist)
+        if done:
+            self._unproven.wrote(topic, twist)
         return done
+
+    def _open(self) -> None:
+        self._unproven.begin()  # what the link before held went with it
+        self._tell(LinkUp(self._url, "control"))
+
+    def _answer(self, number: int) -> None:
+        self._unproven.ponged(number)
+        self._tell(Alive(self._url))
 
     def _hear(self, data: bytes) -> None:
         heard = words.hear(data)
         if heard is None or heard.topic not in self._listened or heard.twist is None:
             return
-        if heard.twist in self._listened[heard.topic]:
+        if self._unproven.echoed(heard.topic, heard.twist):
             self._tell(Alive(self._url))
         self._tell(Echoed(Key(self._url, heard.topic), heard.twist))

@@ -39,7 +39,8 @@ class Lane:
         up: Called when the lane is open and has said what it has to.
         down: Called when it is not open any more.
         text: Called with each message.
-        pong: Called when the bridge has answered a ping.
+        pinged: Called with the number of each ping that goes out; they grow.
+        pong: Called with the number of a ping that the bridge has answered.
 
     """
 
@@ -53,13 +54,15 @@ class Lane:
         up: Callable[[], None],
         down: Callable[[], None],
         text: Callable[[bytes], None],
-        pong: Callable[[], None] = lambda: None,
+        pinged: Callable[[int], None] = lambda _: None,
+        pong: Callable[[int], None] = lambda _: None,
     ) -> None:
         self.url = url
         self.ping_period = self.PING
         self._up = up
         self._down = down
         self._text = text
+        self._pinged = pinged
         self._pong = pong
         self._holds: dict[str, Hold] = {}
         self._socket: Socket | None = None
@@ -144,7 +147,7 @@ class Lane:
         if self._answered < number <= self._pings:
             self._answered = number
             self._answered_at = asyncio.get_running_loop().time()
-            self._pong()
+            self._pong(number)
 
     async def _run(self) -> None:
         wait, complained = FIRST_WAIT, ""
@@ -178,6 +181,7 @@ class Lane:
                 return
             self._pings += 1
             self._socket.ping(self._pings.to_bytes(8, "big"))
+            self._pinged(self._pings)
             self._changed.clear()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(self.ping_period):

@@ -1,0 +1,43 @@
+"""What a stalled link delivers late, through a running gate."""
+
+import contextlib
+import time
+
+from gate_robot import eventually
+
+from webmap.errors import NoLease
+from webmap.geometry import Twist
+
+
+def test_a_program_that_is_quick_leaves_six_velocities_on_a_stalled_link(
+    client, robot_spec, fake
+):
+    client.declare(robot_spec)
+    reports = []
+    client.on_report(reports.append)
+    eventually(lambda: any(getattr(r, "armable", 0) for r in reports), "a robot")
+    client.take("r1").result(5)
+
+    def push():
+        with contextlib.suppress(NoLease):  # the stall is noticed, and then it is gone
+            client.twist("r1", Twist(0.2))
+
+    def under_way():
+        push()
+        return len(fake.moving) > 20
+
+    eventually(under_way, "a robot that moves")
+    fake.hold()
+    held_at = time.monotonic()
+    before = len(fake.moving)
+
+    def stalled():
+        push()
+        return time.monotonic() - held_at > 0.6
+
+    eventually(stalled, "the gate to have seen the stall")
+    fake.go_on()
+    eventually(lambda: fake.last_speed == 0, "a zero")
+    # One more may have been read in the moment when the robot ceased to read.
+    assert len(fake.moving) - before <= 6 + 1
+    assert any(at > held_at + 0.5 for at, _ in fake.velocities)
