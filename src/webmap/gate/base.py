@@ -39,6 +39,7 @@ from webmap.gate.sight import Sight
 from webmap.gate.standing import StandingStop
 from webmap.gate.standstill import STILL_V, speed_of
 from webmap.gate.stoptest import CREEP, StopTest
+from webmap.gate.video import Video
 from webmap.geometry import Twist
 
 State = Literal["free", "held", "driving", "stopping", "stopped"]
@@ -83,6 +84,7 @@ class Base:
         self.motion = Motion(key, control, self._bounds, emit)
         self.standing = StandingStop(key, latch, self.robots, control, self.motion)
         self.sight = Sight(key, emit)
+        self.video = Video()
         self.guard = Guard(self.robots)
         self.arming = Arming(key, self.robots, latch, control, pulse, self.sight)
         self.known = False
@@ -184,7 +186,7 @@ class Base:
 
     def doubt(self, now: float) -> str | None:
         """Return why the machine must not be driven now, in words."""
-        return self.arming.doubt(now)
+        return self.arming.doubt(now) or self.video.doubt(now)
 
     # Leases.
 
@@ -199,6 +201,7 @@ class Base:
         self.deadman = DeadMan(needs_neutral=not to.program)
         self._page_cap = to.cap
         self.ages.clear()
+        self.video.forget()
         self._update_watch(now)
         return epoch
 
@@ -228,6 +231,7 @@ class Base:
         self.lease, self._page_cap = None, None
         self.deadman = DeadMan()
         self.ages.clear()
+        self.video.forget()
         self._update_watch(now)
         if why is not None:
             self.robots.refuse(lease.connection, "lease", why)

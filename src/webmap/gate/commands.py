@@ -28,6 +28,9 @@ lease for it, who answers with ``grant`` or ``deny``, or gives it by saying noth
 measures whether the base stops by itself; it needs the lease, released inputs, and a
 page that goes on sending ``drive``.
 
+A page whose driver goes by a camera adds ``"video"`` to each ``drive``: for how many
+milliseconds the newest picture that the page showed had been there.
+
 Whatever is not one of these is refused whole. What the gate says back stands in
 :mod:`webmap.gate.reports`.
 """
@@ -81,6 +84,8 @@ class Drive:
     turn: float
     clamped: bool = False
     """Whether an axis lay beyond ``[-1, 1]``."""
+    video: float | None = None
+    """Seconds since the picture was taken that the driver goes by, if there is one."""
 
     @property
     def neutral(self) -> bool:
@@ -230,6 +235,9 @@ class _Fields:
         except KeyError:
             _refuse(f"{name!r} is missing")
 
+    def has(self, name: str) -> bool:
+        return name in self._fields
+
     def robot(self) -> str:
         value = self._take("robot")
         if not (isinstance(value, str) and value and len(value) <= MAX_NAME):
@@ -269,7 +277,9 @@ def _drive(fields: _Fields) -> Drive:
     epoch, seq, tick = (fields.whole(name) for name in ("epoch", "seq", "tick"))
     asked = [fields.number(name) for name in ("x", "y", "turn")]
     x, y, turn = (min(1.0, max(-1.0, axis)) for axis in asked)
-    return Drive(robot, epoch, seq, tick, x, y, turn, clamped=asked != [x, y, turn])
+    clamped = asked != [x, y, turn]
+    video = fields.whole("video") / 1000 if fields.has("video") else None
+    return Drive(robot, epoch, seq, tick, x, y, turn, clamped, video)
 
 
 def _goal(fields: _Fields) -> Goal:

@@ -306,6 +306,9 @@ class Gate:
         if drive.clamped and not connection.flagged:
             connection.flagged = True
             log.warning("connection %s asks for more than full speed", connection.id)
+        # What the page showed when it spoke has aged on the way here.
+        seen = None if drive.video is None else drive.video + age
+        base.video.saw(seen, now)
         speed = base.speed
         wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
         if reason := base.drive(wanted, drive.neutral, drive.tick, now):

@@ -138,6 +138,21 @@ export class Drive {
     if (was !== this._hands.pressed) this._step();
   }
 
+  /**
+   * Say that the operator goes by the picture of a robot's camera: while it is older
+   * than a second, the robot does not move.
+   *
+   * @param {string} robot
+   * @param {() => number} age How old the picture is that the page shows now, in ms.
+   * @returns {() => void} The operator goes by it no more.
+   */
+  goBy(robot, age) {
+    this._pilot.video.set(robot, age);
+    return () => {
+      if (this._pilot.video.get(robot) === age) this._pilot.video.delete(robot);
+    };
+  }
+
   /** Forget what is held and go neutral at once: for inputs that are in doubt. */
   doubt() {
     this._doubt(false);

@@ -484,3 +484,44 @@ describe("a robot for which a STOP stands", () => {
     assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
   });
 });
+
+describe("a camera that the operator goes by", () => {
+  const last = () => bench.sent.filter((m) => m.op === "drive").at(-1);
+
+  test("is spoken of in each command, and only while there is one", () => {
+    bench.pilot.video.set("r1", () => 123.4);
+    bench.drive();
+    assert.equal(last().video, 123);
+    bench.pilot.video.delete("r1");
+    bench.run(50);
+    assert.ok(!("video" in last()));
+  });
+
+  test("of another robot says nothing of this one", () => {
+    bench.pilot.video.set("r2", () => 9999);
+    bench.drive();
+    assert.ok(!("video" in last()));
+  });
+
+  test("stops the robot when it freezes, until hands are off and press again", () => {
+    let age = 100;
+    bench.pilot.video.set("r1", () => age);
+    bench.drive();
+    age = 1001;
+    assert.deepEqual(moves(bench.run(500)), []);
+    assert.equal(last().video, 1001);
+    age = 100;
+    assert.deepEqual(moves(bench.run(1000)), []);
+    bench.letGo();
+    bench.run(300);
+    assert.equal(moves(bench.press()).length, 1);
+  });
+
+  test("that never had a picture is as old as a number can tell", () => {
+    bench.pilot.video.set("r1", () => Infinity);
+    bench.press();
+    bench.grant("r1");
+    assert.deepEqual(moves(bench.run(600)), []);
+    assert.equal(last().video, 1e9);
+  });
+});

@@ -19,6 +19,9 @@ export const SETTLE = 250;
 /** A take that was not answered for this long is given up; ms. */
 export const TAKE_PATIENCE = 1500;
 
+/** The oldest picture that a robot is driven by, once a camera was chosen; ms. */
+export const BLIND = 1000;
+
 /** Steps come every 50 ms; after a longer gap than this the page was not awake; ms. */
 export const ASLEEP = 250;
 
@@ -88,6 +91,11 @@ export class Pilot {
      * @type {Map<string, number>}
      */
     this._given = new Map();
+    /**
+     * The ages of the pictures that the operator goes by, in ms, by robot.
+     * @type {Map<string, () => number>}
+     */
+    this.video = new Map();
   }
 
   /** The robot that this page drives, moving or not; null without a lease. */
@@ -113,6 +121,20 @@ export class Pilot {
     const report = this.robots.get(robot);
     if (!report?.mine || this._given.get(robot) === report.epoch) return null;
     return report.epoch;
+  }
+
+  /** Whether the picture that the operator goes by is too old to drive by (S16). */
+  get blind() {
+    return this._lease !== null && (this._pictureAge(this._lease.robot) ?? 0) > BLIND;
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {number | undefined} In whole ms; undefined if no camera was chosen.
+   */
+  _pictureAge(robot) {
+    const age = this.video.get(robot)?.();
+    return age === undefined ? undefined : Math.round(Math.min(Math.max(age, 0), 1e9));
   }
 
   /** What the operator should know of the chosen robot and of the hands. */
@@ -373,6 +395,7 @@ export class Pilot {
     this._steppedAt = now;
     if (!attentive || gap < 0 || gap > ASLEEP) this.doubt(now, { drop: true });
     if (this.loop.tick === null || this.loop.state(now) !== "open") this.doubt(now);
+    if (this.blind) this.doubt(now);
     return [...this._reach(now), ...this._stream(now), ...this._tidy(now)];
   }
 
@@ -449,6 +472,7 @@ export class Pilot {
     this.loop.sent(stamp.seq, now);
     lease.firstNeutral ??= stamp.seq;
     const { x, y, turn } = axes;
+    const video = this._pictureAge(lease.robot);
     return {
       op: "drive",
       robot: lease.robot,
@@ -457,6 +481,7 @@ export class Pilot {
       x,
       y,
       turn,
+      ...(video === undefined ? {} : { video }),
     };
   }
 

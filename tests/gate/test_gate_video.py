@@ -1,0 +1,110 @@
+"""A driver who goes by a camera does not drive by an old picture (S16)."""
+
+import pytest
+from gate_harness import Bench
+
+from webmap.gate.commands import parse
+from webmap.gate.refusal import Refusal
+from webmap.gate.video import Video
+
+
+@pytest.fixture
+def bench():
+    """A robot that is driven by a camera whose pictures come."""
+    bench = Bench().begin()
+    bench.take("a")
+    look(bench, 0.3, 100)
+    look(bench, 0.5, 100, x=1.0)
+    assert bench.state == "driving"
+    return bench
+
+
+def look(bench, seconds, video, **axes):
+    """Hold inputs for a while with a picture that stays so many ms old."""
+    bench.run(seconds, lambda: bench.drive(video=video, **axes))
+
+
+def freeze(bench, seconds, **axes):
+    """Hold inputs for a while with a picture that ages."""
+    frozen = bench.now - 0.1
+    bench.run(
+        seconds,
+        lambda: bench.drive(video=round(1000 * (bench.now - frozen)), **axes),
+    )
+
+
+def test_a_robot_stops_when_the_picture_is_a_second_old(bench):
+    before = bench.now
+    freeze(bench, 3.0, x=1.0)
+    last = max(w.at for w in bench.moving_since(before))
+    assert 0.7 < last - before <= 0.95  # it was 100 ms old before
+    assert bench.written[-1].twist.is_zero
+    assert not bench.report().armed
+    assert bench.report().reason == "no picture from the camera for 1 s"
+    assert "no picture from the camera" in bench.refusals()[-1].why
+
+
+def test_it_stops_also_when_the_last_command_that_came_was_fresh(bench):
+    look(bench, 0.1, 990, x=1.0)
+    at = bench.now
+    bench.run(0.15)
+    assert not bench.moving_since(at + 0.05)
+    assert bench.report().reason == "no picture from the camera for 1 s"
+
+
+def test_pictures_that_come_again_move_nothing_until_hands_are_off_and_press(bench):
+    freeze(bench, 2.0, x=1.0)
+    at = bench.now
+    look(bench, 2.0, 50, x=1.0)
+    assert not bench.moving_since(at)
+    assert bench.report().reason is None
+    look(bench, 0.3, 50)
+    assert not bench.moving_since(at)
+    look(bench, 0.3, 50, x=1.0)
+    assert bench.moving_since(at)
+
+
+def test_what_a_picture_ages_on_the_way_here_counts(bench):
+    at = bench.now
+
+    def late():
+        bench.drive(video=900, tick=bench.tick - 4, x=1.0)
+
+    bench.run(0.5, late)
+    assert not bench.moving_since(at + 0.06)
+
+
+def test_without_a_camera_nobody_asks_for_pictures(bench):
+    freeze(bench, 2.0, x=1.0)
+    bench.hold(0.3)
+    at = bench.now
+    bench.hold(0.5, x=1.0)
+    assert bench.moving_since(at)
+
+
+def test_the_next_driver_does_not_inherit_an_old_picture(bench):
+    freeze(bench, 2.0, x=0.0)
+    bench.say("a", op="release", robot="r1")
+    bench.run(1.0)
+    bench.drive_off("b")
+    assert bench.state == "driving"
+
+
+def test_an_old_picture_stands_against_nobody_who_does_not_drive(bench):
+    video = Video()
+    video.saw(5.0, 100.0)
+    assert video.doubt(100.0)
+    video.forget()
+    assert video.doubt(100.0) is None
+
+
+@pytest.mark.parametrize("video", [-1, 1.5, None, "100", True, [], 2**53])
+def test_an_age_that_is_none_is_garbage(video):
+    import json
+
+    fields = {"op": "drive", "robot": "r1", "epoch": 1, "seq": 1, "tick": 1}
+    fields |= {"x": 0, "y": 0, "turn": 0}
+    assert parse(json.dumps(fields).encode()).video is None
+    assert parse(json.dumps({**fields, "video": 250}).encode()).video == 0.25
+    with pytest.raises(Refusal, match="'video' is"):
+        parse(json.dumps({**fields, "video": video}).encode())
