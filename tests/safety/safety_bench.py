@@ -41,6 +41,23 @@ def pass_time(seconds):
     time.sleep(seconds)
 
 
+RESET = """new Promise((done) => {
+    const url = new URL("/_webmap/drive", location.href);
+    url.protocol = "ws:";
+    const socket = new WebSocket(url);
+    socket.onmessage = (event) => {
+        const message = JSON.parse(event.data);
+        if (message.op !== "robot") return;
+        if (message.latched) {
+            socket.send(JSON.stringify({ op: "reset", robot: message.robot }));
+        } else {
+            socket.close();
+            done(message.state);
+        }
+    };
+})"""
+
+
 class Bench:
     """Everything from the finger to the wheel, with real processes."""
 
@@ -161,6 +178,20 @@ class Bench:
             text="w",
             autoRepeat=True,
         )
+
+    def space(self, kind):
+        """Press the space bar, which says STOP, or let it go."""
+        self.tab.call(
+            "Input.dispatchKeyEvent",
+            type=kind,
+            key=" ",
+            code="Space",
+            windowsVirtualKeyCode=32,
+        )
+
+    def reset_stop(self):
+        """End the STOP, through a socket of the page's own, as its button does."""
+        assert self.tab.evaluate(RESET) in {"free", "held", "stopping"}
 
     def heal(self):
         """Have a display and a page, whatever the test before left behind."""

@@ -1,6 +1,7 @@
 """A page with one robot, and code of its user that blocks when the robot says so.
 
-The addresses come from the environment: SAFETY_BRIDGE, where the robot is.
+The addresses come from the environment: SAFETY_BRIDGE, where the robot is, and
+SAFETY_FLOOD, if there is more to show: where robots that scan are, and where maps are.
 """
 
 import asyncio
@@ -47,12 +48,27 @@ bridge.subscribe("/block", block, "std_msgs/Float64")
 bridge.subscribe("/hold", hold_the_interpreter, "std_msgs/Float64")
 
 
+scanners, maps = [], None
+if flood := os.environ.get("SAFETY_FLOOD"):
+    robots, maps = map(webmap.Bridge, flood.split())
+    for number in range(10):
+        one = webmap.Robot(f"s{number}", webmap.svg.circle(cx=0, cy=0, r=0.2))
+        one.set_odometry_topic(robots, f"/robot_{number}/odom")
+        topic = f"/robot_{number}/base_scan"
+        one.add_module("LaserScanner", robots, topic, max_dots=None, throttle=0)
+        scanners.append(one)
+
+
 @webmap.page("/")
 def main(page):
     """Show the robot, chosen, with keys to drive it."""
     map = webmap.Map(page.element("webmap_container"), 400, 300)
     map.add_module("Teleop", 1.0, 1.5)
     map.scale(40, map.canvas_width * 0.5, map.canvas_height * 0.5)
+    if maps is not None:
+        map.add_module("OccupancyGrid", maps, "/huge")
+    for one in scanners:
+        map.add_robot(one)
     map.add_robot(bob)
     map.set_selected(bob)
 

@@ -118,41 +118,15 @@ def test_a_busy_page_stops_the_robot(bench):
     )
 
 
-RESET = """new Promise((done) => {
-    const url = new URL("/_webmap/drive", location.href);
-    url.protocol = "ws:";
-    const socket = new WebSocket(url);
-    socket.onmessage = (event) => {
-        const message = JSON.parse(event.data);
-        if (message.op !== "robot") return;
-        if (message.latched) {
-            socket.send(JSON.stringify({ op: "reset", robot: message.robot }));
-        } else {
-            socket.close();
-            done(message.state);
-        }
-    };
-})"""
-
-
 def test_stop_on_the_keyboard_stops_the_robot_and_the_reset_moves_nothing(bench):
-    def key(kind):
-        bench.tab.call(
-            "Input.dispatchKeyEvent",
-            type=kind,
-            key=" ",
-            code="Space",
-            windowsVirtualKeyCode=32,
-        )
-
     def back():
-        key("keyUp")
+        bench.space("keyUp")
         pass_time(0.5)
-        assert bench.tab.evaluate(RESET) in {"free", "held", "stopping"}
+        bench.reset_stop()
 
     bench.prove(
         "STOP by the space bar, with W held on",
-        lambda: key("keyDown"),
+        lambda: bench.space("keyDown"),
         within=0.1,
         back=back,
     )

@@ -1,34 +1,63 @@
-"""A crowd that watches, and a processor that is busy, while a person holds W."""
+"""Much to show, many who watch and a busy processor, while a person holds W.
+
+Ten robots scan ten times a second, a map of 16 million cells comes every two seconds
+through a rosbridge, and fifty viewers look on, of whom five read nothing.
+"""
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from safety_bench import TRIALS, pass_time
+from safety_bench import pass_time, wait_for
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
-VIEWERS = 50 if TRIALS > 1 else 20
+VIEWERS = 50
 SILENT = 5
+SCANNERS = 10
+
+UNDER_LOAD = (
+    f"a map of 16 million cells, {SCANNERS} robots that scan, {VIEWERS} viewers, "
+    f"{SILENT} of whom read nothing, and a busy processor"
+)
+
+PICTURE = "document.querySelector('.occupancy-grid image')?.getAttribute('href')"
+DOTS = """[...document.querySelectorAll('.laserscan .dot')]
+    .filter((dots) => dots.getAttribute('d')).length"""
+
+
+@contextlib.contextmanager
+def helper(script, *arguments):
+    """Run a script of this folder until its standard input ends."""
+    command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as process:
+        try:
+            yield process
+            assert process.poll() is None, f"{script} has ended"
+        finally:
+            process.stdin.close()
+            process.wait(20)
 
 
 @contextlib.contextmanager
 def crowd(url):
-    script = Path(__file__).with_name("safety_crowd.py")
-    command = [sys.executable, str(script), url, str(VIEWERS), str(SILENT)]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen(command, text=True, **pipes) as process:
-        try:
-            assert process.stdout.readline() == "ready\n"
-            yield
-            assert process.poll() is None, "the crowd has gone"
-        finally:
-            process.stdin.close()
-            process.wait(20)
+    with helper("safety_crowd.py", url, str(VIEWERS), str(SILENT)) as process:
+        assert process.stdout.readline() == "ready\n"
+        yield
+
+
+@contextlib.contextmanager
+def flood():
+    with helper("safety_flood.py") as process:
+        lines = sorted(process.stdout.readline() for _ in range(2))
+        maps, robots = [re.search(r"ws://\S+", line)[0] for line in lines]
+        yield f"{robots} {maps}"
 
 
 @contextlib.contextmanager
@@ -40,32 +69,69 @@ def busy_processor():
             process.kill()
 
 
-def test_a_crowd_and_a_busy_processor_do_not_slow_a_release(bench):
+@pytest.fixture(scope="module")
+def loaded(bench):
+    """The bench, with all there is to show on the page."""
+    with flood() as addresses:
+        os.environ["SAFETY_FLOOD"] = addresses
+        bench.end_display()
+        bench.start_display()
+        bench.open_page()
+        with crowd(bench.url), busy_processor():
+            wait_for(lambda: bench.tab.evaluate(DOTS) == SCANNERS, "scans", 30)
+            wait_for(lambda: bench.tab.evaluate(PICTURE), "a map", 30)
+            yield bench
+        del os.environ["SAFETY_FLOOD"]
+        bench.end_display()
+
+
+@contextlib.contextmanager
+def maps_coming(bench):
+    """See that a map came, and was drawn, in the meantime."""
+    before = bench.tab.evaluate(PICTURE)
+    yield
     bench.heal()
-    with crowd(bench.url), busy_processor():
-        bench.prove(
-            f"the key is let go; {VIEWERS} viewers, {SILENT} of them read nothing, "
-            "and a busy processor",
-            bench.let_go,
+    wait_for(lambda: bench.tab.evaluate(PICTURE) not in (None, before), "maps", 30)
+    assert bench.tab.evaluate(DOTS) == SCANNERS
+
+
+def test_under_load_letting_go_stops_the_robot_as_quickly(loaded):
+    with maps_coming(loaded):
+        loaded.prove(
+            f"the key is let go; {UNDER_LOAD}",
+            loaded.let_go,
             within=0.1,
             held_after=False,
         )
 
 
-def test_a_crowd_and_a_busy_processor_do_not_slow_the_dead_man(bench):
+def test_under_load_the_dead_man_stops_the_robot_as_quickly(loaded):
     def send(sig):
-        os.killpg(bench.browser.process.pid, sig)
+        os.killpg(loaded.browser.process.pid, sig)
 
     def back():
         pass_time(0.5)
         send(signal.SIGCONT)
 
-    bench.heal()
-    with crowd(bench.url), busy_processor():
-        bench.prove(
-            f"the browser is stopped; {VIEWERS} viewers, {SILENT} of them read "
-            "nothing, and a busy processor",
+    with maps_coming(loaded):
+        loaded.prove(
+            f"the browser is stopped; {UNDER_LOAD}",
             lambda: send(signal.SIGSTOP),
             within=0.3,
+            back=back,
+        )
+
+
+def test_under_load_stop_stops_the_robot_as_quickly(loaded):
+    def back():
+        loaded.space("keyUp")
+        pass_time(0.5)
+        loaded.reset_stop()
+
+    with maps_coming(loaded):
+        loaded.prove(
+            f"STOP by the space bar, with W held on; {UNDER_LOAD}",
+            lambda: loaded.space("keyDown"),
+            within=0.1,
             back=back,
         )

@@ -1,0 +1,68 @@
+"""Ten robots that scan, and a map of 16 million cells that comes again and again.
+
+A process of its own, with two rosbridge servers; says on standard output where they
+are, and ends when standard input does.
+"""
+
+import asyncio
+import time
+
+import numpy as np
+
+from webmap.sim import run_simulator
+from webmap.sim.messages import Messages
+from webmap.sim.process import end_with_stdin
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import parse_quirks
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+ROBOTS = 10
+SIDE = 4000
+"""Cells along a side of the map."""
+
+EVERY = 2.0
+"""Seconds between two of the maps."""
+
+
+async def send_maps(stop: asyncio.Event) -> None:
+    """Publish maps, no two of which are the same, to whoever subscribes."""
+    schema, quirks = Schema(Dialect("ros1")), parse_quirks("real", "ros1")
+    graph, node = Graph(schema), object()
+    server = RosbridgeServer(graph, Encoder(schema, quirks))
+    graph.advertise(node, "/huge", "nav_msgs/OccupancyGrid", node="/map_server")
+    messages = Messages(Dialect("ros1"))
+    cells = np.zeros((SIDE, SIDE), np.int8)
+    cells[::97], cells[:, ::113], cells[: SIDE // 8] = 100, 100, -1
+    print(f"maps at {await server.start('127.0.0.1', 0)}", flush=True)
+    number = 0
+    while not stop.is_set():
+        number += 1
+        cells[SIDE // 2, : number % SIDE] = 50
+        now = time.time()
+        message = messages.cells("/huge", now, "map", cells, 0.05, (0.0, 0.0))
+        graph.publish(node, "/huge", message)
+        try:
+            async with asyncio.timeout(EVERY):
+                await stop.wait()
+        except TimeoutError:
+            continue
+    await server.stop()
+
+
+async def main() -> None:
+    """Run both servers until standard input ends."""
+    stop = asyncio.Event()
+    end_with_stdin(stop)
+
+    def ready(url: str) -> None:
+        print(f"robots at {url}", flush=True)
+
+    robots = run_simulator(robots=ROBOTS, wander=True, on_ready=ready, stop=stop)
+    await asyncio.gather(robots, send_maps(stop))
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
