@@ -22,6 +22,7 @@ from webmap.ros.offload import Offload
 from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
 from webmap.ros.publications import Publications
+from webmap.ros.renewal import Renewals
 from webmap.ros.subscriptions import Subscription, Topic, Wish, checked
 from webmap.scope import Removal
 
@@ -72,6 +73,7 @@ class Bridge:
         self._graph = Graph(self.call_service)
         self._offload = Offload()
         self._doubts = Doubts(self.name, self._graph, self._report)
+        self._renewals = Renewals(self._graph.published, self._topics.values)
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
@@ -273,6 +275,7 @@ class Bridge:
         await self._calls.stop()
         await self._offload.stop()
         await self._doubts.stop()
+        await self._renewals.stop()
 
     def _new_topic(self, name: str) -> Topic:
         return Topic(
@@ -310,6 +313,7 @@ class Bridge:
         for topic in list(self._topics.values()):
             topic.again()
             self._doubts.watch(topic)
+        self._renewals.begin()
         self._on_open.call()
 
     def _link_lost(self, reason: str) -> None:
@@ -317,6 +321,7 @@ class Bridge:
         log.log(level, "%s: the link ended: %s", self.name, reason)
         self.trouble = reason
         self._doubts.forget()
+        self._renewals.forget()
         for topic in self._topics.values():
             topic.link_lost()
         self._on_close.call(reason)

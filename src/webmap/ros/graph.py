@@ -46,6 +46,14 @@ class Graph:
         self._types[topic] = found
         return found
 
+    async def published(self, topic: str) -> bool | None:
+        """Return whether anybody publishes ``topic``, or None if nobody answers."""
+        try:
+            answer = await self._call("/rosapi/publishers", {"topic": topic})
+            return bool(convert(answer, _Publishers).publishers)
+        except (BridgeError, ProtocolError):
+            return None
+
     async def topics(self) -> dict[str, str]:
         """Return the type of every topic.
 
@@ -61,6 +69,10 @@ class Graph:
             raise ServiceError(f"/rosapi/topics made no sense: {error}") from None
         self._types.update({name: type for name, type in found.items() if type})
         return found
+
+
+class _Publishers(msgspec.Struct):
+    publishers: list[str]
 
 
 class _Topics(msgspec.Struct):

@@ -204,6 +204,15 @@ class Topic:
         self._complained, self._fault = False, None
         self._ask(self.wish())
 
+    def renew(self) -> None:
+        """Give the subscription up and ask for it anew.
+
+        While there is one, a bridge goes on with the old one's quality of service.
+        """
+        if self._asked is not None:
+            self._send(ops.unsubscribe(self.name, id=self._id))
+            self._ask(self.wish())
+
     def link_lost(self) -> None:
         """Forget what the old link brought and was asked."""
         self._asked, self._latest = None, None

@@ -1,0 +1,100 @@
+"""Topics that were subscribed before anybody published them."""
+
+import asyncio
+from itertools import pairwise
+
+import pytest
+from fake_rosbridge import bridged, until
+
+from webmap.ros import renewal
+from webmap.ros.renewal import AGAIN, FIRST, LONGEST, UNANSWERED, Silence
+
+TYPE = "nav_msgs/OccupancyGrid"
+
+
+def looks(answers, until):
+    """At which times a silent topic is asked after, and when it is renewed."""
+    silence = Silence(0.0)
+    asked, renewed = [], []
+    for tenth in range(int(until * 10)):
+        now = tenth / 10
+        if silence.due(now):
+            asked.append(now)
+            if silence.heard(answers(now), now):
+                renewed.append(now)
+    return asked, renewed
+
+
+def test_a_topic_is_asked_for_anew_once_somebody_publishes_it():
+    asked, renewed = looks(lambda now: now >= 20, 25)
+    assert asked[0] == FIRST
+    (at,) = renewed
+    assert 20 <= at <= 20 + LONGEST
+
+
+def test_one_that_is_published_and_stays_silent_is_asked_for_now_and_then():
+    _, renewed = looks(lambda _now: True, 300)
+    assert renewed[0] == FIRST
+    gaps = [b - a for a, b in pairwise(renewed)]
+    assert gaps
+    assert all(AGAIN <= gap <= AGAIN + LONGEST for gap in gaps)
+
+
+def test_one_that_nobody_publishes_is_left_alone():
+    asked, renewed = looks(lambda _now: False, 300)
+    assert renewed == []
+    assert len(asked) < 300 / LONGEST + 4
+
+
+def test_where_nobody_can_tell_it_is_asked_for_now_and_then():
+    _, renewed = looks(lambda _now: None, 300)
+    assert 300 / (AGAIN + LONGEST) - 1 <= len(renewed) <= 300 / AGAIN
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(renewal, "PERIOD", 0.01)
+    monkeypatch.setattr(renewal, "FIRST", 0.02)
+    monkeypatch.setattr(renewal, "LONGEST", 0.05)
+
+
+def test_the_old_subscription_is_given_up_before_the_new_one_is_asked_for(quick):
+    async def scenario():
+        got = []
+        async with bridged(publishers={"publishers": []}) as (server, bridge):
+            bridge.subscribe("/map", got.append, TYPE)
+            bridge.subscribe("/heard", got.append, "std_msgs/String")
+            (first,) = await server.heard("subscribe", topic="/map")
+            await server.publish("/heard", {"data": "I am here"})
+            await server.heard("call_service", count=3, service="/rosapi/publishers")
+            assert len(server.ops("subscribe", topic="/map")) == 1
+            server.answer["/rosapi/publishers"] = {"publishers": ["/map_server"]}
+            await server.heard("subscribe", count=2, topic="/map")
+            about = [m for m in server.said if m.get("topic") == "/map"]
+            assert [m["op"] for m in about] == ["subscribe", "unsubscribe", "subscribe"]
+            assert about[1]["id"] == first["id"] != about[2]["id"]
+            await server.publish("/map", {"info": {}})
+            await until(lambda: len(got) == 2)
+            asked = server.ops("call_service", service="/rosapi/publishers")
+            later = [m for m in asked if m["args"]["topic"] == "/heard"]
+            assert len(later) <= 1
+            assert len(server.ops("subscribe", topic="/heard")) == 1
+
+    asyncio.run(scenario())
+
+
+def test_a_bridge_without_rosapi_is_not_troubled(quick, monkeypatch):
+    monkeypatch.setattr(renewal, "AGAIN", 0.3)
+
+    async def scenario():
+        errors = []
+        async with bridged() as (server, bridge):
+            bridge.on_error(errors.append)
+            bridge.subscribe("/map", print, TYPE)
+            # It is asked for anew now and then, since nobody can tell.
+            await server.heard("subscribe", count=3, topic="/map")
+            asked = server.ops("call_service", service="/rosapi/publishers")
+            assert len(asked) == UNANSWERED
+            assert errors == []
+
+    asyncio.run(scenario())
