@@ -1,5 +1,6 @@
 """Starts a real ROS 2 graph, and in front of it a rosbridge that is not ours."""
 
+import contextlib
 import json
 import os
 import re
@@ -8,9 +9,11 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
+
+from ros_facts import ROBOT
+from websockets.sync.client import connect
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -120,6 +123,18 @@ class Ros:
         found = self.bridge.wait_for(r"listening address=127\.0\.0\.1:(\d+)")
         self._port = int(found[1])
 
+    def wait_until_known(self, topic, within=20.0):
+        """Wait until the bridge has found a topic, which takes it a moment."""
+        subscribe = json.dumps({"op": "subscribe", "topic": topic})
+        deadline = time.monotonic() + within
+        with connect(self.url, proxy=None) as socket:
+            while time.monotonic() < deadline:
+                socket.send(subscribe)
+                with contextlib.suppress(TimeoutError):
+                    if json.loads(socket.recv(timeout=0.5))["op"] == "publish":
+                        return
+        raise AssertionError(f"{topic} is not known to the bridge")
+
     def kill_bridge(self):
         self.bridge.end(signal.SIGKILL)
         self.bridge = None
@@ -135,12 +150,13 @@ class Ros:
                 program.end()
 
 
-@contextmanager
+@contextlib.contextmanager
 def running(about):
     """Run a graph and its rosbridge."""
     ros = Ros(about)
     try:
         ros.start_bridge()
+        ros.wait_until_known(f"{ROBOT}/odom")
         yield ros
     finally:
         ros.end()

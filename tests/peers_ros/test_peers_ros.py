@@ -129,7 +129,8 @@ def test_a_bridge_that_is_killed_under_way_says_zero_first_when_it_is_back(opene
     wait_until(lambda: stands(ros), what="zero")
     assert all(t.is_zero for t in ros.twists()[killed:]), "the held key drove on"
     opened.keyboard.up("w")
-    drawn_now(opened).wait_for(state="attached")
+    # A bridge that is asked for a topic before it has found it has to be asked again.
+    drawn_now(opened).wait_for(state="attached", timeout=60_000)
     expect(opened.locator(f"{BOB} > .laserscan:not(.stale)")).to_be_attached()
     expect_drawn_where_it_is(opened, ros)
     drive(opened, ros)
