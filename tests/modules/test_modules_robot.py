@@ -39,24 +39,26 @@ def scan(ranges, *, start=0.0, step=math.pi / 2, low=0.1, high=10.0) -> LaserSca
 
 
 def test_a_dot_is_where_a_ray_hits():
-    points = scan_points(scan([1.0, 2.0, 3.0]))
+    points, rays = scan_points(scan([1.0, 2.0, 3.0]))
+    assert list(rays) == [0, 1, 2]
     assert points == pytest.approx(np.array([[1, 0], [0, 2], [-3, 0]]), abs=1e-6)
 
 
 @pytest.mark.parametrize("miss", [None, math.inf, -math.inf, math.nan, 0.05, 11.0])
 def test_a_ray_that_hits_nothing_has_no_dot(miss):
-    points = scan_points(scan([1.0, miss, 3.0]))
+    points, rays = scan_points(scan([1.0, miss, 3.0]))
+    assert list(rays) == [0, 2]
     assert points == pytest.approx(np.array([[1, 0], [-3, 0]]), abs=1e-6)
 
 
 def test_a_scan_that_sweeps_clockwise():
-    points = scan_points(scan([1.0, 1.0], step=-math.pi / 2))
+    points, _ = scan_points(scan([1.0, 1.0], step=-math.pi / 2))
     assert points == pytest.approx(np.array([[1, 0], [0, -1]]), abs=1e-6)
 
 
 def test_dots_are_thinned_evenly_and_keep_their_bearings():
     step = math.tau / 360
-    points = scan_points(scan([1.0] * 360, step=step), max_dots=50)
+    points, _ = scan_points(scan([1.0] * 360, step=step), max_dots=50)
     assert len(points) == 50
     bearings = np.arctan2(points[:, 1], points[:, 0])
     rays = np.round(np.unwrap(bearings) / step).astype(int)
@@ -64,14 +66,14 @@ def test_dots_are_thinned_evenly_and_keep_their_bearings():
 
 
 def test_fewer_rays_than_dots_are_all_drawn():
-    assert len(scan_points(scan([1.0] * 20), max_dots=50)) == 20
+    assert len(scan_points(scan([1.0] * 20), max_dots=50)[0]) == 20
 
 
 @pytest.mark.parametrize(
     "bad", [scan([]), scan([None] * 5), scan([1.0], high=math.nan)]
 )
 def test_a_scan_with_nothing_in_it_draws_nothing_or_all_that_is_finite(bad):
-    assert len(scan_points(bad)) <= 1
+    assert len(scan_points(bad)[0]) <= 1
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf])

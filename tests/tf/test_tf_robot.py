@@ -168,9 +168,10 @@ def test_a_wrong_transform_is_logged_once_and_the_others_are_taken(link, bob, ca
         link.say("/tf", {"transforms": [bad, transform("map", "odom", 10.0)]})
     link.say("/odom", odometry(1.0))
     assert where(bob) == (11.0, 0.0, 0.0)
-    said = [line for line in caplog.messages if "a transform was left out" in line]
+    said = [line for line in caplog.messages if line.startswith("test: a transform")]
     assert len(said) == 1
     assert "not finite" in said[0]
+    assert bob.problems["frames"] == said[0].removeprefix("test: ")
 
 
 def test_frames_are_plain_data_and_back():

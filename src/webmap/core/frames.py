@@ -1,9 +1,11 @@
 """The frames of a ROS system, heard once for all robots that need them."""
 
 import logging
+import time
 from collections.abc import Callable
 from functools import partial
 
+from webmap.core.frame_faults import FrameFaults
 from webmap.geometry import Quaternion, Vector3
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
@@ -16,8 +18,6 @@ TYPE = "tf2_msgs/TFMessage"
 
 QUEUE = 100
 """Messages that a bridge may hold back: many nodes share the topic, and each counts."""
-
-MOST_COMPLAINTS = 50
 
 _heard: dict[tuple[Bridge, str], "Frames"] = {}
 
@@ -35,8 +35,9 @@ class Frames:
         self.bridge = bridge
         self.namespace = namespace
         self.buffer = Buffer()
+        self.faults = FrameFaults(self.buffer)
+        """What was wrong with transforms of late."""
         self._listeners: dict[int, Callable[[], object]] = {}
-        self._complained: set[str] = set()
         with no_scope():
             self._subscriptions = [
                 bridge.subscribe(
@@ -64,31 +65,29 @@ class Frames:
         return Removal(leave)
 
     def _hear(self, static: bool, message: TFMessage) -> None:
+        now = time.monotonic()
         for each in message.transforms:
+            parent = self.buffer.name(each.frame_id, self.namespace)
+            child = self.buffer.name(each.child_frame_id, self.namespace)
             place, turn = each.transform.translation, each.transform.rotation
             try:
-                self.buffer.add(
-                    each.frame_id,
-                    each.child_frame_id,
+                note = self.buffer.add(
+                    parent,
+                    child,
                     Transform(
                         Vector3(place.x, place.y, place.z),
                         Quaternion(turn.x, turn.y, turn.z, turn.w),
                     ),
                     each.stamp,
                     static=static,
-                    namespace=self.namespace,
                 )
             except TransformError as error:
-                self._complain(each.child_frame_id, str(error))
-        if not static:
+                note = f"a transform was left out: {error}"
+            if note and self.faults.note(parent, child, note, now):
+                log.warning("%s: %s", self.bridge.name, note)
+        if not static or self.faults.any:
             for listener in list(self._listeners.values()):
                 listener()
-
-    def _complain(self, frame: str, words: str) -> None:
-        """Log what is wrong, once for each frame."""
-        if frame not in self._complained and len(self._complained) < MOST_COMPLAINTS:
-            self._complained.add(frame)
-            log.warning("%s: a transform was left out: %s", self.bridge.name, words)
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:

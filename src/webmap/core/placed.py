@@ -3,13 +3,13 @@
 import math
 from typing import TYPE_CHECKING
 
-from webmap.core.frames import frames_of
+from webmap.core.sighting import Sighting, Sightings
+from webmap.core.whereabouts import affine
 from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry import Pose
+from webmap.geometry import Affine, Pose
 from webmap.scene import svg
-from webmap.scene.element import Child
+from webmap.scene.element import Child, Element
 from webmap.scope import Removal, keep
-from webmap.tf import Buffer, NotKnownThen, TransformError
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -18,23 +18,23 @@ FRAMES = ("map", "robot")
 
 
 class Placed:
-    """A group of a robot's, in the robot's frame or in that of the map.
+    """A group of a robot's whose data stays where it was measured.
 
-    Whichever it is, it is part of the robot's fragment, so that all maps share it and
-    CSS finds it below ``.robot``; it ends with the scope that it was made in. A group
-    in the map's frame lies under the robot's model, and its module has to call
-    :meth:`follow` in ``on_odometry_update``.
+    It is part of the robot's fragment, so that all maps share it and CSS finds it below
+    ``.robot``; it ends with the scope that it was made in.
 
-    A message whose frame is another is taken there by the frames that the robot was
-    given with ``set_tf``: see :meth:`stand_in`. Without them its numbers are taken to
-    be in the group's frame.
+    Data of the robot's own frame goes with the robot until a message says when it was
+    measured: see :meth:`stand_in`. From then on it stays on the map where the robot was
+    at that time, so that a wall does not turn along with who looks at it.
+
+    A group in the map's frame lies under the robot's model.
 
     Args:
         robot: The robot.
         *children: What is in the group.
         class_: Its class.
-        frame: ``"map"`` if it stays where it is while the robot moves, ``"robot"`` if
-            it goes with it.
+        frame: ``"map"`` if its coordinates are the map's, ``"robot"`` if they are the
+            robot's.
         x: Metres along x of the frame.
         y: Metres along y of the frame.
         angle: Degrees, counter-clockwise.
@@ -60,74 +60,113 @@ class Placed:
             raise ConfigError(f"a place must be finite, got {x}, {y}, {angle}")
         self.robot = robot
         self.frame = frame
-        self._offset = Pose(x, y, math.radians(angle))
-        self._mounted = self._offset != Pose()
-        self._known: dict[str, Pose] = {}
         self._class = class_
+        mount = Pose(x, y, math.radians(angle))
+        self._sightings = Sightings(robot, frame, mount if mount != Pose() else None)
+        self._seen: tuple[str, float] | None = None
+        self._offset = affine(mount)
+        """What takes the group's coordinates to those of the robot's own map, or to the
+        robot's; or to the common map if no message was ever taken."""
+        self._on_robot = frame == "robot"
+        self._settled = True
+        self._trouble = ""
         self.svg = svg.g(*children, class_=class_, pointer_events="none")
         if frame == "map":
             robot.svg.insert(robot.svg.children.index(robot.model), self.svg)
         else:
             robot.svg.append(self.svg)
-        self.follow(always=True)
+        self._put()
+        self._hears = robot.whereabouts.join(self._news)
         keep(Removal(self._end))
 
     def stand_in(self, frame_id: str, stamp: float) -> None:
-        """Take the group's own coordinates to be in a frame that a message names.
+        """Take coordinates to be in the frame that a message names, as it was then.
 
-        It is looked up as it was at the stamp. Without frames, or where the module was
-        told a place on the robot, nothing changes; a frame that nobody tells of is
-        taken to be where it was last, or the group's own, and that is said.
+        Where that frame was at the stamp is told by the frames that the robot was given
+        with ``set_tf``, and else by its poses. If the newest of them is older than the
+        stamp, the group is put where they would go on to, and set right when they come.
+
+        A robot without frames is taken to carry its sensors where their modules were
+        told, or at its own origin. A frame that nobody tells of is taken to be where it
+        was last, or the robot's own or the map's, and that is said.
 
         Args:
             frame_id: The frame of the message; empty if it does not say.
             stamp: When it was measured, in seconds of the robot's clock; 0 if not said.
 
         """
-        tf = self.robot.tf
-        if tf is None or self._mounted or not frame_id:
+        self._seen = (frame_id, stamp)
+        self._settle()
+
+    def moved_within(self, seconds: float) -> Affine:
+        """Return where the sensor is that time after the stamp, as it was at the stamp.
+
+        Args:
+            seconds: How long; 0.5 s at the most are looked ahead.
+
+        """
+        if self._seen is None or not self._seen[1] or self._on_robot:
+            return Affine()
+        frame_id, stamp = self._seen
+        then, later = (
+            self._sightings.look(frame_id, stamp + after) for after in (0.0, seconds)
+        )
+        if then.on_robot or later.on_robot or not then.offset.determinant:
+            return Affine()
+        return then.offset.inverse @ later.offset
+
+    def follow(self) -> None:
+        """Stay in place on the map while the robot goes along."""
+        self._put()
+
+    def _news(self) -> None:
+        if not self._settled:
+            self._settle()
+        else:
+            self._put()
+
+    def _settle(self) -> None:
+        """Find out where the group is, as well as it can be known by now."""
+        if self._seen is None:
             return
-        buffer = frames_of(tf["bridge"], tf["namespace"]).buffer
-        source = buffer.name(frame_id, tf["namespace"])
-        target = tf["map_frame"] if self.frame == "map" else tf["base_frame"]
-        try:
-            pose = (
-                Pose() if source == target else _lookup(buffer, target, source, stamp)
-            )
-            self._known[source] = pose
+        found = self._sightings.look(*self._seen)
+        self._offset, self._on_robot = found.offset, found.on_robot
+        self._settled = found.settled
+        self._say(found)
+        self._put()
+
+    def _put(self) -> None:
+        place = self._offset
+        if not self._on_robot:
+            at = self.robot.position
+            own = affine(Pose(at.x, at.y, self.robot.yaw))
+            if self._seen is not None:
+                place = self.robot.whereabouts.placing @ place
+            place = own.inverse @ place
+        _place(self.svg, place)
+
+    def _say(self, found: Sighting) -> None:
+        """Say what is wrong with the place, once; take it back when that is mended."""
+        if found.trouble == self._trouble:
+            return
+        self._trouble = found.trouble
+        if found.trouble:
+            self.robot.set_problem(self, f"{self._class}: {found.words}")
+        else:
             self.robot.clear_problem(self)
-        except TransformError as error:
-            pose = self._known.get(source, Pose())
-            if not tf["quiet"]:
-                self.robot.set_problem(
-                    self, f"{self._class}: it is not known where {source!r} is: {error}"
-                )
-        self._offset = pose
-        self.follow(always=True)
 
     def _end(self) -> None:
+        self._hears.remove()
         self.svg.remove()
         self.robot.clear_problem(self)
 
-    def follow(self, *, always: bool = False) -> None:
-        """Stay in place on the map: undo how the robot has moved."""
-        place = self._offset
-        if self.frame == "map":
-            at = self.robot.position
-            place = Pose(at.x, at.y, self.robot.yaw).inverse @ place
-        elif not always:
-            return
-        self.svg.set_pose(place.x, place.y, place.yaw)
 
-
-def _lookup(buffer: Buffer, target: str, source: str, stamp: float) -> Pose:
-    """Return the pose of a frame in another, at a time or at the newest one known."""
-    if stamp:
-        try:
-            return buffer.lookup(target, source, stamp).planar
-        except NotKnownThen:
-            pass
-    return buffer.lookup(target, source).planar
+def _place(element: Element, place: Affine) -> None:
+    """Place an element: by a pose, which is short on the wire, if it is one."""
+    if abs(place.a - place.d) < 1e-9 and abs(place.b + place.c) < 1e-9:
+        element.set_pose(place.e, place.f, math.atan2(place.b, place.a))
+    else:
+        element.set_matrix(place)
 
 
 def rounded(value: float) -> float:

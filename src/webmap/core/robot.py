@@ -8,12 +8,14 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from webmap.core.alignment import alignment
 from webmap.core.extendable import Extendable
 from webmap.core.frames import Frames, frames_of
 from webmap.core.motion import MotionRoad, MoveTopic, TwistTopic
 from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.placing import Placing
 from webmap.core.registry import Namespace, robot_modules
+from webmap.core.whereabouts import Whereabouts
 from webmap.errors import MotionError
 from webmap.gate.assist import AssistSpec, polygon_around
 from webmap.gate.messages import RobotReport
@@ -112,7 +114,10 @@ class Robot(Extendable):
         self._feed: OdometryFeed | None = None
         self._frames: Frames | None = None
         self._placing: Placing | None = None
+        self._placing_kind = ""
         self._says_placing = True
+        self.whereabouts = Whereabouts()
+        """Where it is and was, on its own map and on the common one."""
         self._hears_frames = Removal(lambda: None)
         self.motion = MotionRoad(self.name, self.report_error)
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
@@ -195,6 +200,7 @@ class Robot(Extendable):
             self._feed = OdometryFeed(
                 bridge, topic, throttle, type, self._on_pose, self._on_odometry_problem
             )
+        self._find_bridge()
 
     def unsubscribe_odometry_topic(self) -> None:
         """Stop following poses; does nothing if there is no topic."""
@@ -203,6 +209,7 @@ class Robot(Extendable):
             self._feed = None
             self.clear_problem("odometry")
             self.motion.clear_odometry()
+            self._find_bridge()
 
     def set_tf(
         self,
@@ -238,12 +245,16 @@ class Robot(Extendable):
         )
         self._says_placing = not quiet
         self._hears_frames = frames.join(self._on_frames)
+        self._find_bridge()
 
     def unset_tf(self) -> None:
         """Draw the robot where its odometry has it; does nothing if it is so."""
         self._hears_frames.remove()
         self._frames = self._placing = None
+        self._placing_kind = ""
         self.clear_problem("tf")
+        self.clear_problem("frames")
+        self._find_bridge()
 
     @property
     def tf(self) -> Mapping[str, Any] | None:
@@ -257,6 +268,26 @@ class Robot(Extendable):
             "namespace": self._frames.namespace,
             "quiet": not self._says_placing,
         }
+
+    def set_alignment(self, x: float, y: float, angle: float) -> None:
+        """Lay the robot's own map onto the common one: its poses, data and goals.
+
+        Args:
+            x: Where its map's origin is, in metres along the common map's x.
+            y: In metres along its y.
+            angle: How its map is turned, in degrees, counter-clockwise.
+
+        Raises:
+            ConfigError: If a number makes no sense.
+
+        """
+        self.whereabouts.align(alignment(x, y, angle))
+        self._on_alignment()
+
+    def unset_alignment(self) -> None:
+        """Let the robot lie where its bridge's alignment has it."""
+        self.whereabouts.align(None)
+        self._on_alignment()
 
     # How it is moved.
 
@@ -587,31 +618,67 @@ class Robot(Extendable):
                 self._feed.bridge, self._feed.topic, self._feed.type
             )
         if self._placing is not None:
-            reading = self._placing.of_reading(reading)
-            self._tell_placing(self._placing)
+            reading = self._placing.of_reading(reading, self.pose_stamp)
         self._place(reading)
+        self._tell_trouble()
 
     def _on_frames(self) -> None:
         """Look where the frames have the base, if no topic says where it is."""
-        if self._feed is not None or self._placing is None:
-            return
         now = time.monotonic()
-        if self.pose_stamp is not None and now - self.pose_stamp < TF_PERIOD:
-            return
-        reading = self._placing.of_base()
-        self._tell_placing(self._placing)
-        if reading is not None:
-            self.pose_stamp = now
-            self.svg.set_age(0.0, limit=POSE_LIMIT)
-            self._place(reading)
+        soon = self.pose_stamp is not None and now - self.pose_stamp < TF_PERIOD
+        if self._feed is None and self._placing is not None and not soon:
+            reading = self._placing.of_base(now)
+            if reading is not None:
+                self.pose_stamp = now
+                self.svg.set_age(0.0, limit=POSE_LIMIT)
+                self._place(reading)
+        self._tell_trouble()
+        self.whereabouts.tell()
 
-    def _tell_placing(self, placing: Placing) -> None:
-        if placing.problem is None:
+    def _on_alignment(self) -> None:
+        """Go where a new alignment has the robot, and all that it knows."""
+        if self.whereabouts.newest is not None:
+            self._show(self.whereabouts.on_map(self.whereabouts.newest))
+        self.whereabouts.tell()
+
+    def _find_bridge(self) -> None:
+        """Note where poses come from now: the alignment of that bridge holds."""
+        self.whereabouts.forget()
+        source = self._frames if self._feed is None else self._feed
+        bridge = None if source is None else source.bridge
+        if bridge is not self.whereabouts.bridge:
+            self.whereabouts.come_from(bridge, self._on_alignment)
+            self._on_alignment()
+
+    def _tell_trouble(self) -> None:
+        """Say what is wrong with the frames or the poses; take back what is mended."""
+        placing, frames = self._placing, self._frames
+        if placing is not None and placing.kind != self._placing_kind:
+            self._placing_kind = placing.kind
             self.clear_problem("tf")
-        elif self._says_placing and "tf" not in self.problems:
-            self.set_problem("tf", placing.problem)
+            if placing.problem is not None and self._says_placing:
+                self.set_problem("tf", placing.problem)
+        words = {
+            "frames": None
+            if placing is None or frames is None
+            else frames.faults.of(placing.base_frame, time.monotonic()),
+            "jumps": self.whereabouts.jumps.problem,
+        }
+        for about, text in words.items():
+            if text is None:
+                self.clear_problem(about)
+            else:
+                self.set_problem(about, text)
 
     def _place(self, reading: PoseReading) -> None:
+        """Take the newest pose, in the robot's own map."""
+        period = 0.0 if self._feed is None else self._feed.throttle / 1000
+        self.whereabouts.jumps.look(reading, time.monotonic())
+        self._show(self.whereabouts.take(reading, period))
+        self.whereabouts.tell()
+
+    def _show(self, reading: PoseReading) -> None:
+        """Draw the robot at a pose on the common map, if that is news."""
         changed = (
             reading.position != self.position
             or reading.orientation != self.orientation

@@ -81,7 +81,7 @@ class Buffer:
         *,
         static: bool = False,
         namespace: str = "",
-    ) -> None:
+    ) -> str | None:
         """Take one transform.
 
         Args:
@@ -91,6 +91,9 @@ class Buffer:
             stamp: When it held, in seconds of the robot's clock.
             static: Whether it holds for all times: it came on ``/tf_static``.
             namespace: Of the topic: ``/robot_0`` for ``/robot_0/tf``.
+
+        Returns:
+            What was odd and was dealt with, in a sentence; None if nothing was.
 
         Raises:
             TransformError: If it is none, or would close a loop; nothing is changed.
@@ -106,17 +109,27 @@ class Buffer:
             raise TransformError(f"{said}: {error}") from None
         if not math.isfinite(stamp):
             raise TransformError(f"{said}: the stamp is {stamp}")
-        track = self._track(parent, child, static)
+        track, note = self._track(parent, child, static)
         newest = track.newest
         if newest is not None and stamp < newest - JUMP:
-            self.notes.append(
+            note = (
                 f"{said}: time jumped back by {newest - stamp:.3f} s; what was known "
                 f"of it is forgotten"
             )
             track.clear()
         track.add(transform, stamp, self.history)
+        if note is not None:
+            self.notes.append(note)
+        return note
 
-    def lookup(self, target: str, source: str, time: float | None = None) -> Transform:
+    def lookup(
+        self,
+        target: str,
+        source: str,
+        time: float | None = None,
+        *,
+        ahead: float = 0.0,
+    ) -> Transform:
         """Return what takes coordinates of ``source`` to those of ``target``.
 
         Args:
@@ -124,6 +137,8 @@ class Buffer:
             source: The frame that the numbers are in.
             time: When, in seconds of the robot's clock; None for the newest time at
                 which the whole way is known.
+            ahead: How long after its newest transform a frame is taken to go on as it
+                did, in seconds.
 
         Raises:
             FrameMissing: If nobody told of a frame; the words name what there is.
@@ -137,7 +152,7 @@ class Buffer:
         down, up = self._way(target, source)
         if time is None:
             time = self._newest_common([*down, *up])
-        return self._along(down, time).inverse @ self._along(up, time)
+        return self._along(down, time, ahead).inverse @ self._along(up, time, ahead)
 
     def newest(self, target: str, source: str) -> float | None:
         """Return the newest time at which the way is known; None for all times.
@@ -151,23 +166,28 @@ class Buffer:
         stamps = [self._tracks[frame].newest for frame in (*down, *up)]
         return min((stamp for stamp in stamps if stamp is not None), default=None)
 
+    def chain(self, frame: str) -> list[str]:
+        """Return a frame and those that it hangs from, up to the root."""
+        return self._ancestors(self.name(frame))
+
     def clear(self) -> None:
         """Forget everything."""
         self._tracks.clear()
         self._roots.clear()
 
-    def _track(self, parent: str, child: str, static: bool) -> Track:
+    def _track(self, parent: str, child: str, static: bool) -> tuple[Track, str | None]:
         """Return where to keep a transform; parents and kinds may change."""
         track = self._tracks.get(child)
         if track is not None and track.parent == parent and track.static == static:
-            return track
+            return track, None
         self._refuse_loop(parent, child)
         if track is None and len(self._tracks) >= MOST_FRAMES:
             raise TransformError(
                 f"{parent!r} -> {child!r}: there are {MOST_FRAMES} frames already"
             )
+        note = None
         if track is not None and track.parent != parent:
-            self.notes.append(
+            note = (
                 f"{child!r} was in {track.parent!r} and is in {parent!r} now; if that "
                 f"happens again and again, two nodes tell of it"
             )
@@ -175,7 +195,7 @@ class Buffer:
         if track is None or track.parent != parent:
             self._roots[parent] = self._roots.get(parent, 0) + 1
         self._tracks[child] = found = Track(parent, static=static)
-        return found
+        return found, note
 
     def _let_go(self, parent: str) -> None:
         self._roots[parent] -= 1
@@ -223,13 +243,13 @@ class Buffer:
             way.append(track.parent)
         return way
 
-    def _along(self, frames: Sequence[str], time: float) -> Transform:
+    def _along(self, frames: Sequence[str], time: float, ahead: float) -> Transform:
         """Return what takes the first frame's coordinates to the last one's parent."""
         total = Transform()
         for frame in reversed(frames):
             track = self._tracks[frame]
             try:
-                total = total @ track.at(time, self.gap)
+                total = total @ track.at(time, self.gap, ahead)
             except NotKnownThen as error:
                 raise NotKnownThen(f"{track.parent!r} -> {frame!r}: {error}") from None
         return total

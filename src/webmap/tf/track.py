@@ -1,5 +1,6 @@
 """What is known of one frame in its parent, over time."""
 
+import math
 from bisect import bisect_left
 
 from webmap.tf.errors import NotKnownThen
@@ -7,6 +8,15 @@ from webmap.tf.transform import Transform, between
 
 MOST = 4096
 """Transforms that are kept of one frame, whatever their times."""
+
+EVEN = 0.3
+"""Seconds between two transforms beyond which nobody knows how it goes on."""
+
+FASTEST = 5.0
+"""Metres per second; what is faster is no motion but a correction."""
+
+FASTEST_TURN = 10.0
+"""Radians per second, likewise."""
 
 
 class Track:
@@ -62,12 +72,14 @@ class Track:
         if old:
             del self._stamps[:old], self._transforms[:old]
 
-    def at(self, time: float, gap: float) -> Transform:
+    def at(self, time: float, gap: float, ahead: float = 0.0) -> Transform:
         """Return the transform at a time.
 
         Args:
             time: When, in seconds.
             gap: The longest time between two transforms that is bridged, in seconds.
+            ahead: How long after the newest one it is taken to go on as it did, in
+                seconds.
 
         Raises:
             NotKnownThen: If nothing was told of that time; the words have no frames.
@@ -79,6 +91,8 @@ class Track:
             return self._transforms[0]
         place = bisect_left(self._stamps, time)
         if place == len(self._stamps):
+            if time <= self._stamps[-1] + ahead:
+                return self._going_on(time)
             raise NotKnownThen(
                 f"the newest is of {self._stamps[-1]:.3f} s, and {time:.3f} s is "
                 f"{time - self._stamps[-1]:.3f} s later"
@@ -98,3 +112,30 @@ class Track:
             )
         share = (time - before) / (after - before)
         return between(self._transforms[place - 1], self._transforms[place], share)
+
+    def _going_on(self, time: float) -> Transform:
+        """Return where it gets if it goes on evenly; where it is if it leapt."""
+        newest = self._transforms[-1]
+        if len(self._stamps) == 1:
+            return newest
+        took, before = self._stamps[-1] - self._stamps[-2], self._transforms[-2]
+        if took > EVEN or leapt(before, newest, took):
+            return newest
+        return between(before, newest, 1.0 + (time - self._stamps[-1]) / took)
+
+
+def leapt(one: Transform, other: Transform, took: float) -> bool:
+    """Tell whether nothing moves that fast.
+
+    Args:
+        one: Where it was.
+        other: Where it is.
+        took: The time in between, in seconds.
+
+    """
+    p, q = one.rotation, other.rotation
+    cosine = abs(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w)
+    turned = 2.0 * math.acos(min(cosine, 1.0))
+    a, b = one.translation, other.translation
+    went = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
+    return went > FASTEST * took or turned > FASTEST_TURN * took

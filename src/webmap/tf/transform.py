@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from webmap.geometry import Pose, Quaternion, Vector3
+from webmap.geometry import Affine, Pose, Quaternion, Vector3
 from webmap.tf.errors import TransformError
 
 NEARLY = 0.1
@@ -39,6 +39,16 @@ class Transform:
     def planar(self) -> Pose:
         """Place and heading seen from above."""
         return Pose(self.translation.x, self.translation.y, self.rotation.yaw)
+
+    @property
+    def from_above(self) -> Affine:
+        """What it does to points of its own plane, seen from above.
+
+        It mirrors what hangs upside down, and flattens what stands upright.
+        """
+        q, by = self.rotation, self.translation
+        x, y = _turn(q, Vector3(1.0)), _turn(q, Vector3(0.0, 1.0))
+        return Affine(x.x, x.y, y.x, y.y, by.x, by.y)
 
     def apply(self, point: Vector3) -> Vector3:
         """Return where a point is in the other frame."""

@@ -4,6 +4,7 @@ import logging
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.placed import Placed
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from webmap.core.robot import Robot
+    from webmap.geometry import Affine
 
 log = logging.getLogger("webmap.modules.laser_scanner")
 
@@ -23,8 +25,24 @@ AGE_LIMIT = 1.0
 """Seconds after which a scan is drawn as old."""
 
 
+LONGEST_SWEEP = 0.5
+"""Seconds; a scan that claims to have taken longer is taken to be of one moment."""
+
+
+class SweepMsg(LaserScanMsg, frozen=True, kw_only=True):
+    """A scan that says how long it took."""
+
+    time_increment: float = 0.0
+    """Seconds between neighbouring rays; 0 for a scan of one moment."""
+
+
 class LaserScanner:
     """Draws a dot where each ray of a ``sensor_msgs/LaserScan`` hit something.
+
+    A scan stays on the map where the robot was at its stamp, and what the robot turned
+    and moved while the scan was taken is made up for, so that walls stand still. Of a
+    robot that knows frames the sensor is where those have it, also upside down, unless
+    its place is told here.
 
     The dots can be styled by CSS: ``.laserscan > .dot``; their size is the custom
     property ``--dot-size``, in metres.
@@ -61,27 +79,30 @@ class LaserScanner:
         self.max_dots = max_dots
         self.topic = topic
         self._dots = svg.path(class_="dot")
-        self.svg = svg.g(self._dots, class_="laserscan")
-        self.svg.set_pose(x, y, math.radians(angle))
-        robot.svg.append(self.svg)
+        self._placed = Placed(
+            robot, self._dots, class_="laserscan", frame="robot", x=x, y=y, angle=angle
+        )
+        self.svg = self._placed.svg
         bridge.subscribe(
             topic,
             self.on_scan,
             "sensor_msgs/LaserScan",
             throttle=throttle,
-            decode=LaserScanMsg,
+            decode=SweepMsg,
         )
-
-    def destroy(self) -> None:
-        """Take the dots away."""
-        self.svg.remove()
 
     def on_scan(self, scan: LaserScanMsg) -> None:
         """Draw a scan in place of the one before."""
-        points = scan_points(scan, self.max_dots)
-        if points is None:
+        found = scan_points(scan, self.max_dots)
+        if found is None:
             log.debug("%s: a scan without a usable angle was ignored", self.topic)
             return
+        points, rays = found
+        self._placed.stand_in(scan.frame_id, scan.stamp)
+        took = len(scan.ranges) * getattr(scan, "time_increment", 0.0)
+        if 0.0 < took <= LONGEST_SWEEP and len(points):
+            moved = self._placed.moved_within(took)
+            points = straightened(points, rays / len(scan.ranges), moved)
         unit = UNIT
         if len(points):
             reach = float(abs(points).max())
@@ -91,9 +112,30 @@ class LaserScanner:
         self.svg.set_age(0.0, limit=AGE_LIMIT)
 
 
+def straightened(
+    points: "NDArray[np.float64]", shares: "NDArray[np.float64]", moved: "Affine"
+) -> "NDArray[np.float64]":
+    """Return points as they would have been seen at the beginning of a sweep.
+
+    Args:
+        points: As the sensor saw them one after another, of shape (N, 2), in metres.
+        shares: When, from 0 at the beginning to 1 at the end of the sweep.
+        moved: Where the sensor is at the end, seen from where it was at the beginning.
+
+    """
+    import numpy as np
+
+    turn = shares * math.atan2(moved.b, moved.a)
+    cos, sin = np.cos(turn), np.sin(turn)
+    x, y = points[:, 0], points[:, 1]
+    return np.column_stack(
+        (cos * x - sin * y + shares * moved.e, sin * x + cos * y + shares * moved.f)
+    )
+
+
 def scan_points(
     scan: LaserScanMsg, max_dots: int | None = None
-) -> "NDArray[np.float64] | None":
+) -> "tuple[NDArray[np.float64], NDArray[np.int64]] | None":
     """Return where the rays hit, in metres in the sensor's own frame.
 
     A ray counts if its range lies within the sensor's limits, which leaves out what
@@ -105,7 +147,8 @@ def scan_points(
             same bearings are kept in every scan; None for all.
 
     Returns:
-        Shape (N, 2), in ray order; None if the scan's angles are not finite.
+        Points of shape (N, 2), in ray order, and the number of each one's ray; None if
+        the scan's angles are not finite.
 
     """
     import numpy as np
@@ -120,6 +163,8 @@ def scan_points(
     low = scan.range_min if math.isfinite(scan.range_min) else 0.0
     high = scan.range_max if scan.range_max > 0 else math.inf
     hit = np.isfinite(ranges) & (ranges >= low) & (ranges <= high)
-    bearings = scan.angle_min + scan.angle_increment * rays[hit]
+    rays = rays[hit]
+    bearings = scan.angle_min + scan.angle_increment * rays
     reach = ranges[hit].astype(np.float64)
-    return np.column_stack((reach * np.cos(bearings), reach * np.sin(bearings)))
+    points = np.column_stack((reach * np.cos(bearings), reach * np.sin(bearings)))
+    return points, rays

@@ -1,0 +1,184 @@
+"""Where the frame of a message was when the message was measured."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from webmap.core.frames import frames_of
+from webmap.core.whereabouts import affine
+from webmap.geometry import Affine, Pose
+from webmap.tf import Buffer, NotKnownThen, Transform, TransformError
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+AHEAD = 0.2
+"""Seconds for which a motion is taken to go on as it did."""
+
+SOON = 0.5
+"""Seconds within which frames and poses catch up with a stamp, as a rule."""
+
+FLOWING = 1.0
+"""Seconds since the newest pose within which poses are said to be coming."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Where data is, as well as that is known by now."""
+
+    offset: Affine
+    """What takes its coordinates to those of the robot's own map; or to the robot's."""
+
+    on_robot: bool = False
+    """Whether :attr:`offset` is on the robot, and goes with it."""
+
+    settled: bool = True
+    """Whether more news would not change it."""
+
+    trouble: str = ""
+    """Which kind of trouble there is, if any; the words of one kind may differ."""
+
+    words: str = ""
+    """What is wrong, in a sentence."""
+
+
+class Sightings:
+    """Looks where a robot's sensors were.
+
+    Args:
+        robot: The robot.
+        frame: ``"map"`` if data without a frame is in the map's, ``"robot"`` if it is
+            in the robot's.
+        mount: Where the sensor is on the robot, if that was told; what frames say of it
+            is then left alone.
+
+    """
+
+    def __init__(self, robot: "Robot", frame: str, mount: Pose | None) -> None:
+        self._robot = robot
+        self._in_map = frame == "map"
+        self._mount = mount
+        self._known: dict[str, Transform] = {}
+
+    def look(self, frame_id: str, stamp: float) -> Sighting:
+        """Return where data of a frame was at a stamp.
+
+        Args:
+            frame_id: As the message names it; empty if it does not say.
+            stamp: In seconds of the robot's clock; 0 if not said.
+
+        """
+        tf = self._robot.tf
+        if self._in_map and (tf is None or self._mount or not frame_id):
+            return Sighting(affine(self._mount or Pose()))
+        if tf is None:
+            return self._by_poses(_mounted(self._mount), stamp)
+        buffer = frames_of(tf["bridge"], tf["namespace"]).buffer
+        source = buffer.name(frame_id, tf["namespace"]) or tf["base_frame"]
+        if self._mount is not None:
+            source = tf["base_frame"]
+        if self._in_map:
+            return self._on_map(buffer, tf, source, stamp)
+        return self._carried(buffer, tf, source, stamp)
+
+    def _on_map(
+        self, buffer: Buffer, tf: Mapping[str, Any], source: str, stamp: float
+    ) -> Sighting:
+        """Return where data of the map is that came in another frame."""
+        target = tf["map_frame"]
+        try:
+            found, settled = _lookup(buffer, target, source, stamp)
+        except TransformError as error:
+            found = self._known.get(source, Transform())
+            return self._lost(tf, source, error, Sighting(found.from_above))
+        self._known[source] = found
+        return Sighting(found.from_above, settled=settled)
+
+    def _carried(
+        self, buffer: Buffer, tf: Mapping[str, Any], source: str, stamp: float
+    ) -> Sighting:
+        """Return where a sensor was that the robot carries."""
+        base, mount = tf["base_frame"], _mounted(self._mount)
+        if stamp:
+            try:
+                found = buffer.lookup(tf["map_frame"], source, stamp)
+                return Sighting((found @ mount).from_above)
+            except TransformError:
+                pass  # The poses may tell what the frames do not.
+        if source == base:
+            return self._by_poses(mount, stamp)
+        try:
+            found, _ = _lookup(buffer, base, source, stamp)
+        except TransformError as error:
+            found = self._known.get(source, Transform())
+            return self._lost(tf, source, error, self._by_poses(found, stamp))
+        self._known[source] = found
+        return self._by_poses(found @ mount, stamp)
+
+    def _by_poses(self, mount: Transform, stamp: float) -> Sighting:
+        """Return where the robot's poses have a sensor."""
+        on_robot = Sighting(mount.from_above, on_robot=True)
+        where = self._robot.whereabouts
+        newest = where.newest_stamp
+        if not stamp or newest is None:
+            return on_robot
+        try:
+            return Sighting((where.at(stamp) @ mount).from_above)
+        except NotKnownThen as error:
+            reason = error
+        if newest < stamp <= newest + SOON:
+            reach = min(stamp, newest + AHEAD)
+            found = where.at(reach, AHEAD) @ mount
+            return Sighting(found.from_above, settled=False)
+        age = self._robot.pose_age
+        if age is None or age > FLOWING:
+            return on_robot
+        return Sighting(
+            mount.from_above,
+            on_robot=True,
+            settled=stamp <= newest,
+            trouble="then",
+            words=f"it is not known where the robot was at the stamp of what is drawn, "
+            f"so it is drawn where the robot is now: {reason}; are the clocks of the "
+            f"sensor and of the odometry the same?",
+        )
+
+    def _lost(
+        self,
+        tf: Mapping[str, Any],
+        source: str,
+        error: TransformError,
+        otherwise: Sighting,
+    ) -> Sighting:
+        if tf["quiet"]:
+            return otherwise
+        return Sighting(
+            otherwise.offset,
+            otherwise.on_robot,
+            settled=False,
+            trouble=f"{type(error).__name__} {source}",
+            words=f"it is not known where {source!r} is: {error}",
+        )
+
+
+def _mounted(mount: Pose | None) -> Transform:
+    return Transform.from_pose(mount or Pose())
+
+
+def _lookup(
+    buffer: Buffer, target: str, source: str, stamp: float
+) -> tuple[Transform, bool]:
+    """Return a frame in another, and whether more news would not change it.
+
+    It is as it was at the stamp if that is known, and else as it is now.
+    """
+    if source == target:
+        return Transform(), True
+    if stamp:
+        try:
+            return buffer.lookup(target, source, stamp), True
+        except NotKnownThen:
+            pass
+    newest = buffer.newest(target, source)
+    coming = bool(stamp) and newest is not None and newest < stamp <= newest + SOON
+    return buffer.lookup(target, source), not coming
