@@ -368,7 +368,7 @@ class TestLife:
 
     def test_a_request_to_a_gate_that_dies_is_answered(self, client, robot_spec):
         client.declare(robot_spec)
-        eventually(lambda: client._ready, "a gate")
+        eventually(lambda: client.ready, "a gate")
         os.kill(client.pid, signal.SIGSTOP)
         future = client.take("r1")
         os.kill(client.pid, signal.SIGKILL)
@@ -387,8 +387,7 @@ class TestLife:
 
     def test_a_display_whose_heart_stops_is_a_zero(self, client, page, fake):
         page.drive_off(fake)
-        client._ending.set()  # the heartbeat's thread ends, and nothing else
-        client._supervisor.join()
+        client._supervisor.end_heartbeat()  # and nothing else
         at = time.monotonic()
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.3 + JITTER
@@ -429,7 +428,7 @@ class TestLife:
             client.declare(spec)
 
     def test_starting_twice_is_one_gate(self, client):
-        eventually(lambda: client._ready, "a gate")
+        eventually(lambda: client.ready, "a gate")
         pid = client.pid
         client.start()
         assert client.pid == pid
@@ -437,7 +436,7 @@ class TestLife:
         client.stop()
         assert client.pid is None
         client.start()
-        eventually(lambda: client._ready, "a gate")
+        eventually(lambda: client.ready, "a gate")
 
 
 class TestStopStands:

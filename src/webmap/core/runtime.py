@@ -15,7 +15,14 @@ from webmap.core.motion import MotionRoad, roads
 from webmap.core.refused import refusals
 from webmap.core.robot import robots
 from webmap.core.tasks import spawn
-from webmap.gate.messages import RefusedCount, Report, RobotReport, SentGoal, SentTwist
+from webmap.gate.messages import (
+    GateDown,
+    RefusedCount,
+    Report,
+    RobotReport,
+    SentGoal,
+    SentTwist,
+)
 from webmap.geometry import Quaternion
 from webmap.lifecycle import lifecycle
 from webmap.scope import Removal
@@ -34,6 +41,9 @@ class Watcher(Protocol):
 
     def tick(self, now: float) -> None:
         """Take what changed, at the loop's monotonic time ``now``."""
+
+    def notice(self, text: str) -> None:
+        """Take a sentence that everybody should read."""
 
 
 class Runtime:
@@ -166,6 +176,11 @@ class Runtime:
         if isinstance(report, RefusedCount):
             now = datetime.now(UTC)
             refusals.note(report.by, report.count, report.last, now)
+            return
+        if isinstance(report, GateDown):
+            if report.failing:
+                for watcher in list(self._watchers.values()):
+                    watcher.notice(report.why)
             return
         name = getattr(report, "robot", None)
         robot = None if name is None else robots.get(name)

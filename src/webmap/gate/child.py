@@ -1,7 +1,9 @@
 """One process of the gate, seen from the display: started, written to, read, ended."""
 
+import contextlib
 import logging
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -17,6 +19,9 @@ log = logging.getLogger("webmap.gate")
 
 MAX_UNSENT = 1 << 20
 """Bytes that a gate may leave unread before it is taken for hung."""
+
+MAX_WORDS = 300
+"""The longest line of a gate that is kept as its last words, in characters."""
 
 
 class Child:
@@ -44,16 +49,23 @@ class Child:
             [sys.executable, "-P", "-m", "webmap.gate"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             start_new_session=True,
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
+        assert self._process.stderr is not None
         self._in = self._process.stdin.fileno()
         self._out = self._process.stdout.fileno()
         if sys.platform != "win32":
             os.set_blocking(self._in, False)
+        self._err = self._process.stderr
+        self._last_words = b""
         self._reader = threading.Thread(
             target=self._read, name="webmap-gate-reader", daemon=True
+        )
+        self._listener = threading.Thread(
+            target=self._listen, name="webmap-gate-stderr", daemon=True
         )
 
     @property
@@ -61,8 +73,19 @@ class Child:
         """The process's number."""
         return self._process.pid
 
+    @property
+    def epitaph(self) -> str:
+        """What it ended of, in words, after :meth:`stop`."""
+        code = self._process.returncode
+        if code is not None and code < 0:
+            return f"it was ended by {signal.Signals(-code).name}"
+        self._listener.join(1.0)
+        said = self._last_words.decode("utf-8", "replace").strip()
+        return said[:MAX_WORDS] or f"exit code {code}, without a word"
+
     def start(self) -> None:
         """Begin to read."""
+        self._listener.start()
         self._reader.start()
 
     def send(self, *messages: msgspec.Struct) -> None:
@@ -99,6 +122,15 @@ class Child:
             self._process.wait()
         if self._reader.is_alive() and self._reader is not threading.current_thread():
             self._reader.join(1.0)
+
+    def _listen(self) -> None:
+        """Pass on what it says to people, and keep the last line."""
+        with self._err, contextlib.suppress(ValueError):  # closed at our own end
+            for line in self._err:
+                if line.strip():
+                    self._last_words = line
+                with contextlib.suppress(OSError):
+                    os.write(2, line)
 
     def _read(self) -> None:
         assert self._process.stdout is not None

@@ -421,6 +421,8 @@ class GateDown(msgspec.Struct, frozen=True, tag="down"):
     """The gate's process is gone: every lease and tick with it (by the client)."""
 
     why: str
+    failing: bool = False
+    """Whether one gate after the other ends, so that somebody must do something."""
 
 
 FromGate = (
@@ -445,6 +447,7 @@ Report = (
     | RefusedCount
     | SentTwist
     | SentGoal
+    | SentPose
     | GateUp
     | GateDown
 )

@@ -137,6 +137,10 @@ class PageHost:
             if data is not None:
                 self._outbox.offer(data)
 
+    def notice(self, text: str) -> None:
+        """Show a sentence to the viewer until it is dismissed."""
+        self._session.error(text)
+
     # From the page.
 
     def _hello(self, sizes: Mapping[str, tuple[float, float]]) -> None:

@@ -1,0 +1,155 @@
+"""The program's road to the gate: a lease of its own, and velocities one by one."""
+
+import concurrent.futures
+import itertools
+import math
+import threading
+from collections.abc import Callable
+
+from webmap.errors import MotionError, NoLease
+from webmap.gate import messages
+from webmap.gate.messages import PROGRAM
+from webmap.geometry import Twist
+
+
+class ProgramRoad:
+    """What the display's own Python code may ask of the gate.
+
+    Args:
+        tell: Sends a message to the gate, if it runs.
+        lock: Held while anything here changes.
+
+    """
+
+    def __init__(
+        self, tell: Callable[[messages.ToGate], None], lock: "threading.RLock"
+    ) -> None:
+        self._tell = tell
+        self._lock = lock
+        self._numbers = itertools.count(1)
+        self._takes: dict[int, concurrent.futures.Future[int]] = {}
+        self._epochs: dict[str, int] = {}
+        self._tick: int | None = None
+
+    def take(
+        self, robot_id: str, trouble: str | None
+    ) -> "concurrent.futures.Future[int]":
+        """Ask for the lease of a robot.
+
+        Args:
+            robot_id: The robot.
+            trouble: Why there is no gate to ask, in words.
+
+        Returns:
+            A future of the lease's epoch; its exception is ``NoLease`` if the robot
+            is not to be had.
+
+        """
+        future: concurrent.futures.Future[int] = concurrent.futures.Future()
+        future.set_running_or_notify_cancel()
+        with self._lock:
+            if trouble is not None:
+                future.set_exception(NoLease(trouble))
+                return future
+            request = next(self._numbers)
+            self._takes[request] = future
+            self._tell(messages.ProgramTake(request, robot_id))
+        return future
+
+    def release(self, robot_id: str) -> None:
+        """Give the program's lease back; the robot is stopped if it is driven."""
+        with self._lock:
+            self._epochs.pop(robot_id, None)
+            self._tell(messages.ProgramRelease(robot_id))
+
+    def twist(self, robot_id: str, twist: Twist) -> None:
+        """Send one velocity; without another within 200 ms the robot is stopped.
+
+        Raises:
+            NoLease: If this program does not hold the lease.
+            MotionError: If the velocity is not made of finite numbers.
+
+        """
+        if not twist.is_finite:
+            raise MotionError(f"a velocity is made of finite numbers, got {twist}")
+        with self._lock:
+            epoch, tick = self._licence(robot_id)
+            velocity = (float(twist.vx), float(twist.vy), float(twist.wz))
+            self._tell(messages.ProgramTwist(robot_id, epoch, tick, velocity))
+
+    def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal: metres and radians in the robot's ``goal_frame``.
+
+        Raises:
+            NoLease: If this program does not hold the lease.
+            MotionError: If the pose is not made of finite numbers.
+
+        """
+        if not all(map(math.isfinite, (x, y, yaw))):
+            raise MotionError(f"a pose is made of finite numbers, got {(x, y, yaw)}")
+        with self._lock:
+            epoch, tick = self._licence(robot_id)
+            pose = (float(x), float(y), float(yaw))
+            self._tell(messages.ProgramMove(robot_id, epoch, tick, pose))
+
+    def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
+        """Tell where a robot is: metres and radians in its ``goal_frame``.
+
+        Raises:
+            NoLease: If this program does not hold the lease.
+            MotionError: If the pose is not made of finite numbers.
+
+        """
+        if not all(map(math.isfinite, (x, y, yaw))):
+            raise MotionError(f"a pose is made of finite numbers, got {(x, y, yaw)}")
+        with self._lock:
+            epoch, tick = self._licence(robot_id)
+            pose = (float(x), float(y), float(yaw))
+            self._tell(messages.ProgramLocate(robot_id, epoch, tick, pose))
+
+    def cancel(self, robot_id: str) -> None:
+        """Cancel the robot's goals; needs no lease."""
+        self._tell(messages.ProgramCancel(robot_id))
+
+    def _licence(self, robot_id: str) -> tuple[int, int]:
+        epoch = self._epochs.get(robot_id)
+        if epoch is None or self._tick is None:
+            raise NoLease(f"this program does not hold the lease of robot {robot_id!r}")
+        return epoch, self._tick
+
+    # What the gate says.
+
+    def hear_tick(self, tick: int) -> None:
+        """Note the newest tick."""
+        self._tick = tick
+
+    def hear_robot(self, report: messages.RobotReport) -> None:
+        """Note whose a robot is now."""
+        holder = None if report.holder is None else report.holder.connection
+        with self._lock:
+            if holder == PROGRAM and report.epoch is not None:
+                self._epochs[report.robot] = report.epoch
+            else:
+                self._epochs.pop(report.robot, None)
+
+    def hear_take(self, reply: messages.TakeReply) -> None:
+        """Answer who asked for a lease."""
+        with self._lock:
+            future = self._takes.pop(reply.request, None)
+            if reply.epoch is not None:
+                self._epochs[reply.robot] = reply.epoch
+        if future is None:
+            return
+        if reply.epoch is None:
+            future.set_exception(NoLease(f"robot {reply.robot!r}: {reply.why}"))
+        else:
+            future.set_result(reply.epoch)
+
+    def gone(self, why: str) -> None:
+        """The gate is gone, and every lease with it."""
+        with self._lock:
+            takes, self._takes = self._takes, {}
+            self._tick = None
+            self._epochs.clear()
+        for future in takes.values():
+            future.set_exception(NoLease(why))

@@ -1,0 +1,147 @@
+"""A gate that ends at every start: what is said of it, and the STOPs of meanwhile."""
+
+import sys
+import time
+
+import pytest
+from gate_page import Page
+from gate_robot import eventually
+
+from webmap.core.runtime import Runtime
+from webmap.errors import NoLease
+from webmap.gate import messages
+from webmap.gate.client import GateClient
+
+
+@pytest.fixture
+def broken(tmp_path, monkeypatch):
+    """Have every gate end at once, until it is mended; the times of its starts."""
+    starts = tmp_path / "starts"
+    script = tmp_path / "python"
+    script.write_text(
+        f"#!/bin/sh\necho x >> {starts}\n"
+        "echo 'Traceback (most recent call last):' >&2\n"
+        "echo \"ModuleNotFoundError: No module named 'webmap'\" >&2\necho >&2\nexit 1\n"
+    )
+    script.chmod(0o755)
+    starts.touch()
+
+    class Broken:
+        @property
+        def starts(self):
+            return len(starts.read_text().split())
+
+        def mend(self):
+            monkeypatch.undo()
+
+    monkeypatch.setattr(sys, "executable", str(script))
+    return Broken()
+
+
+@pytest.fixture
+def reports():
+    return []
+
+
+@pytest.fixture
+def failing(broken, reports, robot_spec, state_folder, monkeypatch):
+    """A client whose gate has ended several times."""
+    client = GateClient()
+    client.on_report(reports.append)
+    client.declare(robot_spec)
+    client.start()
+    eventually(lambda: downs(reports) and downs(reports)[-1].failing, "trouble")
+    yield client
+    client.stop()
+
+
+def downs(reports):
+    return [report for report in reports if isinstance(report, messages.GateDown)]
+
+
+def mend(broken, monkeypatch, state_folder):
+    broken.mend()
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(state_folder))
+
+
+def test_it_is_started_ever_more_rarely(failing, broken):
+    begun = time.monotonic()
+    before = broken.starts
+    eventually(lambda: broken.starts >= before + 3, "three more starts")
+    # After the second: 0.25, 0.5, 1 and 2 seconds, of which one may have passed.
+    assert time.monotonic() - begun > 1.2
+
+
+def test_it_is_said_in_words_why(failing, reports):
+    assert [down.failing for down in downs(reports)[:2]] == [False, True]
+    why = downs(reports)[-1].why
+    assert why.startswith(
+        "The gate does not start: ModuleNotFoundError: No module named 'webmap'. "
+    )
+    with pytest.raises(NoLease, match="does not start: ModuleNotFoundError"):
+        failing.take("r1").result(5)
+
+
+@pytest.mark.parametrize("robot", ["r1", "*"])
+@pytest.mark.parametrize("by", ["a page", "a page that is gone", "a program"])
+def test_a_stop_of_meanwhile_stands_as_soon_as_a_gate_runs(
+    failing, broken, monkeypatch, state_folder, by, robot
+):
+    page = Page(failing)
+    if by == "a program":
+        failing.stop_robot(None if robot == "*" else robot)
+    else:
+        page.say(op="stop", robot=robot)
+    if by == "a page that is gone":
+        page.end()
+        page = Page(failing)
+    before = broken.starts
+    eventually(lambda: broken.starts > before, "one more gate that ends")
+    mend(broken, monkeypatch, state_folder)
+    stop = eventually(lambda: page.robot().get("stop"), "a STOP that stands")
+    assert stop["by"] == ("Ann" if by == "a page" else "program")
+    page.end()
+
+
+def test_a_gate_that_runs_again_is_said_to_run_and_drives(
+    failing, broken, reports, monkeypatch, state_folder, fake
+):
+    mend(broken, monkeypatch, state_folder)
+    eventually(lambda: isinstance(reports[-1], messages.RobotReport), "a gate")
+    assert any(isinstance(report, messages.GateUp) for report in reports)
+    page = Page(failing)
+    page.drive_off(fake)
+    page.end()
+
+
+def test_a_program_that_cannot_be_started_at_all_is_said_too(
+    monkeypatch, reports, tmp_path
+):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "nothing"))
+    client = GateClient()
+    client.on_report(reports.append)
+    client.start()
+    eventually(lambda: downs(reports) and downs(reports)[-1].failing, "trouble")
+    assert "No such file" in downs(reports)[-1].why
+    client.stop()
+
+
+def test_everybody_who_looks_at_a_page_is_told_why_the_gate_does_not_start(broken):
+    class Viewer:
+        notices: list[str] = []
+
+        def tick(self, now):
+            pass
+
+        def notice(self, text):
+            self.notices.append(text)
+
+    runtime = Runtime()
+    runtime.start()
+    try:
+        runtime.call(runtime.watch, Viewer())
+        told = eventually(lambda: Viewer.notices, "a notice")
+    finally:
+        runtime.stop()
+    assert told[0].startswith("The gate does not start: ModuleNotFoundError: ")
+    assert "no robot can be driven" in told[0]

@@ -1,0 +1,94 @@
+"""When a gate is started again, and which STOPs it is told then."""
+
+import pytest
+
+from webmap.gate.restarts import LIVED, LONGEST_PAUSE, Restarts, in_words
+from webmap.gate.unheard import HEEDED, Unheard
+
+
+def pauses(restarts, count, now=100.0):
+    found = []
+    for _ in range(count):
+        restarts.started(now)
+        now += 0.1
+        restarts.ended(now)
+        ended, steps = now, 0
+        while not restarts.due(now):
+            steps += 1
+            now = ended + steps * 0.01
+        found.append(round(now - ended, 2))
+    return found
+
+
+class TestRestarts:
+    def test_the_first_gate_is_started_at_once(self):
+        assert Restarts().due(0.0)
+
+    def test_one_that_ends_is_replaced_at_once_and_then_after_longer_pauses(self):
+        assert pauses(Restarts(), 8) == [0, 0.25, 0.5, 1, 2, 4, 4, 4]
+        assert LONGEST_PAUSE == 4
+
+    def test_the_second_end_in_a_row_is_trouble(self):
+        restarts = Restarts()
+        pauses(restarts, 1)
+        assert not restarts.failing
+        pauses(restarts, 1)
+        assert restarts.failing
+
+    def test_one_that_lived_for_a_while_is_replaced_at_once(self):
+        restarts = Restarts()
+        pauses(restarts, 5)
+        restarts.started(200.0)
+        restarts.ended(200.0 + LIVED)
+        assert restarts.due(200.0 + LIVED)
+        assert not restarts.failing
+        assert pauses(restarts, 2, now=300.0) == [0.25, 0.5]
+
+    def test_one_that_lives_for_a_while_ends_the_trouble(self):
+        restarts = Restarts()
+        pauses(restarts, 3)
+        restarts.started(200.0)
+        restarts.lives(200.0 + LIVED - 1)
+        assert restarts.failing
+        restarts.lives(200.0 + LIVED)
+        assert not restarts.failing
+        restarts.lives(200.0 + LIVED + 1)
+        assert not restarts.failing
+
+    def test_it_is_said_whether_a_gate_ever_came_to_run(self):
+        assert in_words("no disk", spoke=False).startswith(
+            "The gate does not start: no disk. "
+        )
+        assert "ends again and again: no disk" in in_words("no disk", spoke=True)
+
+
+class TestUnheard:
+    @pytest.fixture
+    def unheard(self):
+        unheard = Unheard()
+        unheard.say(None, "r1", 10.0)
+        unheard.say("c1", None, 10.5)
+        return unheard
+
+    def test_a_stop_is_kept_until_a_gate_has_gone_on_for_a_while(self, unheard):
+        unheard.lives(10.0 + HEEDED - 0.1)
+        assert list(unheard) == [(None, "r1"), ("c1", None)]
+        unheard.lives(10.0 + HEEDED)
+        assert list(unheard) == [("c1", None)]
+        unheard.lives(10.5 + HEEDED)
+        assert list(unheard) == []
+        unheard.lives(99.0)
+
+    def test_for_a_new_gate_the_time_begins_anew(self, unheard):
+        unheard.told(50.0)
+        unheard.lives(50.0 + HEEDED - 0.1)
+        assert len(list(unheard)) == 2
+
+    def test_a_reset_forgets_the_stop_of_that_robot_alone(self, unheard):
+        unheard.say(None, "r2", 10.6)
+        unheard.reset("r1")
+        assert list(unheard) == [("c1", None), (None, "r2")]
+
+    def test_a_reset_of_all_forgets_every_stop(self, unheard):
+        unheard.reset(None)
+        assert list(unheard) == []
