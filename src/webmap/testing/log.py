@@ -1,8 +1,9 @@
 """What a witness noted: every message with the time when it came."""
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from webmap.geometry import Twist
 
@@ -77,20 +78,15 @@ class WitnessLog:
 
     def last_moving(self, since: float) -> float | None:
         """Return when the last velocity that moves came, if any did after ``since``."""
-        return max(
-            (t.at for t in list(self.told) if t.at >= since and not t.is_zero),
-            default=None,
-        )
+        return next((t.at for t in reversed(self.moving_since(since))), None)
 
     def first_zero(self, since: float) -> float | None:
         """Return when the first zero came after ``since``."""
-        return min(
-            (t.at for t in list(self.told) if t.at >= since and t.is_zero), default=None
-        )
+        return next((t.at for t in _from(self.told, since) if t.is_zero), None)
 
     def moving_since(self, since: float, until: float = math.inf) -> list[Told]:
         """Return the velocities that move, of those that came in a stretch of time."""
-        return [t for t in list(self.told) if since <= t.at < until and not t.is_zero]
+        return [t for t in _from(self.told, since) if t.at < until and not t.is_zero]
 
     def standstill(self, since: float, slow: float = 0.01) -> float | None:
         """Return when the wheels came to rest after ``since``, and stayed so.
@@ -101,11 +97,21 @@ class WitnessLog:
 
         """
         rest = None
-        for moved in list(self.moved):
-            if moved.at < since:
-                continue
+        for moved in _from(self.moved, since):
             if max(abs(moved.twist.vx), abs(moved.twist.wz)) > slow:
                 rest = None
             elif rest is None:
                 rest = moved.at
         return rest
+
+
+Noted = TypeVar("Noted", Told, Moved)
+
+
+def _from(noted: list[Noted], since: float) -> list[Noted]:
+    """Return what was noted from a time on.
+
+    A log grows for as long as a robot lives, and is asked again and again by who waits
+    for something, in the process of the witness: what is old must cost nothing.
+    """
+    return noted[bisect_left(noted, since, key=lambda one: one.at) :]

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from bisect import bisect_left
 
 
 class Sentinel:
@@ -32,10 +33,7 @@ class Sentinel:
     def worst(self, since: float, until: float | None = None) -> float:
         """Return the longest delay in a stretch of the monotonic clock, in seconds."""
         until = time.monotonic() if until is None else until
-        return max(
-            (late for at, late in list(self._late) if since <= at <= until + late),
-            default=0.0,
-        )
+        return max((late for _, late in self._between(since, until)), default=0.0)
 
     def stolen(self, since: float, until: float | None = None) -> float:
         """Return how long in a stretch a thread that was ready had to wait, in all.
@@ -45,11 +43,12 @@ class Sentinel:
         1 ms late is an idle machine's and does not count.
         """
         until = time.monotonic() if until is None else until
-        return sum(
-            late
-            for at, late in list(self._late)
-            if since <= at <= until + late and late > 0.001
-        )
+        return sum(late for _, late in self._between(since, until) if late > 0.001)
+
+    def _between(self, since: float, until: float) -> list[tuple[float, float]]:
+        """Return the wakes that were due in a stretch, each with how late it was."""
+        first = bisect_left(self._late, (since, 0.0))
+        return [(at, late) for at, late in self._late[first:] if at <= until + late]
 
     def _watch(self) -> None:
         while not self._end.is_set():
