@@ -49,10 +49,10 @@ class Page:
             turn=0.0,
         )
 
-    def goal(self, robot="r1"):
+    def goal(self, robot="r1", op="goal"):
         self._seq += 1
         self.say(
-            op="goal",
+            op=op,
             robot=robot,
             epoch=self.robots[robot]["epoch"] or 0,
             seq=self._seq,

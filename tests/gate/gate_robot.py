@@ -134,6 +134,11 @@ class FakeRobot:
 
         self._loop.call_soon_threadsafe(cut)
 
+    def cut(self, link):
+        """Drop one link without a word."""
+        socket, _ = self._sockets[link]
+        self._loop.call_soon_threadsafe(socket.transport.abort)
+
     def hold(self):
         """Stop reading, as a robot behind a stalled network."""
         self._each(lambda transport: transport.pause_reading())

@@ -199,6 +199,81 @@ class TestGoals:
             eventually(lambda: second.link not in fake._sockets, "its socket's end")
             page.end()
 
+    def test_move_base_says_on_its_topics_how_a_goal_goes(self, client, robot_spec):
+        with FakeRobot() as fake:
+            client.declare(
+                messages.msgspec.structs.replace(
+                    robot_spec,
+                    bridge_url=fake.url,
+                    action="/move_base",
+                    action_type="move_base_msgs/MoveBaseAction",
+                    pose_topic="/initialpose",
+                )
+            )
+            page = Page(client)
+            page.take()
+
+            def goal_of(state):
+                goal = page.robot().get("goal") or {}
+                return goal if goal.get("state") == state else None
+
+            def sent():
+                if not fake.of("publish", "/move_base/goal"):
+                    page.goal()
+                    time.sleep(0.05)
+                return fake.of("publish", "/move_base/goal")
+
+            told = eventually(sent, "the goal")[0]
+            heard = {t.topic: t for t in fake.of("subscribe")}
+            assert heard["/move_base/result"].at < told.at, "no word is missed"
+            id = told.message["msg"]["goal_id"]["id"]
+            status = {"goal_id": {"id": id}, "status": 1, "text": ""}
+            word = {"op": "publish", "topic": "/move_base/status"}
+            fake.send(told.link, {**word, "msg": {"status_list": [status]}})
+            eventually(lambda: goal_of("under way"), "that it is under way")
+            page.say(op="cancel", robot="r1")
+            eventually(lambda: fake.of("publish", "/move_base/cancel"), "the cancel")
+            end = {**word, "topic": "/move_base/result"}
+            end["msg"] = {"status": {**status, "status": 2}, "result": {}}
+            fake.send(told.link, end)
+            eventually(lambda: goal_of("cancelled"), "its end")
+            topics = {t.topic for t in fake.of("unsubscribe")}
+            assert "/move_base/status" in topics, "an idle robot costs nothing"
+            page.goal(op="locate")
+            pose = eventually(lambda: fake.of("publish", "/initialpose"), "the pose")
+            covariance = pose[0].message["msg"]["pose"]["covariance"]
+            assert {n: v for n, v in enumerate(covariance) if v} == {
+                0: 0.25,
+                7: 0.25,
+                35: 0.068,
+            }
+            page.end()
+
+    def test_an_action_says_how_its_goal_goes_until_its_link_is_lost(
+        self, client, robot_spec
+    ):
+        with FakeRobot() as fake:
+            client.declare(
+                messages.msgspec.structs.replace(
+                    robot_spec, bridge_url=fake.url, action="/navigate_to_pose"
+                )
+            )
+            page = Page(client)
+            page.take()
+            eventually(lambda: self._goes(page, fake, 1), "the goal")
+            goal = fake.of("send_action_goal")[0]
+            assert goal.message["feedback"] is True
+            feedback = {"op": "action_feedback", "id": goal.message["id"]}
+            feedback["values"] = {"distance_remaining": 2.5, "number_of_recoveries": 1}
+            fake.send(goal.link, feedback)
+            eventually(lambda: page.robot()["goal"].get("left") == 2.5, "the feedback")
+            assert page.robot()["goal"]["recoveries"] == 1
+            fake.cut(goal.link)
+            eventually(lambda: page.robot()["goal"]["state"] == "unknown", "its loss")
+            eventually(lambda: page.robot().get("armable"), "the link")
+            assert len(fake.of("send_action_goal")) == 1
+            page.end()
+
     def _goes(self, page, fake, number):
         """Ask again until the link is there: a goal never waits for one."""
 

@@ -3,7 +3,9 @@
 import pytest
 from gate_harness import URL, ZERO, Bench, spec
 
+from webmap.errors import ConfigError
 from webmap.gate import actions, events, messages
+from webmap.gate.specs import checked
 from webmap.geometry import Twist
 
 
@@ -182,6 +184,294 @@ def test_when_its_sender_is_lost_a_goal_does_what_was_set(loss, policy):
     else:
         bench.tell(events.Shutdown("the end"))
     assert cancels(bench) == (1 if policy == "cancel" else 0)
+
+
+def test_one_that_cannot_be_cancelled_goes_on_whatever_is_set():
+    only = spec(on_operator_loss="cancel", cancel_topic=None)
+    bench = Bench().begin(only)
+    bench.take()
+    bench.goal()
+    bench.tell(messages.Disconnect("a"))
+    assert cancels(bench) == 0
+
+
+MOVE_BASE = {"action": "/move_base", "action_type": "move_base_msgs/MoveBaseAction"}
+
+
+class TestWay:
+    @pytest.mark.parametrize(
+        ("changes", "way"),
+        [
+            ({}, "topic"),
+            ({"action": "/go"}, "navigate_to_pose"),
+            ({"action": "/go", "goal_topic": None}, "navigate_to_pose"),
+            (MOVE_BASE, "move_base"),
+            ({"goal_topic": None}, None),
+        ],
+    )
+    def test_goals_go_the_way_that_the_robot_has(self, changes, way):
+        bench = Bench().begin(spec(**changes))
+        assert bench.report().way == way
+        bench.take()
+        bench.goal()
+        assert [goal.way for goal in goals(bench)] == [way][: way is not None]
+
+    def test_a_bridge_without_actions_gets_the_next_goal_on_the_topic(self):
+        bench = Bench().begin(spec(action="/go"))
+        bench.take()
+        bench.goal()
+        (first,) = goals(bench)
+        bench.tell(
+            events.GoalEnded("r1", first.id, "failed", "too old", no_actions=True)
+        )
+        report = bench.report()
+        assert report.goal.state == "failed"
+        assert report.goal.why == "too old; the next one goes to /goal"
+        assert report.way == "topic"
+        assert len(goals(bench)) == 1, "nothing is sent by itself"
+        bench.goal()
+        assert goals(bench)[-1].way == "topic"
+
+    def test_without_a_topic_it_stays_with_the_action(self):
+        bench = Bench().begin(spec(action="/go", goal_topic=None))
+        bench.take()
+        bench.goal()
+        (first,) = goals(bench)
+        bench.tell(
+            events.GoalEnded("r1", first.id, "failed", "too old", no_actions=True)
+        )
+        assert bench.report().goal.why == "too old"
+        assert bench.report().way == "navigate_to_pose"
+
+
+class TestHowItGoes:
+    @pytest.fixture
+    def bench(self):
+        bench = Bench().begin(spec(action="/go"))
+        bench.say("a", op="cancel", robot="r1")
+        bench.done.clear()
+        bench.take()
+        bench.goal()
+        return bench
+
+    def tell(self, bench, **word):
+        bench.tell(events.GoalProgress("r1", goals(bench)[-1].id, **word))
+        bench.run(0.2)
+        return bench.report().goal
+
+    def end(self, bench, *how):
+        bench.tell(events.GoalEnded("r1", goals(bench)[-1].id, *how))
+        return bench.report().goal
+
+    def test_a_goal_is_sent_accepted_under_way_and_reached(self, bench):
+        goal = bench.report().goal
+        assert (goal.x, goal.y, goal.yaw, goal.by) == (1.0, 2.0, 0.5, "a")
+        assert (goal.state, goal.left) == ("sent", None)
+        assert self.tell(bench, active=False).state == "accepted"
+        goal = self.tell(bench, active=True, left=2.5, time=1.0, eta=4.0, recoveries=1)
+        assert goal.state == "under way"
+        assert (goal.left, goal.time, goal.eta, goal.recoveries) == (2.5, 1.0, 4.0, 1)
+        goal = self.tell(bench, active=True)
+        assert goal.left == 2.5, "what a word does not tell was told before"
+        goal = self.end(bench, "reached", "")
+        assert (goal.state, goal.why) == ("reached", "")
+
+    def test_numbers_that_flow_are_told_ten_times_a_second_at_most(self, bench):
+        self.tell(bench, active=True, left=9.0)
+        before = len(bench.of(messages.RobotReport))
+        id = goals(bench)[-1].id
+
+        def say():
+            bench.tell(events.GoalProgress("r1", id, active=True, left=bench.now))
+
+        bench.run(1.0, say)
+        assert len(bench.of(messages.RobotReport)) - before <= 11
+
+    def test_a_failure_has_its_reason(self, bench):
+        goal = self.end(bench, "failed", "no path to the goal")
+        assert (goal.state, goal.why) == ("failed", "no path to the goal")
+        assert self.end(bench, "reached", "").state == "failed", "it ends once"
+        assert self.tell(bench, active=True).state == "failed"
+
+    def test_a_failure_without_a_reason_says_that(self, bench):
+        assert self.end(bench, "failed", "").why == "the robot does not say why"
+
+    def test_a_cancel_is_under_way_until_the_robot_says_so(self, bench):
+        bench.say("b", op="cancel", robot="r1")
+        assert bench.report().goal.state == "cancelling"
+        goal = self.tell(bench, active=True, left=1.0)
+        assert (goal.state, goal.left) == ("cancelling", 1.0)
+        assert self.end(bench, "cancelled", "canceled").state == "cancelled"
+
+    def test_a_goal_that_was_reached_before_the_cancel_came_was_reached(self, bench):
+        bench.say("b", op="cancel", robot="r1")
+        assert self.end(bench, "reached").state == "reached"
+
+    def test_a_goal_that_somebody_else_cancelled_says_so(self, bench):
+        goal = self.end(bench, "cancelled", "")
+        assert goal.why == "by the robot, or by somebody else"
+
+    @pytest.mark.parametrize(
+        ("act", "why"),
+        [
+            (lambda bench: bench.say("b", op="stop", robot="r1"), "STOP"),
+            (
+                lambda bench: (bench.hold(0.3), bench.hold(0.1, x=1.0)),
+                "somebody drives the robot",
+            ),
+        ],
+    )
+    def test_a_cancelled_goal_says_who_did_it(self, bench, act, why):
+        act(bench)
+        assert bench.report().goal.why == why
+        assert self.end(bench, "cancelled", "canceled").why == why
+
+    def test_a_goal_that_nobody_tells_of_any_more_is_unknown_until_it_is(self, bench):
+        id = goals(bench)[-1].id
+        bench.tell(events.GoalLost("r1", id, "no link"))
+        assert bench.report().goal.state == "unknown"
+        assert bench.report().goal.why == "no link"
+        assert self.tell(bench, active=True).state == "under way"
+        self.end(bench, "reached")
+        bench.tell(events.GoalLost("r1", id, "no link"))
+        assert bench.report().goal.state == "reached"
+
+    def test_a_new_link_sends_no_goal_again(self, bench):
+        bench.break_links()
+        bench.run(0.5)
+        bench.connect_links()
+        bench.run(1.0)
+        assert len(goals(bench)) == 1
+
+    def test_a_cancel_that_waits_for_a_link_is_not_taken_for_done(self):
+        bench = Bench().begin()
+        bench.take()
+        bench.goal()
+        assert bench.report().goal.why == "this robot does not say how it goes"
+        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.say("a", op="cancel", robot="r1")
+        assert bench.report().goal.state == "cancelling"
+        bench.tell(events.LinkUp(URL, "tasks"))
+        assert bench.report().goal.state == "cancelled"
+
+    def test_words_about_other_goals_and_other_robots_change_nothing(self, bench):
+        before = bench.report()
+        for word in (
+            events.GoalProgress("r1", "x", active=True),
+            events.GoalEnded("r1", "x", "failed", "no"),
+            events.GoalLost("r1", "x", "no"),
+            events.GoalProgress("r9", "x", active=True),
+            events.GoalEnded("r9", "x"),
+            events.GoalLost("r9", "x", "no"),
+        ):
+            bench.tell(word)
+        assert bench.report() == before
+
+
+class TestWhereItIs:
+    @pytest.fixture
+    def bench(self):
+        return Bench().begin(spec(pose_topic="/initialpose"))
+
+    def locate(self, bench, who="a", **changes):
+        bench.goal(who, **{"op": "locate", **changes})
+        return bench.did(actions.TellPose)
+
+    def why(self, bench, who="a"):
+        return bench.refusals(who)[-1].why
+
+    def test_who_has_the_robot_tells_it_where_it_is(self, bench):
+        assert bench.report().locates
+        bench.take()
+        bench.hold(0.1)
+        (told,) = self.locate(bench)
+        assert (told.robot, told.x, told.y, told.yaw) == ("r1", 1.0, 2.0, 0.5)
+        bench.tell(events.WrotePose("r1", 1.0, 2.0, 0.5, "a", done=True))
+        assert bench.of(messages.SentPose) == [
+            messages.SentPose("r1", 1.0, 2.0, 0.5, "a")
+        ]
+        bench.tell(events.WrotePose("r1", 1.0, 2.0, 0.5, "a", done=False))
+        assert "dropped" in self.why(bench)
+
+    @pytest.mark.parametrize(
+        ("changes", "why"),
+        [({"epoch": 0}, "epoch"), ({"tick": 1}, "tick"), ({"seq": 0}, "seq")],
+    )
+    def test_it_needs_lease_epoch_and_a_fresh_tick(self, bench, changes, why):
+        assert self.locate(bench) == []
+        assert "take it first" in self.why(bench)
+        bench.take()
+        bench.hold(0.1)
+        assert self.locate(bench, **changes) == []
+        assert why in self.why(bench)
+        assert self.locate(bench, "b") == []
+
+    def test_it_is_refused_while_the_robot_follows_a_goal(self, bench):
+        bench.take()
+        bench.goal()
+        assert self.locate(bench) == []
+        assert "follows a goal" in self.why(bench)
+        bench.say("a", op="cancel", robot="r1")
+        assert len(self.locate(bench)) == 1
+
+    def test_it_is_refused_while_the_robot_is_driven_and_while_it_stops(self, bench):
+        bench.drive_off()
+        assert self.locate(bench) == []
+        bench.drive()
+        assert self.locate(bench) == []
+        assert "is driven" in self.why(bench)
+        bench.hold(1.0)
+        assert len(self.locate(bench)) == 1
+
+    def test_it_is_refused_while_stop_stands_and_without_a_link(self, bench):
+        bench.take()
+        bench.tell(events.LinkDown(URL, "tasks"))
+        assert self.locate(bench) == []
+        assert "no link" in self.why(bench)
+        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.say("a", op="stop", robot="r1")
+        assert self.locate(bench) == []
+
+    def test_it_is_refused_while_the_display_is_silent(self, bench):
+        bench.take()
+        bench.beating = False
+        bench.run(0.3)
+        assert self.locate(bench) == []
+
+    def test_a_robot_without_a_topic_for_it_says_so(self):
+        bench = Bench().begin()
+        bench.take()
+        assert not bench.report().locates
+        assert self.locate(bench) == []
+        assert "no topic for its initial pose" in self.why(bench)
+
+    def test_a_goal_without_an_end_does_not_forbid_it_for_ever(self):
+        bench = Bench().begin(spec(pose_topic="/initialpose", cancel_topic=None))
+        bench.take()
+        bench.goal()
+        assert len(self.locate(bench)) == 1
+
+    def test_a_program_with_the_lease_tells_it_too(self, bench):
+        told = messages.ProgramLocate("r1", 0, bench.tick, (1.0, 2.0, 0.5))
+        bench.tell(told)
+        assert bench.did(actions.TellPose) == []
+        bench.tell(messages.ProgramTake(1, "r1"))
+        bench.run(0.1)
+        epoch = bench.report().epoch
+        bench.tell(messages.msgspec.structs.replace(told, epoch=epoch, tick=bench.tick))
+        assert len(bench.did(actions.TellPose)) == 1
+
+    @pytest.mark.parametrize(
+        ("changes", "what"),
+        [
+            ({"pose_type": "geometry_msgs/PoseStamped"}, "initial pose is told as"),
+            ({"pose_covariance": (-1.0, 0.0, 0.0)}, "from 0 on"),
+            ({"action": "/go", "action_type": "a/Fib"}, "NavigateToPose or"),
+        ],
+    )
+    def test_a_robot_that_cannot_be_meant_is_refused(self, changes, what):
+        with pytest.raises(ConfigError, match=what):
+            checked(spec(**{"pose_topic": "/initialpose", **changes}))
 
 
 class TestGoalsOnly:

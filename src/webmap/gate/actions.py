@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from webmap.gate.events import Key
-from webmap.gate.messages import FromGate, RobotSpec
+from webmap.gate.messages import FromGate, RobotSpec, Way
 from webmap.geometry import Twist
 
 
@@ -53,6 +53,19 @@ class SendGoal:
     key: Key
     robot: str
     id: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+    way: Way
+
+
+@dataclass(frozen=True, slots=True)
+class TellPose:
+    """Tell the robot where it is, now or not at all; answered by ``WrotePose``."""
+
+    key: Key
+    robot: str
     x: float
     y: float
     yaw: float
@@ -139,6 +152,7 @@ Action = (
     | Watch
     | WriteTwist
     | SendGoal
+    | TellPose
     | CancelGoals
     | CutLink
     | Lock

@@ -404,6 +404,21 @@ class Base:
         self._lapse("a goal was sent", now)
         self.robots.goals[robot].send(*pose, by)
 
+    def locate(
+        self, robot: str, pose: tuple[float, float, float], by: str, now: float
+    ) -> None:
+        """Tell the robot where it is, while nothing moves it.
+
+        Raises:
+            Refusal: If it cannot be told now.
+
+        """
+        if reason := self.unarmable(now):
+            raise Refusal(reason)
+        if not self.silent:
+            raise Refusal("it is driven: let it stand first")
+        self.robots.goals[robot].locate(*pose, by)
+
     def wrote_goal(self, write: WroteGoal) -> None:
         """Note that a goal went out: what moves from here on moves by itself."""
         self.robots.goals[write.robot].wrote(write)

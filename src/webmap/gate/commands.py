@@ -8,6 +8,8 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
      "x": 1.0, "y": 0.0, "turn": 0.0}
     {"op": "goal", "robot": "r1", "epoch": 3, "seq": 18, "tick": 813,
      "x": 1.0, "y": 2.0, "yaw": 0.5}
+    {"op": "locate", "robot": "r1", "epoch": 3, "seq": 19, "tick": 814,
+     "x": 1.0, "y": 2.0, "yaw": 0.5}
     {"op": "cancel", "robot": "r1"}
     {"op": "stop", "robot": "r1"}        or "*" for all
     {"op": "reset", "robot": "r1"}       or "*" for all
@@ -20,8 +22,9 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
 when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
 left and ``turn`` counter-clockwise, as parts of the speed in force, each in
 ``[-1, 1]``; what lies beyond is clamped. ``epoch`` is the lease's, ``tick`` the newest
-one that came, and ``seq`` grows with every ``drive`` and ``goal`` of the connection.
-``goal`` is a pose in the robot's goal frame, in metres and radians. ``reset`` ends a
+one that came, and ``seq`` grows with every ``drive``, ``goal`` and ``locate`` of the
+connection. ``goal`` is a pose in the robot's goal frame, in metres and radians, that it
+is to drive to, and ``locate`` one that it is at. ``reset`` ends a
 STOP that stands; it moves nothing and gives no lease. ``ask`` asks the holder of the
 lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
 10 s; ``release`` also takes the question back. ``stop-test`` creeps, stops sending and
@@ -40,7 +43,7 @@ import math
 import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from webmap.gate.refusal import Refusal
 
@@ -107,6 +110,19 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
+class Locate:
+    """Where the robot is, as somebody sees it: metres and radians in its goal frame."""
+
+    robot: str
+    epoch: int
+    seq: int
+    tick: int
+    x: float
+    y: float
+    yaw: float
+
+
+@dataclass(frozen=True, slots=True)
 class Cancel:
     """The robot should give up its goals."""
 
@@ -160,6 +176,7 @@ Command = (
     | Release
     | Drive
     | Goal
+    | Locate
     | Cancel
     | Stop
     | Reset
@@ -168,6 +185,9 @@ Command = (
     | Deny
     | StopTest
 )
+
+
+P = TypeVar("P", Goal, Locate)
 
 
 def parse(data: bytes) -> Command:
@@ -282,11 +302,11 @@ def _drive(fields: _Fields) -> Drive:
     return Drive(robot, epoch, seq, tick, x, y, turn, clamped, video)
 
 
-def _goal(fields: _Fields) -> Goal:
+def _pose(kind: type[P], fields: _Fields) -> P:
     robot = fields.robot()
     epoch, seq, tick = (fields.whole(name) for name in ("epoch", "seq", "tick"))
     x, y = fields.coordinate("x"), fields.coordinate("y")
-    return Goal(
+    return kind(
         robot, epoch, seq, tick, x, y, math.remainder(fields.number("yaw"), math.tau)
     )
 
@@ -300,7 +320,8 @@ _READERS: dict[str, Callable[[_Fields], Command]] = {
     "take": lambda fields: Take(fields.robot()),
     "release": lambda fields: Release(fields.robot()),
     "drive": _drive,
-    "goal": _goal,
+    "goal": lambda fields: _pose(Goal, fields),
+    "locate": lambda fields: _pose(Locate, fields),
     "cancel": lambda fields: Cancel(fields.robot()),
     "ask": lambda fields: Ask(fields.robot()),
     "grant": lambda fields: Grant(fields.robot()),

@@ -7,6 +7,7 @@ from webmap.gate.assist import Sweep
 from webmap.geometry import Twist
 
 Lane = Literal["control", "witness", "tasks"]
+Outcome = Literal["reached", "failed", "cancelled"]
 
 
 class Key(NamedTuple):
@@ -65,11 +66,54 @@ class WroteGoal:
 
 
 @dataclass(frozen=True, slots=True)
+class WrotePose:
+    """What became of a word on where the robot is."""
+
+    robot: str
+    x: float
+    y: float
+    yaw: float
+    by: str
+    done: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GoalProgress:
+    """The robot says how a goal goes; what it does not say is ``None``."""
+
+    robot: str
+    id: str
+    active: bool
+    """Whether it is under way, or only accepted."""
+    left: float | None = None
+    """Metres to go."""
+    time: float | None = None
+    """Seconds under way."""
+    eta: float | None = None
+    """Seconds to go."""
+    recoveries: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class GoalEnded:
     """The action reported the result of a goal, whatever it is."""
 
     robot: str
     id: str
+    outcome: Outcome = "reached"
+    why: str = ""
+    """The robot's reason, in its own words."""
+    no_actions: bool = False
+    """Whether the bridge takes no goals of actions at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalLost:
+    """What would have told how a goal goes is gone; the robot may go on."""
+
+    robot: str
+    id: str
+    why: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +197,10 @@ Event = (
     | Alive
     | Wrote
     | WroteGoal
+    | WrotePose
+    | GoalProgress
     | GoalEnded
+    | GoalLost
     | Echoed
     | Measured
     | Scanned

@@ -8,10 +8,11 @@ from webmap.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
 from webmap.gate.base import Base
+from webmap.gate.goals import Goals
 from webmap.gate.health import Health, Pulse
 from webmap.gate.latch import Latch
 from webmap.gate.lease import Epochs
-from webmap.gate.messages import Forget, RobotGone, RobotSpec, SentGoal
+from webmap.gate.messages import Forget, RobotGone, RobotSpec, SentGoal, SentPose
 from webmap.gate.refusal import Refusal
 from webmap.gate.reporting import Reporter, report
 from webmap.gate.specs import checked, key_of
@@ -53,6 +54,9 @@ class Fleet:
             events.Alive: self._alive,
             events.Wrote: self._wrote,
             events.WroteGoal: self._wrote_goal,
+            events.WrotePose: self._wrote_pose,
+            events.GoalProgress: self._goal_progress,
+            events.GoalLost: self._goal_lost,
             events.GoalEnded: self._goal_ended,
             events.Echoed: self._echoed,
             events.Measured: self._measured,
@@ -208,6 +212,7 @@ class Fleet:
         if base is None:
             return
         if event.done:
+            self._touched.add(base.key)
             base.wrote_goal(event)
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(Say(sent))
@@ -215,10 +220,33 @@ class Fleet:
             why = "the link is backed up: the goal was dropped"
             self._refuse(event.by, event.robot, "goal", why, now)
 
+    def _wrote_pose(self, event: events.WrotePose, now: float) -> None:
+        if event.done:
+            told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
+            self._emit(Say(told))
+        else:
+            why = "the link is backed up: the pose was dropped"
+            self._refuse(event.by, event.robot, "locate", why, now)
+
+    def _goal_progress(self, event: events.GoalProgress, now: float) -> None:
+        if goals := self._goals_of(event.robot):
+            goals.progress(event)
+
     def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
-        base = self._by_robot.get(event.robot)
-        if base is not None:
-            base.robots.goals[event.robot].ended(event.id)
+        if goals := self._goals_of(event.robot):
+            goals.ended(event)
+
+    def _goal_lost(self, event: events.GoalLost, now: float) -> None:
+        if goals := self._goals_of(event.robot):
+            goals.gone_dark(event)
+
+    def _goals_of(self, robot: str) -> Goals | None:
+        """Return a robot's goals, which may change by that; it may be gone."""
+        base = self._by_robot.get(robot)
+        if base is None:
+            return None
+        self._touched.add(base.key)
+        return base.robots.goals[robot]
 
     def _echoed(self, event: events.Echoed, now: float) -> None:
         base = self._of_key(event.key)

@@ -20,6 +20,7 @@ from webmap.gate.commands import (
     Drive,
     Goal,
     Grant,
+    Locate,
     Release,
     Reset,
     Stop,
@@ -78,6 +79,7 @@ class Gate:
             messages.ProgramRelease: self._program_release,
             messages.ProgramTwist: self._program_twist,
             messages.ProgramMove: self._program_move,
+            messages.ProgramLocate: self._program_locate,
             messages.ProgramCancel: self._program_cancel,
             events.Shutdown: self._shut_down,
         }
@@ -204,6 +206,10 @@ class Gate:
                 base, _ = self._licensed(connection, command, now)
                 pose = (command.x, command.y, command.yaw)
                 base.goal(robot, pose, connection.id, now)
+            case Locate(robot):
+                base, _ = self._licensed(connection, command, now)
+                pose = (command.x, command.y, command.yaw)
+                base.locate(robot, pose, connection.id, now)
             case Take(robot):
                 self._take(connection, robot, now)
             case Release(robot):
@@ -290,7 +296,7 @@ class Gate:
             raise
 
     def _licensed(
-        self, connection: Connection, command: Drive | Goal, now: float
+        self, connection: Connection, command: Drive | Goal | Locate, now: float
     ) -> tuple[Base, float]:
         base, age = self._checked(
             connection, command.robot, command.epoch, command.tick, now
@@ -388,6 +394,15 @@ class Gate:
             base.goal(robot, _finite(message.pose), program.id, now)
 
         self._attempt(program, robot, "goal", move, now)
+
+    def _program_locate(self, message: messages.ProgramLocate, now: float) -> None:
+        program, robot = self._people.program, message.robot
+
+        def locate() -> None:
+            base, _ = self._checked(program, robot, message.epoch, message.tick, now)
+            base.locate(robot, _finite(message.pose), program.id, now)
+
+        self._attempt(program, robot, "locate", locate, now)
 
     def _program_cancel(self, message: messages.ProgramCancel, now: float) -> None:
         program, robot = self._people.program, message.robot

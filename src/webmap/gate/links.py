@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from webmap.gate import actions
 from webmap.gate.control import ControlLane
-from webmap.gate.events import Event, Key, Wrote, WroteGoal
+from webmap.gate.events import Event, Key, Wrote, WroteGoal, WrotePose
 from webmap.gate.messages import RobotSpec
 from webmap.gate.motion import ZERO
 from webmap.gate.tasks import TasksLane, Topic, goal_topics, hook_topics
@@ -37,6 +37,10 @@ class Links:
                 return Wrote(key, twist, epoch, by, done)
             case actions.SendGoal():
                 return self._send_goal(action)
+            case actions.TellPose(key, robot, x, y, yaw, by):
+                spec = self._robots[key][robot]
+                done = self._tasks[_goal_url(spec)].tell_pose(spec, action)
+                return WrotePose(robot, x, y, yaw, by, done)
             case actions.CancelGoals(key, robot):
                 spec = self._robots[key][robot]
                 self._tasks[_goal_url(spec)].cancel(spec)
@@ -55,7 +59,9 @@ class Links:
             case actions.Detach(key, robot):
                 watched = key in self._watched
                 self._unwatch(key)
-                self._detach(key, self._robots[key].pop(robot))
+                spec = self._robots[key].pop(robot)
+                self._tasks[_goal_url(spec)].forget(robot)
+                self._detach(key, spec)
                 if watched and self._robots[key]:
                     self._watch(key)
                 self._close_unwanted()
@@ -93,6 +99,8 @@ class Links:
         watched = key in self._watched
         self._unwatch(key)
         if earlier is not None:
+            if (_goal_url(earlier), earlier.action) != (_goal_url(spec), spec.action):
+                self._tasks[_goal_url(earlier)].forget(spec.id)
             self._detach(key, earlier)
         robots[spec.id] = spec
         if spec.twist_topic is not None:

@@ -33,7 +33,8 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     age, test = base.ages.p95, base.test
     unarmable = base.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
-    link = base.control if spec.twist_topic else base.robots.goals[spec.id].link
+    goals = base.robots.goals[spec.id]
+    link = base.control if spec.twist_topic else goals.link
     return RobotReport(
         robot=spec.id,
         name=spec.name,
@@ -62,6 +63,10 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         test=None if test is None else TestReport(test.state, test.text),
         armable=unarmable is None,
         reason=unarmable if lease is None else base.doubt(now),
+        way=goals.way,
+        cancels=goals.can_cancel,
+        locates=spec.pose_topic is not None,
+        goal=goals.report,
     )
 
 
@@ -123,7 +128,9 @@ def _alike(one: RobotReport, other: RobotReport) -> bool:
 
 def _gist(report: RobotReport) -> RobotReport:
     """Return ``report`` without the numbers that change all the time."""
-    asker, stop, alarm = report.asker, report.stop, report.alarm
+    asker, stop, alarm, goal = report.asker, report.stop, report.alarm, report.goal
+    if goal is not None:
+        goal = msgspec.structs.replace(goal, left=None, time=None, eta=None)
     if asker is not None:
         asker = msgspec.structs.replace(asker, left=0.0)
     if stop is not None:
@@ -138,4 +145,5 @@ def _gist(report: RobotReport) -> RobotReport:
         alarm=None if alarm is None else "",
         age=None,
         reaction=0.0,
+        goal=goal,
     )

@@ -11,7 +11,10 @@
      "sent": [0.0, 0.0, 0.0], "echoed": null, "measured": [0.0, 0.0, 0.0],
      "alarm": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
      "stop_time": 0.25, "stop_source": "stated", "stop_date": null, "test": null,
-     "armable": true, "reason": null}
+     "armable": true, "reason": null, "way": "navigate_to_pose", "cancels": true,
+     "locates": true, "goal": {"id": "g7", "x": 1.0, "y": 2.0, "yaw": 0.5, "by": "c5",
+     "way": "navigate_to_pose", "state": "under way", "why": "", "left": 3.2,
+     "time": 4.5, "eta": 5.3, "recoveries": 0}}
     {"op": "gone", "robot": "r1"}
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
 
@@ -35,7 +38,13 @@ robot at worst, and ``brake`` the deceleration that is assumed, in m/s². ``stop
 is what is known of the base stopping by itself, in seconds: ``"stated"``, or
 ``"tested"`` on ``stop_date`` (null if it did not stop then). ``test`` tells of the stop
 test: ``{"state": "creeping", "text": "..."}``, then ``"waiting"``, ``"done"`` or
-``"failed"``.
+``"failed"``. ``way`` is how goals are sent to the robot (null if none can be),
+``cancels`` whether they can be called off, ``locates`` whether it can be told where it
+is. ``goal`` is the newest one, by the connection ``by``, also when it has ended:
+``"sent"``, ``"accepted"``, ``"under way"``, ``"cancelling"``, ``"unknown"`` (what told
+of it was lost), ``"reached"``, ``"failed"`` or ``"cancelled"``, with the reason, the
+metres and seconds to go, the seconds under way and how often the robot had to free
+itself; null is what it does not say.
 ``refused`` names the ``op`` (``what``) that was refused, or ``"command"`` for words
 that made no sense (``robot`` is then null), or ``"lease"`` when a lease has ended. The
 same refusal is said once a second.

@@ -7,8 +7,14 @@ import msgspec
 from webmap.errors import ConfigError
 from webmap.gate.assist import AssistSpec
 from webmap.gate.events import Key
+from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import RobotSpec
 from webmap.ros.names import is_type, normalise_topic, normalise_url, split_type
+
+ACTIONS = ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction")
+"""The types of actions that take goals."""
+
+POSE_TYPE = "geometry_msgs/PoseWithCovarianceStamped"
 
 
 def checked(spec: RobotSpec) -> RobotSpec:
@@ -32,6 +38,21 @@ def checked(spec: RobotSpec) -> RobotSpec:
             f"robot {spec.name!r}: goals are sent as geometry_msgs/PoseStamped, "
             f"got {spec.goal_type!r}"
         )
+    if spec.action and not is_type(spec.action_type, *ACTIONS):
+        raise ConfigError(
+            f"robot {spec.name!r}: goals are sent to actions of type "
+            f"{' or '.join(ACTIONS)}, got {spec.action_type!r}"
+        )
+    if spec.pose_topic and not is_type(spec.pose_type, POSE_TYPE):
+        raise ConfigError(
+            f"robot {spec.name!r}: its initial pose is told as {POSE_TYPE}, "
+            f"got {spec.pose_type!r}"
+        )
+    if not all(math.isfinite(v) and v >= 0 for v in spec.pose_covariance):
+        raise ConfigError(
+            f"robot {spec.name!r}: the covariance of its initial pose is made of "
+            f"numbers from 0 on, got {spec.pose_covariance}"
+        )
     if spec.odometry_type:
         split_type(spec.odometry_type)
     url = normalise_url(spec.bridge_url)
@@ -45,12 +66,13 @@ def checked(spec: RobotSpec) -> RobotSpec:
         goal_topic=_topic(spec.goal_topic),
         cancel_topic=_topic(spec.cancel_topic),
         action=_topic(spec.action),
+        pose_topic=_topic(spec.pose_topic),
         v_max=_number(spec, "v_max", least=0.0),
         w_max=_number(spec, "w_max", least=0.0),
         a_max=_number(spec, "a_max", least=1e-3),
         stops_within=_number(spec, "stops_within", least=0.0),
         assist=spec.assist and checked_assist(spec.name, spec.assist),
-        stop_hooks=tuple(_hook(spec, hook) for hook in spec.stop_hooks),
+        stop_hooks=checked_hooks(spec.name, spec.stop_hooks, spec.twist_topic),
     )
 
 
@@ -104,22 +126,6 @@ def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
             f"got {assist.blind!r}"
         )
     return msgspec.structs.replace(assist, topic=normalise_topic(assist.topic))
-
-
-def _hook(spec: RobotSpec, hook: dict[str, str]) -> dict[str, str]:
-    """Return a stop hook with its name resolved and its type filled in."""
-    for place, type in (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger")):
-        if hook.get(place) and hook.keys() <= {place, "type"}:
-            if not is_type(hook.get("type", type), type):
-                break
-            name = normalise_topic(hook[place])
-            if name == _topic(spec.twist_topic):
-                break
-            return {place: name, "type": hook.get("type", type)}
-    raise ConfigError(
-        f"robot {spec.name!r}: a stop hook is a topic of type std_msgs/Bool or a "
-        f"service of type std_srvs/Trigger, got {hook!r}"
-    )
 
 
 def _topic(topic: str | None) -> str | None:

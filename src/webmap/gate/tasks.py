@@ -5,6 +5,9 @@ has ended. So a goal of an action uses up a socket: it is kept for the result, a
 lane opens another for what comes next. For the same reason, and because the handle of
 an action goal belongs to the socket that sent it, the cancel service is called on a
 socket of its own.
+
+move_base is an action of topics, which block nothing: its words come on the lane
+itself, its status only while a goal of ours is followed.
 """
 
 import asyncio
@@ -12,9 +15,10 @@ import logging
 from collections.abc import Callable, Iterable
 
 from webmap.errors import BridgeClosed
-from webmap.gate import words
-from webmap.gate.actions import SendGoal
-from webmap.gate.events import Event, GoalEnded, LinkDown, LinkUp
+from webmap.gate import navigation, words
+from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
+from webmap.gate.goals import is_move_base
 from webmap.gate.lanes import Lane
 from webmap.gate.messages import RobotSpec
 from webmap.gate.sockets import Ears, Socket, open_socket
@@ -28,6 +32,18 @@ MAX_SPENT = 8
 
 CALL_TIMEOUT = 2.0
 """How long a service is given to answer, in seconds."""
+
+FEEDBACK_PERIOD = 0.2
+"""The least time between two words on how a goal goes, in seconds."""
+
+GOAL_ID = "actionlib_msgs/GoalID"
+
+_ACTIONLIB = {
+    "status": ("actionlib_msgs/GoalStatusArray", 200),
+    "feedback": ("move_base_msgs/MoveBaseActionFeedback", 200),
+    "result": ("move_base_msgs/MoveBaseActionResult", 0),
+}
+"""What is heard of a goal of move_base: the type, and milliseconds between two."""
 
 Topic = tuple[str, str]
 """The name of a topic and its type."""
@@ -47,11 +63,14 @@ class TasksLane:
         self._tell = tell
         self._spent: list[Socket] = []
         self._calling: set[asyncio.Task[None]] = set()
+        self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
+        """The goals of move_base that are under way, by robot."""
+        self._spending = False
         self.lane = Lane(
             url,
             up=lambda: tell(LinkUp(url, "tasks")),
-            down=lambda: tell(LinkDown(url, "tasks")),
-            text=lambda _: None,
+            down=self._down,
+            text=self._hear,
         )
 
     def attach(self, topics: Iterable[Topic]) -> None:
@@ -68,10 +87,19 @@ class TasksLane:
 
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
         """Write a goal now or drop it; return whether it went out."""
+        if goal.way == "move_base":
+            # First, so that no word is missed: they may be on their way at once.
+            self._follow(spec, goal)
         done = self.lane.write(words.goal(spec, goal), only_if_clear=True)
-        if done and spec.goal_topic is None:
+        if done and goal.way == "navigate_to_pose":
             self._keep_for_result(goal)
+        if not done:
+            self.forget(goal.robot)
         return done
+
+    def tell_pose(self, spec: RobotSpec, at: TellPose) -> bool:
+        """Tell where the robot is, now or not; return whether it went out."""
+        return self.lane.write(words.pose_estimate(spec, at), only_if_clear=True)
 
     def cancel(self, spec: RobotSpec) -> None:
         """Cancel every goal of the robot, by every way that it has."""
@@ -79,7 +107,11 @@ class TasksLane:
             self.lane.write(
                 words.cancel_by_topic(spec.cancel_topic), only_if_clear=False
             )
-        if spec.action is not None:
+        if spec.action is not None and is_move_base(spec):
+            topic = f"{spec.action}/cancel"
+            if topic != spec.cancel_topic:
+                self.lane.write(words.cancel_by_topic(topic), only_if_clear=False)
+        elif spec.action is not None:
             id, what = generate_id(), f"cancelling the goals of {spec.action}"
             self._call(words.cancel_by_service(spec.action, id), id, what)
 
@@ -114,23 +146,67 @@ class TasksLane:
         self._spent.clear()
 
     def _keep_for_result(self, goal: SendGoal) -> None:
-        def hear(data: bytes) -> None:
-            heard = words.hear(data)
-            if heard is not None and (heard.op, heard.id) == ("action_result", goal.id):
-                link.close()
-                forget("the goal has ended")
-                self._tell(GoalEnded(goal.robot, goal.id))
+        polite = Pace()
 
-        def forget(why: str) -> None:
+        def hear(data: bytes) -> None:
+            word = navigation.of_action(data, goal)
+            if isinstance(word, GoalEnded):
+                link.close()
+                forget()
+            if word is not None and polite(word):
+                self._tell(word)
+
+        def forget() -> None:
             if link in self._spent:
                 self._spent.remove(link)
 
-        found = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=forget))
+        def lost(why: str) -> None:
+            forget()
+            self._tell(GoalLost(goal.robot, goal.id, f"the link is lost: {why}"))
+
+        self._spending = True
+        found = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=lost))
+        self._spending = False
         assert found is not None  # it has just been written to
         link = found
         self._spent.append(link)
         if len(self._spent) > MAX_SPENT:
             self._spent.pop(0).close()
+
+    # move_base.
+
+    def _follow(self, spec: RobotSpec, goal: SendGoal) -> None:
+        self.forget(goal.robot)
+        self._followed[goal.robot] = (spec, goal)
+        for part, (type, throttle) in _ACTIONLIB.items():
+            topic = f"{spec.action}/{part}"
+            id = f"webmap-gate follow {topic} {goal.robot}"
+            hello = ops.subscribe(topic, type=type, id=id, throttle_rate=throttle)
+            self.lane.hold(id, hello, ops.unsubscribe(topic, id=id))
+
+    def forget(self, robot: str) -> None:
+        """Listen no more to how a robot's goal goes."""
+        found = self._followed.pop(robot, None)
+        if found is not None:
+            for part in _ACTIONLIB:
+                topic = f"{found[0].action}/{part}"
+                self.lane.let_go(f"webmap-gate follow {topic} {robot}")
+
+    def _hear(self, data: bytes) -> None:
+        for robot, (spec, goal) in list(self._followed.items()):
+            word = navigation.of_topics(data, spec, goal)
+            if isinstance(word, GoalEnded):
+                self.forget(robot)
+            if word is not None:
+                self._tell(word)
+
+    def _down(self) -> None:
+        self._tell(LinkDown(self._url, "tasks"))
+        if self._spending:
+            return  # the socket goes on for the goal that it was spent on
+        for _, goal in list(self._followed.values()):
+            why = f"no link to {self._url}"
+            self._tell(GoalLost(goal.robot, goal.id, why))
 
     async def _call_and_wait(self, request: bytes, id: str, what: str) -> None:
         """Call a service on a socket of its own."""
@@ -156,6 +232,21 @@ class TasksLane:
             log.warning("%s: no answer", what)
 
 
+class Pace:
+    """Thins out what a robot may say of a goal a hundred times a second."""
+
+    def __init__(self) -> None:
+        self._at = float("-inf")
+
+    def __call__(self, word: navigation.Word) -> bool:
+        """Return whether the display should hear this word."""
+        now = asyncio.get_running_loop().time()
+        if isinstance(word, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
+            self._at = now
+            return True
+        return False
+
+
 def hook_topics(spec: RobotSpec) -> list[Topic]:
     """Return the topics of a robot's stop hooks."""
     hooks = spec.stop_hooks
@@ -168,7 +259,13 @@ def goal_topics(spec: RobotSpec) -> list[Topic]:
     if spec.goal_topic is not None:
         topics.append((spec.goal_topic, spec.goal_type))
     if spec.cancel_topic is not None:
-        topics.append((spec.cancel_topic, "actionlib_msgs/GoalID"))
+        topics.append((spec.cancel_topic, GOAL_ID))
+    if spec.action is not None and is_move_base(spec):
+        topics.append((f"{spec.action}/goal", "move_base_msgs/MoveBaseActionGoal"))
+        if spec.cancel_topic != f"{spec.action}/cancel":
+            topics.append((f"{spec.action}/cancel", GOAL_ID))
+    if spec.pose_topic is not None:
+        topics.append((spec.pose_topic, spec.pose_type))
     return topics
 
 

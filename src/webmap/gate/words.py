@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.gate.actions import SendGoal
+from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.messages import RobotSpec
 from webmap.geometry import Quaternion, Twist
 from webmap.ros import ops
@@ -31,9 +31,20 @@ def velocity(topic: str, type: str, twist: Twist) -> bytes:
 
 def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
     """Return the operation that sends the robot to a goal."""
-    if spec.goal_topic is not None:
-        return ops.publish(spec.goal_topic, _pose(spec.goal_type, spec, goal))
-    pose = _pose("geometry_msgs/msg/PoseStamped", spec, goal)
+    if goal.way == "topic":
+        topic = spec.goal_topic or ""  # there is one, or there were no such goal
+        return ops.publish(topic, _stamped(spec.goal_type, spec, _pose(goal)))
+    if goal.way == "move_base":
+        target = _stamped("geometry_msgs/PoseStamped", spec, _pose(goal))
+        return ops.publish(
+            f"{spec.action}/goal",
+            {
+                "header": _header("", ""),
+                "goal_id": {"stamp": {"secs": 0, "nsecs": 0}, "id": goal.id},
+                "goal": {"target_pose": target},
+            },
+        )
+    pose = _stamped("geometry_msgs/msg/PoseStamped", spec, _pose(goal))
     return json.dumps(
         {
             "op": "send_action_goal",
@@ -41,7 +52,7 @@ def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
             "action": spec.action,
             "action_type": spec.action_type,
             "args": {"pose": pose, "behavior_tree": ""},
-            "feedback": False,
+            "feedback": True,
         },
         allow_nan=False,
     ).encode()
@@ -72,15 +83,25 @@ def trigger(service: str, type: str, id: str) -> bytes:
     return ops.call_service(service, {}, id=id, type=type)
 
 
-def _pose(type: str, spec: RobotSpec, goal: SendGoal) -> dict[str, Any]:
-    q = Quaternion.from_yaw(goal.yaw)
+def pose_estimate(spec: RobotSpec, at: TellPose) -> bytes:
+    """Return the operation that tells the robot where it is."""
+    covariance = [0.0] * 36
+    covariance[0], covariance[7], covariance[35] = spec.pose_covariance
+    pose = {"pose": _pose(at), "covariance": covariance}
+    message = _stamped(spec.pose_type, spec, pose)
+    return ops.publish(spec.pose_topic or "", message)
+
+
+def _pose(at: SendGoal | TellPose) -> dict[str, Any]:
+    q = Quaternion.from_yaw(at.yaw)
     return {
-        "header": _header(type, spec.goal_frame),
-        "pose": {
-            "position": {"x": goal.x, "y": goal.y, "z": 0.0},
-            "orientation": {"x": q.x, "y": q.y, "z": q.z, "w": q.w},
-        },
+        "position": {"x": at.x, "y": at.y, "z": 0.0},
+        "orientation": {"x": q.x, "y": q.y, "z": q.z, "w": q.w},
     }
+
+
+def _stamped(type: str, spec: RobotSpec, pose: dict[str, Any]) -> dict[str, Any]:
+    return {"header": _header(type, spec.goal_frame), "pose": pose}
 
 
 def _header(type: str, frame: str) -> dict[str, Any]:

@@ -1,0 +1,218 @@
+"""What a robot's navigation says of a goal, as a bridge passes it on. No I/O.
+
+A ``NavigateToPose`` action answers on the socket that sent the goal, by
+``action_feedback`` and ``action_result``. move_base answers by three topics of
+actionlib, each with the id that the goal was given. Nothing else is believed: a word
+that is not about this goal, or makes no sense, is passed over.
+"""
+
+import json
+import math
+from typing import Any, TypeVar
+
+import msgspec
+
+from webmap.gate.actions import SendGoal
+from webmap.gate.events import GoalEnded, GoalProgress, Outcome
+from webmap.gate.messages import RobotSpec
+
+Word = GoalProgress | GoalEnded
+T = TypeVar("T")
+
+MOST_WORDS = 200
+"""The longest reason that is passed on, in characters."""
+
+_ROS2: dict[int, Outcome] = {4: "reached", 5: "cancelled", 6: "failed"}
+_ACTIONLIB: dict[int, Outcome] = {
+    2: "cancelled",
+    3: "reached",
+    4: "failed",
+    5: "failed",
+    8: "cancelled",
+    9: "failed",
+}
+_ACTIONLIB_WAITING, _ACTIONLIB_ACTIVE = (0, 7), (1, 6)
+_ACTIONLIB_WORDS = {5: "the robot refused it", 9: "the robot lost it"}
+
+
+class _Duration(msgspec.Struct):
+    """A duration of ROS 2; move_base tells none."""
+
+    sec: float = 0.0
+    nanosec: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        return self.sec + self.nanosec * 1e-9
+
+
+class _Header(msgspec.Struct):
+    frame_id: str = ""
+
+
+class _Position(msgspec.Struct):
+    x: float | None = None
+    y: float | None = None
+
+
+class _Pose(msgspec.Struct):
+    position: _Position = msgspec.field(default_factory=_Position)
+
+
+class _PoseStamped(msgspec.Struct):
+    header: _Header = msgspec.field(default_factory=_Header)
+    pose: _Pose = msgspec.field(default_factory=_Pose)
+
+
+class _Feedback(msgspec.Struct):
+    """The feedback of either action."""
+
+    distance_remaining: float | None = None
+    navigation_time: _Duration | None = None
+    estimated_time_remaining: _Duration | None = None
+    number_of_recoveries: int | None = None
+    base_position: _PoseStamped | None = None
+
+
+class _GoalId(msgspec.Struct):
+    id: str = ""
+
+
+class _Status(msgspec.Struct):
+    goal_id: _GoalId = msgspec.field(default_factory=_GoalId)
+    status: int = -1
+    text: str = ""
+
+
+class _Said(msgspec.Struct):
+    """A message of one of actionlib's three topics."""
+
+    status: _Status | None = None
+    status_list: list[_Status] = []
+    feedback: _Feedback | None = None
+
+
+class _Result(msgspec.Struct):
+    error_code: int = 0
+    error_msg: str = ""
+
+
+class _Frame(msgspec.Struct):
+    op: str = ""
+    id: str | int | None = None
+    topic: str = ""
+    level: str = ""
+    status: int | None = None
+    values: Any = None
+    msg: Any = None
+
+
+def of_action(data: bytes, goal: SendGoal) -> Word | None:
+    """Return what came for a goal on the socket that sent it as an action."""
+    frame = _read(data)
+    if frame is None:
+        return None
+    if frame.op == "status" and frame.level == "error":
+        return _complaint(str(frame.msg), goal)
+    if frame.id is None or str(frame.id) != goal.id:
+        return None
+    if frame.op == "action_feedback":
+        feedback = _as(frame.values, _Feedback)
+        return None if feedback is None else _progress(feedback, goal, "")
+    if frame.op != "action_result":
+        return None
+    outcome = _ROS2.get(frame.status or 0, "failed")
+    if isinstance(frame.values, str):
+        return _ended(goal, outcome, frame.values)
+    result = _as(frame.values, _Result) or _Result()
+    why = result.error_msg
+    if not why and result.error_code:
+        why = f"error {result.error_code}"
+    return _ended(goal, outcome, why)
+
+
+def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> Word | None:
+    """Return what came for a goal on one of move_base's topics."""
+    frame = _read(data)
+    if frame is None or frame.op != "publish":
+        return None
+    part = frame.topic.removeprefix(f"{spec.action}/")
+    said = _as(frame.msg, _Said)
+    if said is None or part not in ("status", "feedback", "result"):
+        return None
+    if part == "status":
+        ours = [each for each in said.status_list if each.goal_id.id == goal.id]
+        return _of_status(ours[0], goal) if ours else None
+    if said.status is None or said.status.goal_id.id != goal.id:
+        return None
+    if part == "result":
+        return _of_status(said.status, goal)
+    return _progress(said.feedback or _Feedback(), goal, spec.goal_frame)
+
+
+def _of_status(status: _Status, goal: SendGoal) -> Word | None:
+    outcome = _ACTIONLIB.get(status.status)
+    if outcome is not None:
+        why = status.text or _ACTIONLIB_WORDS.get(status.status, "")
+        return _ended(goal, outcome, "" if outcome == "reached" else why)
+    if status.status in _ACTIONLIB_ACTIVE + _ACTIONLIB_WAITING:
+        active = status.status in _ACTIONLIB_ACTIVE
+        return GoalProgress(goal.robot, goal.id, active=active)
+    return None
+
+
+def _progress(feedback: _Feedback, goal: SendGoal, frame: str) -> GoalProgress:
+    left, eta = feedback.distance_remaining, feedback.estimated_time_remaining
+    at, time = feedback.base_position, feedback.navigation_time
+    if at is not None and at.header.frame_id.strip("/") == frame.strip("/"):
+        place = at.pose.position
+        if place.x is not None and place.y is not None:
+            left = math.dist((place.x, place.y), (goal.x, goal.y))
+    return GoalProgress(
+        goal.robot,
+        goal.id,
+        active=True,
+        left=_sensible(left),
+        time=_sensible(None if time is None else time.seconds),
+        eta=_sensible(None if eta is None else eta.seconds),
+        recoveries=feedback.number_of_recoveries,
+    )
+
+
+def _sensible(number: float | None) -> float | None:
+    """Return a number for people, None if it is none to show."""
+    if number is None or not math.isfinite(number) or number < 0:
+        return None
+    return round(number, 1)
+
+
+def _complaint(text: str, goal: SendGoal) -> GoalEnded | None:
+    """Return what the bridge's error means, if it is about the goal."""
+    if "send_action_goal" not in text:
+        return None
+    if "nknown operation" in text:
+        why = "the bridge is too old for goals of an action"
+        return GoalEnded(goal.robot, goal.id, "failed", why, no_actions=True)
+    return _ended(goal, "failed", text)
+
+
+def _ended(goal: SendGoal, outcome: Outcome, why: str) -> GoalEnded:
+    plain = " ".join(why.split())
+    text = "".join(letter for letter in plain if letter.isprintable())
+    return GoalEnded(goal.robot, goal.id, outcome, text[:MOST_WORDS])
+
+
+def _read(data: bytes) -> _Frame | None:
+    try:
+        # Bridges write a bare NaN, which msgspec does not take.
+        value = json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+    return _as(value, _Frame)
+
+
+def _as(value: Any, type: type[T]) -> T | None:
+    try:
+        return msgspec.convert(value, type)
+    except msgspec.ValidationError:
+        return None

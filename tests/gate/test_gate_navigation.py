@@ -1,0 +1,167 @@
+"""What robots say of their goals, in both dialects, and what is no word of theirs."""
+
+import json
+
+import pytest
+
+from webmap.gate import navigation
+from webmap.gate.actions import SendGoal
+from webmap.gate.events import GoalEnded, GoalProgress, Key
+from webmap.gate.messages import RobotSpec
+
+KEY = Key("ws://robot:9090", "/cmd_vel")
+SPEC = RobotSpec(
+    id="r1",
+    name="Bob",
+    bridge_url=KEY.url,
+    action="/move_base",
+    action_type="move_base_msgs/MoveBaseAction",
+)
+
+
+def goal(way):
+    return SendGoal(KEY, "r1", "g1", 3.0, 4.0, 0.0, "a", way)
+
+
+def of_action(text=None, **frame):
+    data = (text or json.dumps(frame)).encode()
+    return navigation.of_action(data, goal("navigate_to_pose"))
+
+
+def of_topics(part, msg, **frame):
+    fields = {"op": "publish", "topic": f"/move_base/{part}", "msg": msg, **frame}
+    return navigation.of_topics(json.dumps(fields).encode(), SPEC, goal("move_base"))
+
+
+class TestAction:
+    def feedback(self, **values):
+        return of_action(op="action_feedback", id="g1", values=values)
+
+    def result(self, status, values=None, **frame):
+        fields = {"op": "action_result", "id": "g1", "status": status, "result": True}
+        return of_action(**{**fields, "values": values or {}, **frame})
+
+    def test_feedback_says_how_far_how_long_and_how_often_it_got_stuck(self):
+        assert self.feedback(
+            distance_remaining=3.26,
+            navigation_time={"sec": 4, "nanosec": 500000000},
+            estimated_time_remaining={"sec": 6, "nanosec": 0},
+            number_of_recoveries=2,
+            current_pose={"header": {"frame_id": "map"}},
+        ) == GoalProgress("r1", "g1", True, left=3.3, time=4.5, eta=6.0, recoveries=2)
+
+    def test_numbers_that_say_nothing_are_left_out(self):
+        word = of_action(
+            '{"op": "action_feedback", "id": "g1", "values": '
+            '{"distance_remaining": NaN, "estimated_time_remaining": {"sec": -1}}}'
+        )
+        assert word == GoalProgress("r1", "g1", True)
+
+    @pytest.mark.parametrize(
+        ("status", "values", "outcome", "why"),
+        [
+            (4, {}, "reached", ""),
+            (5, {}, "cancelled", ""),
+            (6, {"error_code": 208, "error_msg": "no  path\n"}, "failed", "no path"),
+            (6, {"error_code": 208, "error_msg": ""}, "failed", "error 208"),
+            (6, {"result": {}}, "failed", ""),
+            (0, "Action goal was rejected", "failed", "Action goal was rejected"),
+            (None, [1], "failed", ""),
+        ],
+    )
+    def test_a_result_ends_it(self, status, values, outcome, why):
+        assert self.result(status, values) == GoalEnded("r1", "g1", outcome, why)
+
+    def test_a_long_reason_is_cut_and_holds_no_control_characters(self):
+        end = self.result(6, {"error_msg": "\x1b[31m" + "x" * 999})
+        assert end.why.startswith("[31mx")
+        assert len(end.why) == navigation.MOST_WORDS
+
+    def test_a_bridge_that_knows_no_actions_is_told_apart(self):
+        said = "Unknown operation: send_action_goal.  Allowed operations: [...]"
+        end = of_action(op="status", level="error", msg=said)
+        assert end.outcome == "failed"
+        assert end.no_actions
+        said = "send_action_goal: wrong type"
+        end = of_action(op="status", level="error", msg=said)
+        assert end == GoalEnded("r1", "g1", "failed", said)
+
+    @pytest.mark.parametrize(
+        "frame",
+        [
+            {"op": "status", "level": "error", "msg": "something else"},
+            {"op": "status", "level": "warning", "msg": "send_action_goal"},
+            {"op": "action_result", "id": "g2", "status": 4},
+            {"op": "action_result", "status": 4},
+            {"op": "action_feedback", "id": "g1", "values": "text"},
+            {"op": "publish", "id": "g1"},
+            {"op": 7},
+        ],
+    )
+    def test_what_is_not_about_it_is_passed_over(self, frame):
+        assert of_action(**frame) is None
+
+    @pytest.mark.parametrize("text", ["{", "[]", "7", "[" * 100_000])
+    def test_what_makes_no_sense_is_passed_over(self, text):
+        assert of_action(text) is None
+
+
+class TestTopics:
+    def status(self, status, text="", id="g1"):
+        return {"goal_id": {"id": id}, "status": status, "text": text}
+
+    @pytest.mark.parametrize(
+        ("status", "active"), [(0, False), (1, True), (6, True), (7, False)]
+    )
+    def test_the_status_says_whether_it_is_under_way(self, status, active):
+        others = self.status(3, id="g0")
+        word = of_topics("status", {"status_list": [others, self.status(status)]})
+        assert word == GoalProgress("r1", "g1", active)
+
+    @pytest.mark.parametrize(
+        ("status", "text", "outcome", "why"),
+        [
+            (2, "preempted", "cancelled", "preempted"),
+            (3, "Goal reached.", "reached", ""),
+            (4, "no path to the goal", "failed", "no path to the goal"),
+            (5, "", "failed", "the robot refused it"),
+            (8, "", "cancelled", ""),
+            (9, "", "failed", "the robot lost it"),
+        ],
+    )
+    def test_status_and_result_end_it(self, status, text, outcome, why):
+        end = GoalEnded("r1", "g1", outcome, why)
+        said = self.status(status, text)
+        assert of_topics("status", {"status_list": [said]}) == end
+        assert of_topics("result", {"status": said, "result": {}}) == end
+
+    def test_feedback_says_how_far_it_is_as_the_crow_flies(self):
+        place = {"header": {"frame_id": "/map"}, "pose": {"position": {"x": 0, "y": 0}}}
+        said = {"status": self.status(1), "feedback": {"base_position": place}}
+        word = of_topics("feedback", said)
+        assert word == GoalProgress("r1", "g1", True, left=5.0)
+
+    @pytest.mark.parametrize(
+        "place",
+        [
+            {"header": {"frame_id": "odom"}, "pose": {"position": {"x": 0, "y": 0}}},
+            {"header": {"frame_id": "map"}, "pose": {"position": {"x": None, "y": 0}}},
+            {"header": {"frame_id": "map"}, "pose": {"position": {"x": 0, "y": None}}},
+            None,
+        ],
+    )
+    def test_from_a_place_that_is_not_known_it_is_no_distance(self, place):
+        feedback = {"base_position": place} if place else None
+        said = {"status": self.status(1), "feedback": feedback}
+        assert of_topics("feedback", said) == GoalProgress("r1", "g1", True)
+
+    def test_what_is_not_about_it_is_passed_over(self):
+        other = self.status(1, id="g0")
+        assert of_topics("status", {"status_list": [other]}) is None
+        assert of_topics("status", {"status_list": [self.status(77)]}) is None
+        assert of_topics("result", {"status": other}) is None
+        assert of_topics("result", {}) is None
+        assert of_topics("goal", {"status": self.status(1)}) is None
+        assert of_topics("status", "text") is None
+        assert of_topics("status", {}, op="status") is None
+        assert of_topics("status", {}, op=7) is None
