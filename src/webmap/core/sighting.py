@@ -98,22 +98,28 @@ class Sightings:
         self, buffer: Buffer, tf: Mapping[str, Any], source: str, stamp: float
     ) -> Sighting:
         """Return where a sensor was that the robot carries."""
-        base, mount = tf["base_frame"], _mounted(self._mount)
+        base, world = tf["base_frame"], tf["map_frame"]
+        mount = _mounted(self._mount)
         if stamp:
             try:
-                found = buffer.lookup(tf["map_frame"], source, stamp)
+                found = buffer.lookup(world, source, stamp)
                 return Sighting((found @ mount).from_above)
             except TransformError:
                 pass  # The poses may tell what the frames do not.
-        if source == base:
-            return self._by_poses(mount, stamp)
-        try:
-            found, _ = _lookup(buffer, base, source, stamp)
-        except TransformError as error:
-            found = self._known.get(source, Transform())
-            return self._lost(tf, source, error, self._by_poses(found, stamp))
-        self._known[source] = found
-        return self._by_poses(found @ mount, stamp)
+        if source != base:
+            try:
+                self._known[source], _ = _lookup(buffer, base, source, stamp)
+            except TransformError as error:
+                found = self._known.get(source, Transform())
+                return self._lost(tf, source, error, self._by_poses(found, stamp))
+            mount = self._known[source] @ mount
+        by_poses = self._by_poses(mount, stamp)
+        if by_poses.settled and not by_poses.trouble:
+            return by_poses
+        ahead = _ahead(buffer, world, base, stamp)
+        if ahead is None:
+            return by_poses
+        return Sighting((ahead @ mount).from_above, settled=False)
 
     def _by_poses(self, mount: Transform, stamp: float) -> Sighting:
         """Return where the robot's poses have a sensor."""
@@ -182,3 +188,14 @@ def _lookup(
     newest = buffer.newest(target, source)
     coming = bool(stamp) and newest is not None and newest < stamp <= newest + SOON
     return buffer.lookup(target, source), not coming
+
+
+def _ahead(buffer: Buffer, target: str, source: str, stamp: float) -> Transform | None:
+    """Return where a frame gets that goes on as it did; None if it is too long ago."""
+    try:
+        newest = buffer.newest(target, source)
+        if newest is None or not newest < stamp <= newest + SOON:
+            return None
+        return buffer.lookup(target, source, min(stamp, newest + AHEAD), ahead=AHEAD)
+    except TransformError:
+        return None

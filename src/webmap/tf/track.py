@@ -1,7 +1,7 @@
 """What is known of one frame in its parent, over time."""
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 
 from webmap.tf.errors import NotKnownThen
 from webmap.tf.transform import Transform, between
@@ -9,7 +9,10 @@ from webmap.tf.transform import Transform, between
 MOST = 4096
 """Transforms that are kept of one frame, whatever their times."""
 
-EVEN = 0.3
+SPAN = 0.1
+"""Seconds over which a motion is looked at to tell how it goes on."""
+
+EVEN = 0.5
 """Seconds between two transforms beyond which nobody knows how it goes on."""
 
 FASTEST = 5.0
@@ -115,13 +118,14 @@ class Track:
 
     def _going_on(self, time: float) -> Transform:
         """Return where it gets if it goes on evenly; where it is if it leapt."""
-        newest = self._transforms[-1]
-        if len(self._stamps) == 1:
+        newest, last = self._transforms[-1], self._stamps[-1]
+        # Stamps that are close together tell a speed badly.
+        place = bisect_right(self._stamps, last - SPAN) - 1
+        took = last - self._stamps[max(place, 0)]
+        before = self._transforms[max(place, 0)]
+        if not SPAN / 2 <= took <= EVEN or leapt(before, newest, took):
             return newest
-        took, before = self._stamps[-1] - self._stamps[-2], self._transforms[-2]
-        if took > EVEN or leapt(before, newest, took):
-            return newest
-        return between(before, newest, 1.0 + (time - self._stamps[-1]) / took)
+        return between(before, newest, 1.0 + (time - last) / took)
 
 
 def leapt(one: Transform, other: Transform, took: float) -> bool:
