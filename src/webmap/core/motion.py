@@ -2,13 +2,16 @@
 
 import itertools
 import logging
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from webmap.core.goal_topics import InitialPoseTopic, MoveTopic
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError, MotionError
 from webmap.gate.assist import AssistSpec
+from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import RobotSpec
 from webmap.gate.specs import checked_assist
 from webmap.geometry import Twist
@@ -39,18 +42,7 @@ class TwistTopic:
     w_max: float | None
     a_max: float | None
     holonomic: bool
-    stop_hooks: tuple[dict[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class MoveTopic:
-    """Where goals go, and how one is called off."""
-
-    bridge: Bridge
-    topic: str
-    frame: str
-    cancel_topic: str | None
-    on_operator_loss: str
+    stop_hooks: Sequence[Mapping[str, str]] = ()
 
 
 class MotionRoad:
@@ -68,6 +60,7 @@ class MotionRoad:
         self._complain = complain
         self._twist: TwistTopic | None = None
         self._move: MoveTopic | None = None
+        self._pose: InitialPoseTopic | None = None
         self._odometry: tuple[Bridge, str, str] | None = None
         self._assist: AssistSpec | None = None
         self._opening: Removable | None = None
@@ -79,6 +72,11 @@ class MotionRoad:
         return self._twist
 
     @property
+    def pose_topic(self) -> InitialPoseTopic | None:
+        """Where the robot is told where it is, if that is set."""
+        return self._pose
+
+    @property
     def move_topic(self) -> MoveTopic | None:
         """Where goals go, if that is set."""
         return self._move
@@ -87,12 +85,15 @@ class MotionRoad:
         """Set or clear where velocity goes.
 
         Raises:
-            ConfigError: If the type is none that carries a velocity.
+            ConfigError: If the type is none that carries a velocity, or a stop hook
+                cannot be meant.
 
         """
         if twist is not None:
             if twist.type is not None:
                 _check_twist_type(twist.topic, twist.type)
+            hooks = checked_hooks(self._name, twist.stop_hooks, twist.topic)
+            twist = replace(twist, stop_hooks=hooks)
             twist.bridge.protect(twist.topic)
         if self._opening is not None:
             self._opening.remove()
@@ -102,13 +103,31 @@ class MotionRoad:
             self._opening = twist.bridge.on_open(lambda: spawn(self._find_type()))
         self.declare()
 
+    @property
+    def assist(self) -> AssistSpec | None:
+        """How the robot is slowed down before what its scanner sees, if that is set."""
+        return self._assist
+
     def set_move(self, move: MoveTopic | None) -> None:
         """Set or clear where goals go."""
         if move is not None:
-            move.bridge.protect(move.topic)
-            if move.cancel_topic:
-                move.bridge.protect(move.cancel_topic)
+            if self._pose is not None:
+                self._pose.fields(move)
+            move.protect()
         self._move = move
+        self.declare()
+
+    def set_pose(self, pose: InitialPoseTopic | None) -> None:
+        """Set or clear where the robot is told where it is.
+
+        Raises:
+            ConfigError: If its goals go to another bridge.
+
+        """
+        if pose is not None:
+            pose.fields(self._move)
+            pose.bridge.protect(pose.topic)
+        self._pose = pose
         self.declare()
 
     def set_odometry(self, bridge: Bridge, topic: str, type: str) -> None:
@@ -145,9 +164,14 @@ class MotionRoad:
     def spec(self) -> RobotSpec | None:
         """Return what the gate needs to know, or None if nothing moves the robot."""
         twist, move = self._twist, self._move
-        link = twist or move
+        pose = self._pose
+        link = twist or move or pose
         if link is None:
             return None
+        goals = {
+            **(pose.fields(move) if pose else {}),
+            **(move.fields() if move else {}),
+        }
         odometry = self._odometry
         return RobotSpec(
             id=self.id,
@@ -161,23 +185,17 @@ class MotionRoad:
             a_max=twist.a_max if twist else None,
             holonomic=twist.holonomic if twist else False,
             assist=self._assist if twist else None,
-            stop_hooks=twist.stop_hooks if twist else (),
+            stop_hooks=tuple(map(dict, twist.stop_hooks)) if twist else (),
             odometry_url=odometry[0].url if odometry else None,
             odometry_topic=odometry[1] if odometry else None,
             odometry_type=odometry[2] if odometry else None,
-            goal_url=move.bridge.url if move else None,
-            goal_topic=move.topic if move else None,
-            goal_frame=move.frame if move else "map",
-            cancel_topic=move.cancel_topic if move else None,
-            on_operator_loss="cancel"
-            if move and move.on_operator_loss == "cancel"
-            else "continue",
+            **goals,
         )
 
     def close(self) -> None:
         """Let the gate forget the robot; it stops if it was driven."""
         self.set_twist(None)
-        self._move = self._odometry = None
+        self._move = self._pose = self._odometry = None
         self.declare()
         roads.discard(self)
 
@@ -196,6 +214,10 @@ class MotionRoad:
     def move(self, x: float, y: float, yaw: float) -> None:
         """Hand one goal to the gate, as this program."""
         self._gate().move(self.id, x, y, yaw)
+
+    def locate(self, x: float, y: float, yaw: float) -> None:
+        """Hand to the gate where the robot is, as this program."""
+        self._gate().locate(self.id, x, y, yaw)
 
     def cancel(self) -> None:
         """Have the gate call off the robot's goals."""

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
+from webmap.core.goal_topics import COVARIANCE, NAVIGATE_TO_POSE
+from webmap.core.plain_assist import ScanAssistData, assist_data
 from webmap.core.plain_svg import element_from_dict, element_to_dict
 from webmap.errors import ConfigError
 from webmap.ros.bridge import Bridge
@@ -35,6 +37,7 @@ class TwistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     w_max: float | None = None
     a_max: float | None = None
     holonomic: bool = False
+    stop_hooks: list[dict[str, str]] = []
 
 
 class TfData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -51,10 +54,20 @@ class MoveData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """The arguments of ``set_move_topic``."""
 
     bridge: str
-    topic: str
+    topic: str = ""
     frame: str = "map"
     cancel_topic: str | None = None
     on_operator_loss: str = "continue"
+    action: str | None = None
+    action_type: str = NAVIGATE_TO_POSE
+
+
+class InitialPoseData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The arguments of ``set_initial_pose_topic``."""
+
+    bridge: str
+    topic: str
+    covariance: tuple[float, float, float] = COVARIANCE
 
 
 class ModuleData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -76,6 +89,8 @@ class RobotData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     tf: TfData | None = None
     twist: TwistData | None = None
     move: MoveData | None = None
+    initial_pose: InitialPoseData | None = None
+    scan_assist: ScanAssistData | None = None
     modules: list[ModuleData] = []
 
 
@@ -111,6 +126,11 @@ def robot_from_dict(
     if plain.move is not None:
         m = msgspec.structs.asdict(plain.move)
         robot.set_move_topic(link(m.pop("bridge")), m.pop("topic"), **m)
+    if plain.scan_assist is not None:
+        robot.set_scan_assist(**msgspec.structs.asdict(plain.scan_assist))
+    if plain.initial_pose is not None:
+        p = msgspec.structs.asdict(plain.initial_pose)
+        robot.set_initial_pose_topic(link(p.pop("bridge")), **p)
     for module in plain.modules:
         args = [_bridge_in(value, link) for value in module.args]
         options = {key: _bridge_in(v, link) for key, v in module.options.items()}
@@ -121,6 +141,7 @@ def robot_from_dict(
 def robot_to_dict(robot: "Robot") -> dict[str, Any]:
     """Return a robot as plain data; see :meth:`Robot.to_dict`."""
     feed, twist, move = robot.feed, robot.motion.twist_topic, robot.motion.move_topic
+    pose = robot.motion.pose_topic
     known = {"robot", "unplaced", "selected", "stale"}
     plain = RobotData(
         name=robot.name,
@@ -144,6 +165,7 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
             twist.w_max,
             twist.a_max,
             twist.holonomic,
+            [dict(hook) for hook in twist.stop_hooks],
         ),
         move=None
         if move is None
@@ -153,7 +175,13 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
             move.frame,
             move.cancel_topic,
             move.on_operator_loss,
+            move.action,
+            move.action_type,
         ),
+        initial_pose=None
+        if pose is None
+        else InitialPoseData(pose.bridge.url, pose.topic, pose.covariance),
+        scan_assist=assist_data(robot.motion.assist),
         modules=[
             ModuleData(
                 name,

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from webmap.core.alignment import alignment
 from webmap.core.extendable import Extendable
 from webmap.core.frames import Frames, frames_of
-from webmap.core.motion import MotionRoad, MoveTopic, TwistTopic
+from webmap.core.goal_topics import (
+    COVARIANCE,
+    NAVIGATE_TO_POSE,
+    InitialPoseTopic,
+    MoveTopic,
+)
+from webmap.core.motion import MotionRoad, TwistTopic
 from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.placing import Placing
 from webmap.core.registry import Namespace, robot_modules
@@ -325,7 +331,8 @@ class Robot(Extendable):
                 calls the service.
 
         Raises:
-            ConfigError: If ``type`` carries no velocity.
+            ConfigError: If ``type`` carries no velocity, or a stop hook cannot be
+                meant.
 
         """
         with no_scope():
@@ -339,7 +346,7 @@ class Robot(Extendable):
                     w_max,
                     a_max,
                     holonomic,
-                    tuple(dict(hook) for hook in stop_hooks),
+                    stop_hooks,
                 )
             )
 
@@ -406,27 +413,69 @@ class Robot(Extendable):
     def set_move_topic(
         self,
         bridge: Bridge,
-        topic: str,
+        topic: str = "",
         *,
         frame: str = "map",
         cancel_topic: str | None = None,
         on_operator_loss: str = "continue",
+        action: str | None = None,
+        action_type: str = NAVIGATE_TO_POSE,
     ) -> None:
         """Say where goals go.
 
+        They go to the action, if there is one: it says how they go and how they end.
+
         Args:
             bridge: The link to the ROS system of the robot's navigation.
-            topic: A topic of ``geometry_msgs/PoseStamped``.
+            topic: A topic of ``geometry_msgs/PoseStamped``; besides an action it is
+                for bridges that take no goals of actions.
             frame: The frame of the goals.
             cancel_topic: actionlib's topic by which goals are called off.
             on_operator_loss: ``"continue"`` if a goal goes on when its operator is
                 lost, ``"cancel"`` if it is called off.
+            action: The name of the action, such as ``"/navigate_to_pose"``.
+            action_type: ``"nav2_msgs/action/NavigateToPose"``, of ROS 2, or
+                ``"move_base_msgs/MoveBaseAction"``, of ROS 1.
+
+        Raises:
+            ConfigError: If there is neither a topic nor an action.
 
         """
         with no_scope():
             self.motion.set_move(
-                MoveTopic(bridge, topic, frame, cancel_topic, on_operator_loss)
+                MoveTopic(
+                    bridge,
+                    topic,
+                    frame,
+                    cancel_topic,
+                    on_operator_loss,
+                    action,
+                    action_type,
+                )
             )
+
+    def set_initial_pose_topic(
+        self,
+        bridge: Bridge,
+        topic: str = "/initialpose",
+        *,
+        covariance: Sequence[float] = COVARIANCE,
+    ) -> None:
+        """Say where the robot is told where it is, in the frame of its goals.
+
+        Args:
+            bridge: The link to its localisation; the bridge of its goals.
+            topic: A topic of ``geometry_msgs/PoseWithCovarianceStamped``.
+            covariance: How sure one is: the variances of x and y in m², of yaw in
+                rad². RViz's are given if not said.
+
+        Raises:
+            ConfigError: If the covariance is not three numbers from 0 on, or goals go
+                to another bridge.
+
+        """
+        with no_scope():
+            self.motion.set_pose(InitialPoseTopic.of(bridge, topic, covariance))
 
     def unadvertise_move_topic(self) -> None:
         """Give up the move topic; does nothing if there is none."""
@@ -510,6 +559,20 @@ class Robot(Extendable):
         """
         o = orientation
         self.motion.move(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+
+    def locate(self, position: Position, orientation: Orientation) -> None:
+        """Tell the robot where it is, while it neither moves nor follows a goal.
+
+        Args:
+            position: Where the base link is, in metres in the goal frame.
+            orientation: Its orientation there.
+
+        Raises:
+            NoLease: If the program does not hold the lease.
+
+        """
+        o = orientation
+        self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
 
     def cancel(self) -> None:
         """Call off the robot's goals."""

@@ -1,0 +1,152 @@
+"""What a robot does on STOP, its reset, and scan assist: set, told, kept, refused."""
+
+import json
+
+import pytest
+
+from webmap import Robot
+from webmap.core.motion import MotionRoad
+from webmap.errors import ConfigError, MotionError
+from webmap.lifecycle import lifecycle
+
+LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
+E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+
+
+class Link:
+    url = "ws://robot:9090"
+
+    def protect(self, topic):
+        pass
+
+
+class Gate:
+    """Notes what a robot asks of it."""
+
+    def __init__(self):
+        self.asked = []
+
+    def declare(self, spec):
+        self.spec = spec
+
+    def forget(self, robot_id):
+        pass
+
+    def stop_robot(self, robot_id):
+        self.asked.append(("stop", robot_id))
+
+    def reset(self, robot_id):
+        self.asked.append(("reset", robot_id))
+
+
+@pytest.fixture
+def robot():
+    robot = Robot("Bob")
+    yield robot
+    robot.motion.close()
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    gate = Gate()
+    monkeypatch.setattr(MotionRoad, "gate", gate)
+    monkeypatch.setattr(type(lifecycle), "running", True)
+    return gate
+
+
+def drivable(robot, **options):
+    robot.set_twist_topic(Link(), "/cmd_vel", type="geometry_msgs/Twist", **options)
+    return robot
+
+
+def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
+    drivable(robot)
+    robot.stop()
+    robot.reset_stop()
+    assert gate.asked == [("stop", robot.motion.id), ("reset", robot.motion.id)]
+
+
+@pytest.mark.parametrize("ask", [Robot.stop, Robot.reset_stop])
+def test_nothing_is_stopped_or_reset_before_webmap_is_started(robot, ask):
+    with pytest.raises(MotionError, match=r"before webmap\.start"):
+        ask(drivable(robot))
+
+
+@pytest.mark.parametrize("ask", [Robot.stop, Robot.reset_stop])
+def test_what_cannot_move_is_neither_stopped_nor_reset(robot, gate, ask):
+    with pytest.raises(MotionError, match="no twist topic and no move topic"):
+        ask(robot)
+    assert gate.asked == []
+
+
+def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
+    drivable(robot, stop_hooks=[LOCK, E_STOP])
+    robot.set_scan_assist("/scan", [(0.3, 0.2), (-0.3, 0), (0.3, -0.2)], angle=30)
+    data = json.loads(json.dumps(robot.to_dict()))
+    assert data["twist"]["stop_hooks"] == [LOCK, E_STOP]
+    assert data["scan_assist"] == data["scan_assist"] | {
+        "topic": "/scan",
+        "footprint": [[0.3, 0.2], [-0.3, 0.0], [0.3, -0.2]],
+        "angle": 30.0,
+    }
+    again = Robot.from_dict(data, {Link.url: Link()})
+    assert json.loads(json.dumps(again.to_dict())) == data
+    assert again.motion.spec().assist == robot.motion.spec().assist
+    assert again.motion.spec().stop_hooks == (LOCK, E_STOP)
+    again.motion.close()
+
+
+def test_a_robot_without_them_says_nothing_of_them(robot):
+    drivable(robot)
+    assert "scan_assist" not in robot.to_dict()
+    assert "stop_hooks" not in robot.to_dict()["twist"]
+
+
+def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):
+    drivable(robot).set_scan_assist("/scan", 0.25, blind="creep", creep=0.05, x=0.1)
+    data = robot.to_dict()
+    again = Robot.from_dict(data, {Link.url: Link()})
+    assert again.to_dict() == data
+    again.motion.close()
+
+
+@pytest.mark.parametrize(
+    ("hooks", "said"),
+    [
+        ([{"topic": 5}], "the topic of a stop hook is a name such as '/lock', got 5"),
+        ([{"topic": ""}], "is a name such as"),
+        ([{"topic": "/lock", "type": 5}], "is of type std_msgs/Bool, got 5"),
+        ([{"service": "/e_stop", "type": "std_msgs/Bool"}], "std_srvs/Trigger, got"),
+        ([{"topik": "/lock"}], "the key 'topic' or the key 'service'"),
+        ([{"topic": "/lock", "data": True}], "and besides 'type' no other"),
+        (["/lock"], "a stop hook is a table such as"),
+        (LOCK, "stop_hooks is a list of hooks, got"),
+        ("/lock", "stop_hooks is a list of hooks, got '/lock'"),
+        (5, "stop_hooks is a list of hooks, got 5"),
+        ([{"topic": "cmd_vel"}], "its velocity goes to /cmd_vel"),
+    ],
+)
+def test_a_stop_hook_that_cannot_be_meant_is_refused_at_once(robot, hooks, said):
+    drivable(robot, stop_hooks=[LOCK])
+    with pytest.raises(ConfigError, match=f"robot 'Bob': .*{said}"):
+        drivable(robot, stop_hooks=hooks)
+    assert robot.motion.spec().stop_hooks == (LOCK,)
+
+
+def test_names_of_stop_hooks_are_resolved_at_once(robot):
+    drivable(robot, stop_hooks=[{"topic": "lock"}, {"service": "e_stop/"}])
+    assert robot.to_dict()["twist"]["stop_hooks"] == [LOCK, E_STOP]
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ({"topic": "/scan"}, "footprint"),
+        ({"topic": "/scan", "footprint": "round"}, "footprint"),
+        ({"topic": "/scan", "footprint": 0.2, "blind": "go"}, "blind"),
+        ({"topic": "/scan", "footprint": 0.2, "brakes": 1}, "brakes"),
+    ],
+)
+def test_plain_scan_assist_that_is_wrong_is_named(data, said):
+    with pytest.raises(ConfigError, match=said):
+        Robot.from_dict({"name": "Bob", "scan_assist": data})
