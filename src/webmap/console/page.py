@@ -14,6 +14,7 @@ from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
 from webmap.console.refused import RefusedList
+from webmap.console.robot_buttons import RobotButtons
 from webmap.console.robot_card import RobotCard
 from webmap.console.robot_list import RobotList
 
@@ -85,6 +86,7 @@ def build(
     frame = map.add_module(Frame, title, floor)
     listed = map.add_module(RobotList, page.element("robots"))
     card = map.add_module(RobotCard, page.element("card"), goals)
+    map.add_module(RobotButtons, page.element("card"))
     links = BridgeList(page.element("bridges"), bridges)
     refused = RefusedList(page.element("refused"), page.viewer.role)
     task = asyncio.get_running_loop().create_task(

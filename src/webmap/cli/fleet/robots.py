@@ -56,6 +56,11 @@ def _robot(
                 setter(bridge, **options)
             except WebMapError as error:
                 mistakes.add((*line.path, key), str(error))
+    if line.buttons:
+        try:
+            robot.add_module("Buttons", bridge, line.buttons)
+        except WebMapError as error:
+            mistakes.add((*line.path, "buttons"), str(error))
     for module in line.modules:
         _add_module(robot, module, bridges, mistakes)
     return robot

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from webmap.cli.fleet import checks
+from webmap.cli.fleet.buttons import read_buttons
 from webmap.cli.fleet.checks import Check, Mistakes
 from webmap.cli.fleet.lines import Path
 from webmap.discovery.naming import same_name
@@ -53,6 +54,8 @@ ROBOT = (
     "move",
     "scan",
     "battery",
+    "cameras",
+    "buttons",
     "modules",
 )
 MODULE = ("name", "args", "options")
@@ -82,6 +85,8 @@ class RobotLine:
     move: dict[str, Any] | None = None
     scans: list[str] = field(default_factory=list)
     battery: str = ""
+    cameras: list[CameraLine] = field(default_factory=list)
+    buttons: list[dict[str, Any]] = field(default_factory=list)
     modules: list[ModuleLine] = field(default_factory=list)
 
 
@@ -191,6 +196,8 @@ def _robot(
         robot.battery = checks.one(checks.topic, value["battery"], where, mistakes)
     if "scan" in value:
         robot.scans = _scans(value["scan"], (*path, "scan"), mistakes)
+    if "buttons" in value:
+        robot.buttons = read_buttons(value["buttons"], (*path, "buttons"), mistakes)
     robot.modules = _modules(
         value.get("modules", []), (*path, "modules"), bridges, mistakes
     )

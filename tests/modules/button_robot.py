@@ -1,0 +1,103 @@
+"""A node of a robot behind a rosbridge, which answers services and hears topics."""
+
+import contextlib
+import json
+import re
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+Answer = Callable[[dict], dict | None]
+
+
+class RobotNode:
+    """Answers what it is told to, and keeps what it was asked and sent.
+
+    Args:
+        link: To the rosbridge.
+        services: For each name its type, and what returns the answer: None for never.
+        topics: The type of each topic that it listens to.
+
+    """
+
+    def __init__(
+        self,
+        link: ClientConnection,
+        services: dict[str, tuple[str, Answer]],
+        topics: dict[str, str],
+    ) -> None:
+        self.calls: list[tuple[str, dict]] = []
+        self.heard: list[tuple[str, Any]] = []
+        self._answers = {name: answer for name, (_, answer) in services.items()}
+        self._link = link
+        for name, (type, _) in services.items():
+            self._say(op="advertise_service", service=name, type=type)
+        for name, type in topics.items():
+            self._say(op="subscribe", id=f"s{name}", topic=name, type=type)
+        # What came before this answer was taken by then.
+        self._say(op="call_service", id="ready", service="/rosapi/get_time")
+        while json.loads(self._link.recv(10)).get("id") != "ready":
+            pass
+        self._thread = threading.Thread(target=self._live, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._link.close()
+        self._thread.join(5)
+
+    def _say(self, **op: Any) -> None:
+        self._link.send(json.dumps(op))
+
+    def _live(self) -> None:
+        for frame in self._link:
+            op = json.loads(frame)
+            if op["op"] == "publish":
+                self.heard.append((op["topic"], op["msg"]))
+            elif op["op"] == "call_service":
+                self._answer(op)
+
+    def _answer(self, op: dict) -> None:
+        service = op["service"]
+        self.calls.append((service, op["args"]))
+        values = self._answers[service](op["args"])
+        if values is not None:
+            self._say(
+                op="service_response",
+                id=op["id"],
+                service=service,
+                values=values,
+                result=True,
+            )
+
+
+@contextlib.contextmanager
+def robot_node(
+    url: str, services: dict[str, tuple[str, Answer]], topics: dict[str, str]
+) -> Iterator[RobotNode]:
+    with connect(url) as link:
+        node = RobotNode(link, services, topics)
+        try:
+            yield node
+        finally:
+            node.close()
+
+
+@contextlib.contextmanager
+def simulator(*options: str) -> Iterator[str]:
+    """Run ``webmap sim`` and return its address."""
+    command = [sys.executable, "-m", "webmap", "sim", "--port", "0", *options]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
+        try:
+            found = re.search(r"ready at (ws://\S+)", process.stdout.readline())
+            assert found
+            yield found[1]
+        finally:
+            process.send_signal(signal.SIGTERM)
+            process.wait(10)
