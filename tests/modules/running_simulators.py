@@ -1,0 +1,80 @@
+"""Simulators that run beside a test, which sees and moves what is in them."""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+from webmap.sim.maps import FLOOR, load_map
+from webmap.sim.node import STEP, RobotsNode
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import parse_quirks
+from webmap.sim.rosbridge.rosapi import Rosapi
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+from webmap.sim.world import World, WorldOptions
+
+
+class Running:
+    """One simulator, its world and what it said last."""
+
+    def __init__(self, dialect: str) -> None:
+        quirks = parse_quirks("real", dialect)
+        self.world = World(load_map(FLOOR), WorldOptions(robots=2, seed=4))
+        schema = Schema(Dialect(dialect))
+        graph = Graph(schema)
+        Rosapi(graph, quirks).start()
+        self.node = RobotsNode(self.world, graph, "Twist", quirks)
+        self.said: dict[str, dict[str, Any]] = {}
+        publish = self.node.publish
+
+        def publish_and_note(topic: str, message: dict[str, Any]) -> None:
+            self.said[topic] = message
+            publish(topic, message)
+
+        self.node.publish = publish_and_note
+        self.node.start()
+        self.server = RosbridgeServer(graph, Encoder(schema, quirks))
+        self.url = ""
+
+    async def run(self) -> None:
+        self.url = await self.server.start("127.0.0.1", 0)
+
+    def do(self, action) -> None:
+        """Change something in the world between two of its steps."""
+        done = threading.Event()
+        self.loop.call_soon_threadsafe(lambda: (action(), done.set()))
+        assert done.wait(10)
+
+
+@contextlib.contextmanager
+def simulators(*dialects: str) -> Iterator[dict[str, Running]]:
+    """Run a simulator of each dialect in a thread of their own."""
+    found = {dialect: Running(dialect) for dialect in dialects}
+    ready, stop = threading.Event(), threading.Event()
+
+    async def run() -> None:
+        for each in found.values():
+            each.loop = asyncio.get_running_loop()
+            await each.run()
+        ready.set()
+        due = asyncio.get_running_loop().time()
+        while not stop.is_set():
+            for each in found.values():
+                each.node.step()
+            due = max(due + STEP, asyncio.get_running_loop().time() - 1)
+            await asyncio.sleep(max(due - asyncio.get_running_loop().time(), 0))
+        for each in found.values():
+            await each.server.stop()
+
+    thread = threading.Thread(target=lambda: asyncio.run(run()))
+    thread.start()
+    try:
+        assert ready.wait(30)
+        yield found
+    finally:
+        stop.set()
+        thread.join(20)
