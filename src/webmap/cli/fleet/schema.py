@@ -54,7 +54,6 @@ ROBOT = (
     "move",
     "scan",
     "battery",
-    "cameras",
     "buttons",
     "modules",
 )
@@ -85,7 +84,6 @@ class RobotLine:
     move: dict[str, Any] | None = None
     scans: list[str] = field(default_factory=list)
     battery: str = ""
-    cameras: list[CameraLine] = field(default_factory=list)
     buttons: list[dict[str, Any]] = field(default_factory=list)
     modules: list[ModuleLine] = field(default_factory=list)
 
