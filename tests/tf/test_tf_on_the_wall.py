@@ -1,6 +1,7 @@
 """The dots of a scan stay on the wall while the robot turns, as a page shows it."""
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,11 +45,18 @@ SAMPLE = """async (seconds) => {
 }"""
 
 
+PAGE = Path(__file__).with_name("page_of_turning.py")
+
+
 @contextmanager
-def started(*arguments: str, ready: str) -> Iterator[str]:
+def started(*arguments: str, ready: str, **environment: str) -> Iterator[str]:
     command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, **environment},
     ) as process:
         try:
             yield re.search(ready, process.stdout.readline())[1]
@@ -119,7 +128,9 @@ def to_wall(points: np.ndarray) -> np.ndarray:
 def test_dots_stay_on_the_wall_while_the_robot_turns(chromium, dialect):
     with (
         started("sim", "-n", "1", "--dialect", dialect, ready=r"at (ws://\S+)") as sim,
-        started("view", sim, "--no-browser", ready=r"at (http\S+)") as url,
+        started(
+            *("run", str(PAGE), "--no-browser"), ready=r"(http\S+)", TURNING_URL=sim
+        ) as url,
         watched_tab(chromium, 800, 600) as page,
     ):
         page.goto(url)
