@@ -1,0 +1,117 @@
+"""Where goals and the initial pose go: what the gate is told, and what is refused."""
+
+import pytest
+
+from webmap import Robot
+from webmap.errors import ConfigError
+from webmap.gate.specs import checked
+
+MOVE_BASE = "move_base_msgs/MoveBaseAction"
+SURE = (0.25, 0.25, 0.068)
+
+
+class Link:
+    """A bridge as far as goals need one."""
+
+    def __init__(self, url="ws://test:9090"):
+        self.url = url
+        self.protected = set()
+
+    def protect(self, topic):
+        self.protected.add(topic)
+
+
+def spec_of(set_up):
+    robot = Robot("Bob")
+    set_up(robot)
+    spec = robot.motion.spec()
+    robot.destroy()
+    return checked(spec)
+
+
+def test_the_gate_is_told_of_an_action_and_of_the_topic_beside_it():
+    def set_up(robot):
+        robot.set_move_topic(Link(), "/goal_pose", action="/navigate_to_pose")
+
+    spec = spec_of(set_up)
+    assert (spec.goal_topic, spec.action) == ("/goal_pose", "/navigate_to_pose")
+    assert spec.goal_type == "geometry_msgs/msg/PoseStamped"
+    assert spec.pose_topic is None
+
+
+def test_a_robot_may_have_an_action_alone():
+    def set_up(robot):
+        robot.set_move_topic(Link(), action="/move_base", action_type=MOVE_BASE)
+
+    spec = spec_of(set_up)
+    assert (spec.goal_topic, spec.action_type) == (None, MOVE_BASE)
+    assert spec.goal_type == "geometry_msgs/PoseStamped"
+
+
+def test_a_robot_may_have_an_initial_pose_alone():
+    spec = spec_of(lambda robot: robot.set_initial_pose_topic(Link()))
+    assert (spec.pose_topic, spec.pose_covariance) == ("/initialpose", SURE)
+    assert spec.pose_type == "geometry_msgs/PoseWithCovarianceStamped"
+
+
+def test_the_initial_pose_is_spelled_and_framed_as_the_goals_are():
+    def set_up(robot):
+        robot.set_move_topic(link, action="/navigate_to_pose", frame="hall")
+        robot.set_initial_pose_topic(link, "/here", covariance=[1, 2, 3])
+
+    link = Link()
+    spec = spec_of(set_up)
+    assert spec.pose_type == "geometry_msgs/msg/PoseWithCovarianceStamped"
+    assert (spec.goal_frame, spec.pose_covariance) == ("hall", (1, 2, 3))
+
+
+def test_what_the_gate_writes_is_protected_on_the_bridge():
+    def set_up(robot):
+        robot.set_move_topic(link, "/goal", action="/move_base", action_type=MOVE_BASE)
+        robot.set_initial_pose_topic(link)
+
+    link = Link()
+    spec_of(set_up)
+    assert link.protected == {
+        "/goal",
+        "/move_base/goal",
+        "/move_base/cancel",
+        "/initialpose",
+    }
+
+
+def test_goals_that_go_nowhere_are_refused():
+    with pytest.raises(ConfigError, match="neither is given"):
+        Robot("Bob").set_move_topic(Link())
+
+
+@pytest.mark.parametrize(
+    "covariance", [(1, 2), (1, 2, -3), (1, 2, float("nan")), (1, 2, "3"), "abc"]
+)
+def test_a_covariance_that_is_none_is_refused(covariance):
+    with pytest.raises(ConfigError, match="three numbers from 0 on"):
+        Robot("Bob").set_initial_pose_topic(Link(), covariance=covariance)
+
+
+def test_goals_and_initial_pose_go_to_one_bridge():
+    one, other = Link(), Link("ws://other:9090")
+    robot = Robot("Bob")
+    robot.set_move_topic(one, "/goal")
+    with pytest.raises(ConfigError, match="both go to one bridge"):
+        robot.set_initial_pose_topic(other)
+    assert robot.motion.pose_topic is None
+    robot.set_initial_pose_topic(one)
+    with pytest.raises(ConfigError, match="both go to one bridge"):
+        robot.set_move_topic(other, "/goal")
+    assert robot.motion.move_topic.bridge is one
+
+
+def test_goals_and_initial_pose_are_plain_data_and_back():
+    link = Link()
+    robot = Robot("Bob")
+    robot.set_move_topic(link, action="/navigate_to_pose")
+    robot.set_initial_pose_topic(link, "/here", covariance=(1, 2, 3))
+    data = robot.to_dict()
+    assert data["move"] == {"bridge": link.url, "action": "/navigate_to_pose"}
+    assert data["initial_pose"]["covariance"] == (1, 2, 3)
+    assert Robot.from_dict(data, {link.url: link}).to_dict() == data
