@@ -8,6 +8,7 @@ from typing import Any
 
 from webmap.sim.maps import FLOOR, load_map
 from webmap.sim.node import STEP, RobotsNode
+from webmap.sim.robot import BaseOptions
 from webmap.sim.rosbridge.dialect import Dialect
 from webmap.sim.rosbridge.encode import Encoder
 from webmap.sim.rosbridge.graph import Graph
@@ -23,7 +24,10 @@ class Running:
 
     def __init__(self, dialect: str) -> None:
         quirks = parse_quirks("real", dialect)
-        self.world = World(load_map(FLOOR), WorldOptions(robots=2, seed=4))
+        # Without any drift, odometry would be taken from the map at every step.
+        base = BaseOptions(drift=1e-9)
+        options = WorldOptions(robots=2, seed=4, base=base)
+        self.world = World(load_map(FLOOR), options)
         schema = Schema(Dialect(dialect))
         graph = Graph(schema)
         Rosapi(graph, quirks).start()

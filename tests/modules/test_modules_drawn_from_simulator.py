@@ -161,6 +161,8 @@ def near(tab: Page, script: str, wanted, within: float, what: str) -> None:
 
 def test_the_robot_is_where_it_truly_is(tab, running):
     pose = running.world.robots[0].pose
+    odometry = running.world.robots[0].odometry
+    assert math.dist((odometry.x, odometry.y), (pose.x, pose.y)) > 5
     front = pose @ Pose(1.0)
     script = 'inWorld("g.robot[data-name=Bob]", [[0, 0], [1, 0]])'
     near(tab, script, [(pose.x, pose.y), (front.x, front.y)], 0.005, "robot")
