@@ -59,10 +59,17 @@ RESET = """new Promise((done) => {
 
 
 class Bench:
-    """Everything from the finger to the wheel, with real processes."""
+    """Everything from the finger to the wheel, with real processes.
 
-    def __init__(self, folder):
+    Args:
+        folder: For what stays on the disk.
+        timeout: Seconds until the robot stops by itself; None for one that never does.
+
+    """
+
+    def __init__(self, folder, timeout=ROBOT_TIMEOUT):
         self._folder = folder
+        self._timeout = timeout
         self._open = ExitStack()
         self.browser = self.tab = self.display = None
         self.causes = []
@@ -70,7 +77,7 @@ class Bench:
 
     def __enter__(self):
         enter = self._open.enter_context
-        self.robot = enter(WitnessRobot(timeout=ROBOT_TIMEOUT))
+        self.robot = enter(WitnessRobot(timeout=self._timeout))
         self.robot_hop = enter(FaultProxy(self.robot.port))
         self.sentinel = enter(Sentinel())
         self._open.callback(self.end_display)
@@ -191,6 +198,7 @@ class Bench:
 
     def reset_stop(self):
         """End the STOP, through a socket of the page's own, as its button does."""
+        self.tab.wait("document.body.innerText.includes('stays stopped')")
         assert self.tab.evaluate(RESET) in {"free", "held", "stopping"}
 
     def heal(self):
@@ -219,7 +227,8 @@ class Bench:
                     return
                 pass_time(0.01)
             self.let_go()
-        raise AssertionError(f"W does not drive the robot\n{self.display.log}")
+        said = self.tab.evaluate("document.body.innerText")
+        raise AssertionError(f"W does not drive it\n{said}\n{self.display.log}")
 
     def steady(self):
         """Whether the robot has been moved without a break for a moment."""

@@ -64,6 +64,7 @@ def main(page):
     """Show the robot, chosen, with keys to drive it."""
     map = webmap.Map(page.element("webmap_container"), 400, 300)
     map.add_module("Teleop", 1.0, 1.5)
+    map.add_module("StopButton")
     map.scale(40, map.canvas_width * 0.5, map.canvas_height * 0.5)
     if maps is not None:
         map.add_module("OccupancyGrid", maps, "/huge")

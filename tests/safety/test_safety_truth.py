@@ -1,0 +1,116 @@
+"""What the page says of a robot that does not obey, and of a link that is slow.
+
+From a finger on a key of a real Chromium, through the real display and gate, to a robot
+that notes what it is told; and back from its odometry to the words on the page.
+"""
+
+import time
+
+import pytest
+from safety_bench import V_MAX, Bench, pass_time, wait_for
+
+from webmap.testing import Shape
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+ALARM = "document.querySelector('.webmap-alarm')?.innerText"
+COVERED = """(() => {
+    const box = document.querySelector(".webmap-alarm").getBoundingClientRect();
+    return box.left <= 0 && box.top <= 0 &&
+        box.right >= innerWidth && box.bottom >= innerHeight;
+})()"""
+WORDS = "document.body.innerText"
+
+EACH_WAY = 0.075
+"""Latency of the slow link in seconds: the loop is then older than 150 ms."""
+
+BLIND, DEADMAN, STOPS_WITHIN = 0.25, 0.2, 0.5
+"""What S15 grants the robot, in metres, and what it reckons with, in seconds."""
+
+
+@pytest.fixture(scope="module")
+def stubborn(tmp_path_factory):
+    """A bench whose robot never stops by itself."""
+    with Bench(tmp_path_factory.mktemp("truth"), timeout=None) as bench:
+        yield bench
+
+
+@pytest.fixture
+def bench(stubborn):
+    yield stubborn
+    stubborn.web_hop.shape(Shape())
+    stubborn.robot.obeys = True
+    stubborn.let_go()
+    stop_and_reset(stubborn)
+
+
+def stop_and_reset(bench):
+    """Say STOP, which is said again and again, so that whatever moves stands."""
+    bench.space("keyDown")
+    bench.space("keyUp")
+    wait_for(lambda: abs(bench.robot.velocity.vx) < 0.01, "standing still")
+    bench.reset_stop()
+
+
+def test_the_page_says_that_a_robot_does_not_obey_until_it_stands(bench):
+    bench.drive_off()
+    bench.robot.obeys = False
+    bench.let_go()
+    released = time.monotonic()
+    bench.tab.wait(f"({ALARM} ?? '').includes('ROBOT NOT OBEYING')")
+    said_after = time.monotonic() - released
+    assert 0.9 < said_after < 1.6 + bench.sentinel.stolen(released)
+    said = bench.tab.evaluate(ALARM)
+    assert "Use the hardware stop." in said
+    assert "Bob" in said
+    assert "still moving at 1.00 m/s" in said
+    assert bench.tab.evaluate(COVERED), "the alarm does not cover the page"
+    assert bench.robot.log.moving_since(released + 0.5) == []
+    bench.robot.obeys = True
+    stop_and_reset(bench)
+    bench.tab.wait("document.querySelector('.webmap-alarm') === null")
+
+
+def test_the_page_says_nothing_of_a_robot_that_obeys(bench):
+    bench.drive_off()
+    bench.let_go()
+    released = time.monotonic()
+    while time.monotonic() < released + 1.5:
+        assert bench.tab.evaluate(ALARM) is None
+
+
+def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
+    bench.drive_off()
+    assert bench.robot.log.told[-1].twist.vx == pytest.approx(V_MAX)
+    # Latency that comes at once is a gap, which may stop the robot: so from anew.
+    bench.let_go()
+    bench.web_hop.shape(Shape(latency=EACH_WAY))
+    bench.drive_off(within=45.0)
+    said = bench.tab.evaluate(WORDS)
+    assert "slow link: " in said, said
+    assert "Up to 0.2" in said, said
+    # The loop takes both ways at least; what it waits for a tick makes it slower.
+    most = BLIND / (2 * EACH_WAY + DEADMAN + STOPS_WITHIN)
+    now = time.monotonic()
+    late = [told.speed for told in bench.robot.log.moving_since(now - 0.3)]
+    assert late
+    assert max(late) <= most, (max(late), most)
+    assert min(late) > 0.1, "a slow link is to slow it down, not to stop it"
+
+    bench.web_hop.shape(Shape())
+    quick = time.monotonic()
+    bench.let_go()
+    wait_for(lambda: time.monotonic() > quick + 2.5, "what was slow is forgotten")
+    bench.drive_off()
+    assert bench.robot.log.told[-1].twist.vx == pytest.approx(V_MAX)
+    assert "slow link: " not in bench.tab.evaluate(WORDS)
+
+
+def test_a_link_slower_than_the_age_limit_moves_nothing(bench):
+    bench.drive_off()
+    bench.web_hop.shape(Shape(latency=0.2))
+    wait_for(lambda: bench.robot.log.told[-1].is_zero, "zero")
+    stopped = time.monotonic()
+    pass_time(1.5)
+    bench.repeat_press()
+    assert bench.robot.log.moving_since(stopped) == []
