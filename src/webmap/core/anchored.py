@@ -1,5 +1,6 @@
 """Where a layer lies whose data is in another frame than the map's."""
 
+from webmap.core.alignment import alignments
 from webmap.core.frames import Frames, frames_of
 from webmap.core.layer import Layer
 from webmap.geometry import Pose
@@ -11,8 +12,8 @@ from webmap.tf import NotKnownThen, TransformError
 class Anchored:
     """Keeps a layer where the frames of a ROS system have its data.
 
-    Frames are only heard once a message names one that is not the map's. It ends with
-    the scope that it is used in first, which is the layer's.
+    The layer lies on the common map as the bridge is aligned. Frames are only heard
+    once a message names one that is not the map's. It ends with the layer.
 
     Args:
         layer: What is moved, whole.
@@ -32,6 +33,10 @@ class Anchored:
         self._namespace = namespace
         self._frame = ""
         self._frames: Frames | None = None
+        self._offset = Pose()
+        with layer.scope.active():
+            keep(alignments.on_change(bridge, self._put))
+        self._put()
 
     def stand_in(self, frame_id: str, stamp: float) -> None:
         """Take the layer's coordinates to be in a frame, as it was at a time.
@@ -75,5 +80,10 @@ class Anchored:
             text = f"it is not known where {self._frame!r} is on the map: {error}"
             self._layer.set_problem(self, text)
             return
-        self._layer.svg.set_pose(pose.x, pose.y, pose.yaw)
+        self._offset = pose
+        self._put()
         self._layer.clear_problem(self)
+
+    def _put(self) -> None:
+        place = alignments.of(self._bridge) @ self._offset
+        self._layer.svg.set_pose(place.x, place.y, place.yaw)

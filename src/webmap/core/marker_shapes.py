@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any
 
-from webmap.core.placed import check_finite, rounded
+from webmap.core.placed import check_finite, put, rounded
+from webmap.core.whereabouts import affine
 from webmap.errors import ProtocolError
 from webmap.geometry import Affine
 from webmap.ros import messages_marker as kinds
@@ -27,6 +28,9 @@ LETTERS = 16.0
 SHADES = 16
 """How finely the colours of single points are told apart, from 0 to 1."""
 
+AS_IT_COMES = Affine()
+"""The frame of a marker that is drawn with its own numbers."""
+
 CLASSES = {
     kinds.ARROW: "arrow",
     kinds.CUBE: "cube",
@@ -43,8 +47,12 @@ CLASSES = {
 """The class of each type that can be drawn."""
 
 
-def shape_of(marker: MarkerMsg) -> Element:
+def shape_of(marker: MarkerMsg, frame: Affine = AS_IT_COMES) -> Element:
     """Return a marker as a group in its place, seen from above.
+
+    Args:
+        marker: The marker.
+        frame: As :func:`place` has it.
 
     Raises:
         ProtocolError: If its type cannot be drawn, or a number makes no sense.
@@ -62,7 +70,7 @@ def shape_of(marker: MarkerMsg) -> Element:
             f"it has {len(marker.colors)} colours for {len(marker.points)} points"
         )
     group = svg.g(class_=f"marker {name}")
-    place(group, marker)
+    place(group, marker, frame)
     group.append(*_DRAWN[marker.type](marker))
     return group
 
@@ -73,8 +81,13 @@ def look_of(marker: MarkerMsg) -> tuple[object, ...]:
     return (m.type, m.scale, m.color, m.points, m.colors, m.text)
 
 
-def place(shape: Element, marker: MarkerMsg) -> None:
+def place(shape: Element, marker: MarkerMsg, frame: Affine = AS_IT_COMES) -> None:
     """Put a shape where the marker has it.
+
+    Args:
+        shape: The shape.
+        marker: Its marker.
+        frame: What takes coordinates of the marker's frame to those of the map.
 
     Raises:
         ProtocolError: If its pose makes no sense.
@@ -86,10 +99,9 @@ def place(shape: Element, marker: MarkerMsg) -> None:
         check_finite([at], "the place of a text")
         # The world has y upward; letters have it downward.
         size = _sizes(marker, "z")[0] / LETTERS
-        shape.set_matrix(Affine(size, 0, 0, -size, *at))
+        shape.set_matrix(Affine(size, 0, 0, -size, *frame.apply(*at)))
     else:
-        pose = marker.pose.usable
-        shape.set_pose(pose.x, pose.y, pose.yaw)
+        put(shape, frame @ affine(marker.pose.usable))
 
 
 def _text(marker: MarkerMsg) -> Iterable[Element]:

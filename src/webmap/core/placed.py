@@ -143,7 +143,7 @@ class Placed:
             if self._seen is not None:
                 place = self.robot.whereabouts.placing @ place
             place = own.inverse @ place
-        _place(self.svg, place)
+        put(self.svg, place)
 
     def _say(self, found: Sighting) -> None:
         """Say what is wrong with the place, once; take it back when that is mended."""
@@ -161,7 +161,7 @@ class Placed:
         self.robot.clear_problem(self)
 
 
-def _place(element: Element, place: Affine) -> None:
+def put(element: Element, place: Affine) -> None:
     """Place an element: by a pose, which is short on the wire, if it is one."""
     if abs(place.a - place.d) < 1e-9 and abs(place.b + place.c) < 1e-9:
         element.set_pose(place.e, place.f, math.atan2(place.b, place.a))

@@ -87,7 +87,7 @@ class Sightings:
         """Return where data of the map is that came in another frame."""
         target = tf["map_frame"]
         try:
-            found, settled = _lookup(buffer, target, source, stamp)
+            found, settled = newest_or_at(buffer, target, source, stamp)
         except TransformError as error:
             found = self._known.get(source, Transform())
             return self._lost(tf, source, error, Sighting(found.from_above))
@@ -108,7 +108,7 @@ class Sightings:
                 pass  # The poses may tell what the frames do not.
         if source != base:
             try:
-                self._known[source], _ = _lookup(buffer, base, source, stamp)
+                self._known[source], _ = newest_or_at(buffer, base, source, stamp)
             except TransformError as error:
                 found = self._known.get(source, Transform())
                 return self._lost(tf, source, error, self._by_poses(found, stamp))
@@ -171,7 +171,7 @@ def _mounted(mount: Pose | None) -> Transform:
     return Transform.from_pose(mount or Pose())
 
 
-def _lookup(
+def newest_or_at(
     buffer: Buffer, target: str, source: str, stamp: float
 ) -> tuple[Transform, bool]:
     """Return a frame in another, and whether more news would not change it.

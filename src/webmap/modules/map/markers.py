@@ -4,7 +4,10 @@ import asyncio
 import time
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from webmap.core.layer import Layer
+from webmap.core.marker_frames import MarkerFrames
 from webmap.core.marker_shapes import look_of, place, shape_of
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError, WebMapError
@@ -13,7 +16,6 @@ from webmap.ros.messages_marker import (
     ADD,
     DELETE,
     DELETE_ALL,
-    MarkerArrayMsg,
     MarkerMsg,
 )
 from webmap.ros.names import split_type
@@ -29,9 +31,22 @@ MAX_MARKERS = 5000
 NEVER = 1e9
 """Seconds after which markers without an age limit are drawn as old."""
 
-VIEWS: dict[str, type[MarkerMsg] | type[MarkerArrayMsg]] = {
-    "visualization_msgs/MarkerArray": MarkerArrayMsg,
-    "visualization_msgs/Marker": MarkerMsg,
+
+class FramedMarkerMsg(MarkerMsg, frozen=True, kw_only=True):
+    """A marker that says whether it moves with its frame."""
+
+    frame_locked: bool = False
+
+
+class FramedMarkerArrayMsg(msgspec.Struct, frozen=True):
+    """``visualization_msgs/MarkerArray``."""
+
+    markers: list[FramedMarkerMsg]
+
+
+VIEWS: dict[str, type[FramedMarkerMsg] | type[FramedMarkerArrayMsg]] = {
+    "visualization_msgs/MarkerArray": FramedMarkerArrayMsg,
+    "visualization_msgs/Marker": FramedMarkerMsg,
 }
 
 Key = tuple[str, int]
@@ -44,17 +59,24 @@ class Markers:
     texts are drawn, with their colours; meshes are not. A marker that makes no sense
     is left out by itself, and said.
 
+    Each is drawn where its own frame was at its stamp, and one that is ``frame_locked``
+    goes on moving with the frame. One whose frame nobody tells of is drawn as it comes,
+    and that is said until somebody does.
+
     Style it by CSS: ``.markers > .marker``, with the type as a further class
     (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in
     ``data-ns``: ``.marker[data-ns="goals"] { display: none }``.
 
     Args:
-        map: The map. Markers are drawn as they come, in its frame.
+        map: The map.
         bridge: The link to the ROS system that has the topic.
         topic: The topic.
         type: ``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``.
         age_limit: Seconds after which all of them are drawn as old; None for what is
             sent but once.
+        map_frame: The map's own frame, to which ``/tf`` of the bridge leads; None to
+            draw all markers with the numbers that they come with.
+        namespace: ``/robot_0`` where frames are told on ``/robot_0/tf``.
         order: What lies over what: greater is nearer; robots have 100.
 
     Raises:
@@ -70,13 +92,17 @@ class Markers:
         *,
         type: str = "visualization_msgs/MarkerArray",
         age_limit: float | None = None,
+        map_frame: str | None = "map",
+        namespace: str = "",
         order: float = 50.0,
     ) -> None:
         known = str(split_type(type))
         if known not in VIEWS:
             raise ConfigError(f"type is one of {', '.join(VIEWS)}, got {type!r}")
         self.map = map
-        self.layer = MarkerLayer.shared(bridge, topic, known, age_limit)
+        self.layer = MarkerLayer.shared(
+            bridge, topic, known, age_limit, map_frame, namespace
+        )
         self.layer.show_on(map, order=order)
 
 
@@ -84,9 +110,16 @@ class MarkerLayer(Layer):
     """The markers of one topic, for all maps that show them."""
 
     def __init__(
-        self, bridge: Bridge, topic: str, type: str, age_limit: float | None
+        self,
+        bridge: Bridge,
+        topic: str,
+        type: str,
+        age_limit: float | None,
+        map_frame: str | None,
+        namespace: str,
     ) -> None:
         super().__init__()
+        self.frames = MarkerFrames(self, bridge, map_frame, namespace)
         self.bridge = bridge
         self.topic = topic
         self.type = type
@@ -111,28 +144,29 @@ class MarkerLayer(Layer):
             queue_length=100,
         )
 
-    def on_markers(self, message: MarkerArrayMsg | MarkerMsg) -> None:
+    def on_markers(self, message: FramedMarkerArrayMsg | FramedMarkerMsg) -> None:
         """Add, change and delete as the markers say.
 
         Raises:
             ProtocolError: If there is one that makes no sense; the others are drawn.
 
         """
-        single = isinstance(message, MarkerMsg)
-        markers = [message] if isinstance(message, MarkerMsg) else message.markers
+        single = isinstance(message, FramedMarkerMsg)
+        markers = [message] if isinstance(message, FramedMarkerMsg) else message.markers
         wrong: list[str] = []
         for marker in markers:
             try:
                 self._take(marker)
             except WebMapError as error:
                 wrong.append(f"marker {marker.id} of {marker.ns!r}: {error}")
+        self.frames.say()
         self._set_timer()
         self.svg.set_age(0.0, limit=self.age_limit)
         if wrong:
             more = "" if single else f" ({len(wrong)} of {len(markers)} are left out)"
             raise ProtocolError(wrong[0] + more)
 
-    def _take(self, marker: MarkerMsg) -> None:
+    def _take(self, marker: FramedMarkerMsg) -> None:
         key = (marker.ns, marker.id)
         if marker.action == ADD:
             self._put(key, marker)
@@ -147,21 +181,34 @@ class MarkerLayer(Layer):
                 f"{marker.action}"
             )
 
-    def _put(self, key: Key, marker: MarkerMsg) -> None:
+    def _put(self, key: Key, marker: FramedMarkerMsg) -> None:
         before, look = self.shapes.get(key), look_of(marker)
-        if before is not None and self._looks[key] == look:
-            place(before, marker)
-        else:
-            self._draw(key, before, marker)
-            self._looks[key] = look
+        same = before is not None and self._looks[key] == look
+        if before is None and len(self.shapes) >= MAX_MARKERS:
+            raise ProtocolError(f"{MAX_MARKERS} markers are the limit")
+        frame = self.frames.place(
+            key,
+            marker.frame_id,
+            marker.stamp,
+            marker.frame_locked,
+            lambda frame: place(self.shapes[key], marker, frame),
+        )
+        try:
+            if before is not None and same:
+                place(before, marker, frame)
+            else:
+                self._draw(key, before, shape_of(marker, frame), marker)
+                self._looks[key] = look
+        except WebMapError:
+            self.frames.forget(key)
+            raise
         self._ends.pop(key, None)
         if marker.lifetime.seconds > 0:
             self._ends[key] = time.monotonic() + marker.lifetime.seconds
 
-    def _draw(self, key: Key, before: Element | None, marker: MarkerMsg) -> None:
-        if before is None and len(self.shapes) >= MAX_MARKERS:
-            raise ProtocolError(f"{MAX_MARKERS} markers are the limit")
-        shape = shape_of(marker)
+    def _draw(
+        self, key: Key, before: Element | None, shape: Element, marker: MarkerMsg
+    ) -> None:
         shape.set("data-ns", marker.ns)
         shape.set("data-id", str(marker.id))
         if before is None:
@@ -175,6 +222,7 @@ class MarkerLayer(Layer):
         shape = self.shapes.pop(key, None)
         self._looks.pop(key, None)
         self._ends.pop(key, None)
+        self.frames.forget(key)
         if shape is not None:
             shape.remove()
 
