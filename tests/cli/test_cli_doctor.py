@@ -54,3 +54,16 @@ def test_a_bridge_that_is_away_is_wrong():
     assert said.returncode == 1
     assert "WRONG    The rosbridge cannot be reached" in said.stdout
     assert "Traceback" not in said.stderr
+
+
+def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
+    topics = tmp_path / "topics.txt"
+    topics.write_text("/robot_1/odom [nav_msgs/Odometry]\n")
+    said = webmap("doctor", ros1, "--seconds", "1", "--topics", str(topics))
+    assert "those of the list that was given; robots found: robot_1." in said.stdout
+    assert "robot_0" not in said.stdout
+
+
+def test_a_call_that_hangs_is_tried_where_that_is_wanted(ros1):
+    said = webmap("doctor", ros1, "--seconds", "0.5", "--try-call")
+    assert "A service that hangs blocks no socket (tried)" in said.stdout

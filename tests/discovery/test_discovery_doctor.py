@@ -76,6 +76,38 @@ def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
     assert ("topics_glob" in found.advice) is (level != "good")
 
 
+def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():
+    seen = replace(GOOD, url="ws://bob:9090", peer="192.168.1.7", shown=("/rosout",))
+    assert said(seen, "Nothing is hidden from anybody either (/rosout") == "warning"
+    at_home = replace(GOOD, shown=("/rosout",))
+    assert not any("hidden" in each.words for each in judge(at_home))
+
+
+def test_only_the_first_of_many_robots_are_listened_to_and_that_is_said():
+    topics = {f"/r{n}/odom": "nav_msgs/Odometry" for n in range(12)}
+    many = replace(GOOD, findings=discover(topics))
+    assert said(many, "12 robots are many: only the first 10") == "note"
+
+
+def test_a_map_that_nobody_publishes_is_told():
+    topics = TOPICS | {"/map": "nav_msgs/OccupancyGrid"}
+    seen = replace(GOOD, findings=discover(topics, "bob"))
+    assert not any("no map under it" in each.words for each in judge(seen))
+    seen = replace(seen, publishers={**GOOD.publishers, "/map": ()})
+    assert said(seen, "Nobody publishes /map") == "warning"
+
+
+def test_a_battery_may_be_slow():
+    topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
+    seen = replace(GOOD, findings=discover(topics, "bob"))
+    seen = replace(seen, heard={**LISTENED, "/battery_state": Heard(seconds=3.0)})
+    assert said(seen, "Nothing came on /battery_state in 3 s; it may") == "note"
+    slow = {**LISTENED, "/battery_state": Heard(1, 3.0, 3.0)}
+    assert said(replace(seen, heard=slow), "/battery_state: 0.3 messages") == "good"
+    broken = {**LISTENED, "/battery_state": Heard(1, 3.0, trouble="not JSON")}
+    assert said(replace(seen, heard=broken), "cannot be read: not JSON") == "warning"
+
+
 def test_a_bridge_without_rosapi_is_told_what_to_do():
     bare = Observed("ws://localhost:9090", rosapi="no answer")
     assert said(bare, "rosapi does not say") == "warning"

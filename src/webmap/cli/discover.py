@@ -6,6 +6,7 @@ import sys
 import click
 
 from webmap.cli.options import verbose_option
+from webmap.cli.topic_list import one_bridge, topics_option
 
 
 @click.command()
@@ -18,8 +19,11 @@ from webmap.cli.options import verbose_option
     show_default=True,
     help="Seconds to wait for a rosbridge that cannot be reached.",
 )
+@topics_option
 @verbose_option
-def discover(url: tuple[str, ...], toml: bool, wait: float) -> None:
+def discover(
+    url: tuple[str, ...], toml: bool, wait: float, topics: dict[str, str] | None
+) -> None:
     r"""Print which robots are behind rosbridges, their topics, and why.
 
     Nothing is driven and nothing is changed. The exit code is 1 if no robot is found.
@@ -27,13 +31,16 @@ def discover(url: tuple[str, ...], toml: bool, wait: float) -> None:
     \b
     webmap discover ws://robot:9090
     webmap discover ws://robot:9090 --toml > fleet.toml
+    ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
     from webmap.cli.finding import find
     from webmap.discovery.fleet_toml import fleet_toml
     from webmap.discovery.words import report
     from webmap.ros.names import normalise_url
 
-    found = asyncio.run(find([normalise_url(text) for text in url], wait=wait))
+    one_bridge(url, topics)
+    urls = [normalise_url(text) for text in url]
+    found = asyncio.run(find(urls, wait=wait, topics=topics))
     if toml:
         click.echo(
             fleet_toml([(one.label, one.url, one.findings) for one in found]), nl=False

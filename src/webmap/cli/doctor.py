@@ -6,6 +6,7 @@ import sys
 import click
 
 from webmap.cli.options import verbose_option
+from webmap.cli.topic_list import one_bridge, topics_option
 
 
 @click.command()
@@ -31,6 +32,13 @@ from webmap.cli.options import verbose_option
     "that hangs blocks its socket.",
 )
 @click.option(
+    "--try-call",
+    is_flag=True,
+    help="Offer a service that hangs for a second and call it, which finds out whether "
+    "one that hangs blocks its socket.",
+)
+@topics_option
+@click.option(
     "--stop-test",
     metavar="ROBOT",
     help="Instead, have this robot creep and see whether it stops by itself: it MOVES. "
@@ -43,6 +51,8 @@ def doctor(
     seconds: float,
     wait: float,
     ask_parameters: bool,
+    try_call: bool,
+    topics: dict[str, str] | None,
     stop_test: str | None,
     yes: bool,
 ) -> None:
@@ -60,6 +70,7 @@ def doctor(
     from webmap.discovery.doctor.verdict import report
     from webmap.ros.names import normalise_url
 
+    one_bridge(url, topics)
     ready = True
     for number, address in enumerate([normalise_url(text) for text in url]):
 
@@ -72,6 +83,8 @@ def doctor(
                 wait=wait,
                 seconds=seconds,
                 ask_parameters=ask_parameters,
+                try_call=try_call,
+                topics=topics,
                 waiting=waiting,
             )
         )

@@ -1,7 +1,7 @@
 """What is behind several bridges, asked all at once."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import click
@@ -14,7 +14,8 @@ from webmap.errors import BridgeClosed, BridgeError
 
 TELL = (
     "Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN, "
-    "as in --robot Bob:/odom:/cmd_vel:/scan"
+    "as in --robot Bob:/odom:/cmd_vel:/scan; "
+    "or give webmap discover a list of the topics with --topics"
 )
 
 
@@ -43,7 +44,9 @@ class Found:
         return f"{self.url}: {reason}. {TELL}"
 
 
-async def find(urls: Sequence[str], *, wait: float) -> list[Found]:
+async def find(
+    urls: Sequence[str], *, wait: float, topics: Mapping[str, str] | None = None
+) -> list[Found]:
     """Return what is behind each bridge; no two robots have one name.
 
     Says on standard error that a bridge is waited for.
@@ -51,9 +54,13 @@ async def find(urls: Sequence[str], *, wait: float) -> list[Found]:
     Args:
         urls: The bridges' addresses.
         wait: How long to wait for one that cannot be reached, in seconds.
+        topics: Types by topic, where a bridge cannot be asked for them.
 
     """
-    asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
+    if topics is None:
+        asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
+    else:
+        asked = [(discover(topics, host_name(url)), None) for url in urls]
     named = unique_names(
         [(host_name(url), one) for url, (one, _) in zip(urls, asked, strict=True)]
     )

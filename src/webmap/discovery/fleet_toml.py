@@ -111,11 +111,18 @@ def _motion(robot: FoundRobot) -> list[str]:
             f"twist.type = {_text(velocity.type)}",
             *UNSURE.splitlines(),
         ]
+    if robot.action is not None and (guess := robot.first("action")) is not None:
+        name, type = robot.action
+        lines.append(f"move.action = {_text(name)} # {guess.rule}")
+        lines.append(f"move.action_type = {_text(type)}")
     if goal is not None:
         lines.append(f"move.topic = {_text(goal.topic)} # {goal.rule}")
         cancel = robot.first("cancel")
         if cancel is not None:
             lines.append(f"move.cancel_topic = {_text(cancel.topic)} # {cancel.rule}")
+    pose = robot.first("initialpose")
+    if pose is not None:
+        lines.append(f"initial_pose = {_text(pose.topic)} # {pose.rule}")
     return lines
 
 

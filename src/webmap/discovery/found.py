@@ -12,7 +12,9 @@ Role: TypeAlias = Literal[
     "battery",
     "plan",
     "goal",
+    "action",
     "cancel",
+    "initialpose",
     "map",
     "costmap",
     "camera",
@@ -29,7 +31,9 @@ ROLES: tuple[Role, ...] = (
     "battery",
     "plan",
     "goal",
+    "action",
     "cancel",
+    "initialpose",
     "map",
     "costmap",
     "camera",
@@ -37,6 +41,13 @@ ROLES: tuple[Role, ...] = (
     "tf",
 )
 """Every role, in the order in which they are shown."""
+
+
+ACTIONS = {
+    "/_action/feedback": "nav2_msgs/action/NavigateToPose",
+    "/goal": "move_base_msgs/MoveBaseAction",
+}
+"""The topics by which actions are known, without the action's name, and their types."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +85,17 @@ class FoundRobot:
         """Return the best topic for a role, empty if nothing fits."""
         found = self.first(role)
         return "" if found is None else found.topic
+
+    @property
+    def action(self) -> tuple[str, str] | None:
+        """The name and the type of the action that goals go to, if there is one."""
+        found = self.first("action")
+        if found is None:
+            return None
+        for tail, type in ACTIONS.items():
+            if found.topic.endswith(tail):
+                return found.topic.removesuffix(tail), type
+        return None
 
     @property
     def tf_namespace(self) -> str | None:

@@ -103,6 +103,24 @@ RULES: tuple[Rule, ...] = (
         "where move_base and RViz take goals",
     ),
     Rule(
+        "action",
+        ("nav2_msgs/NavigateToPose_FeedbackMessage",),
+        r"navigate_to_pose/_action/feedback",
+        "Nav2's action, which says how a goal goes",
+    ),
+    Rule(
+        "action",
+        ("move_base_msgs/MoveBaseActionGoal",),
+        r"move_base/goal",
+        "move_base's action, which says how a goal goes",
+    ),
+    Rule(
+        "initialpose",
+        POSES[:1],
+        r"initialpose",
+        "where AMCL and RViz take an initial pose",
+    ),
+    Rule(
         "cancel",
         ("actionlib_msgs/GoalID",),
         r"move_base/cancel",

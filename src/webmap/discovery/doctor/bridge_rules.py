@@ -4,7 +4,12 @@ import ipaddress
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
-from webmap.discovery.doctor.observed import Clock, Finding, Observed
+from webmap.discovery.doctor.observed import (
+    MOST_ROBOTS,
+    Clock,
+    Finding,
+    Observed,
+)
 
 ABOUT = "bridge"
 
@@ -15,8 +20,16 @@ NO_LOOP = 0.3
 """Seconds from which there is none: no command is that fresh."""
 
 CLOCK_OFF = 0.5
+"""Seconds from which stamps of both machines do not fit together."""
+
 SIMULATED = 365 * 24 * 3600.0
 """Seconds of difference from which the robot's clock is a simulator's."""
+
+
+TELL = (
+    "Give a list of the topics (webmap doctor URL --topics FILE), or name each robot "
+    "to webmap view with --robot NAME:ODOM:CMD_VEL:SCAN."
+)
 
 
 def bridge_findings(seen: Observed) -> Iterator[Finding]:
@@ -30,7 +43,7 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
         )
         return
     yield _openness(seen)
-    yield _rosapi(seen)
+    yield from _rosapi(seen)
     if seen.clock is not None:
         yield from _clock(seen.clock)
     elif not seen.rosapi:
@@ -51,6 +64,11 @@ def is_loopback(address: str) -> bool:
 
 def _openness(seen: Observed) -> Finding:
     parts = urlsplit(seen.url)
+    hidden = (
+        f" Nothing is hidden from anybody either ({', '.join(seen.shown)} is shown)."
+        if seen.shown
+        else ""
+    )
     if is_loopback(seen.peer or parts.hostname or ""):
         return Finding(
             "good", ABOUT, "The rosbridge was reached at an address of this machine."
@@ -64,28 +82,41 @@ def _openness(seen: Observed) -> Finding:
         "note" if parts.scheme == "wss" else "warning",
         ABOUT,
         f"The rosbridge is open to the network ({seen.peer or parts.hostname}): it "
-        f"asks nobody who they are, so whoever reaches it can drive; {secret}.",
+        f"asks nobody who they are, so whoever reaches it can drive; {secret}.{hidden}",
         "Let it listen on the robot alone or on a VPN (address), hide what nobody "
         "needs (topics_glob, services_glob), and use wss with a certificate.",
     )
 
 
-def _rosapi(seen: Observed) -> Finding:
+def _rosapi(seen: Observed) -> Iterator[Finding]:
+    robots = seen.findings.robots
     if seen.rosapi:
-        return Finding(
-            "warning",
+        yield Finding(
+            "note" if seen.told else "warning",
             ABOUT,
             f"rosapi does not say which topics there are: {seen.rosapi}.",
-            "Start the rosapi node beside rosbridge; until then name robots with "
-            "--robot NAME:ODOM:CMD_VEL:SCAN.",
+            "Start the rosapi node beside rosbridge. Without it nobody tells who else "
+            "writes velocity, and robots that come later are not found."
+            + ("" if seen.told else f" {TELL}"),
         )
-    number = len(seen.findings.robots)
-    if not number:
+        if not seen.told:
+            return
+    source = "rosapi answers"
+    if seen.told:
+        source = "The topics are those of the list that was given"
+    if not robots:
         said = " ".join(seen.findings.notes)
-        advice = "Name the robot with --robot NAME:ODOM:CMD_VEL:SCAN."
-        return Finding("wrong", ABOUT, f"No robot was found. {said}", advice)
-    names = ", ".join(robot.name for robot in seen.findings.robots)
-    return Finding("good", ABOUT, f"rosapi answers; robots found: {names}.")
+        yield Finding("wrong", ABOUT, f"No robot was found. {said}", TELL)
+        return
+    names = ", ".join(robot.name for robot in robots)
+    yield Finding("good", ABOUT, f"{source}; robots found: {names}.")
+    if len(robots) > MOST_ROBOTS:
+        yield Finding(
+            "note",
+            ABOUT,
+            f"{len(robots)} robots are many: only the first {MOST_ROBOTS} of them were "
+            f"listened to.",
+        )
 
 
 def _clock(clock: Clock) -> Iterator[Finding]:
@@ -120,11 +151,15 @@ def _blocking(seen: Observed) -> Finding:
         "Set call_services_in_new_thread: true on rosbridge_websocket. WebMap sends "
         "velocity and calls over different sockets in any case."
     )
+    how = " (tried)" if seen.tried else ", as the bridge says"
     if seen.calls_in_threads is True:
-        return Finding("good", ABOUT, "A service that hangs blocks no socket.")
+        return Finding("good", ABOUT, f"A service that hangs blocks no socket{how}.")
     if seen.calls_in_threads is False:
         return Finding(
-            "warning", ABOUT, "A service that hangs blocks its whole socket.", advice
+            "warning",
+            ABOUT,
+            f"A service that hangs blocks its whole socket{how}.",
+            advice,
         )
     if seen.findings.dialect is None:
         return Finding(
@@ -137,13 +172,14 @@ def _blocking(seen: Observed) -> Finding:
             "note",
             ABOUT,
             "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
-            "does unless told otherwise; it was not asked (--ask-parameters does).",
-            advice,
+            "does unless told otherwise; it was not tried.",
+            f"webmap doctor --try-call finds out. {advice}",
         )
     return Finding(
         "good",
         ABOUT,
-        "rosbridge for ROS 1 makes each call in a thread of its own.",
+        "rosbridge for ROS 1 makes each call in a thread of its own, so one that hangs "
+        "blocks nothing.",
     )
 
 

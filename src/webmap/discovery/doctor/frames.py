@@ -51,16 +51,23 @@ class FrameListening:
         notes = [] if buffer is None else list(buffer.notes)
         return tuple(dict.fromkeys([*self._refused.get(namespace, ()), *notes]))
 
-    def missing(self, namespace: str, frame: str) -> str:
-        """Return why nothing leads from the map to a frame; empty if it does."""
+    def missing(self, namespace: str, frame: str, start: str = MAP) -> str:
+        """Return why nothing leads from one frame to another; empty if it does.
+
+        Args:
+            namespace: Of the topic that tells of them.
+            frame: Where it should lead to.
+            start: Where it should begin.
+
+        """
         buffer = self._buffers.get(namespace)
         if buffer is None:
             return f"nothing came on {namespace}/tf"
-        name = buffer.name(frame, namespace)
-        if name == MAP:
+        name, start = buffer.name(frame, namespace), buffer.name(start, namespace)
+        if name == start:
             return ""
         try:
-            buffer.lookup(MAP, name)
+            buffer.lookup(start, name)
         except TransformError as error:
             return str(error)
         return ""

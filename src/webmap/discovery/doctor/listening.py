@@ -1,6 +1,6 @@
 """What came on topics, counted; without I/O."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 
 import msgspec
 
@@ -13,19 +13,21 @@ from webmap.ros.messages import Header
 
 class _Stamped(msgspec.Struct, frozen=True):
     header: Header = Header()
+    child_frame_id: str = ""
 
 
 class Listening:
     """Counts the messages of topics.
 
     Args:
-        topics: Which.
+        topics: Which; only these count.
         now: When listening begins, on the monotonic clock.
 
     """
 
-    def __init__(self, topics: Mapping[str, str], now: float) -> None:
+    def __init__(self, topics: Iterable[str], now: float) -> None:
         self._began = now
+        topics = tuple(topics)
         self._last = dict.fromkeys(topics, now)
         self._gap = dict.fromkeys(topics, 0.0)
         self._heard = {topic: Heard() for topic in topics}
@@ -62,10 +64,11 @@ class Listening:
         if topic not in self._newest:
             return Heard(seconds=seconds, longest_gap=gap)
         message, wall = self._newest[topic]
-        frame, stamp, trouble = "", None, ""
+        frame, child, stamp, trouble = "", "", None, ""
         try:
-            header = message.decode(_Stamped).header
-            frame, stamp = header.frame_id, header.stamp.seconds or None
+            stamped = message.decode(_Stamped)
+            frame, child = stamped.header.frame_id, stamped.child_frame_id
+            stamp = stamped.header.stamp.seconds or None
         except ProtocolError as error:
             trouble = str(error)
         return Heard(
@@ -74,6 +77,7 @@ class Listening:
             longest_gap=gap,
             bytes=heard.bytes,
             frame=frame,
+            child=child,
             stamp=stamp,
             arrived=wall,
             binary=cbor.looks_like_cbor(message.frame),

@@ -9,6 +9,9 @@ from webmap.discovery.found import Findings
 Level: TypeAlias = Literal["wrong", "warning", "note", "good"]
 """``wrong``: it will not work, or not safely. ``note``: cannot be told from here."""
 
+MOST_ROBOTS = 10
+"""How many robots are listened to."""
+
 LEVELS: tuple[Level, ...] = ("wrong", "warning", "note", "good")
 """All levels, the worst first."""
 
@@ -55,6 +58,9 @@ class Heard:
     trouble: str = ""
     """Why a message could not be read."""
 
+    child: str = ""
+    """The frame that moves in it, where the message names one, as odometry does."""
+
     @property
     def rate(self) -> float:
         """Messages a second."""
@@ -74,7 +80,7 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """The frames between the map and a robot's odometry."""
+    """The frames from the map to a robot's odometry, its base and its scanner."""
 
     frame: str
     """The frame of the odometry."""
@@ -84,6 +90,18 @@ class Way:
 
     oddities: tuple[str, ...] = ()
     """What was odd in these frames, in sentences."""
+
+    base: str = ""
+    """The frame of the base, as odometry names it."""
+
+    base_missing: str = ""
+    """Why nothing leads there from the odometry's frame."""
+
+    scan: str = ""
+    """The frame of the scanner, empty if there is none or it said nothing."""
+
+    scan_missing: str = ""
+    """Why nothing leads there from the base."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +119,13 @@ class Observed:
     """Whether the bridge would compress its socket."""
 
     rosapi: str = ""
-    """Why the topics are not known, empty if they are."""
+    """Why rosapi does not say the topics, empty if it does."""
+
+    told: bool = False
+    """Whether the topics are those of a list that the user gave."""
+
+    shown: tuple[str, ...] = ()
+    """Topics that no client needs and that the bridge shows all the same."""
 
     findings: Findings = field(default_factory=Findings)
     clock: Clock | None = None
@@ -116,4 +140,7 @@ class Observed:
     """What the frames say of each robot that has some, by its name."""
 
     calls_in_threads: bool | None = None
-    """Whether the bridge makes calls in threads of their own, if it said so."""
+    """Whether calls do not hold up what comes after them, if that is known."""
+
+    tried: bool = False
+    """Whether that was tried with a call that hangs, and not only asked."""

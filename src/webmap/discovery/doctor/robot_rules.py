@@ -2,18 +2,11 @@
 
 from collections.abc import Iterator
 
-from webmap.discovery.doctor.observed import Finding, Heard, Observed
+from webmap.discovery.doctor.heard_rules import heard_finding, rare_finding
+from webmap.discovery.doctor.observed import Finding, Observed, Way
 from webmap.discovery.found import FoundRobot, Guess
 from webmap.ros.names import is_type
 
-OLD = 1.0
-"""Seconds after which a pose is too old to drive by."""
-
-SLOW = 5.0
-"""Messages a second below which a pose or a scan jumps."""
-
-AGED = 0.5
-AHEAD = 0.1
 MOST_ODDITIES = 3
 BRIDGES = ("rosbridge", "webmap")
 """What is in the names of nodes that publish for their clients, ourselves too."""
@@ -31,10 +24,13 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             "Start its odometry, or name the topic with --robot.",
         )
     elif where.topic in seen.heard:
-        yield _heard(robot.name, where, seen, needed=True)
-    scan = robot.first("scan")
+        yield heard_finding(robot.name, where, seen, needed=True)
+    scan, battery = robot.first("scan"), robot.first("battery")
     if scan is not None and scan.topic in seen.heard:
-        yield _heard(robot.name, scan, seen, needed=False)
+        yield heard_finding(robot.name, scan, seen, needed=False)
+    if battery is not None and battery.topic in seen.heard:
+        yield rare_finding(robot.name, battery, seen)
+    yield from _map(robot, seen)
     yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
         yield Finding(
@@ -42,7 +38,19 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             robot.name,
             "Whether the base stops by itself when commands cease cannot be seen from "
             "here.",
-            "Set its timeout, try it with raised wheels, and state it as stops_within.",
+            "Set its timeout, and try it where it may creep for three seconds: webmap "
+            f"doctor {seen.url} --stop-test {robot.name}, or the button on its card.",
+        )
+
+
+def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+    grid = robot.first("map")
+    if grid is not None and seen.publishers.get(grid.topic) == ():
+        yield Finding(
+            "warning",
+            robot.name,
+            f"Nobody publishes {grid.topic}, so there is no map under it.",
+            "Start map_server or slam_toolbox, or give a floor plan with --floor.",
         )
 
 
@@ -50,6 +58,9 @@ def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     way = seen.ways.get(robot.name)
     if way is None:
         return
+    topic = f"{robot.tf_namespace}/tf"
+    rate = seen.heard[topic].rate if topic in seen.heard else 0.0
+    often = f" ({topic}: {rate:.1f} messages a second)" if rate else ""
     if way.missing:
         yield Finding(
             "note",
@@ -60,13 +71,43 @@ def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             "slam_toolbox, or a static transform.",
         )
     else:
-        yield Finding("good", robot.name, f"Frames lead from map to {way.frame}.")
+        yield Finding(
+            "good", robot.name, f"Frames lead from map to {way.frame}{often}."
+        )
+    yield from _inner_frames(robot.name, way)
     for oddity in way.oddities[:MOST_ODDITIES]:
         yield Finding(
             "warning",
             robot.name,
             f"A frame is odd: {oddity}.",
             "Look which node tells of it, and whether two do.",
+        )
+
+
+def _inner_frames(name: str, way: Way) -> Iterator[Finding]:
+    if way.base_missing:
+        yield Finding(
+            "note",
+            name,
+            f"The frames do not lead from {way.frame} to {way.base}, which odometry "
+            f"says all the same: {way.base_missing}.",
+            "Let one node send that transform too: the base's driver, or the filter "
+            "that makes the odometry (publish_tf).",
+        )
+    if way.scan_missing:
+        yield Finding(
+            "warning",
+            name,
+            f"Nothing says where the scanner is on the robot: {way.scan_missing}. Its "
+            f"dots are drawn as if it were in the middle, looking ahead.",
+            "Start robot_state_publisher with the robot's URDF, or a "
+            f"static_transform_publisher from {way.base} to {way.scan}.",
+        )
+    elif way.scan and way.base and not way.base_missing:
+        yield Finding(
+            "good",
+            name,
+            f"Frames lead on from {way.frame} to {way.base} and to {way.scan}.",
         )
 
 
@@ -128,69 +169,3 @@ def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Fin
         )
     else:
         yield Finding("good", robot.name, f"Nobody else writes to {velocity.topic}.")
-
-
-def _heard(name: str, guess: Guess, seen: Observed, *, needed: bool) -> Finding:
-    heard = seen.heard[guess.topic]
-    bad = "wrong" if needed else "warning"
-    if not heard.count:
-        return Finding(
-            bad,  # type: ignore[arg-type]
-            name,
-            f"Nothing came on {guess.topic} in {heard.seconds:.0f} s"
-            + (", and without a pose a robot is not driven." if needed else "."),
-            "Start what publishes it; the topic may be there only because somebody "
-            "listens to it.",
-        )
-    if heard.trouble:
-        return Finding(
-            bad,  # type: ignore[arg-type]
-            name,
-            f"{guess.topic} cannot be read: {heard.trouble}.",
-            "Look whether its type is the one that rosapi says.",
-        )
-    said = f"{guess.topic}: {heard.rate:.1f} messages a second"
-    if heard.frame:
-        said += f" in the frame {heard.frame}"
-    age = age_of(heard, seen)
-    if needed and heard.longest_gap > OLD:
-        return Finding(
-            "wrong",
-            name,
-            f"{said}, and none for {heard.longest_gap:.1f} s: driving stops when a "
-            f"pose is older than {OLD:g} s.",
-            "Let it be published at 10 Hz or more.",
-        )
-    if age is not None and age > AGED:
-        return Finding(
-            "warning",
-            name,
-            f"{said}, {age:.1f} s old when they come.",
-            "Look for a slow link, a queue, or a stamp that is not set anew.",
-        )
-    if age is not None and age < -AHEAD:
-        return Finding(
-            "warning",
-            name,
-            f"{said}, stamped {-age:.1f} s ahead of the robot's own clock.",
-            "Let all of the robot's computers take the time from one server.",
-        )
-    if heard.rate < SLOW:
-        return Finding(
-            "warning",
-            name,
-            f"{said}: few, so what is shown jumps.",
-            "Let it be published at 10 Hz or more.",
-        )
-    old = "" if age is None else f", {max(age, 0.0) * 1000:.0f} ms old"
-    return Finding("good", name, f"{said}{old}.")
-
-
-def age_of(heard: Heard, seen: Observed) -> float | None:
-    """Return how old the newest message was when it came, in seconds.
-
-    None if it has no stamp, or nobody told the robot's time.
-    """
-    if heard.stamp is None or seen.clock is None:
-        return None
-    return heard.arrived + seen.clock.ahead - heard.stamp

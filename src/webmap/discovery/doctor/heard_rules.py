@@ -1,0 +1,132 @@
+"""What the readiness check says of what came, or did not come, on a topic."""
+
+from webmap.discovery.doctor.observed import Finding, Heard, Level, Observed
+from webmap.discovery.found import Guess
+
+OLD = 1.0
+"""Seconds after which a pose is too old to drive by."""
+
+SLOW = 5.0
+"""Messages a second below which a pose or a scan jumps."""
+
+AGED = 0.5
+AHEAD = 0.1
+
+
+def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> Finding:
+    """Say how often a pose or a scan comes, and how old it is.
+
+    Args:
+        name: The robot's.
+        guess: The topic.
+        seen: All that was seen.
+        needed: Whether a robot cannot be driven without it.
+
+    """
+    heard = seen.heard[guess.topic]
+    bad: Level = "wrong" if needed else "warning"
+    if not heard.count:
+        return _silent(name, guess, seen, bad, needed=needed)
+    if heard.trouble:
+        return Finding(
+            bad,
+            name,
+            f"{guess.topic} cannot be read: {heard.trouble}.",
+            "Look whether its type is the one that rosapi says.",
+        )
+    said = f"{guess.topic}: {heard.rate:.1f} messages a second"
+    if heard.frame:
+        said += f" in the frame {heard.frame}"
+    age = age_of(heard, seen)
+    if needed and heard.longest_gap > OLD:
+        return Finding(
+            "wrong",
+            name,
+            f"{said}, and none for {heard.longest_gap:.1f} s: driving stops when a "
+            f"pose is older than {OLD:g} s.",
+            "Let it be published at 10 Hz or more.",
+        )
+    if age is not None and age > AGED:
+        return Finding(
+            "warning",
+            name,
+            f"{said}, {age:.1f} s old when they come.",
+            "Look for a slow link, a queue, or a stamp that is not set anew.",
+        )
+    if age is not None and age < -AHEAD:
+        return Finding(
+            "warning",
+            name,
+            f"{said}, stamped {-age:.1f} s ahead of the robot's own clock.",
+            "Let all of the robot's computers take the time from one server.",
+        )
+    if heard.rate < SLOW:
+        return Finding(
+            "warning",
+            name,
+            f"{said}: few, so what is shown jumps.",
+            "Let it be published at 10 Hz or more.",
+        )
+    old = "" if age is None else f", {max(age, 0.0) * 1000:.0f} ms old"
+    return Finding("good", name, f"{said}{old}.")
+
+
+def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
+    """Say what came on a topic that may well be slow, as a battery's is."""
+    heard = seen.heard[guess.topic]
+    if not heard.count:
+        return Finding(
+            "note",
+            name,
+            f"Nothing came on {guess.topic} in {heard.seconds:.0f} s; it may be slow.",
+        )
+    if heard.trouble:
+        return Finding(
+            "warning",
+            name,
+            f"{guess.topic} cannot be read: {heard.trouble}.",
+            "Look whether its type is the one that rosapi says.",
+        )
+    return Finding("good", name, f"{guess.topic}: {heard.rate:.1f} messages a second.")
+
+
+def _silent(
+    name: str, guess: Guess, seen: Observed, bad: Level, *, needed: bool
+) -> Finding:
+    seconds = seen.heard[guess.topic].seconds
+    said = f"Nothing came on {guess.topic} in {seconds:.0f} s"
+    blind = ", and without a pose a robot is not driven" if needed else ""
+    writers = seen.publishers.get(guess.topic)
+    if writers:
+        return Finding(
+            bad,
+            name,
+            f"{said}, though {', '.join(writers)} could publish it{blind}.",
+            "Look whether that node is waiting for something, and in ROS 2 whether its "
+            "quality of service is one that the bridge takes (ros2 topic info -v).",
+        )
+    if writers == ():
+        return Finding(
+            bad,
+            name,
+            f"{said}: nobody publishes it{blind}.",
+            "Start what publishes it; the topic is there only because somebody listens "
+            "to it.",
+        )
+    return Finding(
+        bad,
+        name,
+        f"{said}{blind}.",
+        "Start what publishes it; the topic may be there only because somebody listens "
+        "to it.",
+    )
+
+
+def age_of(heard: Heard, seen: Observed) -> float | None:
+    """Return how old the newest message was when it came, in seconds.
+
+    None if it has no stamp, or nobody told the robot's time.
+    """
+    if heard.stamp is None or seen.clock is None:
+        return None
+    return heard.arrived + seen.clock.ahead - heard.stamp

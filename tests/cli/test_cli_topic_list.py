@@ -1,0 +1,42 @@
+"""``--topics``, for bridges that cannot say which topics there are."""
+
+import subprocess
+import sys
+import tomllib
+
+TOPICS = "/bob/odom [nav_msgs/msg/Odometry]\n/bob/cmd_vel [geometry_msgs/msg/Twist]\n"
+
+
+def webmap(*arguments, told=""):
+    return subprocess.run(
+        [sys.executable, "-m", "webmap", *arguments],
+        input=told,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+
+
+def test_robots_of_a_list_are_found_without_asking_the_bridge():
+    command = ("discover", "ws://127.0.0.1:1", "--topics", "-", "--toml")
+    said = webmap(*command, told=TOPICS)
+    assert said.returncode == 0, said.stderr
+    (robot,) = tomllib.loads(said.stdout)["robots"]
+    assert robot["name"] == "bob"
+    assert "/bob/odom" in said.stdout
+
+
+def test_a_wrong_line_is_said_with_its_number_and_what_was_expected():
+    said = webmap("discover", "ws://127.0.0.1:1", "--topics", "-", told="/odom\n")
+    assert said.returncode == 2
+    assert said.stderr.startswith("Error: <stdin>, line 1: got '/odom'; expected a")
+
+
+def test_a_list_is_of_one_bridge(tmp_path):
+    topics = tmp_path / "topics.txt"
+    topics.write_text(TOPICS)
+    for command in ("discover", "doctor"):
+        said = webmap(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
+        assert said.returncode == 2
+        assert "one bridge, and 2 were given" in said.stderr

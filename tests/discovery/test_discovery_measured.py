@@ -1,0 +1,221 @@
+"""That each thing the readiness check says is measured, on systems with that fault."""
+
+import asyncio
+
+import pytest
+from faulty_site import site
+from websockets.asyncio.server import serve
+
+from webmap.discovery.doctor import judge
+from webmap.discovery.doctor.heard_from import listen
+from webmap.discovery.doctor.measure import observe
+
+SECONDS = 0.4
+DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+
+
+def looked_at(system, look=None, **options):
+    """Observe a system; return it, the findings, and what was seen."""
+
+    async def run():
+        async with system as there:
+            if look is not None:
+                look(there)
+            seen = await observe(there.url, seconds=SECONDS, **options)
+            async with asyncio.timeout(5):
+                while there.server.sessions:
+                    await asyncio.sleep(0.01)
+            return there, judge(seen), seen
+
+    return asyncio.run(run())
+
+
+def said(findings, words):
+    """The level of the only finding that says these words."""
+    (found,) = [each for each in findings if words in each.words]
+    if found.level in ("wrong", "warning"):
+        assert found.advice, "what to do is said"
+    return found.level
+
+
+@DIALECTS
+def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
+    progress = []
+    there, findings, _ = looked_at(site(dialect), progress=progress.append)
+    assert {each.level for each in findings} == {"good", "note"}, findings
+    assert there.graph.advertised == [], "something was published"
+    assert not {"/rosapi/get_param_names", "/rosapi/message_details"} & {
+        *there.called
+    }, "ends or hangs rosapi"
+    assert all(name.startswith("/rosapi/") for name in there.called)
+    assert progress[0].startswith("Asking")
+    assert progress[-1] == f"Listening for {SECONDS:g} s."
+
+
+@pytest.mark.parametrize(
+    ("dialect", "twist"), [("ros1", "Twist"), ("ros2", "TwistStamped")]
+)
+def test_the_type_of_velocity_is_the_one_that_the_base_takes(dialect, twist):
+    _, findings, _ = looked_at(site(dialect, twist=twist))
+    assert said(findings, f"/robot_0/cmd_vel takes {twist}, and") == "good"
+
+
+@DIALECTS
+def test_a_node_that_writes_velocity_too_is_named(dialect):
+    def joystick(there):
+        there.graph.advertise(
+            object(), "/robot_0/cmd_vel", "geometry_msgs/Twist", node="/joy_teleop"
+        )
+
+    _, findings, _ = looked_at(site(dialect), joystick)
+    assert said(findings, "other writers too: /joy_teleop") == "warning"
+
+
+@DIALECTS
+@pytest.mark.parametrize(
+    ("ahead", "words"),
+    [(4.0, "4.0 s ahead of this"), (-7.0, "7.0 s behind this")],
+)
+def test_clocks_that_differ_are_told_and_ages_are_right_all_the_same(
+    dialect, ahead, words
+):
+    _, findings, seen = looked_at(site(dialect, ahead=ahead))
+    assert said(findings, words) == "warning"
+    assert said(findings, "/robot_0/odom:") == "good"
+    assert seen.clock.ahead == pytest.approx(ahead, abs=0.2)
+
+
+@DIALECTS
+def test_stamps_that_stand_still_are_old(dialect):
+    first = []
+
+    def stuck(name, message):
+        if name == "/robot_0/odom":
+            first.append(message["header"]["stamp"])
+            old = dict(first[0])
+            key = "sec" if "sec" in old else "secs"
+            old[key] -= 5
+            message = {**message, "header": {**message["header"], "stamp": old}}
+        return message
+
+    _, findings, _ = looked_at(site(dialect, change=stuck))
+    assert said(findings, "s old when they come") == "warning"
+
+
+@DIALECTS
+def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
+    def mute(name, message):
+        return None if name in ("/robot_0/odom", "/robot_0/base_scan") else message
+
+    _, findings, _ = looked_at(site(dialect, change=mute))
+    assert said(findings, "Nothing came on /robot_0/odom") == "wrong"
+    assert said(findings, "Nothing came on /robot_0/base_scan") == "warning"
+    for topic in ("odom", "base_scan"):
+        words = f"Nothing came on /robot_0/{topic} in 0 s, though /robots could publish"
+        assert any(words in each.words for each in findings)
+
+
+def without(*children):
+    """Lose the transforms of some frames."""
+
+    def change(name, message):
+        if name not in ("/tf", "/tf_static"):
+            return message
+        kept = [
+            each
+            for each in message["transforms"]
+            if each["child_frame_id"].rpartition("/")[2] not in children
+        ]
+        return {"transforms": kept}
+
+    return change
+
+
+@DIALECTS
+@pytest.mark.parametrize(
+    ("lost", "level", "words"),
+    [
+        ("odom", "note", "drawn in the frame robot_0/odom, where odometry has it"),
+        ("base_link", "note", "do not lead from robot_0/odom to robot_0/base_link"),
+        ("base_laser", "warning", "Nothing says where the scanner is on the robot"),
+    ],
+)
+def test_each_frame_that_is_missing_is_told(dialect, lost, level, words):
+    _, findings, _ = looked_at(site(dialect, change=without(lost)))
+    assert said(findings, words) == level
+
+
+@DIALECTS
+def test_frames_that_are_complete_are_good(dialect):
+    _, findings, _ = looked_at(site(dialect))
+    assert said(findings, "Frames lead from map to robot_0/odom (/tf:") == "good"
+    assert said(findings, "Frames lead on from robot_0/odom to robot_0/base_link") == (
+        "good"
+    )
+
+
+@pytest.mark.parametrize(
+    ("quirks", "level", "words"),
+    [
+        ("polite", "good", "blocks no socket (tried)"),
+        ("polite,blocking_services", "warning", "blocks its whole socket (tried)"),
+    ],
+)
+@DIALECTS
+def test_what_a_call_that_hangs_holds_up_is_tried(dialect, quirks, level, words):
+    there, findings, _ = looked_at(site(dialect, quirks=quirks), try_call=True)
+    assert said(findings, words) == level
+    assert not any("webmap_doctor" in name for name in there.graph.services)
+
+
+def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
+    def deaf(there):
+        there.graph.serve = lambda *arguments, **named: None
+
+    _, findings, seen = looked_at(site("ros2"), deaf, try_call=True)
+    assert seen.calls_in_threads is None
+    assert said(findings, "it was not tried") == "note"
+
+
+TOPICS = {
+    "/robot_0/odom": "nav_msgs/Odometry",
+    "/robot_0/cmd_vel": "geometry_msgs/Twist",
+}
+
+
+@DIALECTS
+def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
+    _, findings, seen = looked_at(site(dialect, rosapi=False), topics=TOPICS)
+    assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
+    assert said(findings, "rosapi does not say") == "note"
+    assert said(findings, "The topics are those of the list that was given") == "good"
+    assert said(findings, "/robot_0/odom:") == "good"
+    assert said(findings, "cannot be told: rosapi did not say") == "note"
+
+
+def test_without_rosapi_and_without_a_list_the_list_is_asked_for():
+    _, findings, _ = looked_at(site(rosapi=False))
+    (found,) = [each for each in findings if "rosapi does not say" in each.words]
+    assert found.level == "warning"
+    assert "--topics FILE" in found.advice
+
+
+def test_topics_that_nobody_needs_tell_that_nothing_is_hidden():
+    def log_topic(there):
+        there.graph.advertise(object(), "/rosout", "rosgraph_msgs/Log", node="/rosout")
+
+    _, _, seen = looked_at(site(), log_topic)
+    assert seen.shown == ("/rosout",)
+
+
+@pytest.mark.parametrize(("compression", "offered"), [("deflate", True), (None, False)])
+def test_whether_the_socket_could_be_compressed_is_seen(compression, offered):
+    async def run():
+        async with serve(
+            lambda link: link.wait_closed(), "127.0.0.1", 0, compression=compression
+        ) as server:
+            port = server.sockets[0].getsockname()[1]
+            _, deflate, _ = await listen(f"ws://127.0.0.1:{port}", {}, 0.0)
+            return deflate
+
+    assert asyncio.run(run()) is offered
