@@ -156,7 +156,7 @@ class TestLoopAge:
             late.append(bench.tick)
             bench.drive(x=x, tick=late[-5] if len(late) > 4 else late[0])
 
-        bench.run(0.5, lambda: each(0.0))
+        bench.run(0.8, lambda: each(0.0))
         bench.run(0.5, lambda: each(1.0))
         report = bench.report()
         assert 200 <= report.age <= 250

@@ -2,10 +2,14 @@
 
 Read it in this order: ``messages`` (what crosses the pipe), ``commands`` and
 ``reports`` (what crosses the socket to a page), then the decisions, none of which
-does I/O: ``ticks``, ``lease``, ``limits``, ``loopage``, ``deadman``, ``health``,
-``arming``, ``goals``, ``latch``, ``confirm``, ``standing`` (a STOP that stands),
-``handover``, ``stoptest``, ``obedience``, ``base`` (one machine) and ``gate`` (all of
-them). Around them, the shell: ``sockets``, ``lanes`` and ``links`` towards the robots,
-``disk`` and ``records`` for what outlives it, ``process`` towards the display, and
-``client``, which is the display's end of the pipe.
+does I/O. What one rule needs: ``ticks``, ``lease``, ``limits``, ``loopage``,
+``deadman``, ``health``, ``sight``, ``arming``, ``goals``, ``latch``, ``confirm``,
+``handover``, ``stoptest``, ``obedience``, ``unproven``. What one machine does with
+them: ``speeds``, ``motion``, ``stoptesting``, ``hands`` (who has it), ``driving`` (what
+commands come to), ``standing`` (a STOP that stands) and ``base``, which is all of that.
+What comes in: ``orders`` of pages, ``programorders``, ``fleet`` (all machines) and
+``gate``. Around them, the shell: ``sockets``, ``lanes`` and ``links`` towards the
+robots, ``disk`` and ``records`` for what outlives it, ``process`` towards the display.
+The display's end of the pipe is ``client``, with ``supervisor``, ``restarts``,
+``unheard``, ``pages`` and ``program``.
 """

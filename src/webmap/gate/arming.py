@@ -4,10 +4,8 @@ from webmap.gate.events import Key, LockState
 from webmap.gate.health import Health, Pulse
 from webmap.gate.latch import Latch
 from webmap.gate.robots import Robots
-from webmap.gate.sight import Sight
-
-BLIND_LIMIT = 1.0
-"""The oldest odometry with which a machine is driven, in seconds (S16)."""
+from webmap.gate.sight import BLIND_LIMIT, Sight
+from webmap.gate.video import Video
 
 
 class Arming:
@@ -34,12 +32,18 @@ class Arming:
     ) -> None:
         self.lock = LockState(key, held=False)
         """Whether this gate alone on this computer has it."""
+        self.video = Video()
         self._url = key.url
         self._robots = robots
         self._latch = latch
         self._control = control
         self._pulse = pulse
         self._sight = sight
+
+    @property
+    def stopped(self) -> bool:
+        """Whether STOP stands."""
+        return self._latch.on
 
     def obstacle(self, now: float) -> str | None:
         """Return why nobody can have the machine, in words."""
@@ -64,10 +68,9 @@ class Arming:
             return "it has no velocity topic"
         if not self._control.fresh(now):
             return f"{self._url} does not answer"
-        if not self._robots.has_odometry:
-            return None
-        if self._sight.seen_at is None:
-            return "no odometry yet"
-        if now - self._sight.seen_at > BLIND_LIMIT:
-            return f"no odometry for {BLIND_LIMIT:g} s"
-        return None
+        if self._robots.has_odometry:
+            if self._sight.seen_at is None:
+                return "no odometry yet"
+            if now - self._sight.seen_at > BLIND_LIMIT:
+                return f"no odometry for {BLIND_LIMIT:g} s"
+        return self.video.doubt(now)

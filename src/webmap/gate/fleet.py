@@ -186,7 +186,7 @@ class Fleet:
         for base in self:
             if base.control is link:
                 base.link_up(now)
-            base.tasks_up(link)
+            base.standing.tasks_up(link)
 
     def _link_down(self, event: events.LinkDown, now: float) -> None:
         link = self._link(event.url, event.lane)
@@ -251,7 +251,7 @@ class Fleet:
     def _echoed(self, event: events.Echoed, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.saw_echo(event.twist)
+            base.sight.saw_echo(event.twist)
 
     def _measured(self, event: events.Measured, now: float) -> None:
         base = self._of_key(event.key)
@@ -271,14 +271,14 @@ class Fleet:
     def _latch_kept(self, event: events.LatchKept, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.latch_kept(event)
+            base.latch.kept(event)
         else:  # the robot was forgotten meanwhile; its STOP was not
             self._latches[event.key].kept(event)
 
     def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.stop_tested(event.record)
+            base.speeds.tested = event.record
 
     def _of_key(self, key: events.Key) -> Base | None:
         """Return a machine, which may change by that; it may be gone meanwhile."""

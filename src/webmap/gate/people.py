@@ -1,6 +1,7 @@
 """Everybody who may say something: the pages' connections and the program. No I/O."""
 
 import logging
+from collections.abc import Callable
 
 from webmap.gate.actions import Emit, Say
 from webmap.gate.connection import Connection
@@ -11,6 +12,7 @@ from webmap.gate.messages import (
     Hello,
     Refused,
 )
+from webmap.gate.refusal import Refusal
 
 log = logging.getLogger("webmap.gate")
 
@@ -72,6 +74,20 @@ class People:
         connection.note_refused(what, why)
         if connection.news(robot, what, why, now):
             self._emit(Say(Refused(id, robot, what, why)))
+
+    def attempt(
+        self,
+        id: str,
+        robot: str | None,
+        what: str,
+        act: Callable[[], object],
+        now: float,
+    ) -> None:
+        """Do what somebody commands; they are told if it is refused."""
+        try:
+            act()
+        except Refusal as refusal:
+            self.refuse(id, robot, what, refusal.why, now)
 
     def close(self, connection: Connection, why: str) -> None:
         """Ask the display to close the page's socket."""

@@ -29,9 +29,9 @@ _REST = (0.0, 0.0, 0.0)
 
 def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     """Return how it stands with one robot at ``now``."""
-    lease, speed = base.lease, base.speed
-    age, test = base.ages.p95, base.test
-    unarmable = base.unarmable(now)
+    lease, speed = base.hands.lease, base.speeds.speed
+    age, test = base.speeds.ages.p95, base.tests.last
+    unarmable = base.hands.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
     goals = base.robots.goals[spec.id]
     link = base.control if spec.twist_topic else goals.link
@@ -44,8 +44,8 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         holder=holder,
         epoch=None if lease is None else lease.epoch,
         asker=_asker(base, now),
-        changing=base.handover.heir is not None,
-        armed=lease is not None and base.deadman.armed,
+        changing=base.hands.handover.heir is not None,
+        armed=lease is not None and base.hands.deadman.armed,
         v=speed.v,
         w=speed.w,
         why=speed.why + base.guard.why,
@@ -55,14 +55,14 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         measured=_velocity(base.sight.measured),
         alarm=base.obedience.alarm(now),
         age=None if age is None else round(age * 1000, 0),
-        reaction=round(reaction(age, base.stop_time), 3),
+        reaction=round(reaction(age, base.speeds.stop_time), 3),
         brake=base.robots.a_max or BRAKE,
-        stop_time=base.stop_time,
+        stop_time=base.speeds.stop_time,
         stop_source=_stop_source(base),
-        stop_date=None if base.tested is None else base.tested.date,
+        stop_date=None if base.speeds.tested is None else base.speeds.tested.date,
         test=None if test is None else TestReport(test.state, test.text),
         armable=unarmable is None,
-        reason=unarmable if lease is None else base.doubt(now),
+        reason=unarmable if lease is None else base.arming.doubt(now),
         way=goals.way,
         cancels=goals.can_cancel,
         locates=spec.pose_topic is not None,
@@ -71,16 +71,16 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
 
 
 def _stop_source(base: Base) -> Literal["stated", "tested"] | None:
-    if base.tested is not None:
+    if base.speeds.tested is not None:
         return "tested"
-    return None if base.stop_time is None else "stated"
+    return None if base.speeds.stop_time is None else "stated"
 
 
 def _asker(base: Base, now: float) -> AskerReport | None:
-    asker = base.handover.asker
+    asker = base.hands.handover.asker
     if asker is None:
         return None
-    return AskerReport(asker.id, asker.name, round(base.handover.left(now), 1))
+    return AskerReport(asker.id, asker.name, round(base.hands.handover.left(now), 1))
 
 
 def _stop(base: Base) -> StopReport | None:

@@ -4,6 +4,9 @@ from webmap.gate.actions import Emit, Watch
 from webmap.gate.events import Key
 from webmap.geometry import Twist
 
+BLIND_LIMIT = 1.0
+"""The oldest odometry or picture with which a machine is driven, in seconds (S16)."""
+
 
 class Sight:
     """The newest echo and the newest odometry of one machine.
@@ -34,3 +37,8 @@ class Sight:
     def saw(self, measured: Twist | None, now: float) -> None:
         """Note that odometry came."""
         self.measured, self.seen_at = measured, now
+
+    def saw_echo(self, twist: Twist) -> None:
+        """Note what the robot's ROS says on the velocity topic."""
+        if self.on:
+            self.echoed = twist

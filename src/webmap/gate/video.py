@@ -1,6 +1,6 @@
 """How old the picture is that a driver goes by (S16). No I/O."""
 
-from webmap.gate.arming import BLIND_LIMIT
+from webmap.gate.sight import BLIND_LIMIT
 
 
 class Video:

@@ -1,0 +1,45 @@
+"""How fast one machine may go now, by everything that is known of it. No I/O."""
+
+from webmap.gate.events import StopRecord
+from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
+from webmap.gate.loopage import LoopAge, governed
+from webmap.gate.motion import Bounds
+from webmap.gate.robots import Robots
+
+
+class Speeds:
+    """The speeds in force for one machine.
+
+    Args:
+        robots: The robots that it is.
+
+    """
+
+    def __init__(self, robots: Robots) -> None:
+        self.ages = LoopAge()
+        """How old its driver's picture of it is."""
+        self.tested: StopRecord | None = None
+        """What the last stop test that came to an end found, whenever that was."""
+        self.page_cap: Cap | None = None
+        """What the page of its driver asks for at most."""
+        self._robots = robots
+
+    @property
+    def speed(self) -> Speed:
+        """The speeds in force now."""
+        specs = self._robots.specs.values()
+        caps = [cap for spec in specs for cap in caps_of(spec, self.tested)]
+        if self.page_cap is not None:
+            caps.append(self.page_cap)
+        return governed(speed_in_force(caps), self.ages.slow, self.stop_time)
+
+    @property
+    def stop_time(self) -> float | None:
+        """Seconds within which the machine stops by itself, if that is known."""
+        if self.tested is not None:
+            return self.tested.seconds
+        return self._robots.stops_within
+
+    def bounds(self) -> Bounds:
+        """Return what the machine may do at most now."""
+        return Bounds(self.speed, self._robots.a_max, self._robots.holonomic)
