@@ -25,7 +25,8 @@ def test_the_table_names_each_topic_with_its_rule():
     assert line.split() == [
         "velocity", "/cmd_vel", "geometry_msgs/Twist", "the", "usual", "name",
     ]  # fmt: skip
-    assert "not found: pose, battery, map, costmap, camera, cloud, tf" in text
+    missing = "pose, battery, action, initialpose, map, costmap, camera, cloud, tf"
+    assert f"not found: {missing}" in text
     assert "--robot NAME:ODOM:CMD_VEL:SCAN" in text
 
 

@@ -66,7 +66,8 @@ def demo(
                 battery=f"/robot_{index}/battery_state",
                 cameras=(f"/robot_{index}/camera/image_raw/compressed",),
                 goal=f"/robot_{index}/move_base_simple/goal",
-                cancel=f"/robot_{index}/move_base/cancel",
+                action=(f"/robot_{index}/move_base", "move_base_msgs/MoveBaseAction"),
+                initial_pose=f"/robot_{index}/initialpose",
                 stops_within=0.25,
             )
             for index in range(robots)

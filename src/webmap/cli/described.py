@@ -34,6 +34,8 @@ def describe(
         cameras=tuple(guess.topic for guess in cameras[:MOST_CAMERAS]),
         goal=robot.topic("goal"),
         cancel=robot.topic("cancel"),
+        action=robot.action,
+        initial_pose=robot.topic("initialpose"),
         stops_within=stops_within,
     )
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
+from webmap.console.fleet import set_goals
 from webmap.discovery import FoundRobot
 from webmap.discovery.found import Role
 from webmap.scope import no_scope
@@ -39,13 +40,20 @@ def grow(
         )
         robot.svg.insert(1, scanner.svg)  # after the title, under the body
 
+    def use_goals() -> None:
+        set_goals(
+            robot, bridge, found.topic("goal"), found.topic("cancel"), found.action
+        )
+
     uses: dict[Role, Callable[[], object]] = {
         "odometry": lambda: robot.set_odometry_topic(bridge, found.topic("odometry")),
         "velocity": lambda: robot.set_twist_topic(
             bridge, found.topic("velocity"), stops_within=stops_within
         ),
-        "goal": lambda: robot.set_move_topic(
-            bridge, found.topic("goal"), cancel_topic=found.topic("cancel") or None
+        "goal": use_goals,
+        "action": use_goals,
+        "initialpose": lambda: robot.set_initial_pose_topic(
+            bridge, found.topic("initialpose")
         ),
         "scan": use_scan,
         "battery": lambda: robot.add_module("Battery", bridge, found.topic("battery")),

@@ -30,6 +30,12 @@ class RobotDescription:
     """A topic of ``geometry_msgs/PoseStamped`` that sends it somewhere."""
     cancel: str = ""
     """A topic of ``actionlib_msgs/GoalID`` that calls goals off."""
+    action: tuple[str, str] | None = None
+    """The action that sends it somewhere and says how that goes: its name and its
+    type, ``nav2_msgs/action/NavigateToPose`` or ``move_base_msgs/MoveBaseAction``."""
+    initial_pose: str = ""
+    """A topic of ``geometry_msgs/PoseWithCovarianceStamped`` that tells it where it
+    is."""
     goal_frame: str = "map"
     stops_within: float | None = None
     """Seconds within which the base stops by itself when velocity ceases, if known."""
@@ -79,6 +85,25 @@ def parse_robot(
     )
 
 
+def set_goals(
+    robot: "Robot",
+    bridge: "Bridge",
+    goal: str,
+    cancel: str,
+    action: tuple[str, str] | None,
+    *,
+    frame: str = "map",
+) -> None:
+    """Say where a robot's goals go, if they go anywhere."""
+    if goal or action:
+        chosen = (
+            {} if action is None else {"action": action[0], "action_type": action[1]}
+        )
+        robot.set_move_topic(
+            bridge, goal, frame=frame, cancel_topic=cancel or None, **chosen
+        )
+
+
 def make_robot(about: RobotDescription) -> "Robot":
     """Return the robot of a description, with what the console shows of it."""
     bridge = about.bridge
@@ -87,13 +112,11 @@ def make_robot(about: RobotDescription) -> "Robot":
         robot.set_odometry_topic(bridge, about.odometry)
     if about.twist:
         robot.set_twist_topic(bridge, about.twist, stops_within=about.stops_within)
-    if about.goal:
-        robot.set_move_topic(
-            bridge,
-            about.goal,
-            frame=about.goal_frame,
-            cancel_topic=about.cancel or None,
-        )
+    set_goals(
+        robot, bridge, about.goal, about.cancel, about.action, frame=about.goal_frame
+    )
+    if about.initial_pose:
+        robot.set_initial_pose_topic(bridge, about.initial_pose)
     if about.scan:
         scanner = robot.add_module(
             "LaserScanner", bridge, about.scan, max_dots=None, throttle=100

@@ -46,7 +46,7 @@ def robot_table(robot: FoundRobot) -> list[str]:
     widths = [max((len(row[column]) for row in rows), default=0) for column in (1, 2)]
     lines = [f"{robot.name} ({where})"]
     lines += [
-        f"  {role:<9} {topic:<{widths[0]}}  {type:<{widths[1]}}  {rule}"
+        f"  {role:<11} {topic:<{widths[0]}}  {type:<{widths[1]}}  {rule}"
         for role, topic, type, rule in rows
     ]
     missing = [role for role in ROLES if role not in robot.guesses]

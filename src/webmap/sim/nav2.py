@@ -45,6 +45,12 @@ class NavigateToPose:
             self._on_cancel,
             node="/robots",
         )
+        self.node.graph.advertise(
+            self.node,
+            f"{self.action}/_action/feedback",
+            f"{self.type}_FeedbackMessage",
+            node="/robots",
+        )
         self.node.on_step.append(self._publish_feedback)
 
     def send_goal(
@@ -91,15 +97,16 @@ class NavigateToPose:
             time = self.node.graph.schema.dialect.time
             now = self.node.graph.clock()
             pose = world.robots[self.index].pose
-            handle.on_feedback(
-                {
-                    "current_pose": self.node.messages.pose_stamped(now, pose),
-                    "navigation_time": time(world.now - handle.started_at),
-                    "estimated_time_remaining": time(left / 0.6),
-                    "number_of_recoveries": 0,
-                    "distance_remaining": left,
-                }
-            )
+            feedback = {
+                "current_pose": self.node.messages.pose_stamped(now, pose),
+                "navigation_time": time(world.now - handle.started_at),
+                "estimated_time_remaining": time(left / 0.6),
+                "number_of_recoveries": navigator.recoveries,
+                "distance_remaining": left,
+            }
+            handle.on_feedback(feedback)
+            message = {"goal_id": {"uuid": handle.uuid}, "feedback": feedback}
+            self.node.publish(f"{self.action}/_action/feedback", message)
 
 
 class _Handle:

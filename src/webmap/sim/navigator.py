@@ -66,6 +66,8 @@ class Navigator:
         """What it follows, in the map's frame; empty without a path."""
         self.path_changes = 0
         """Grows with every new path, and when one ends."""
+        self.recoveries = 0
+        """How often it got stuck on the way to its goal and looked for another way."""
         self._search: Iterator[list[Point] | None] | None = None
         self._plans = 0
         self._next = 0
@@ -78,6 +80,7 @@ class Navigator:
         """Drive to a goal, instead of what it drove to before."""
         self.cancel("another goal came")
         self.goal = goal
+        self.recoveries = 0
         self._plans = 0
         self._search = None
         self._stuck_for = 0.0
@@ -162,6 +165,7 @@ class Navigator:
         if self._stuck_for > self._patience:
             # Two that meet must not step aside, and aside again, like mirrors.
             self._patience = self._random.uniform(*_PATIENCE)
+            self.recoveries += 1
             self._set_path([])
 
     def _follow(self, discs: Discs) -> None:

@@ -93,6 +93,19 @@ def above_zero(unit: str) -> Check:
     return check
 
 
+def covariance(value: Any) -> list[float]:
+    """Take the variances of x, y and yaw."""
+    numbers = value if isinstance(value, list) and len(value) == 3 else [None]
+    for number in numbers:
+        plain = isinstance(number, int | float) and not isinstance(number, bool)
+        if not plain or not 0 <= number <= LARGEST:
+            raise ConfigError(
+                "three numbers from 0 on: the variances of x and y in m², of yaw in "
+                "rad², such as [0.25, 0.25, 0.068]"
+            )
+    return [float(number) for number in numbers]
+
+
 def milliseconds(value: Any) -> int:
     """Take a whole number of milliseconds."""
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:

@@ -166,6 +166,10 @@ MESSAGES = {
         " duration estimated_time_remaining; int16 number_of_recoveries;"
         " float32 distance_remaining"
     ),
+    "nav2_msgs/NavigateToPose_FeedbackMessage": (
+        "unique_identifier_msgs/UUID goal_id;"
+        " nav2_msgs/NavigateToPose_Feedback feedback"
+    ),
     "rosapi/TypeDef": (
         "string type; string[] fieldnames; string[] fieldtypes;"
         " int32[] fieldarraylen; string[] examples; string[] constnames;"

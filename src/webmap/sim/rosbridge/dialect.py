@@ -27,6 +27,8 @@ class Dialect:
         if not self.is_ros2:
             return canonical
         package, _, name = canonical.partition("/")
+        if name.endswith("_FeedbackMessage"):
+            kind = "action"
         return f"{_SERVICE_PACKAGES.get(package, package)}/{kind}/{name}"
 
     def time(self, seconds: float) -> dict[str, int]:
