@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import webmap
+from webmap.cli.fleet.cameras import add_cameras
 from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.schema import Fleet, ModuleLine, RobotLine
 from webmap.console import RobotDescription
@@ -61,6 +62,7 @@ def _robot(
             robot.add_module("Buttons", bridge, line.buttons)
         except WebMapError as error:
             mistakes.add((*line.path, "buttons"), str(error))
+    add_cameras(robot, bridge, line.cameras)
     for module in line.modules:
         _add_module(robot, module, bridges, mistakes)
     return robot

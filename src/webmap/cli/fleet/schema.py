@@ -5,6 +5,7 @@ from typing import Any
 
 from webmap.cli.fleet import checks
 from webmap.cli.fleet.buttons import read_buttons
+from webmap.cli.fleet.cameras import CameraLine, read_cameras
 from webmap.cli.fleet.checks import Check, Mistakes
 from webmap.cli.fleet.lines import Path
 from webmap.discovery.naming import same_name
@@ -54,6 +55,7 @@ ROBOT = (
     "move",
     "scan",
     "battery",
+    "cameras",
     "buttons",
     "modules",
 )
@@ -84,6 +86,7 @@ class RobotLine:
     move: dict[str, Any] | None = None
     scans: list[str] = field(default_factory=list)
     battery: str = ""
+    cameras: list[CameraLine] = field(default_factory=list)
     buttons: list[dict[str, Any]] = field(default_factory=list)
     modules: list[ModuleLine] = field(default_factory=list)
 
@@ -194,6 +197,9 @@ def _robot(
         robot.battery = checks.one(checks.topic, value["battery"], where, mistakes)
     if "scan" in value:
         robot.scans = _scans(value["scan"], (*path, "scan"), mistakes)
+    if "cameras" in value:
+        where = (*path, "cameras")
+        robot.cameras = read_cameras(value["cameras"], where, mistakes)
     if "buttons" in value:
         robot.buttons = read_buttons(value["buttons"], (*path, "buttons"), mistakes)
     robot.modules = _modules(
