@@ -1,0 +1,208 @@
+"""STOP and cancel get through a rosbridge that does nothing else while something hangs.
+
+A rosbridge of ROS 2 runs an action goal, and a service call, on the thread that reads
+its socket: what comes behind on the same socket waits until that has ended.
+"""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack
+
+import pytest
+from safety_bench import wait_for
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from webmap.gate.client import GateClient
+from webmap.gate.messages import RobotSpec
+from webmap.testing import Sentinel, WitnessRobot
+
+pytestmark = [pytest.mark.safety, pytest.mark.serial]
+
+FAR = (0.0, 0.0, 0.0)
+"""A goal that the simulated robot drives to for half a minute."""
+
+STILL = 0.02
+"""Metres per second below which a robot stands."""
+
+BRAKING = 2.0
+"""Seconds in which a simulated robot that is told to stop stands."""
+
+
+class Simulator:
+    """A simulator's process, of ROS 2, and what its only robot's odometry says."""
+
+    def __enter__(self):
+        options = ["--robots", "1", "--dialect", "ros2", "--until-eof"]
+        quirks = ["--quirks", "real,blocking_goals,blocking_services,hanging_stop"]
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "webmap.sim", *options, *quirks],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        self.url = self._process.stdout.readline().split()[-1]
+        self._open = ExitStack()
+        link = connect(self.url, max_size=None, proxy=None)
+        self._socket = self._open.enter_context(link)
+        subscribe = {"op": "subscribe", "topic": "/robot_0/odom"}
+        self._socket.send(json.dumps(subscribe))
+        self.speeds = []
+        """When each message came, and the speed in it."""
+        self._thread = threading.Thread(target=self._read)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception):
+        self._open.close()
+        self._thread.join(10)
+        self._process.stdin.close()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+    @property
+    def moves(self):
+        return bool(self.speeds) and self.speeds[-1][1] > 0.2
+
+    @property
+    def stands(self):
+        return bool(self.speeds) and self.speeds[-1][1] < STILL
+
+    def stays(self, seconds):
+        """Return whether the robot stood for the time from now on."""
+        begun = time.monotonic()
+        wait_for(lambda: self.speeds[-1][0] > begun + seconds, "odometry")
+        return all(speed < STILL for at, speed in self.speeds if at > begun)
+
+    def _read(self):
+        try:
+            for frame in self._socket:
+                twist = json.loads(frame)["msg"]["twist"]["twist"]
+                self.speeds.append((time.monotonic(), abs(twist["linear"]["x"])))
+        except ConnectionClosed:
+            pass
+
+
+class Page:
+    """A gate with one robot, a program that has it, and a page that looks on."""
+
+    def __init__(self, **robot):
+        self.reports, self.refused = [], []
+        self.client = GateClient()
+        self.client.declare(RobotSpec(id="r1", name="Bob", **robot))
+
+    def __enter__(self):
+        self.client.start()
+        self._socket = self.client.connect("Ann", "operator", self._hear, print)
+        wait_for(lambda: self.reports, "a report")
+        wait_for(lambda: self.reports[-1]["armable"], "a robot to take")
+        return self
+
+    def __exit__(self, *exception):
+        self.client.stop()
+
+    def send_away(self, x, y, yaw):
+        self.client.take("r1").result(10)
+        self.client.move("r1", x, y, yaw)
+
+    def say(self, op):
+        self._socket.receive(json.dumps({"op": op, "robot": "r1"}))
+
+    def reset(self):
+        wait_for(lambda: self.reports[-1]["latched"], "STOP on the disk")
+        self.say("reset")
+        wait_for(lambda: not self.reports[-1]["latched"], "the reset")
+
+    def _hear(self, text):
+        message = json.loads(text)
+        if message["op"] == "robot":
+            self.reports.append(message)
+        elif message["op"] == "refused":
+            self.refused.append(message)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def simulated(folder):
+    with (
+        Simulator() as robot,
+        Page(
+            bridge_url=robot.url,
+            twist_topic="/robot_0/cmd_vel",
+            odometry_topic="/robot_0/odom",
+            odometry_type="nav_msgs/msg/Odometry",
+            action="/robot_0/navigate_to_pose",
+            stop_hooks=({"service": "/robot_0/stop"},),
+        ) as page,
+    ):
+        page.send_away(*FAR)
+        wait_for(lambda: robot.moves, "the robot on its way")
+        yield robot, page
+
+
+def test_a_stop_ends_a_goal_that_blocks_its_socket_while_a_stop_hook_hangs(simulated):
+    robot, page = simulated
+    page.say("stop")
+    wait_for(lambda: robot.stands, "standing still", BRAKING)
+    page.reset()
+    # Nobody says zero any more: if the goal were not called off, it would go on.
+    assert robot.stays(2.0), "the goal goes on after the reset"
+
+
+def test_a_cancel_ends_a_goal_that_blocks_its_socket(simulated):
+    robot, page = simulated
+    page.say("cancel")
+    wait_for(lambda: robot.stands, "standing still", BRAKING)
+    assert robot.stays(1.0)
+
+
+def test_a_cancel_gets_through_behind_a_stop_hook_that_hangs(simulated):
+    robot, page = simulated
+    page.say("stop")
+    page.reset()
+    wait_for(lambda: robot.stands, "standing still", BRAKING)
+    page.send_away(*FAR)
+    wait_for(lambda: robot.moves, "the robot on its way again")
+    page.say("cancel")
+    wait_for(lambda: robot.stands, "standing still", BRAKING)
+    assert robot.stays(1.0)
+
+
+def test_zero_is_not_held_up_by_a_goal_and_a_call_that_hang(folder):
+    with (
+        Sentinel() as sentinel,
+        WitnessRobot(goals_block=True) as robot,
+        Page(
+            bridge_url=robot.url,
+            twist_topic="/cmd_vel",
+            odometry_topic="/odom",
+            odometry_type="nav_msgs/Odometry",
+            action="/navigate_to_pose",
+            stop_hooks=({"service": "/e_stop"},),
+        ) as page,
+    ):
+        page.send_away(1.0, 2.0, 0.0)
+        wait_for(lambda: robot.log.of("send_action_goal"), "the goal")
+        robot.answers_services(False)
+        stopped = time.monotonic()
+        page.say("stop")
+        wait_for(lambda: robot.log.first_zero(stopped), "a zero")
+        late = robot.log.first_zero(stopped) - stopped
+        assert late < 0.1 + sentinel.stolen(stopped)
+
+        def calls():
+            return {heard.message["service"] for heard in robot.log.of("call_service")}
+
+        wanted = {"/navigate_to_pose/_action/cancel_goal", "/e_stop"}
+        wait_for(lambda: wanted <= calls(), "the cancel and the hook")
+        (goal,) = robot.log.of("send_action_goal")
+        links = {heard.link for heard in robot.log.of("call_service")}
+        assert goal.link not in links, "behind the goal a call would wait for its end"
