@@ -50,6 +50,10 @@ def _robot(
         "tf": (line.tf, robot.set_tf),
         "twist": (line.twist, robot.set_twist_topic),
         "move": (line.move, robot.set_move_topic),
+        "scan_assist": (
+            line.scan_assist,
+            lambda bridge, **options: robot.set_scan_assist(**options),
+        ),
     }
     for key, (options, setter) in setters.items():
         if options is not None:

@@ -8,6 +8,7 @@ from webmap.cli.fleet.buttons import read_buttons
 from webmap.cli.fleet.cameras import CameraLine, read_cameras
 from webmap.cli.fleet.checks import Check, Mistakes
 from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.stopping import read_assist, read_hooks
 from webmap.discovery.naming import same_name
 from webmap.errors import ConfigError
 from webmap.ros.names import normalise_url
@@ -32,6 +33,7 @@ TWIST: dict[str, Check] = {
     "w_max": checks.above_zero("radians per second"),
     "a_max": checks.above_zero("metres per second squared"),
     "holonomic": checks.yes_or_no,
+    "stop_hooks": lambda value: value,  # read with the way to each of them
 }
 TF: dict[str, Check] = {
     "map_frame": checks.text,
@@ -54,6 +56,7 @@ ROBOT = (
     "twist",
     "move",
     "scan",
+    "scan_assist",
     "battery",
     "cameras",
     "buttons",
@@ -85,6 +88,7 @@ class RobotLine:
     twist: dict[str, Any] | None = None
     move: dict[str, Any] | None = None
     scans: list[str] = field(default_factory=list)
+    scan_assist: dict[str, Any] | None = None
     battery: str = ""
     cameras: list[CameraLine] = field(default_factory=list)
     buttons: list[dict[str, Any]] = field(default_factory=list)
@@ -190,6 +194,14 @@ def _robot(
     for key, fields in known.items():
         if key in value:
             setattr(robot, key, _topic(value[key], fields, (*path, key), mistakes))
+    if robot.twist is not None and "stop_hooks" in robot.twist:
+        where = (*path, "twist", "stop_hooks")
+        hooks = read_hooks(robot.twist["stop_hooks"], where, mistakes)
+        robot.twist["stop_hooks"] = hooks
+    if "scan_assist" in value:
+        where = (*path, "scan_assist")
+        driven = "twist" in value
+        robot.scan_assist = read_assist(value["scan_assist"], where, driven, mistakes)
     if "tf" in value:
         robot.tf = _frames(value["tf"], (*path, "tf"), mistakes)
     if "battery" in value:
