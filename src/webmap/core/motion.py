@@ -14,7 +14,7 @@ from webmap.gate.assist import AssistSpec
 from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import RobotSpec
 from webmap.gate.specs import checked_assist
-from webmap.geometry import Twist
+from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import same_type
@@ -63,6 +63,7 @@ class MotionRoad:
         self._pose: InitialPoseTopic | None = None
         self._odometry: tuple[Bridge, str, str] | None = None
         self._assist: AssistSpec | None = None
+        self._own_map = Pose()
         self._opening: Removable | None = None
         roads.add(self)
 
@@ -146,6 +147,12 @@ class MotionRoad:
         self._assist = assist and checked_assist(self._name, assist)
         self.declare()
 
+    def set_alignment(self, own_map: Pose) -> None:
+        """Tell where the robot's own map lies on the common one: goals need it."""
+        if own_map != self._own_map:
+            self._own_map = own_map
+            self.declare()
+
     def clear_odometry(self) -> None:
         """Tell that there is no such topic any more."""
         self._odometry = None
@@ -189,6 +196,7 @@ class MotionRoad:
             odometry_url=odometry[0].url if odometry else None,
             odometry_topic=odometry[1] if odometry else None,
             odometry_type=odometry[2] if odometry else None,
+            own_map=(self._own_map.x, self._own_map.y, self._own_map.yaw),
             **goals,
         )
 

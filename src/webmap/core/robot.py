@@ -550,7 +550,7 @@ class Robot(Extendable):
         """Send the robot to a pose, by its own navigation.
 
         Args:
-            position: Where the base link is to be, in metres in the goal frame.
+            position: Where the base link is to be, in metres on the common map.
             orientation: Its orientation there.
 
         Raises:
@@ -564,7 +564,7 @@ class Robot(Extendable):
         """Tell the robot where it is, while it neither moves nor follows a goal.
 
         Args:
-            position: Where the base link is, in metres in the goal frame.
+            position: Where the base link is, in metres on the common map.
             orientation: Its orientation there.
 
         Raises:
@@ -702,6 +702,7 @@ class Robot(Extendable):
         """Go where a new alignment has the robot, and all that it knows."""
         if self.whereabouts.newest is not None:
             self._show(self.whereabouts.on_map(self.whereabouts.newest))
+        self.motion.set_alignment(self.whereabouts.alignment)
         self.whereabouts.tell()
 
     def _find_bridge(self) -> None:

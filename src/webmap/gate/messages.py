@@ -72,6 +72,9 @@ class RobotSpec(
     pose_type: str = "geometry_msgs/PoseWithCovarianceStamped"
     pose_covariance: tuple[float, float, float] = (0.25, 0.25, 0.068)
     """How sure a person is of it: the variances of x and y in m², of yaw in rad²."""
+    own_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the origin of its goal frame is on the common map: metres and radians.
+    Goals and poses come on the common map, and are told to the robot in its own."""
     assist: AssistSpec | None = None
     """How the robot is slowed down before what its scanner sees; off without it."""
     stop_hooks: tuple[dict[str, str], ...] = ()

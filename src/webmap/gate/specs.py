@@ -53,6 +53,11 @@ def checked(spec: RobotSpec) -> RobotSpec:
             f"robot {spec.name!r}: the covariance of its initial pose is made of "
             f"numbers from 0 on, got {spec.pose_covariance}"
         )
+    if not all(map(math.isfinite, spec.own_map)):
+        raise ConfigError(
+            f"robot {spec.name!r}: its own map lies on the common one by finite "
+            f"numbers, got {spec.own_map}"
+        )
     if spec.odometry_type:
         split_type(spec.odometry_type)
     url = normalise_url(spec.bridge_url)

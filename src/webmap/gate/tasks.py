@@ -21,6 +21,7 @@ from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
 from webmap.gate.goals import is_move_base
 from webmap.gate.lanes import Lane
 from webmap.gate.messages import RobotSpec
+from webmap.gate.own_map import in_own_map
 from webmap.gate.sockets import Ears, Socket, open_socket
 from webmap.identifiers import generate_id
 from webmap.ros import ops
@@ -87,6 +88,7 @@ class TasksLane:
 
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
         """Write a goal now or drop it; return whether it went out."""
+        goal = in_own_map(spec, goal)
         if goal.way == "move_base":
             # First, so that no word is missed: they may be on their way at once.
             self._follow(spec, goal)
@@ -99,7 +101,8 @@ class TasksLane:
 
     def tell_pose(self, spec: RobotSpec, at: TellPose) -> bool:
         """Tell where the robot is, now or not; return whether it went out."""
-        return self.lane.write(words.pose_estimate(spec, at), only_if_clear=True)
+        estimate = words.pose_estimate(spec, in_own_map(spec, at))
+        return self.lane.write(estimate, only_if_clear=True)
 
     def cancel(self, spec: RobotSpec) -> None:
         """Cancel every goal of the robot, by every way that it has."""

@@ -1,0 +1,85 @@
+"""What people point at on the common map is told to a robot in its own."""
+
+import math
+import time
+
+import msgspec
+import pytest
+from gate_page import Page
+from gate_robot import eventually
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.errors import ConfigError
+from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.events import Key
+from webmap.gate.messages import RobotSpec
+from webmap.gate.own_map import in_own_map
+from webmap.gate.specs import checked
+from webmap.geometry import Pose
+
+QUARTER = math.pi / 2
+KEY = Key("ws://robot:9090", "/cmd_vel")
+LENGTH = st.floats(-1000, 1000)
+ANGLE = st.floats(-3.1, 3.1)
+
+
+def robot(**changes) -> RobotSpec:
+    plain = RobotSpec(id="r1", name="Bob", bridge_url="ws://robot:9090")
+    return msgspec.structs.replace(plain, **changes)
+
+
+def goal(x, y, yaw) -> SendGoal:
+    return SendGoal(KEY, "r1", "g1", x, y, yaw, "c1", "topic")
+
+
+def test_a_goal_of_a_robot_on_the_common_map_stays_as_it_is():
+    at = goal(1.0, 2.0, 0.5)
+    assert in_own_map(robot(), at) is at
+
+
+@given(LENGTH, LENGTH, ANGLE, LENGTH, LENGTH, ANGLE)
+def test_its_own_map_laid_on_the_common_one_gives_the_goal_again(x, y, a, gx, gy, yaw):
+    told = in_own_map(robot(own_map=(x, y, a)), goal(gx, gy, yaw))
+    back = Pose(x, y, a) @ Pose(told.x, told.y, told.yaw)
+    assert (back.x, back.y) == pytest.approx((gx, gy), abs=1e-6)
+    assert math.cos(back.yaw - yaw) == pytest.approx(1.0)
+
+
+def test_a_pose_that_it_is_told_to_be_at_is_in_its_own_map_too():
+    at = TellPose(KEY, "r1", 10.0, 3.0, QUARTER, "c1")
+    told = in_own_map(robot(own_map=(10.0, 0.0, QUARTER)), at)
+    assert (told.x, told.y, told.yaw) == pytest.approx((3.0, 0.0, 0.0))
+
+
+def test_a_map_that_lies_nowhere_is_refused():
+    with pytest.raises(ConfigError, match="its own map lies on the common one"):
+        checked(robot(own_map=(0.0, math.nan, 0.0)))
+
+
+def test_a_page_s_goal_reaches_the_robot_in_its_own_map(client, fake, robot_spec):
+    aligned = msgspec.structs.replace(
+        robot_spec, own_map=(10.0, 0.0, QUARTER), pose_topic="/initialpose"
+    )
+    client.declare(aligned)
+    page = Page(client)
+    page.take()
+
+    def told(topic, op):
+        if not fake.of("publish", topic):
+            page.goal(op=op)  # at 1, 2 on the common map, looking along its x
+            time.sleep(0.05)
+        return fake.of("publish", topic)
+
+    for topic, op in (("/initialpose", "locate"), ("/goal", "goal")):
+        message = eventually(lambda t=topic, o=op: told(t, o), f"the {op}")[0].message
+        pose = message["msg"]["pose"]
+        pose = pose.get("pose", pose)
+        place, turn = pose["position"], pose["orientation"]
+        assert (place["x"], place["y"]) == pytest.approx((2.0, 9.0))
+        yaw = 2 * math.atan2(turn["z"], turn["w"])
+        assert yaw == pytest.approx(-QUARTER)
+    eventually(lambda: page.robot().get("goal"), "the report")
+    shown = page.robot()["goal"]
+    assert (shown["x"], shown["y"], shown["yaw"]) == (1.0, 2.0, 0.0), "the common map"
+    page.end()
