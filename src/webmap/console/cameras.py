@@ -5,6 +5,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
+from webmap.console.camera_panel import camera_number, cameras_of
 from webmap.console.robot_list import AGE_LIMIT
 
 if TYPE_CHECKING:
@@ -16,33 +17,47 @@ class CameraViews:
 
     def __init__(self) -> None:
         self.element: Element = html.div(class_="cameras")
+        self._robot: Robot | None = None
         self._views: list[View] = []
 
     def show(self, robot: "Robot | None") -> None:
         """Show the cameras of a robot in place of those of the one before."""
+        self._robot = robot
         for view in self._views:
             view.destroy()
-        cameras = [] if robot is None else [m for m in robot.modules if is_camera(m)]
-        self._views = [View(camera) for camera in cameras]
+        self._views = [View(camera) for camera in cameras_of(robot)]
         self.element.append(*(view.element for view in self._views))
 
     def poll(self) -> None:
-        """Look at the ages again."""
+        """Look at the ages again, and whether there are other cameras now."""
+        if cameras_of(self._robot) != [view.camera for view in self._views]:
+            self.show(self._robot)
         for view in self._views:
             view.poll()
 
 
 class View:
-    """What one camera sees."""
+    """What one camera sees; pressed, it is shown large."""
 
     def __init__(self, camera: Any) -> None:
         self.camera = camera
         self._image = html.img(alt=f"{camera.name} of {camera.robot.name}", hidden=True)
         self._age = html.span(class_="age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
-        self.element: Element = html.figure(
-            self._image, html.figcaption(html.span(text=camera.name), self._age)
+        button = html.button(
+            self._image,
+            html.span(
+                html.span(text=camera.name, class_="camera-title"),
+                self._age,
+                class_="camera-line",
+            ),
+            type="button",
+            class_="camera-small",
+            title="Show it large, or small again",
         )
+        # camera_panel.js shows it, without a way to here and back.
+        button.set("data-camera-id", str(camera_number(camera)))
+        self.element: Element = html.figure(button)
         self._watching = camera.watch(self._show)
         self._show()
 
@@ -61,8 +76,3 @@ class View:
         if url is not None:
             self._image.set(src=url, hidden=False)
             self._age.set_age(0.0)
-
-
-def is_camera(module: object) -> bool:
-    """Return whether a module of a robot is a camera that can be watched."""
-    return hasattr(module, "watch") and hasattr(module, "url")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import webmap
 from webmap.console.bridge_list import BridgeList
+from webmap.console.camera_panel import CameraPanel
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
@@ -86,12 +87,13 @@ def build(
     frame = map.add_module(Frame, title, floor)
     listed = map.add_module(RobotList, page.element("robots"))
     card = map.add_module(RobotCard, page.element("card"), goals)
+    cameras = map.add_module(CameraPanel)
     map.add_module(RobotButtons, page.element("card"))
     links = BridgeList(page.element("bridges"), bridges)
     refused = RefusedList(page.element("refused"), page.viewer.role)
-    task = asyncio.get_running_loop().create_task(
-        poll_on([frame.place, listed.poll, card.poll, links.poll, refused.poll])
-    )
+    polls = [frame.place, listed.poll, card.poll, cameras.poll]
+    polls += [links.poll, refused.poll]
+    task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 
 

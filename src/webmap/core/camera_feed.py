@@ -1,6 +1,7 @@
 """What everything has that shows the pictures of a camera to whoever watches."""
 
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,14 @@ if TYPE_CHECKING:
 AGE_LIMIT = 1.0
 """Seconds after which a picture is old."""
 
-_KEPT = 3
+LEAST_KEPT, MOST_KEPT = 3, 16
 """Pictures that may be asked for: pages that lag still ask for the ones before."""
+
+KEPT_FOR = 2.0
+"""Seconds for which one more than the least is kept."""
+
+KEPT_BYTES = 8 << 20
+"""How many bytes more than the least are kept."""
 
 
 class CameraFeed:
@@ -38,7 +45,7 @@ class CameraFeed:
         self.stamp: float | None = None
         """When it came, in monotonic seconds."""
         self._watchers: dict[object, Callable[[], None]] = {}
-        self._urls: list[str] = []
+        self._kept: deque[tuple[str, float, int]] = deque()
 
     def begin(self) -> None:
         """Have pictures come: somebody watches now."""
@@ -81,16 +88,21 @@ class CameraFeed:
     def show(self, data: bytes, media_type: str) -> None:
         """Show a picture to everybody who watches, in place of the one before."""
         self.url = pictures.publish(data, media_type)
-        self.stamp = time.monotonic()
-        self._urls.append(self.url)
-        while len(self._urls) > _KEPT:
-            pictures.withdraw(self._urls.pop(0))
+        self.stamp = now = time.monotonic()
+        kept = self._kept
+        kept.append((self.url, now, len(data)))
+        while len(kept) > LEAST_KEPT and (
+            len(kept) > MOST_KEPT
+            or now - kept[0][1] > KEPT_FOR
+            or sum(size for _, _, size in kept) > KEPT_BYTES
+        ):
+            pictures.withdraw(kept.popleft()[0])
         for fn in tuple(self._watchers.values()):
             fn()
 
     def _finish(self) -> None:
         self.end()
         self.robot.clear_problem(self)
-        while self._urls:
-            pictures.withdraw(self._urls.pop())
+        while self._kept:
+            pictures.withdraw(self._kept.popleft()[0])
         self.url = self.stamp = None

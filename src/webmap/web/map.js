@@ -23,6 +23,7 @@ import {
  * @property {(report: object) => void} send Tells the server.
  * @property {(id: number) => Element | null} find The element of a mounted fragment.
  * @property {() => import('./drive.js').Drive} drive The page's one line to the gate.
+ * @property {() => number | null} clock The display's clock in seconds, if it was heard.
  */
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -123,6 +124,14 @@ export class MapCanvas {
   /** The page's one line to the gate; see `drive.js`. */
   get drive() {
     return this._surroundings.drive();
+  }
+
+  /**
+   * The display's monotonic clock now, in seconds: what tells the age of anything that
+   * the display has stamped. null while it was never heard.
+   */
+  get clock() {
+    return this._surroundings.clock();
   }
 
   /** @returns {Matrix} From the world to the map's pixels. */

@@ -109,6 +109,7 @@ export class Scene {
       send: (/** @type {object} */ report) => this._page.send(report),
       find: (/** @type {number} */ id) => this._find(svg, id),
       drive: () => this._page.drive(),
+      clock: () => this._clock.at(performance.now() / 1000),
     };
   }
 

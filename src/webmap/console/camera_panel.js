@@ -1,0 +1,295 @@
+import { NewestPicture } from "./camera_picture.js";
+import { keep, listenToDrags, readKept } from "./camera_place.js";
+import { CameraView } from "./camera_view.js";
+import { closeSheet } from "./sheet.js";
+
+/** @typedef {import('./camera_place.js').Dock} Dock */
+
+/**
+ * @typedef {object} MapCanvas
+ * @property {SVGSVGElement} svg
+ * @property {number | null} clock
+ * @property {{
+ *   robots: ReadonlyMap<string, {mine: boolean}>,
+ *   goBy: (robot: string, age: () => number) => () => void,
+ * }} drive
+ */
+
+/** @typedef {{id: number, name: string}} Camera */
+/** @typedef {{op: 'cameras', robot: string, name: string, cameras: Camera[]}} Cameras */
+/** @typedef {{op: 'picture', camera: number, url: string, stamp: number}} Picture */
+
+/** Milliseconds between two looks at the age. */
+const PERIOD = 100;
+
+/** The oldest picture that does not look old, in ms; the gate stops at this age too. */
+const OLD = 1000;
+
+/**
+ * One camera of the selected robot, large. Whoever drives the robot while it is open goes
+ * by it: when its picture is old the robot stops.
+ *
+ * @param {MapCanvas} map
+ * @param {object} _options
+ * @param {(message: Record<string, unknown>) => void} send
+ */
+export default function attach(map, _options, send) {
+  const panel = new CameraPanel(map, send);
+  return {
+    receive: (/** @type {Cameras | Picture} */ message) => panel.receive(message),
+    destroy: () => panel.destroy(),
+  };
+}
+
+class CameraPanel {
+  /**
+   * @param {MapCanvas} map
+   * @param {(message: Record<string, unknown>) => void} send
+   */
+  constructor(map, send) {
+    this._map = map;
+    this._send = send;
+    this._kept = readKept();
+    /** @type {Cameras} */
+    this._there = { op: "cameras", robot: "", name: "", cameras: [] };
+    /** @type {Camera | null} */
+    this._camera = null;
+    /** @type {number | null} What the other half was told. */
+    this._watched = null;
+    this._goesBy = () => {};
+    this._view = new CameraView({
+      choose: (id) => this.choose(id),
+      dock: (dock) => this._dock(dock),
+      close: () => this._close(),
+    });
+    this._picture = new NewestPicture(load, (image) => this._view.show(image));
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    document.addEventListener("visibilitychange", () => this._watch(), { signal });
+    document.addEventListener("click", (event) => this._clicked(event), { signal });
+    window.addEventListener("resize", () => this._place(), { signal });
+    listenToDrags(
+      this._view.head,
+      () => this._kept.dock === "float",
+      () => this._room(),
+      () => this._view.element.getBoundingClientRect(),
+      (x, y) => this._float(x, y),
+      signal,
+    );
+    this._timer = setInterval(() => this._look(), PERIOD);
+    this._show();
+  }
+
+  destroy() {
+    this._ending.abort();
+    clearInterval(this._timer);
+    this._goesBy();
+    this._view.element.remove();
+    delete document.body.dataset.camera;
+  }
+
+  /** @param {Cameras | Picture} message */
+  receive(message) {
+    if (message.op === "cameras") this._take(message);
+    else if (message.camera === this._camera?.id) {
+      const { clock } = this._map;
+      const age = clock === null ? 0 : 1000 * (clock - message.stamp);
+      this._picture.offer(addressOf(message.url), age);
+    }
+  }
+
+  /** @param {Cameras} there */
+  _take(there) {
+    const same = there.robot === this._there.robot;
+    this._there = there;
+    // Asked anew, as a page that has come back must: the other half says what it sends.
+    this._watched = null;
+    const { cameras } = there;
+    const chosen = same && cameras.find(({ id }) => id === this._camera?.id);
+    const named = cameras.find(({ name }) => name === this._kept.camera);
+    this._use(chosen || named || cameras.at(0) || null);
+  }
+
+  /**
+   * Show a camera, and open the panel for it.
+   *
+   * @param {number} id
+   */
+  choose(id) {
+    const camera = this._there.cameras.find((one) => one.id === id);
+    if (!camera) return;
+    Object.assign(this._kept, { open: true, camera: camera.name });
+    keep(this._kept);
+    this._use(camera);
+  }
+
+  /** @param {Camera | null} camera */
+  _use(camera) {
+    if (camera?.id !== this._camera?.id) {
+      this._picture.restart();
+      this._view.clear();
+    }
+    this._camera = camera;
+    this._show();
+  }
+
+  get _open() {
+    return this._kept.open && this._camera !== null;
+  }
+
+  _close() {
+    this._kept.open = false;
+    keep(this._kept);
+    this._show();
+    cardButton(this._camera?.id)?.focus();
+  }
+
+  /** @param {Dock} dock */
+  _dock(dock) {
+    const { dock: before, x, y } = this._kept;
+    if (dock === "float" && before === "float") {
+      // Without a pointer it goes from corner to corner.
+      const turned = x < 0.5 ? (y < 0.5 ? [1, 0] : [0, 0]) : y < 0.5 ? [1, 1] : [0, 1];
+      [this._kept.x, this._kept.y] = turned;
+    }
+    this._kept.dock = dock;
+    keep(this._kept);
+    this._show();
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  _float(x, y) {
+    Object.assign(this._kept, { x, y });
+    keep(this._kept);
+    this._place();
+  }
+
+  /** @param {MouseEvent} event */
+  _clicked({ target }) {
+    if (!(target instanceof Element)) return;
+    const button = target.closest("[data-camera-id]");
+    if (!(button instanceof HTMLElement)) return;
+    const id = Number(button.dataset.cameraId);
+    if (this._open && this._camera?.id === id) this._close();
+    else this.choose(id);
+    closeSheet();
+  }
+
+  _show() {
+    const open = this._open;
+    const { dock } = this._kept;
+    if (open) document.body.dataset.camera = dock;
+    else delete document.body.dataset.camera;
+    this._view.open(open, dock, this._there, this._camera);
+    // What floats lies over the map, but under the panels that drive and stop.
+    const before = dock === "float" ? this._map.svg : this._map.svg.parentElement;
+    if (before?.nextElementSibling !== this._view.element) before?.after(this._view.element);
+    this._goesBy();
+    this._goesBy = () => {};
+    if (open) {
+      if (this._watched === null) this._picture.restart();
+      const { drive } = this._map;
+      this._goesBy = drive.goBy(this._there.robot, () => this._picture.age);
+    }
+    this._watch();
+    this._place();
+    this._look();
+  }
+
+  /** Ask for pictures while they can be seen. */
+  _watch() {
+    const seen = this._open && document.visibilityState === "visible";
+    const wanted = seen ? (this._camera?.id ?? null) : null;
+    if (wanted === this._watched) return;
+    this._watched = wanted;
+    this._send({ op: "watch", camera: wanted });
+  }
+
+  _look() {
+    for (const button of document.querySelectorAll("button[data-camera-id]")) {
+      const id = Number(button.getAttribute("data-camera-id"));
+      const large = this._open && id === this._camera?.id;
+      if (button.getAttribute("aria-pressed") !== String(large)) {
+        button.setAttribute("aria-pressed", String(large));
+      }
+    }
+    if (!this._open) return;
+    const { age, shown } = this._picture;
+    const mine = this._map.drive.robots.get(this._there.robot)?.mine === true;
+    this._view.tell(age, shown, age > OLD, mine);
+  }
+
+  /** The free room for the top left corner of what floats, between all other things. */
+  _room() {
+    const map = this._map.svg.getBoundingClientRect();
+    const { width, height } = this._view.element.getBoundingClientRect();
+    const tools = rectangle(".map-tools");
+    const card = rectangle("#card");
+    const teleop = rectangle(".webmap-teleop");
+    const left = Math.max(map.left, tools.left < map.left + width ? tools.right : 0) + GAP;
+    const right = Math.min(map.right, card.left > left ? card.left : Infinity) - GAP;
+    const top = map.top + TOOLS;
+    const bottom = Math.min(map.bottom, teleop.top > top ? teleop.top : Infinity) - GAP;
+    return {
+      left,
+      top,
+      width: Math.max(0, right - left - width),
+      height: Math.max(0, bottom - top - height),
+    };
+  }
+
+  _place() {
+    const { style } = this._view.element;
+    if (!this._open || this._kept.dock !== "float") {
+      style.removeProperty("left");
+      style.removeProperty("top");
+      return;
+    }
+    const { left, top, width, height } = this._room();
+    style.left = `${left + this._kept.x * width}px`;
+    style.top = `${top + this._kept.y * height}px`;
+  }
+}
+
+/** Pixels that what floats stays away from other things, and from the map's top. */
+const GAP = 12;
+const TOOLS = 72;
+
+/**
+ * @param {string} selector
+ * @returns {{left: number, top: number, right: number}} Nowhere if it is not shown.
+ */
+function rectangle(selector) {
+  const element = document.querySelector(selector);
+  const found = element?.getBoundingClientRect();
+  if (!found || found.width === 0) return { left: Infinity, top: Infinity, right: 0 };
+  return found;
+}
+
+/**
+ * @param {string} url Ours begin with "/_webmap/", whatever the server is under.
+ */
+function addressOf(url) {
+  return new URL(`../../${url.replace("/_webmap/", "")}`, import.meta.url).href;
+}
+
+/**
+ * @param {string} url
+ * @returns {Promise<HTMLImageElement>}
+ */
+async function load(url) {
+  const image = new Image();
+  image.src = url;
+  await image.decode();
+  return image;
+}
+
+/** @param {number | undefined} id */
+function cardButton(id) {
+  const button = document.querySelector(`[data-camera-id="${id}"]`);
+  return button instanceof HTMLElement ? button : null;
+}
+

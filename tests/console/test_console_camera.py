@@ -1,0 +1,282 @@
+"""The camera's panel in a real browser, before a robot of the simulator."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from camera_server import CameraServer
+from real_browser import Complaints
+from webmap.testing.loop_thread import LoopThread
+
+pytestmark = pytest.mark.browser
+
+FLEET = """
+[bridges]
+hall = "{bridge}"
+
+[[robots]]
+name = "Bob"
+odometry = "/robot_0/odom"
+twist = {{ topic = "/robot_0/cmd_vel", stops_within = 0.25 }}
+cameras = [
+  {{ url = "{front}", name = "Front", throttle = 100 }},
+  {{ url = "{rear}", name = "Rear" }},
+]
+"""
+
+
+@contextmanager
+def running(*command: str, says: str):
+    """Run a command of webmap until it has said where it is."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "webmap", *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    ) as process:
+        try:
+            line = process.stdout.readline()
+            found = re.search(says, line)
+            assert found, line
+            yield found[1]
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(10)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    """A camera on the web, in a thread of its own."""
+    thread = LoopThread("camera")
+    server = CameraServer()
+    thread.call(server.__aenter__())
+    yield server
+    thread.call(server.__aexit__())
+    thread.end()
+
+
+@pytest.fixture(scope="module")
+def url(camera, tmp_path_factory):
+    with running("sim", "--robots", "1", "--port", "0", says=r"at (ws\S+)") as bridge:
+        fleet = tmp_path_factory.mktemp("fleet") / "fleet.toml"
+        text = FLEET.format(
+            bridge=bridge, front=camera.at("/stream"), rear=camera.at("/snapshot")
+        )
+        fleet.write_text(text)
+        run = ("run", str(fleet), "--port", "0", "--no-browser")
+        with running(*run, says=r"ready at (\S+)") as url:
+            yield url
+
+
+@pytest.fixture
+def open_page(chromium, url, camera):
+    camera.frozen = False
+    contexts, complaints = [], Complaints()
+
+    def open_(size=(1280, 800), **more) -> Page:
+        width, height = size
+        context = chromium.new_context(
+            viewport={"width": width, "height": height}, **more
+        )
+        contexts.append(context)
+        page = context.new_page()
+        complaints.listen(page)
+        return come(page)
+
+    def come(page: Page) -> Page:
+        page.goto(url)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(1)
+        expect(page.locator("#link")).to_have_attribute("data-link", "open")
+        if page.viewport_size["width"] < 500:
+            page.locator("#sheet").click()
+        page.locator("#robots button").first.click()
+        return page
+
+    open_.again = come
+    yield open_
+    for context in contexts:
+        context.close()
+    assert not complaints.unexpected, complaints.unexpected
+
+
+def large(page: Page, name: str = "Front"):
+    page.locator("#card .camera-small", has_text=name).click()
+    panel = page.get_by_role("region", name="Camera")
+    expect(panel.locator("img")).to_be_visible()
+    return panel
+
+
+def red(page: Page) -> int:
+    """Return how red the picture is, which tells which one it is."""
+    return page.evaluate(
+        """() => {
+            const canvas = document.createElement('canvas');
+            const context = canvas.getContext('2d');
+            context.drawImage(document.querySelector('.camera-image'), 0, 0);
+            return context.getImageData(8, 6, 1, 1).data[0];
+        }"""
+    )
+
+
+SENT = """([ms, zero]) => new Promise(done => {
+    const sent = document.querySelector('#card .speeds tbody td');
+    const look = () => {
+        if ((sent.textContent === '0.00') !== zero) return;
+        clearTimeout(end);
+        done(true);
+    };
+    const end = setTimeout(() => done(false), ms);
+    const heard = { childList: true, characterData: true, subtree: true };
+    new MutationObserver(look).observe(sent, heard);
+    look();
+})"""
+
+
+def moves_within(page: Page, ms: int) -> bool:
+    """Return whether the robot is sent a velocity within a time."""
+    return page.evaluate(SENT, [ms, False])
+
+
+def stops_within(page: Page, ms: int) -> bool:
+    """Return whether the robot is sent zero within a time."""
+    return page.evaluate(SENT, [ms, True])
+
+
+def sent(page: Page):
+    """Return where the card says which speed was sent."""
+    return page.locator("#card .speeds tbody td").first
+
+
+def hold_w(page: Page) -> None:
+    """Press W, and see the robot driven by it.
+
+    On a busy machine a picture may be late, which stops the robot as it should: then
+    the key is pressed anew.
+    """
+    for patience in (2000, 2000, 10_000):
+        page.wait_for_timeout(300)  # hands must be off for 200 ms before a press counts
+        page.keyboard.down("w")
+        try:
+            expect(sent(page)).not_to_have_text("0.00", timeout=patience)
+        except AssertionError:
+            page.keyboard.up("w")
+        else:
+            return
+    raise AssertionError(page.locator(".webmap-teleop").inner_text())
+
+
+def test_a_camera_of_the_card_is_shown_large_and_goes_on(open_page, camera):
+    page = open_page()
+    panel = large(page)
+    expect(panel.get_by_role("heading")).to_have_text("Bob: Front")
+    before = red(page)
+    page.wait_for_function(
+        """before => {
+            const canvas = document.createElement('canvas');
+            const context = canvas.getContext('2d');
+            const image = document.querySelector('.camera-image');
+            if (!image) return false;
+            context.drawImage(image, 0, 0);
+            return Math.abs(context.getImageData(8, 6, 1, 1).data[0] - before) > 10;
+        }""",
+        arg=before,
+    )
+    expect(panel.locator(".camera-age")).to_have_text(re.compile(r"^0\.\d s$"))
+    assert len([ask for ask in camera.asked if "/stream" in ask]) <= 1
+    panel.get_by_role("button", name="Rear").click()
+    expect(panel.get_by_role("heading")).to_have_text("Bob: Rear")
+    expect(panel.locator("img")).to_be_visible()
+    panel.get_by_role("button", name="Close the camera").click()
+    expect(panel).to_be_hidden()
+    expect(page.locator("#card .camera-small", has_text="Rear")).to_be_focused()
+
+
+def test_it_floats_within_the_map_and_its_place_and_camera_are_kept(open_page):
+    page = open_page()
+    panel = large(page, "Rear")
+    panel.get_by_role("button", name="Over the map").click()
+    corner = panel.bounding_box()
+    panel.get_by_role("button", name="Over the map").click()
+    assert panel.bounding_box()["x"] > corner["x"]
+    panel.get_by_role("heading").hover()
+    page.mouse.down()
+    page.mouse.move(5000, 5000, steps=4)
+    page.mouse.up()
+    box, teleop = panel.bounding_box(), page.locator(".webmap-teleop").bounding_box()
+    assert box["x"] + box["width"] <= 1280
+    assert box["y"] + box["height"] <= teleop["y"]
+    page = open_page.again(page)
+    panel = page.get_by_role("region", name="Camera")
+    expect(panel.get_by_role("heading")).to_have_text("Bob: Rear")
+    expect(panel).to_have_attribute("data-dock", "float")
+
+
+@pytest.mark.parametrize("dock", ["Above or below", "Over the map"])
+def test_on_a_phone_it_covers_neither_the_stick_nor_stop(open_page, dock):
+    page = open_page((390, 844), has_touch=True, is_mobile=True)
+    panel = large(page)
+    panel.get_by_role("button", name=dock).click()
+    stick = page.locator(".webmap-stick")
+    if not stick.is_visible():
+        page.get_by_role("button", name="Stick").click()
+    for what in (
+        page.get_by_role("button", name="Stop all"),
+        page.get_by_role("button", name="Stop Bob"),
+        stick,
+    ):
+        expect(what).to_be_in_viewport(ratio=0.95)
+        # What is hit there is the thing itself.
+        assert what.evaluate(
+            """e => {
+                const r = e.getBoundingClientRect();
+                const hit = document.elementFromPoint(
+                    r.x + r.width / 2, r.y + r.height / 2);
+                return e === hit || e.contains(hit);
+            }"""
+        )
+    expect(panel.locator("img")).to_be_in_viewport()
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_a_driven_robot_stops_when_its_camera_freezes(open_page, camera):
+    page = open_page()
+    panel = large(page)
+    hold_w(page)
+    camera.frozen = True
+    expect(panel).to_have_class(re.compile("stale"))
+    expect(panel.get_by_role("status")).to_contain_text("Frozen")
+    expect(sent(page)).to_have_text("0.00")
+    told = page.locator(".webmap-teleop")
+    expect(told).to_contain_text("o picture from the camera for 1 s")
+    # It comes again, and the key is still held: nothing moves by that.
+    camera.frozen = False
+    expect(panel).not_to_have_class(re.compile("stale"))
+    assert not moves_within(page, 700)
+    page.keyboard.up("w")
+    hold_w(page)
+    page.keyboard.up("w")
+    # Whoever closes it does not go by it.
+    camera.frozen = True
+    expect(panel).to_have_class(re.compile("stale"))
+    panel.get_by_role("button", name="Close the camera").click()
+    hold_w(page)
+    assert not stops_within(page, 1500)
+    page.keyboard.up("w")
+
+
+def test_many_viewers_are_one_pull(open_page, camera):
+    def pulls():
+        return len([asked for asked in camera.asked if "/stream" in asked])
+
+    before = pulls()
+    for _ in range(2):
+        large(open_page())
+    assert pulls() - before <= 1  # none, where the page of a test before is kept
+    assert 1 <= camera.open <= 2  # the stream, and a snapshot that is on its way
