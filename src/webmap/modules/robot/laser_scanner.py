@@ -1,10 +1,11 @@
 """The readings of a laser scanner, as dots."""
 
-import logging
 import math
 from typing import TYPE_CHECKING
 
 from webmap.core.placed import Placed
+from webmap.core.refusals import refusing
+from webmap.errors import ProtocolError
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg
@@ -16,14 +17,14 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
     from webmap.geometry import Affine
 
-log = logging.getLogger("webmap.modules.laser_scanner")
-
 UNIT = 0.001
 """Metres per unit of the dots on the wire, as long as they fit in 16 bits."""
 
 AGE_LIMIT = 1.0
 """Seconds after which a scan is drawn as old."""
 
+MAX_RAYS = 1 << 18
+"""The most rays that a scan may have."""
 
 LONGEST_SWEEP = 0.5
 """Seconds; a scan that claims to have taken longer is taken to be of one moment."""
@@ -85,17 +86,22 @@ class LaserScanner:
         self.svg = self._placed.svg
         bridge.subscribe(
             topic,
-            self.on_scan,
+            refusing(robot, topic, self.on_scan),
             "sensor_msgs/LaserScan",
             throttle=throttle,
             decode=SweepMsg,
         )
 
     def on_scan(self, scan: LaserScanMsg) -> None:
-        """Draw a scan in place of the one before."""
+        """Draw a scan in place of the one before.
+
+        Raises:
+            ProtocolError: If its angles make no sense, or it has too many rays.
+
+        """
+        check_rays(scan)
         found = scan_points(scan, self.max_dots)
         if found is None:
-            log.debug("%s: a scan without a usable angle was ignored", self.topic)
             return
         points, rays = found
         self._placed.stand_in(scan.frame_id, scan.stamp)
@@ -110,6 +116,28 @@ class LaserScanner:
         dots = (points / unit).round().astype("<i2")
         self._dots.set_dots(dots.tobytes(), unit)
         self.svg.set_age(0.0, limit=AGE_LIMIT)
+
+
+def check_rays(scan: LaserScanMsg) -> None:
+    """Let a scan pass whose rays go somewhere.
+
+    Raises:
+        ProtocolError: If an angle is not finite, several rays have one direction, or
+            there are more rays than any scanner has.
+
+    """
+    for name in ("angle_min", "angle_increment"):
+        angle = getattr(scan, name)
+        if not math.isfinite(angle):
+            raise ProtocolError(f"{name} must be finite radians, got {angle}")
+    count = len(scan.ranges)
+    if count > MAX_RAYS:
+        raise ProtocolError(f"a scan of {count} rays; {MAX_RAYS} are the limit")
+    if count > 1 and scan.angle_increment == 0:
+        raise ProtocolError(
+            f"angle_increment must not be 0 for a scan of {count} rays, which would "
+            "all go one way"
+        )
 
 
 def straightened(
