@@ -17,10 +17,16 @@ class BridgeList:
     Args:
         element: The page's element to fill.
         bridges: The bridges.
+        buttons: For each bridge what can be done with it.
 
     """
 
-    def __init__(self, element: "Element", bridges: Sequence["Bridge"]) -> None:
+    def __init__(
+        self,
+        element: "Element",
+        bridges: Sequence["Bridge"],
+        buttons: Sequence["Element"],
+    ) -> None:
         self._bridges = list(bridges)
         self._text = html.span()
         self._summary = html.summary(
@@ -34,8 +40,11 @@ class BridgeList:
                 html.span(class_="dot").set("aria-hidden", "true"),
                 html.span(text=bridge.name or bridge.url, class_="url"),
                 word,
+                button,
             ).set("title", bridge.url)
-            for bridge, word in zip(self._bridges, self._words, strict=True)
+            for bridge, word, button in zip(
+                self._bridges, self._words, buttons, strict=True
+            )
         ]
         element.append(
             html.details(self._summary, html.ul(*self._lines, class_="bridge-list"))

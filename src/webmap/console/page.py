@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import webmap
 from webmap.console.bridge_list import BridgeList
 from webmap.console.camera_panel import CameraPanel
+from webmap.console.doctor import DoctorReports
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
@@ -89,10 +90,11 @@ def build(
     card = map.add_module(RobotCard, page.element("card"), goals)
     cameras = map.add_module(CameraPanel)
     map.add_module(RobotButtons, page.element("card"))
-    links = BridgeList(page.element("bridges"), bridges)
+    doctor = map.add_module(DoctorReports, page.element("bridges"), bridges)
+    links = BridgeList(page.element("bridges"), bridges, doctor.buttons)
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll]
-    polls += [links.poll, refused.poll]
+    polls += [links.poll, refused.poll, doctor.poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 

@@ -1,0 +1,93 @@
+"""The readiness check that all viewers of a page share."""
+
+import asyncio
+
+import pytest
+
+from webmap import Bridge
+from webmap.console.checkup import Checkup, checkup_of
+from webmap.console.doctor import groups
+from webmap.discovery.doctor import Finding, Observed
+
+
+async def until(condition):
+    async with asyncio.timeout(5):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+def test_however_many_ask_there_is_one_look_at_a_time():
+    asked, go_on = [], asyncio.Event()
+
+    async def observe(url, *, seconds, progress):
+        asked.append(url)
+        progress("Listening for 3 s.")
+        await go_on.wait()
+        return Observed(url, trouble="nothing listens there")
+
+    async def run():
+        checkup = Checkup("ws://bob:9090", observe)
+        for _ in range(3):
+            checkup.start()
+        await until(lambda: checkup.doing == "Listening for 3 s.")
+        checkup.start()
+        assert checkup.is_running
+        assert checkup.ended is None
+        before = checkup.version
+        go_on.set()
+        await until(lambda: not checkup.is_running)
+        assert asked == ["ws://bob:9090"]
+        assert checkup.version > before, "pages see that there is something new"
+        assert checkup.summary == "1 wrong"
+        assert "WRONG    The rosbridge cannot be reached" in checkup.text
+        checkup.start()
+        await until(lambda: not checkup.is_running)
+        assert len(asked) == 2, "it is asked again when somebody wants that"
+
+    asyncio.run(run())
+
+
+def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
+    async def observe(url, *, seconds, progress):
+        raise RuntimeError("broken")
+
+    async def run():
+        checkup = Checkup("ws://bob:9090", observe)
+        for _ in range(2):
+            checkup.start()
+            await until(lambda: not checkup.is_running)
+            (finding,) = checkup.findings
+            assert finding.level == "wrong"
+            assert "RuntimeError('broken')" in finding.words
+
+    asyncio.run(run())
+    assert "the readiness check of ws://bob:9090 failed" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("levels", "words"),
+    [
+        (["good", "note", "good"], "Nothing is in the way: 1 note, 2 good"),
+        (["good", "wrong", "warning", "warning"], "1 wrong, 2 warnings, 1 good"),
+    ],
+)
+def test_findings_are_counted_in_words(levels, words):
+    checkup = Checkup("ws://bob:9090")
+    checkup.findings = [Finding(level, "bridge", "x") for level in levels]
+    assert checkup.summary == words
+
+
+def test_viewers_of_one_bridge_share_its_check():
+    one, other = Bridge("ws://a:1"), Bridge("ws://a:1")
+    assert checkup_of(one) is checkup_of(one)
+    assert checkup_of(one) is not checkup_of(other)
+
+
+def test_what_a_robot_is_called_is_only_ever_text():
+    name = "<b onclick=alert(1)>"
+    heading, items = groups([Finding("warning", name, f"{name} is odd.", "Look.")])
+    assert heading.text == name
+    (item,) = items.children
+    assert item.get("data-level") == "warning"
+    assert f"Warning: {name} is odd." in item.text
+    assert "Look." in item.text

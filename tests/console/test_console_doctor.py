@@ -1,0 +1,118 @@
+"""The report of the readiness check, as an operator asks for it and reads it."""
+
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+from playwright.sync_api import expect
+
+from real_browser import Complaints
+
+pytestmark = pytest.mark.browser
+
+
+def open_report(page):
+    page.locator("#bridges summary").click()
+    page.get_by_role(
+        "button", name=re.compile("^Check .*in the way of driving$")
+    ).click()
+    return page.locator(".doctor:popover-open")
+
+
+def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
+    open_console,
+):
+    page = open_console()
+    assert page.locator(".finding").count() == 0, "nothing is asked of itself"
+    report = open_report(page)
+    expect(report.locator(".status")).to_contain_text("Listening for 3 s")
+    expect(report.get_by_role("button", name="Check again")).to_be_disabled()
+    expect(report.locator(".status")).to_have_text(
+        re.compile(r"^Checked \d.* ago\. Nothing is in the way: \d+ notes, \d+ good$")
+    )
+    velocity = report.locator(".finding").filter(
+        has_text="/robot_0/cmd_vel takes Twist"
+    )
+    expect(velocity).to_have_attribute("data-level", "good")
+    expect(velocity.locator("strong")).to_have_text("Good:")
+    notes = report.locator('.finding[data-level="note"]')
+    expect(notes.locator("strong").first).to_have_text("Note:")
+    shape = "path.solid, path.cut"
+    good, note = (
+        line.locator(shape).evaluate_all("all => all.map(e => e.getAttribute('d'))")
+        for line in (velocity, notes.first)
+    )
+    assert good != note, "not by colour alone"
+    expect(report.get_by_role("heading", name="robot_9")).to_be_attached()
+    expect(page.get_by_role("button", name="Stop all")).to_be_in_viewport(ratio=1)
+
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    report.get_by_role("button", name="Copy as text").click()
+    expect(report.get_by_text("Copied", exact=True)).to_be_visible()
+    text = page.evaluate("navigator.clipboard.readText()")
+    assert text.startswith("ws://127.0.0.1:")
+    assert "  good     /robot_0/cmd_vel takes Twist, and WebMap sends that." in text
+
+    page.keyboard.press("Escape")
+    expect(report).to_be_hidden()
+
+    other = open_console("phone")
+    report = open_report(other)
+    expect(report.locator(".finding").first).to_be_visible()
+    expect(report.locator(".status")).to_contain_text("Checked")
+    expect(other.get_by_role("button", name="Stop all")).to_be_in_viewport(ratio=1)
+    assert other.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_where_the_page_may_not_copy_the_text_is_shown_and_chosen(open_console):
+    page = open_console()
+    report = open_report(page)
+    page.evaluate(
+        """() => {
+            Object.defineProperty(navigator, "clipboard", {value: undefined});
+            document.execCommand = () => false;
+        }"""
+    )
+    report.get_by_role("button", name="Copy as text").click()
+    expect(report.locator("pre")).to_be_visible()
+    chosen = page.evaluate("getSelection().toString()")
+    assert "robot_0/cmd_vel" in chosen
+
+
+def test_a_bridge_that_is_away_is_checked_too(chromium):
+    robot = "Bob:/odom:/cmd_vel:"
+    command = [
+        sys.executable,
+        "-m",
+        "webmap",
+        "view",
+        "ws://127.0.0.1:1",
+        "--port",
+        "0",
+    ]
+    with subprocess.Popen(
+        [*command, "--robot", robot, "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as process:
+        context, complaints = chromium.new_context(), Complaints()
+        try:
+            url = re.search(r"ready at (\S+)", process.stdout.readline())[1]
+            page = context.new_page()
+            complaints.listen(page)
+            page.goto(url)
+            report = open_report(page)
+            expect(report.locator(".status")).to_contain_text("1 wrong")
+            finding = report.locator('.finding[data-level="wrong"]')
+            expect(finding).to_contain_text("Wrong: The rosbridge cannot be reached")
+            expect(finding.locator(".advice")).to_contain_text("Start rosbridge_server")
+            report.get_by_role("button", name="Check again").click()
+            expect(report.locator(".status")).to_contain_text("1 wrong")
+        finally:
+            context.close()
+            process.send_signal(signal.SIGINT)
+            process.wait(15)
+    assert not complaints.unexpected, complaints.unexpected
