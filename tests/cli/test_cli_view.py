@@ -15,11 +15,10 @@ from cli_simulator import simulator
 from webmap import Bridge
 from webmap.cli.described import describe, overrules
 from webmap.cli.latecomers import LateRobots, greet
-from webmap.console import RobotDescription
-from webmap.core.page import PageEntry, site
+from webmap.console import Console, RobotDescription
 from webmap.discovery import discover
 from webmap.discovery.found import ROLES
-from webmap.discovery.newcomers import News
+from webmap.discovery.newcomers import Newcomers, News
 
 COMMAND = [sys.executable, "-m", "webmap", "view"]
 READY = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
@@ -132,17 +131,6 @@ def bridge():
     return Bridge("ws://bob:9090")
 
 
-@pytest.fixture
-def opened():
-    """A page at / that was opened by its function, and what that got."""
-    got = []
-    before = dict(site.pages)
-    site.pages["/"] = PageEntry("/", got.append, None, None, "")
-    yield got
-    site.pages.clear()
-    site.pages.update(before)
-
-
 class FakeMap:
     def __init__(self):
         self.robots, self.modules = [], []
@@ -164,24 +152,25 @@ def found(name="bob", **more):
     return robot
 
 
-def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge, opened):
-    late = LateRobots()
+def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
+    console = Console()
+    late = LateRobots(console)
     early = FakePage()
-    site.pages["/"].function(early)
+    console.opened(early)
     late.add(found(), describe(found(), bridge))
+    late.show_grid(bridge, "")
     late.show_grid(bridge, "/map")
     late.show_grid(bridge, "/other/map")
     after = FakePage()
-    site.pages["/"].function(after)
+    console.opened(after)
     for page in (early, after):
         assert page.maps[0].robots == ["bob"]
         assert page.maps[0].modules == [("OccupancyGrid", bridge, "/map")]
-    assert opened == [early, after]
     late.robots[0].destroy()
 
 
-def test_a_newcomer_gets_a_name_that_nobody_has(bridge, opened, capsys):
-    late = LateRobots()
+def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
+    late = LateRobots(Console())
     came = greet(late, ["BOB"], 0.25)
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
@@ -193,8 +182,8 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, opened, capsys):
     late.robots[0].destroy()
 
 
-def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge, opened):
-    late = LateRobots()
+def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge):
+    late = LateRobots(Console())
     more = {"/tf": "tf2_msgs/TFMessage", "/plan": "nav_msgs/Path"}
     more |= {f"/cam{n}/image_raw/compressed": IMAGE for n in range(6)}
     robot = found(**more)
@@ -214,8 +203,9 @@ def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
     assert describe(robot, bridge).odometry == "/amcl_pose"
 
 
-def test_a_robot_that_gets_more_topics_uses_them(bridge, opened, capsys):
-    late = LateRobots()
+def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
+    console = Console()
+    late = LateRobots(console)
     came = greet(late, [], 0.25)
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
@@ -235,13 +225,47 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, opened, capsys):
     assert robot.tf is not None
     names = {type(module).__name__ for module in robot.modules}
     assert {"LaserScanner", "Battery", "Path"} <= names
-    assert late.grid == (bridge, "/map")
+    assert console.grid == (bridge, "/map")
     assert "bob has more now: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
     robot.destroy()
 
 
-def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, opened, capsys):
-    late = LateRobots()
+def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, capsys):
+    late = LateRobots(Console())
+    came = greet(late, [], 0.25)
+    newcomers = Newcomers()
+
+    def look(cameras):
+        topics = {f"/cam{n}/image_raw/compressed": IMAGE for n in range(cameras)}
+        for _ in range(2):
+            for news in newcomers.look(discover(TOPICS | topics, "bob")):
+                came(news, bridge)
+
+    def names():
+        (robot,) = late.robots
+        return [m.name for m in robot.modules if type(m).__name__ == "Camera"]
+
+    look(0)
+    assert names() == []
+    look(1)
+    assert names() == ["Camera"]
+    look(3)
+    assert names() == ["Camera", "Camera 2", "Camera 3"]
+    look(3)
+    look(6)
+    assert names() == ["Camera", "Camera 2", "Camera 3", "Camera 4"]
+    said = capsys.readouterr().err.splitlines()[1:]
+    assert said == [
+        "bob has more now: camera /cam0/image_raw/compressed",
+        "bob has more now: camera /cam1/image_raw/compressed, "
+        "camera /cam2/image_raw/compressed",
+        "bob has more now: camera /cam3/image_raw/compressed",
+    ]
+    late.robots[0].destroy()
+
+
+def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
+    late = LateRobots(Console())
     greet(late, ["Al"], None)(News(found(), ("velocity",)), bridge)
     assert late.robots == []
     assert capsys.readouterr().err == ""

@@ -15,6 +15,7 @@ from webmap.discovery.words import in_one_line
 
 if TYPE_CHECKING:
     from webmap import Bridge
+    from webmap.console import Console
 
 
 @dataclass(slots=True)
@@ -31,16 +32,17 @@ class FoundFleet:
     known: list[tuple["Bridge", tuple[FoundRobot, ...]]] = field(default_factory=list)
     """For each bridge the robots that were found, also those told by hand."""
 
-    def show(self, *, grid: bool) -> None:
-        """Show what was found and what comes later; after the console was opened.
+    def show(self, console: "Console", *, grid: bool) -> None:
+        """Show what was found and what comes later.
 
         Args:
+            console: The console, which has been opened.
             grid: Whether the robots' own map is shown under them.
 
         """
         from webmap.cli.latecomers import LateRobots, Looking, greet
 
-        late = LateRobots()
+        late = LateRobots(console)
         for robot, about in self.robots:
             if grid:
                 late.show_grid(about.bridge, robot.topic("map"))

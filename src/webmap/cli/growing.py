@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
+from webmap.cli.described import MOST_CAMERAS
 from webmap.console.fleet import set_goals
 from webmap.discovery import FoundRobot
 from webmap.discovery.found import Role
@@ -45,6 +46,16 @@ def grow(
             robot, bridge, found.topic("goal"), found.topic("cancel"), found.action
         )
 
+    def use_cameras() -> list[str]:
+        there = [module for module in robot.modules if hasattr(module, "watch")]
+        known = {getattr(camera, "topic", None) for camera in there}
+        new = [c.topic for c in found.guesses["camera"] if c.topic not in known]
+        new = new[: max(0, MOST_CAMERAS - len(there))]
+        for number, topic in enumerate(new, len(there) + 1):
+            name = "Camera" if number == 1 else f"Camera {number}"
+            robot.add_module("Camera", bridge, topic, name)
+        return new
+
     uses: dict[Role, Callable[[], object]] = {
         "odometry": lambda: robot.set_odometry_topic(bridge, found.topic("odometry")),
         "velocity": lambda: robot.set_twist_topic(
@@ -65,7 +76,9 @@ def grow(
     used = []
     with no_scope():
         for role in roles:
-            if role in uses:
+            if role == "camera":
+                used += [f"camera {topic}" for topic in use_cameras()]
+            elif role in uses:
                 uses[role]()
                 used.append(f"{role} {found.topic(role)}")
     return used

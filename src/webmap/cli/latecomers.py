@@ -1,16 +1,14 @@
 """Robots that appear while the console runs."""
 
 import asyncio
-import weakref
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
-from webmap.console import RobotDescription
+from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
-from webmap.core.page import Page, site
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.naming import same_name
 from webmap.discovery.newcomers import Newcomers, News
@@ -31,31 +29,21 @@ LONGEST = 60.0
 
 
 class LateRobots:
-    """What came after the console was opened, on every page of it.
+    """Robots that were found, made and shown as they come.
 
     Args:
-        path: The page's path.
+        console: Where they are shown.
 
     """
 
-    def __init__(self, path: str = "/") -> None:
-        self.robots: list[Robot] = []
-        self.grid: tuple[Bridge, str] | None = None
-        """The map under the robots: a bridge and a topic."""
+    def __init__(self, console: Console) -> None:
+        self._console = console
         self._places: dict[tuple[Bridge, str], Robot] = {}
-        self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
-        entry = site.pages[path]
 
-        def open_page(page: Page) -> object:
-            result = entry.function(page)
-            self._pages.add(page)
-            if self.grid is not None:
-                _show_grid(self.grid, page)
-            for robot in self.robots:
-                _show(robot, page)
-            return result
-
-        site.pages[path] = replace(entry, function=open_page)
+    @property
+    def robots(self) -> "list[Robot]":
+        """The robots that were made."""
+        return list(self._places.values())
 
     def add(self, found: FoundRobot, about: RobotDescription) -> None:
         """Make one more robot, with what was found of it, and show it.
@@ -73,34 +61,16 @@ class LateRobots:
             if found.topic("plan"):
                 robot.add_module("Path", about.bridge, found.topic("plan"))
         self._places[about.bridge, found.namespace] = robot
-        self.show(robot)
+        self._console.add(robot)
 
     def at(self, bridge: "Bridge", namespace: str) -> "Robot | None":
         """Return the robot that was found in a namespace, None if none was."""
         return self._places.get((bridge, namespace))
 
-    def show(self, robot: "Robot") -> None:
-        """Show a robot on the pages that are open and on those to come."""
-        self.robots.append(robot)
-        for page in list(self._pages):
-            _show(robot, page)
-
     def show_grid(self, bridge: "Bridge", topic: str) -> None:
-        """Show a map under the robots; the first one stays."""
-        if topic and self.grid is None:
-            self.grid = (bridge, topic)
-            for page in list(self._pages):
-                _show_grid(self.grid, page)
-
-
-def _show(robot: "Robot", page: Page) -> None:
-    for map in page.maps:
-        map.add_robot(robot)
-
-
-def _show_grid(grid: tuple["Bridge", str], page: Page) -> None:
-    for map in page.maps:
-        map.add_module("OccupancyGrid", *grid)
+        """Show a map under the robots, if there is one; the first one stays."""
+        if topic:
+            self._console.add_grid(bridge, topic)
 
 
 class Looking:

@@ -77,9 +77,9 @@ def view(
     fleet = None
     if discover or not told:
         fleet = find_fleet(bridges, told, wait=wait, stops_within=stops_within)
-    console.open_console(bridges, told, floor=plan)
+    opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:
-        fleet.show(grid=plan is None)
+        fleet.show(opened, grid=plan is None)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -4,6 +4,7 @@ It is built with WebMap's public API alone, so it is also the longest example of
 """
 
 from webmap.console.fleet import RobotDescription, parse_robot
+from webmap.console.opened import Console
 from webmap.console.page import open_console
 
-__all__ = ["RobotDescription", "open_console", "parse_robot"]
+__all__ = ["Console", "RobotDescription", "open_console", "parse_robot"]

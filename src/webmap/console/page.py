@@ -15,6 +15,7 @@ from webmap.console.doctor import DoctorReports
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
+from webmap.console.opened import Console
 from webmap.console.refused import RefusedList
 from webmap.console.robot_buttons import RobotButtons
 from webmap.console.robot_card import RobotCard
@@ -42,7 +43,7 @@ def open_console(
     *,
     floor: Path | None = None,
     title: str = PRODUCT,
-) -> None:
+) -> Console:
     """Make the console the page at ``/``.
 
     Args:
@@ -51,16 +52,23 @@ def open_console(
         floor: The YAML file of a floor plan, as map_server takes it.
         title: What this installation is called.
 
+    Returns:
+        The console, to add robots that come later.
+
     Raises:
         ConfigError: If the floor plan cannot be read.
 
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(about) for about in robots]
+    opened = Console()
 
     @webmap.page("/", html="console.html", title=title)
     def console(page: "Page") -> None:
         build(page, bridges, fleet, plan, title)
+        opened.opened(page)
+
+    return opened
 
 
 def build(

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
+from webmap.discovery.found import ROLES, Findings, FoundRobot, Guess, Role
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,8 @@ class Newcomers:
 
     The topics of a robot that is being switched on come one by one. So news is told
     when two looks in a row say the same of the robot, and not before. A topic that
-    goes, or a better one that comes, is no news: what is in use stays in use.
+    goes, or a better one that comes, is no news: what is in use stays in use. Of
+    cameras all are used, so each one more is news.
 
     Args:
         known: Robots that are there already.
@@ -46,12 +47,23 @@ class Newcomers:
                 self._seen[robot.namespace] = robot
                 continue
             guesses = {**robot.guesses, **(known.guesses if known else {})}
+            if "camera" in guesses:
+                guesses["camera"] = _all_cameras(robot, known)
             self._known[robot.namespace] = replace(robot, guesses=guesses)
             news.append(News(robot, roles))
         return news
 
 
 def _more(robot: FoundRobot, known: FoundRobot) -> tuple[Role, ...]:
-    return tuple(
-        role for role in ROLES if role in robot.guesses and role not in known.guesses
-    )
+    new = {role for role in robot.guesses if role not in known.guesses}
+    if len(_all_cameras(robot, known)) > len(known.guesses.get("camera", ())):
+        new.add("camera")
+    return tuple(role for role in ROLES if role in new)
+
+
+def _all_cameras(robot: FoundRobot, known: FoundRobot | None) -> tuple[Guess, ...]:
+    """Return the cameras that are known, and then those that are new."""
+    before = () if known is None else known.guesses.get("camera", ())
+    topics = {guess.topic for guess in before}
+    more = robot.guesses.get("camera", ())
+    return (*before, *(guess for guess in more if guess.topic not in topics))

@@ -54,13 +54,11 @@ def prepare(file: Path) -> ReadyFleet:
 
 def open_fleet(ready: ReadyFleet) -> None:
     """Make the console with these robots the page at ``/``."""
-    from webmap.cli.latecomers import LateRobots
-
     options = {"title": ready.fleet.title} if ready.fleet.title else {}
-    console.open_console(list(ready.bridges.values()), [], floor=ready.floor, **options)
-    shown = LateRobots()
+    bridges = list(ready.bridges.values())
+    shown = console.open_console(bridges, [], floor=ready.floor, **options)
     if ready.fleet.map is not None:
         bridge, topic = ready.fleet.map
-        shown.show_grid(ready.bridges[bridge], topic)
+        shown.add_grid(ready.bridges[bridge], topic)
     for robot in ready.robots:
-        shown.show(robot)
+        shown.add(robot)
