@@ -30,6 +30,7 @@ from webmap.gate.lease import Epochs
 from webmap.gate.messages import RobotSpec, SentTwist
 from webmap.gate.motion import Motion
 from webmap.gate.obedience import Obedience
+from webmap.gate.refusal import Refusal
 from webmap.gate.robots import Robots
 from webmap.gate.sight import Sight
 from webmap.gate.speeds import Speeds
@@ -169,6 +170,14 @@ class Base:
         self.standing.press(by, now)
         self._expect_standstill(now)
 
+    def saw_stop_file(self, by: str | None, now: float) -> None:
+        """Note that the file of its STOP changed by another hand."""
+        lock = self.arming.lock
+        if self.standing.saw_file(by, lock.elsewhere) and by is not None:
+            self.hands.end(f"STOP by {by}", now)
+            self.standing.take_over(by, now)
+            self._expect_standstill(now)
+
     def _say_stop(self, now: float) -> None:
         self.standing.say_all(now)
         self._expect_standstill(now)
@@ -181,9 +190,11 @@ class Base:
         """End the STOP that stands; nothing moves by that, and nobody has it.
 
         Raises:
-            Refusal: If none stands.
+            Refusal: If none stands, or another gate has the machine.
 
         """
+        if self.arming.lock.elsewhere:
+            raise Refusal(f"{self.arming.lock.why}: reset its STOP there")
         self.standing.reset()
         self._update_watch(now)
 

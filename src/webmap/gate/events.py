@@ -164,6 +164,17 @@ class LockState:
     """Whose STOP stands on disk, if one does (S7)."""
     tested: StopRecord | None = None
     """What the last stop test found, if there was one."""
+    elsewhere: bool = False
+    """Whether another gate on this computer has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LatchSeen:
+    """The file of a STOP is another than before, or there is none any more."""
+
+    key: Key
+    by: str | None
+    """Whose STOP stands on disk now, if one does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +217,7 @@ Event = (
     | Scanned
     | LockState
     | LatchKept
+    | LatchSeen
     | StopTestKept
     | Shutdown
 )

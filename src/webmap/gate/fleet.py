@@ -63,6 +63,7 @@ class Fleet:
             events.Scanned: self._scanned,
             events.LockState: self._locked,
             events.LatchKept: self._latch_kept,
+            events.LatchSeen: self._latch_seen,
             events.StopTestKept: self._stop_test_kept,
         }
 
@@ -274,6 +275,11 @@ class Fleet:
             base.latch.kept(event)
         else:  # the robot was forgotten meanwhile; its STOP was not
             self._latches[event.key].kept(event)
+
+    def _latch_seen(self, event: events.LatchSeen, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.saw_stop_file(event.by, now)
 
     def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
         base = self._of_key(event.key)

@@ -1,5 +1,8 @@
 """The STOP of one machine, which stands until somebody resets it (S7). No I/O.
 
+The file of it is common to all gates on a computer, of which one alone may have the
+machine. A STOP that is said to another one is found there by the gate that has it.
+
 It holds from the moment it is set. That it is acknowledged is another thing: that
 waits until the disk has it, so that a STOP which was confirmed to anybody is there
 again after whatever happens to this process or this computer.
@@ -45,8 +48,21 @@ class Latch:
             self._keep()
 
     def found(self, by: str) -> None:
-        """Take over what an earlier gate left on disk."""
+        """Take over what an earlier gate left on disk, or another one put there."""
         self.by = by
+
+    @property
+    def settled(self) -> bool:
+        """Whether the disk has what holds here, as far as it can."""
+        return self._kept
+
+    def keep_again(self) -> None:
+        """Keep what holds: somebody took the file away."""
+        self._keep()
+
+    def drop(self) -> None:
+        """Let STOP stand no longer here; what is on disk is another gate's matter."""
+        self.by = None
 
     def reset(self) -> None:
         """Let STOP stand no longer."""

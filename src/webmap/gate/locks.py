@@ -55,9 +55,8 @@ class Locks:
             return LockState(key, held=False, why=why)
         if not _try_lock(file):
             os.close(file)
-            return LockState(
-                key, held=False, why="another WebMap on this computer has it"
-            )
+            why = "another WebMap on this computer has it"
+            return LockState(key, held=False, why=why, elsewhere=True)
         self._held[key] = file
         return LockState(key, held=True, driven=_was_driven(file, key))
 

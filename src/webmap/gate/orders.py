@@ -96,7 +96,7 @@ class Orders:
             self._fleet.find(robot).reset(now)
             return
         for base in self._fleet:
-            if base.latch.on:
+            if base.latch.on and not base.arming.lock.elsewhere:
                 base.reset(now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:

@@ -36,6 +36,9 @@ IDLE_STEP = 0.02
 DRAIN = 0.5
 """The longest time for zeros at the end, in seconds (S14)."""
 
+LOOK = 0.1
+"""Seconds between two looks at the files of STOPs, which another gate may write."""
+
 LOCK_RETRY = 1.0
 """Seconds between two attempts to have a machine that another gate has."""
 
@@ -82,6 +85,7 @@ class Shell:
     async def run(self) -> None:
         """Go on until told to end, then send zeros and close the links."""
         stepping = asyncio.create_task(self._keep_stepping())
+        looking = asyncio.create_task(self._keep_looking())
         await self._ending.wait()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(DRAIN):
@@ -89,6 +93,7 @@ class Shell:
                 await self._links.settle()
                 await self._disk.settle()
         stepping.cancel()
+        looking.cancel()
         self._links.close()
         await asyncio.sleep(0)  # the loop's chance to write what it still holds
 
@@ -108,6 +113,12 @@ class Shell:
                 due += late
             await asyncio.sleep(max(0.0, -late))
 
+    async def _keep_looking(self) -> None:
+        while True:
+            await asyncio.sleep(LOOK)
+            for seen in await self._disk.look():
+                self.tell(seen)
+
     def _do(self, todo: list[actions.Action]) -> None:
         for action in todo:
             result = self._perform(action)
@@ -125,6 +136,7 @@ class Shell:
                 if timer is not None:
                     timer.cancel()
                 self._locks.release(key)
+                self._disk.forget(key)
             case actions.MarkDriven(key, driven):
                 self._locks.mark(key, driven)
             case actions.KeepLatch() | actions.KeepStopTest():

@@ -54,6 +54,14 @@ class Records:
         sound = isinstance(by, str) and by and by.isprintable()
         return by[:MAX_NAME] if sound else UNKNOWN
 
+    def stamp_of(self, key: Key) -> tuple[int, int] | None:
+        """Return what changes with the file of a STOP; ``None`` if there is none."""
+        try:
+            found = path_of(self._folder, key, "stop").stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_ino
+
     def keep_latch(self, key: Key, by: str | None) -> str | None:
         """Have STOP stand on disk, or not; return what went wrong, in words.
 

@@ -73,6 +73,36 @@ class StandingStop:
         for hooks in self._robots.hooks.values():
             hooks.say(stopped=False)
 
+    def saw_file(self, by: str | None, elsewhere: bool) -> bool:
+        """Note that the file of the STOP changed, by another hand than this gate's.
+
+        Args:
+            by: Whose STOP it says that stands, if one does.
+            elsewhere: Whether another gate has the machine.
+
+        Returns:
+            Whether a STOP is to be taken over that was said to another gate.
+
+        """
+        latch = self.latch
+        if not latch.settled or (by is None) == (not latch.on):
+            return False
+        if by is not None:
+            return not elsewhere
+        if elsewhere:  # it was reset where the machine is, and this is an onlooker
+            latch.drop()
+            self._motion.let_go()
+        else:
+            latch.keep_again()  # a file that is gone is no reset
+        return False
+
+    def take_over(self, by: str, now: float) -> None:
+        """Have it stand because another gate was told so; zero goes first."""
+        if self._robots.drivable:
+            self._motion.zero(now)
+        self.latch.found(by)
+        self.say_all(now)
+
     def tasks_up(self, link: Health) -> None:
         """Say what could not be said, or may not have arrived, for want of a link."""
         for goals in self._robots.goals.values():

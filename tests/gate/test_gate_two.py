@@ -1,0 +1,191 @@
+"""Two gates on one computer: one has the machine, and a STOP to either one counts."""
+
+import asyncio
+import time
+
+import pytest
+from gate_harness import KEY, URL, ZERO, Bench, spec
+from gate_page import Page
+from gate_robot import eventually
+
+from webmap.gate import actions
+from webmap.gate.client import GateClient
+from webmap.gate.disk import Disk
+from webmap.gate.events import Key, LatchKept, LatchSeen, LockState
+from webmap.gate.records import Records
+
+
+@pytest.fixture
+def owner():
+    """The gate that has the machine."""
+    return Bench().begin()
+
+
+@pytest.fixture
+def onlooker():
+    """One that does not."""
+    bench = Bench().begin()
+    why = "another WebMap on this computer has it"
+    bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
+    return bench
+
+
+class TestTheOneThatHasIt:
+    def test_takes_over_a_stop_that_was_said_to_the_other(self, owner):
+        owner.drive_off()
+        at = owner.now
+        owner.tell(LatchSeen(KEY, "Ann"))
+        assert owner.written[-1].twist == ZERO
+        assert (owner.state, owner.report().holder) == ("stopped", None)
+        assert owner.report().stop.by == "Ann"
+        assert owner.refusals()[-1].why == "STOP by Ann"
+        owner.hold(1.0, x=1.0)
+        assert [w for w in owner.moving_since(at) if w.at > at] == []
+
+    def test_cancels_goals_and_says_hooks_then_too(self):
+        hook = {"topic": "/lock", "type": "std_msgs/Bool"}
+        bench = Bench().begin(spec(stop_hooks=(hook,)))
+        bench.tell(LatchSeen(KEY, "Ann"))
+        assert bench.did(actions.CancelGoals)
+        assert [hook.stopped for hook in bench.did(actions.RunHook)] == [True]
+
+    def test_stops_what_takes_goals_only(self):
+        bench = Bench().begin(spec(twist_topic=None, cancel_topic=None))
+        bench.tell(LatchSeen(Key(URL, "goal /goal"), "Ann"))
+        assert bench.state == "stopped"
+
+    def test_hears_its_own_stop_without_a_stir(self, owner):
+        owner.say("a", op="stop", robot="r1")
+        before = len(owner.done)
+        owner.tell(LatchSeen(KEY, "A"))
+        assert owner.done[before:] == []
+
+    def test_keeps_a_stop_whose_file_is_gone(self, owner):
+        owner.say("a", op="stop", robot="r1")
+        owner.disk.clear()
+        owner.tell(LatchSeen(KEY, None))
+        assert owner.disk == {KEY: "A"}
+        assert owner.state == "stopped"
+
+    def test_trusts_no_look_at_what_it_is_writing(self, owner):
+        owner.say("a", op="stop", robot="r1")
+        owner.slow_disk = True
+        owner.say("a", op="reset", robot="r1")
+        owner.tell(LatchSeen(KEY, "A"))  # looked at before it was taken away
+        owner.run(0.1)
+        assert not owner.report().latched
+
+    def test_hears_of_a_machine_that_is_gone(self, owner):
+        owner.tell(LatchSeen(Key(URL, "/gone"), "Ann"))
+        assert owner.state == "free"
+
+
+class TestTheOther:
+    def test_stops_it_and_leaves_the_reset_to_the_one_that_has_it(self, onlooker):
+        onlooker.say("a", op="stop", robot="r1")
+        assert onlooker.disk == {KEY: "A"}
+        assert onlooker.written[-1].twist == ZERO
+        onlooker.say("a", op="reset", robot="r1")
+        assert onlooker.refusals()[-1].why == (
+            "another WebMap on this computer has it: reset its STOP there"
+        )
+        onlooker.say("a", op="reset", robot="*")
+        assert onlooker.disk == {KEY: "A"}
+
+    def test_writes_zero_no_more_when_it_was_reset_there(self, onlooker):
+        onlooker.say("a", op="stop", robot="r1")
+        onlooker.run(1.0)
+        onlooker.disk.clear()
+        onlooker.tell(LatchSeen(KEY, None))
+        at = onlooker.now
+        onlooker.run(1.0)
+        assert onlooker.since(at) == []
+        assert onlooker.disk == {}
+        assert not onlooker.report().latched
+
+    def test_writes_nothing_for_a_stop_that_was_said_there(self, onlooker):
+        onlooker.tell(LatchSeen(KEY, "Ann"))
+        onlooker.run(0.2)
+        assert onlooker.written == []
+
+    def test_has_a_stop_of_its_own_stand_when_it_gets_the_machine(self, onlooker):
+        onlooker.say("a", op="stop", robot="r1")
+        onlooker.tell(LockState(KEY, held=True, latched_by="A"))
+        assert onlooker.state == "stopped"
+        onlooker.say("a", op="reset", robot="r1")
+        onlooker.run(1.0)
+        assert onlooker.state == "free"
+
+
+def test_a_disk_tells_of_each_file_that_changed_once(tmp_path):
+    async def scenario():
+        mine, theirs = Disk(Records(tmp_path)), Records(tmp_path)
+        mine.recall(LockState(KEY, held=True))
+        assert await mine.look() == []
+        theirs.keep_latch(KEY, "Ann")
+        # Recalled again, it is news all the same.
+        assert mine.recall(LockState(KEY, held=False)).latched_by == "Ann"
+        assert await mine.look() == [LatchSeen(KEY, "Ann")]
+        assert await mine.look() == []
+        theirs.keep_latch(KEY, "Ben")
+        assert await mine.look() == [LatchSeen(KEY, "Ben")]
+        theirs.keep_latch(KEY, None)
+        assert await mine.look() == [LatchSeen(KEY, None)]
+        mine.forget(KEY)
+        theirs.keep_latch(KEY, "Ann")
+        assert await mine.look() == []
+
+    asyncio.run(scenario())
+
+
+def test_a_stop_that_is_said_while_another_is_reset_is_not_overlooked(tmp_path):
+    async def scenario():
+        theirs = Records(tmp_path)
+
+        class Slow(Records):
+            def keep_latch(self, key, by):
+                result = super().keep_latch(key, by)
+                theirs.keep_latch(key, "Ben")
+                return result
+
+        disk, told = Disk(Slow(tmp_path)), []
+        disk.recall(LockState(KEY, held=True))
+        disk.keep(actions.KeepLatch(KEY, 1, None), told.append)
+        await disk.settle()
+        assert await disk.look() == [LatchSeen(KEY, "Ben")]
+        assert told == [LatchKept(KEY, 1, None)]
+
+    asyncio.run(scenario())
+
+
+def test_what_comes_and_goes_between_two_looks_is_seen_by_who_wrote_it(tmp_path):
+    async def scenario():
+        disk = Disk(Records(tmp_path))
+        disk.recall(LockState(KEY, held=False))
+        disk.keep(actions.KeepLatch(KEY, 1, "Ann"), lambda event: None)
+        await disk.settle()
+        Records(tmp_path).keep_latch(KEY, None)
+        assert await disk.look() == [LatchSeen(KEY, None)]
+
+    asyncio.run(scenario())
+
+
+def test_a_stop_to_the_other_gate_stops_who_drives(client, page, robot_spec, fake):
+    page.drive_off(fake)
+    second = GateClient()
+    second.start()
+    second.declare(robot_spec)
+    other = Page(second, name="Ben")
+    reason = "another WebMap on this computer has it"
+    eventually(lambda: other.robot().get("reason") == reason, "the other's reason")
+    other.say(op="stop", robot="r1")
+    at = time.monotonic()
+    eventually(lambda: page.robot()["latched"], "a STOP here")
+    assert page.robot()["stop"]["by"] == "Ben"
+    eventually(lambda: other.robot()["latched"], "a STOP there")
+    assert all(moved < at + 1.0 for moved, _ in fake.moving)
+    page.say(op="reset", robot="r1")
+    eventually(lambda: not page.robot()["latched"], "no STOP here")
+    eventually(lambda: not other.robot()["latched"], "no STOP there")
+    other.end()
+    second.stop()
