@@ -73,6 +73,10 @@ class Fleet:
             self._touched.add(base.key)
             yield base
 
+    def look(self) -> None:
+        """Have it said of every machine how it stands, as all may have changed."""
+        self._touched.update(self._bases)
+
     @property
     def busy(self) -> bool:
         """Whether time may make a difference to some machine."""

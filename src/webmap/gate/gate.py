@@ -100,8 +100,10 @@ class Gate:
     # The display and its pages.
 
     def _beat(self, message: messages.Heartbeat, now: float) -> None:
-        self._display_there = True
         self._pulse.beat(now)
+        if not self._display_there:
+            self._display_there = True
+            self._fleet.look()
 
     def _shut_down(self, event: events.Shutdown, now: float) -> None:
         self._pulse.ended = event.why
