@@ -1,5 +1,5 @@
 import { NewestPicture } from "./camera_picture.js";
-import { keep, listenToDrags, readKept } from "./camera_place.js";
+import { keep, listenToDrags, nextCorner, readKept, roomFor } from "./camera_place.js";
 import { CameraView } from "./camera_view.js";
 import { closeSheet } from "./sheet.js";
 
@@ -71,7 +71,7 @@ class CameraPanel {
     listenToDrags(
       this._view.head,
       () => this._kept.dock === "float",
-      () => this._room(),
+      () => roomFor(this._view.element, map.svg),
       () => this._view.element.getBoundingClientRect(),
       (x, y) => this._float(x, y),
       signal,
@@ -149,8 +149,7 @@ class CameraPanel {
     const { dock: before, x, y } = this._kept;
     if (dock === "float" && before === "float") {
       // Without a pointer it goes from corner to corner.
-      const turned = x < 0.5 ? (y < 0.5 ? [1, 0] : [0, 0]) : y < 0.5 ? [1, 1] : [0, 1];
-      [this._kept.x, this._kept.y] = turned;
+      Object.assign(this._kept, nextCorner(x, y));
     }
     this._kept.dock = dock;
     keep(this._kept);
@@ -181,19 +180,19 @@ class CameraPanel {
   _show() {
     const open = this._open;
     const { dock } = this._kept;
+    const { element } = this._view;
+    // What was waited for while it was closed does not count.
+    if (open && element.hidden) this._picture.restart();
     if (open) document.body.dataset.camera = dock;
     else delete document.body.dataset.camera;
     this._view.open(open, dock, this._there, this._camera);
     // What floats lies over the map, but under the panels that drive and stop.
     const before = dock === "float" ? this._map.svg : this._map.svg.parentElement;
-    if (before?.nextElementSibling !== this._view.element) before?.after(this._view.element);
+    if (before?.nextElementSibling !== element) before?.after(element);
     this._goesBy();
-    this._goesBy = () => {};
-    if (open) {
-      if (this._watched === null) this._picture.restart();
-      const { drive } = this._map;
-      this._goesBy = drive.goBy(this._there.robot, () => this._picture.age);
-    }
+    const { robot } = this._there;
+    const age = () => this._picture.age;
+    this._goesBy = open ? this._map.drive.goBy(robot, age) : () => {};
     this._watch();
     this._place();
     this._look();
@@ -222,25 +221,6 @@ class CameraPanel {
     this._view.tell(age, shown, age > OLD, mine);
   }
 
-  /** The free room for the top left corner of what floats, between all other things. */
-  _room() {
-    const map = this._map.svg.getBoundingClientRect();
-    const { width, height } = this._view.element.getBoundingClientRect();
-    const tools = rectangle(".map-tools");
-    const card = rectangle("#card");
-    const teleop = rectangle(".webmap-teleop");
-    const left = Math.max(map.left, tools.left < map.left + width ? tools.right : 0) + GAP;
-    const right = Math.min(map.right, card.left > left ? card.left : Infinity) - GAP;
-    const top = map.top + TOOLS;
-    const bottom = Math.min(map.bottom, teleop.top > top ? teleop.top : Infinity) - GAP;
-    return {
-      left,
-      top,
-      width: Math.max(0, right - left - width),
-      height: Math.max(0, bottom - top - height),
-    };
-  }
-
   _place() {
     const { style } = this._view.element;
     if (!this._open || this._kept.dock !== "float") {
@@ -248,25 +228,11 @@ class CameraPanel {
       style.removeProperty("top");
       return;
     }
-    const { left, top, width, height } = this._room();
+    const { element } = this._view;
+    const { left, top, width, height } = roomFor(element, this._map.svg);
     style.left = `${left + this._kept.x * width}px`;
     style.top = `${top + this._kept.y * height}px`;
   }
-}
-
-/** Pixels that what floats stays away from other things, and from the map's top. */
-const GAP = 12;
-const TOOLS = 72;
-
-/**
- * @param {string} selector
- * @returns {{left: number, top: number, right: number}} Nowhere if it is not shown.
- */
-function rectangle(selector) {
-  const element = document.querySelector(selector);
-  const found = element?.getBoundingClientRect();
-  if (!found || found.width === 0) return { left: Infinity, top: Infinity, right: 0 };
-  return found;
 }
 
 /**

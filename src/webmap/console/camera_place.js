@@ -45,6 +45,57 @@ export function keep(kept) {
 }
 
 /**
+ * Return the corner that comes after the one that is nearest, clockwise.
+ *
+ * @param {number} x
+ * @param {number} y
+ */
+export function nextCorner(x, y) {
+  if (y < 0.5) return x < 0.5 ? { x: 1, y: 0 } : { x: 1, y: 1 };
+  return x < 0.5 ? { x: 0, y: 0 } : { x: 0, y: 1 };
+}
+
+/** Pixels that what floats stays away from other things, and from the map's top. */
+const GAP = 12;
+const TOOLS = 72;
+
+/**
+ * Return the free room for the top left corner of what floats over a map, between all
+ * other things that are there.
+ *
+ * @param {Element} floating
+ * @param {Element} over
+ */
+export function roomFor(floating, over) {
+  const map = over.getBoundingClientRect();
+  const { width, height } = floating.getBoundingClientRect();
+  const tools = rectangle(".map-tools");
+  const card = rectangle("#card");
+  const teleop = rectangle(".webmap-teleop");
+  const left = Math.max(map.left, tools.left < map.left + width ? tools.right : 0) + GAP;
+  const right = Math.min(map.right, card.left > left ? card.left : Infinity) - GAP;
+  const top = map.top + TOOLS;
+  const bottom = Math.min(map.bottom, teleop.top > top ? teleop.top : Infinity) - GAP;
+  return {
+    left,
+    top,
+    width: Math.max(0, right - left - width),
+    height: Math.max(0, bottom - top - height),
+  };
+}
+
+/**
+ * @param {string} selector
+ * @returns {{left: number, top: number, right: number}} Nowhere if it is not shown.
+ */
+function rectangle(selector) {
+  const element = document.querySelector(selector);
+  const found = element?.getBoundingClientRect();
+  if (!found || found.width === 0) return { left: Infinity, top: Infinity, right: 0 };
+  return found;
+}
+
+/**
  * Let an element be dragged within the room that there is for it.
  *
  * @param {HTMLElement} handle What is dragged by.

@@ -51,6 +51,7 @@ export class CameraView {
     this._frame.append(this._word);
     this.element = make("section", "camera-panel");
     this.element.setAttribute("aria-label", "Camera");
+    this.element.hidden = true;
     this.element.append(this.head, this._choice, this._frame);
     this._listed = "";
   }
