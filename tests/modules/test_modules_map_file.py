@@ -14,6 +14,7 @@ from webmap.core.layer import Layer
 from webmap.core.map_file import read_map
 from webmap.errors import ConfigError
 from webmap.geometry import Affine
+from webmap.sim.maps import load_map
 
 YAML = "image: {image}\nresolution: 0.05\norigin: [-1.25, 2.5, 0]\nnegate: 0\n"
 ENDS = "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
@@ -150,6 +151,26 @@ WRONG = {
     "no image file 'pipe.pgm'": {"image": "pipe.pgm"},
     "the image must be PGM, PNG or BMP": {"image": "map.yaml"},
 }
+
+
+@pytest.mark.parametrize(
+    "key", ["image", "resolution", "origin", "negate", "mode", "free_thresh", "none"]
+)
+def test_aliases_that_stand_for_a_thousand_million_words_are_refused_at_once(
+    tmp_path, key
+):
+    pgm(tmp_path, ROWS)
+    layers = ["a0: &a0 [" + "x, " * 10 + "]"]
+    for i in range(1, 9):
+        layers.append(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]")
+    file = described(tmp_path, **{key: "*a8"})
+    file.write_text("\n".join([*layers, file.read_text()]))
+    began = time.process_time()
+    for read in (read_map, load_map):
+        with pytest.raises(ConfigError, match="aliases") as refused:
+            read(file)
+        assert len(str(refused.value)) < 300
+    assert time.process_time() - began < 2
 
 
 @pytest.mark.parametrize("why", WRONG)

@@ -48,6 +48,16 @@ class _Settings:
     mode: str
 
 
+class _Texts(yaml.BaseLoader):
+    """Makes nothing but text, so that "yes" is not taken for a 1, and no aliases."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        # A few of them in one another stand for more than any memory holds.
+        if self.check_event(yaml.AliasEvent):
+            raise ValueError("aliases (*name) have no place in a map's YAML")
+        return super().compose_node(parent, index)
+
+
 def read_map(file: Path) -> MapImage:
     """Read a map.
 
@@ -100,8 +110,7 @@ def _read_yaml(file: Path) -> dict[str, Any]:
             data = stream.read(MAX_YAML + 1)
         if len(data) > MAX_YAML:
             raise ConfigError(f"{file}: more than 1 MiB is no map's YAML")
-        # This loader makes nothing but text, so that "yes" is not taken for a 1.
-        said = yaml.load(data, yaml.BaseLoader)  # noqa: S506
+        said = yaml.load(data, _Texts)  # noqa: S506
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         if isinstance(error, ConfigError):
             raise

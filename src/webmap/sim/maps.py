@@ -17,6 +17,8 @@ FLOOR = Path(__file__).parent / "data" / "floor.yaml"
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
+_LARGEST = 1 << 20
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorPlan:
@@ -52,6 +54,14 @@ class FloorPlan:
         )
 
 
+class _Loader(yaml.SafeLoader):
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        # A few of them in one another stand for more than any memory holds.
+        if self.check_event(yaml.AliasEvent):
+            raise ValueError("aliases (*name) have no place in a map's YAML")
+        return super().compose_node(parent, index)
+
+
 def load_map(path: Path | str) -> FloorPlan:
     """Return the floor plan of a map_server YAML file.
 
@@ -76,10 +86,16 @@ def load_map(path: Path | str) -> FloorPlan:
 
 def _read_settings(path: Path) -> dict[str, Any]:
     try:
-        settings = yaml.safe_load(path.read_text(encoding="utf-8"))
+        with path.open("rb") as stream:
+            data = stream.read(_LARGEST + 1)
+        if len(data) > _LARGEST:
+            raise ConfigError(f"{path}: more than 1 MiB is no map's YAML")
+        settings = yaml.load(data, _Loader)  # noqa: S506 - it is a safe one
     except OSError as error:
         raise ConfigError(f"{path}: no map there ({error.strerror})") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except ConfigError:
+        raise
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: not a YAML file: {error}") from error
     if not isinstance(settings, dict):
         raise ConfigError(f"{path}: needs image, resolution and origin")
