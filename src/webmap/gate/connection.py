@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from webmap.gate.limits import Cap
+from webmap.gate.limits import page_cap
 from webmap.gate.messages import PROGRAM, RefusedCount, Role
 
 GARBAGE_LIMIT = 20
@@ -55,7 +55,7 @@ class Connection:
         self.role = role
         self.acked = -1
         """The newest accepted ``seq``."""
-        self.cap = Cap(float("inf"), float("inf"), "limit of the page")
+        self.cap = page_cap()
         self.garbage = Rate(GARBAGE_LIMIT)
         self.messages = Rate(FLOOD_LIMIT)
         self.closing = False
@@ -73,7 +73,7 @@ class Connection:
 
     def set_speeds(self, v: float, w: float) -> None:
         """Take over what the page's ``Teleop`` asks for; nonsense means standstill."""
-        self.cap = Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, self.cap.why)
+        self.cap = page_cap(v, w)
 
     def note_refused(self, what: str, why: str) -> None:
         """Count a message that was refused."""

@@ -64,8 +64,13 @@ def caps_of(spec: RobotSpec, tested: StopRecord | None = None) -> list[Cap]:
     return caps
 
 
-def speed_in_force(caps: Iterable[Cap]) -> Speed:
-    """Return the least of ``caps``; slow where none of them says anything."""
+def page_cap(v: float = math.inf, w: float = math.inf) -> Cap:
+    """Return what a page asks for at most; nonsense means standstill."""
+    return Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, "limit of the page")
+
+
+def least(caps: Iterable[Cap]) -> Speed:
+    """Return the least of ``caps``; infinity where none of them says anything."""
     caps = list(caps)
     v = min((cap.v for cap in caps), default=math.inf)
     w = min((cap.w for cap in caps), default=math.inf)
@@ -74,10 +79,36 @@ def speed_in_force(caps: Iterable[Cap]) -> Speed:
         for cap in caps
         if (cap.v == v and v < math.inf) or (cap.w == w and w < math.inf)
     )
-    if math.inf in (v, w):
-        v, w = min(v, SLOW_V), min(w, SLOW_W)
-        why["no limit was stated"] = None
     return Speed(v, w, tuple(why))
+
+
+def in_force(speed: Speed) -> Speed:
+    """Return ``speed``, or what is slow where it says nothing."""
+    if math.inf not in (speed.v, speed.w):
+        return speed
+    v, w = min(speed.v, SLOW_V), min(speed.w, SLOW_W)
+    return Speed(v, w, (*speed.why, "no limit was stated"))
+
+
+def speed_in_force(caps: Iterable[Cap]) -> Speed:
+    """Return the least of ``caps``; slow where none of them says anything."""
+    return in_force(least(caps))
+
+
+def offered(own: Speed, page: Cap) -> Speed:
+    """Return the speeds that would be in force if a page took a free robot.
+
+    Args:
+        own: What the robot allows by itself, perhaps without end.
+        page: What the page asks for at most.
+
+    """
+    v, w = min(own.v, page.v), min(own.w, page.w)
+    binds = (own.v == v and v < math.inf) or (own.w == w and w < math.inf)
+    why = own.why if binds else ()
+    if page.v < own.v or page.w < own.w:
+        why = (*why, page.why)
+    return in_force(Speed(v, w, why))
 
 
 def fit(wanted: Twist, speed: Speed, *, holonomic: bool) -> Twist:

@@ -307,7 +307,8 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Whether a command to move would be taken now."""
     v: float
     w: float
-    """The speeds in force."""
+    """The speeds in force. Of a robot that nobody has, those that it allows: infinity
+    if none was stated, for who takes it brings a limit along."""
     why: tuple[str, ...]
     """What holds the speeds down, in words."""
     link: Literal["up", "down"]

@@ -8,6 +8,7 @@ from typing import get_args
 
 from webmap.errors import ConfigError
 from webmap.gate import messages, reports
+from webmap.gate.limits import Cap, page_cap
 from webmap.gate.messages import Role
 
 log = logging.getLogger("webmap.gate")
@@ -29,6 +30,8 @@ class DriveConnection:
         self._pages = pages
         self._hello = hello
         self._speeds: messages.Speeds | None = None
+        self.cap = page_cap()
+        """What the page asks for at most."""
         self._send = send
         self._close = close
 
@@ -42,7 +45,8 @@ class DriveConnection:
     def set_speeds(self, v: float, w: float) -> None:
         """Set the greatest speeds that the page asks for, in m/s and rad/s."""
         self._speeds = messages.Speeds(self.id, v, w)
-        self._pages.tell(self._speeds)
+        self.cap = page_cap(v, w)
+        self._pages.new_speeds(self, self._speeds)
 
     def close(self) -> None:
         """The page is gone: what it drove stops."""
@@ -135,6 +139,14 @@ class Pages:
             if self._connections.pop(connection.id, None) is not None:
                 self.tell(messages.Disconnect(connection.id))
 
+    def new_speeds(self, connection: DriveConnection, speeds: messages.Speeds) -> None:
+        """Tell the gate what a page asks for at most, and the page what it gets."""
+        with self._lock:  # so that nothing older comes after what the gate says now
+            self.tell(speeds)
+            for report in list(self._latest.values()):
+                if report.holder is None:  # of the one that it has, the gate says so
+                    self._show(connection, report)
+
     # What the gate says.
 
     def hear_tick(self, tick: messages.Tick) -> None:
@@ -146,17 +158,21 @@ class Pages:
 
     def hear_robot(self, report: messages.RobotReport) -> None:
         """Tell everybody how it stands with a robot."""
+        holder = None if report.holder is None else report.holder.connection
+        texts: dict[tuple[bool, Cap], str] = {}
         with self._lock:
             self._latest[report.robot] = report
-        holder = None if report.holder is None else report.holder.connection
-        theirs = reports.robot_text(report, mine=False)
-        for connection in self._everybody():
-            mine = connection.id == holder
-            connection.say(reports.robot_text(report, mine=True) if mine else theirs)
+            for connection in self._everybody():
+                mine, page = connection.id == holder, connection.cap
+                if (mine, page) not in texts:  # most pages are told the same
+                    text = reports.robot_text(report, mine=mine, page=page)
+                    texts[mine, page] = text
+                connection.say(texts[mine, page])
 
     def hear_gone(self, gone: messages.RobotGone) -> None:
         """Tell everybody that a robot is gone."""
-        self._latest.pop(gone.robot, None)
+        with self._lock:
+            self._latest.pop(gone.robot, None)
         for connection in self._everybody():
             connection.say(reports.gone_text(gone))
 
@@ -174,16 +190,14 @@ class Pages:
 
     def greet(self, hello: messages.Hello) -> None:
         """Tell a page that the gate knows it, and everything that there is."""
-        connection = self._connections.get(hello.connection)
-        if connection is None:
-            return
-        connection.greeted = True
-        connection.say(reports.hello_text(hello))
-        for report in list(self._latest.values()):
-            mine = (
-                report.holder is not None and report.holder.connection == connection.id
-            )
-            connection.say(reports.robot_text(report, mine=mine))
+        with self._lock:
+            connection = self._connections.get(hello.connection)
+            if connection is None:
+                return
+            connection.greeted = True
+            connection.say(reports.hello_text(hello))
+            for report in list(self._latest.values()):
+                self._show(connection, report)
 
     def gone(self) -> None:
         """The gate is gone: what it said counts no longer, and the next one greets."""
@@ -191,6 +205,11 @@ class Pages:
             self._latest.clear()
             for connection in self._connections.values():
                 connection.greeted = False
+
+    def _show(self, connection: DriveConnection, report: messages.RobotReport) -> None:
+        holder = None if report.holder is None else report.holder.connection
+        mine = holder == connection.id
+        connection.say(reports.robot_text(report, mine=mine, page=connection.cap))
 
     def _everybody(self) -> list[DriveConnection]:
         with self._lock:

@@ -29,7 +29,8 @@ _REST = (0.0, 0.0, 0.0)
 
 def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     """Return how it stands with one robot at ``now``."""
-    lease, speed = base.hands.lease, base.speeds.speed
+    lease = base.hands.lease
+    speed = base.speeds.own if lease is None else base.speeds.speed
     age, test = base.speeds.ages.p95, base.tests.last
     unarmable = base.hands.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)

@@ -30,7 +30,8 @@ could tell or the robot still moves. ``asker`` is who asks the holder for the le
 granted by itself; ``changing`` tells that it goes to somebody else as soon as the robot
 stands. ``holder`` and
 ``epoch`` are null without a lease; ``armed`` says whether a command to move would be
-taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force; ``armable`` and
+taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force, or, while nobody
+has the robot, those that would be if this page took it; ``armable`` and
 ``reason``, whether it can be taken, and what stands against that or against moving it.
 ``alarm`` says that the robot moves on a second after zero was sent. ``age`` is the age
 of the driver's loop in milliseconds, ``reaction`` the seconds from a finger to the
@@ -56,6 +57,7 @@ import json
 
 import msgspec
 
+from webmap.gate.limits import Cap, Speed, offered
 from webmap.gate.messages import Hello, Refused, RobotGone, RobotReport
 
 
@@ -69,10 +71,21 @@ def tick_text(tick: int, ack: int) -> str:
     return f'{{"op":"tick","tick":{tick},"ack":{ack}}}'
 
 
-def robot_text(report: RobotReport, *, mine: bool) -> str:
-    """Return a report, for the holder of the lease (``mine``) or for the others."""
+def robot_text(report: RobotReport, *, mine: bool, page: Cap) -> str:
+    """Return a report for one page.
+
+    Args:
+        report: How it stands with a robot.
+        mine: Whether the page has the lease.
+        page: What the page asks for at most, which is in force once it has a robot
+            that is free now.
+
+    """
     fields = msgspec.to_builtins(report)
     del fields["type"]
+    if report.holder is None:
+        speed = offered(Speed(report.v, report.w, report.why), page)
+        fields |= {"v": speed.v, "w": speed.w, "why": speed.why}
     return _text("robot", mine=mine, **fields)
 
 

@@ -1,7 +1,7 @@
 """How fast one machine may go now, by everything that is known of it. No I/O."""
 
 from webmap.gate.events import StopRecord
-from webmap.gate.limits import Cap, Speed, caps_of, speed_in_force
+from webmap.gate.limits import Cap, Speed, caps_of, least, speed_in_force
 from webmap.gate.loopage import LoopAge, governed
 from webmap.gate.motion import Bounds
 from webmap.gate.robots import Robots
@@ -25,10 +25,18 @@ class Speeds:
         self._robots = robots
 
     @property
+    def own(self) -> Speed:
+        """What the robot allows, whoever drives it; infinity where it says nothing."""
+        return least(self._caps())
+
+    def _caps(self) -> list[Cap]:
+        specs = self._robots.specs.values()
+        return [cap for spec in specs for cap in caps_of(spec, self.tested)]
+
+    @property
     def speed(self) -> Speed:
         """The speeds in force now."""
-        specs = self._robots.specs.values()
-        caps = [cap for spec in specs for cap in caps_of(spec, self.tested)]
+        caps = self._caps()
         if self.page_cap is not None:
             caps.append(self.page_cap)
         return governed(speed_in_force(caps), self.ages.slow, self.stop_time)

@@ -1,0 +1,111 @@
+"""What a page is told of the speeds of a robot that nobody has."""
+
+import json
+import math
+import threading
+
+import msgspec
+import pytest
+from gate_harness import Bench, spec
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.gate import messages
+from webmap.gate.limits import Cap, Speed, offered, page_cap, speed_in_force
+from webmap.gate.pages import Pages
+
+INF = math.inf
+LIMITS = st.sampled_from([0.0, 0.2, 0.3, 0.6, 1.0, INF])
+
+
+def free(**changes):
+    """The report of a robot that nobody has."""
+    return Bench().begin(spec(**changes)).report()
+
+
+@pytest.fixture
+def pages():
+    return Pages(lambda message: None, threading.RLock(), lambda message: None)
+
+
+def join(pages, *speeds):
+    said = []
+    connection = pages.connect("Ann", "operator", said.append, print)
+    if speeds:
+        connection.set_speeds(*speeds)
+    pages.greet(messages.Hello(connection.id))
+    return connection, said
+
+
+def cap_of(said):
+    text = json.loads(said[-1])
+    return text["v"], text["w"], text["why"]
+
+
+def test_the_robots_own_limits_are_told_of_a_free_robot():
+    report = free(v_max=0.5, w_max=1.0)
+    assert (report.v, report.w, report.why) == (0.5, 1.0, ("limit of the robot",))
+
+
+def test_a_free_robot_without_limits_is_not_said_to_be_slow():
+    report = free(v_max=None, w_max=None)
+    assert (report.v, report.w, report.why) == (INF, INF, ())
+
+
+def test_a_page_is_told_what_it_would_have(pages):
+    _, quick = join(pages, 0.8, 1.2)
+    _, slow = join(pages, 0.2, 0.4)
+    pages.hear_robot(free(v_max=None, w_max=None))
+    assert cap_of(quick) == (0.8, 1.2, ["limit of the page"])
+    assert cap_of(slow) == (0.2, 0.4, ["limit of the page"])
+    pages.hear_robot(free(v_max=0.5, w_max=1.0))
+    assert cap_of(quick) == (0.5, 1.0, ["limit of the robot"])
+
+
+def test_a_page_is_told_so_when_it_is_taken_too():
+    bench = Bench().begin(spec(v_max=None, w_max=None))
+    bench.tell(messages.Speeds("a", 0.8, 1.2))
+    bench.take()
+    report = bench.report()
+    assert (report.v, report.w, report.why) == (0.8, 1.2, ("limit of the page",))
+
+
+def test_a_page_that_asks_for_another_speed_is_told_at_once(pages):
+    connection, said = join(pages)
+    pages.hear_robot(free(v_max=None, w_max=None))
+    assert cap_of(said) == (0.3, 0.6, ["no limit was stated"])
+    connection.set_speeds(0.8, 1.2)
+    assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
+
+
+def test_of_a_robot_that_somebody_has_the_gate_tells_alone(pages):
+    bench = Bench().begin()
+    bench.take("b")
+    connection, said = join(pages, 0.2, 0.2)
+    pages.hear_robot(bench.report())
+    assert cap_of(said) == (1.0, 1.5, ["limit of the robot"])
+    heard = len(said)
+    connection.set_speeds(0.1, 0.1)
+    assert len(said) == heard
+
+
+def test_what_makes_no_sense_is_standstill():
+    assert page_cap(math.nan, -1.0) == Cap(0.0, 0.0, "limit of the page")
+
+
+@given(LIMITS, LIMITS, LIMITS, LIMITS)
+def test_what_is_offered_is_what_is_in_force_then(own_v, own_w, v, w):
+    stated = any(limit < INF for limit in (own_v, own_w))
+    own = Speed(own_v, own_w, ("limit of the robot",) if stated else ())
+    page = page_cap(v, w)
+    then = speed_in_force([Cap(own_v, own_w, "limit of the robot"), page])
+    seen = offered(own, page)
+    assert (seen.v, seen.w) == (then.v, then.w)
+    assert set(seen.why) <= set(then.why)
+    assert bool(seen.why) == bool(then.why)
+
+
+def test_a_report_with_an_infinite_speed_crosses_the_pipe():
+    report = free(v_max=None, w_max=None)
+    packed = msgspec.msgpack.encode(report)
+    assert msgspec.msgpack.decode(packed, type=messages.RobotReport) == report
