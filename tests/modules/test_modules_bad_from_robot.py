@@ -354,3 +354,33 @@ def test_braces_cost_next_to_no_time(map, channel):
         assert time.process_time() - began < 1.0
 
     with_scene(map, channel, scenario)
+
+
+SIDE = 4096
+HUGE = publish(
+    "/map", grid(0, width=SIDE, height=SIDE, resolution=0.05, data=[-7])
+).replace("[-7]", "[" + "-1," * (SIDE * SIDE - 1) + "100]")
+
+
+@pytest.mark.slow
+def test_a_map_of_fifty_megabytes_is_drawn_while_the_rest_goes_on(map, channel):
+    async def scenario(scene: Scene) -> None:
+        mine = await scene.say_good(0, 1.0)
+        assert len(HUGE) > 48_000_000
+        seen: list[float] = []
+        scene.bridges[1].subscribe(
+            "/odom", lambda message: seen.append(time.monotonic())
+        )
+        sending = asyncio.create_task(scene.servers[0].send(HUGE))
+        while scene.state(0)["/map"] == mine["/map"]:
+            await scene.servers[1].send(publish("/odom", odometry(4.0)))
+            await asyncio.sleep(0.01)
+        await sending
+        assert len(seen) > 20, "the other robot went on meanwhile"
+        assert max(np.diff(seen)) < 1.0
+        layer = scene.grids[0]
+        assert layer.cells.shape == (SIDE, SIDE)
+        assert layer.cells[-1, -1] == 100
+        assert [*scene.errors, *scene.said] == []
+
+    with_scene(map, channel, scenario)
