@@ -72,6 +72,11 @@ def near(points):
     return pytest.approx(np.array(points), abs=0.03)  # a degree at 2 m
 
 
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+
+
 @pytest.fixture
 def scanner(robot, link):
     robot.set_odometry_topic(link, "/odom", 0, type="geometry_msgs/PoseStamped")

@@ -27,6 +27,11 @@ def tell(link, *transforms, static=False) -> None:
     link.say(topic, {"transforms": list(transforms)})
 
 
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+
+
 @pytest.fixture
 def robot(robot, link):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")

@@ -13,6 +13,11 @@ from webmap.core.frames import _heard
 from webmap.geometry import Affine
 
 
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+
+
 @pytest.fixture
 def layer(map, link):
     return map.add_module("Markers", link, "/markers").layer

@@ -61,6 +61,11 @@ def odometry(x, y=0.0, yaw=0.0, *, stamp=10.0, frame="odom"):
     }
 
 
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+
+
 @pytest.fixture
 def link():
     return Link()

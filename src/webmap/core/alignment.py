@@ -1,5 +1,6 @@
 """Where the map of a robot, or of a whole ROS system, lies on the common map."""
 
+import itertools
 import math
 import weakref
 from collections.abc import Callable
@@ -8,6 +9,8 @@ from webmap.errors import ConfigError
 from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
 from webmap.scope import Removal
+
+_numbers = itertools.count(1)
 
 FARTHEST = 1e6
 """Metres; no map lies farther off."""
@@ -57,6 +60,9 @@ class Alignments:
         self._poses: weakref.WeakKeyDictionary[Bridge, Pose] = (
             weakref.WeakKeyDictionary()
         )
+        self._marks: weakref.WeakKeyDictionary[Bridge, str] = (
+            weakref.WeakKeyDictionary()
+        )
         self._listeners: weakref.WeakKeyDictionary[
             Bridge, dict[int, Callable[[], object]]
         ] = weakref.WeakKeyDictionary()
@@ -64,6 +70,16 @@ class Alignments:
     def of(self, bridge: Bridge | None) -> Pose:
         """Return where the map of what is behind a bridge lies."""
         return HERE if bridge is None else self._poses.get(bridge, HERE)
+
+    def stated(self, bridge: Bridge) -> Pose | None:
+        """Return where it lies, None if nobody ever said."""
+        return self._poses.get(bridge)
+
+    def mark(self, bridge: Bridge) -> str:
+        """Return what the page knows the layers of a bridge by."""
+        if bridge not in self._marks:
+            self._marks[bridge] = f"b{next(_numbers)}"
+        return self._marks[bridge]
 
     def set(self, bridge: Bridge, pose: Pose) -> None:
         """Say where the map of what is behind a bridge lies."""

@@ -34,6 +34,7 @@ class Anchored:
         self._frame = ""
         self._frames: Frames | None = None
         self._offset = Pose()
+        layer.svg.set("data-bridge", alignments.mark(bridge))
         with layer.scope.active():
             keep(alignments.on_change(bridge, self._put))
         self._put()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from webmap.core.alignment import alignments
 from webmap.core.frames import Frames, frames_of
 from webmap.core.layer import Layer
+from webmap.core.pose_troubles import Lasting
 from webmap.core.sighting import newest_or_at
 from webmap.geometry import Affine
 from webmap.ros.bridge import Bridge
@@ -52,7 +53,9 @@ class MarkerFrames:
         self._frames: Frames | None = None
         self._moving: dict[object, _Moving] = {}
         self._lost: dict[str, str] = {}
+        self._lasting = Lasting()
         self._moved_at = -1.0
+        layer.svg.set("data-bridge", alignments.mark(bridge))
         with layer.scope.active():
             keep(alignments.on_change(bridge, self._align))
         self._align()
@@ -94,7 +97,7 @@ class MarkerFrames:
         """Say which frames nobody tells of, or take that back."""
         needed = {moving.frame for moving in self._moving.values()}
         self._lost = {f: words for f, words in self._lost.items() if f in needed}
-        if self._lost:
+        if self._lasting.look("lost" if self._lost else ""):
             frame, words = next(iter(self._lost.items()))
             text = f"it is not known where {frame!r} is on the map: {words}"
             more = len(self._lost) - 1

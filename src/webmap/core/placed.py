@@ -3,6 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.pose_troubles import Lasting
 from webmap.core.sighting import Sighting, Sightings
 from webmap.core.whereabouts import affine
 from webmap.errors import ConfigError, ProtocolError
@@ -70,6 +71,7 @@ class Placed:
         self._on_robot = frame == "robot"
         self._settled = True
         self._trouble = ""
+        self._lasting = Lasting()
         self.svg = svg.g(*children, class_=class_, pointer_events="none")
         if frame == "map":
             robot.svg.insert(robot.svg.children.index(robot.model), self.svg)
@@ -147,10 +149,11 @@ class Placed:
 
     def _say(self, found: Sighting) -> None:
         """Say what is wrong with the place, once; take it back when that is mended."""
-        if found.trouble == self._trouble:
+        trouble = self._lasting.look(found.trouble)
+        if trouble == self._trouble:
             return
-        self._trouble = found.trouble
-        if found.trouble:
+        self._trouble = trouble
+        if trouble:
             self.robot.set_problem(self, f"{self._class}: {found.words}")
         else:
             self.robot.clear_problem(self)

@@ -20,6 +20,7 @@ from webmap.core.goal_topics import (
 from webmap.core.motion import MotionRoad, TwistTopic
 from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.placing import Placing
+from webmap.core.pose_troubles import PoseTroubles
 from webmap.core.registry import Namespace, robot_modules
 from webmap.core.whereabouts import Whereabouts
 from webmap.errors import MotionError
@@ -120,7 +121,7 @@ class Robot(Extendable):
         self._feed: OdometryFeed | None = None
         self._frames: Frames | None = None
         self._placing: Placing | None = None
-        self._placing_kind = ""
+        self._troubles = PoseTroubles(self)
         self._says_placing = True
         self.whereabouts = Whereabouts()
         """Where it is and was, on its own map and on the common one."""
@@ -257,9 +258,6 @@ class Robot(Extendable):
         """Draw the robot where its odometry has it; does nothing if it is so."""
         self._hears_frames.remove()
         self._frames = self._placing = None
-        self._placing_kind = ""
-        self.clear_problem("tf")
-        self.clear_problem("frames")
         self._find_bridge()
 
     @property
@@ -708,6 +706,7 @@ class Robot(Extendable):
     def _find_bridge(self) -> None:
         """Note where poses come from now: the alignment of that bridge holds."""
         self.whereabouts.forget()
+        self._troubles.forget()
         source = self._frames if self._feed is None else self._feed
         bridge = None if source is None else source.bridge
         if bridge is not self.whereabouts.bridge:
@@ -716,23 +715,12 @@ class Robot(Extendable):
 
     def _tell_trouble(self) -> None:
         """Say what is wrong with the frames or the poses; take back what is mended."""
-        placing, frames = self._placing, self._frames
-        if placing is not None and placing.kind != self._placing_kind:
-            self._placing_kind = placing.kind
-            self.clear_problem("tf")
-            if placing.problem is not None and self._says_placing:
-                self.set_problem("tf", placing.problem)
-        words = {
-            "frames": None
-            if placing is None or frames is None
-            else frames.faults.of(placing.base_frame, time.monotonic()),
-            "jumps": self.whereabouts.jumps.problem,
-        }
-        for about, text in words.items():
-            if text is None:
-                self.clear_problem(about)
-            else:
-                self.set_problem(about, text)
+        self._troubles.look(
+            self._placing,
+            self._frames,
+            self.whereabouts.jumps,
+            quiet=not self._says_placing,
+        )
 
     def _place(self, reading: PoseReading) -> None:
         """Take the newest pose, in the robot's own map."""
