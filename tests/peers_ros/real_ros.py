@@ -15,6 +15,8 @@ from typing import NamedTuple
 from ros_facts import ROBOT
 from websockets.sync.client import connect
 
+from webmap.testing import FaultProxy
+
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 FOLDER = Path(sys.prefix) / "ros"
@@ -105,37 +107,34 @@ class Ros:
         python = FOLDER / "bin" / "python"
         self.graph = Program([python, HERE / "ros_graph.py"], self._environment)
         self.bridge = None
-        self._port = 0
+        self._door = FaultProxy(0)
+        self._door.refuse()
 
     @property
     def url(self):
-        return f"ws://127.0.0.1:{self._port}"
+        """Where the rosbridge is reached, however often it is started."""
+        return f"ws://127.0.0.1:{self._door.port}"
 
     def start_bridge(self):
-        """Start the rosbridge; again at the port that it had."""
+        """Start a rosbridge, and let clients in when it has found the robot.
+
+        On a busy machine that takes seconds after it began to listen. What is published
+        before then is lost, a zero too.
+        """
         self.graph.wait_for("ready")
         self.bridge = Program(
-            [self._about["bridge"], "--bind", f"127.0.0.1:{self._port}", "--no-rosapi",
+            [self._about["bridge"], "--bind", "127.0.0.1:0", "--no-rosapi",
              "--log-ansi", "false", "--log-directory", FOLDER / "log"],
             # ROS's libraries expect to be loaded by a Python.
             {**self._environment, "LD_PRELOAD": self._about["library"]},
         )  # fmt: skip
         found = self.bridge.wait_for(r"listening address=127\.0\.0\.1:(\d+)")
-        self._port = int(found[1])
-
-    def wait_until_known(self, topic, within=20.0):
-        """Wait until the bridge has found a topic, which takes it a moment."""
-        subscribe = json.dumps({"op": "subscribe", "topic": topic})
-        deadline = time.monotonic() + within
-        with connect(self.url, proxy=None) as socket:
-            while time.monotonic() < deadline:
-                socket.send(subscribe)
-                with contextlib.suppress(TimeoutError):
-                    if json.loads(socket.recv(timeout=0.5))["op"] == "publish":
-                        return
-        raise AssertionError(f"{topic} is not known to the bridge")
+        wait_until_known(f"ws://127.0.0.1:{found[1]}", f"{ROBOT}/odom")
+        self._door.target = int(found[1])
+        self._door.refuse(False)
 
     def kill_bridge(self):
+        self._door.refuse()
         self.bridge.end(signal.SIGKILL)
         self.bridge = None
 
@@ -148,6 +147,20 @@ class Ros:
         for program in (self.bridge, self.graph):
             if program is not None:
                 program.end()
+        self._door.end()
+
+
+def wait_until_known(url, topic, within=20.0):
+    """Wait until a bridge has found a topic."""
+    subscribe = json.dumps({"op": "subscribe", "topic": topic})
+    deadline = time.monotonic() + within
+    with connect(url, proxy=None) as socket:
+        while time.monotonic() < deadline:
+            socket.send(subscribe)
+            with contextlib.suppress(TimeoutError):
+                if json.loads(socket.recv(timeout=0.5))["op"] == "publish":
+                    return
+    raise AssertionError(f"{topic} is not known to the bridge")
 
 
 @contextlib.contextmanager
@@ -156,7 +169,6 @@ def running(about):
     ros = Ros(about)
     try:
         ros.start_bridge()
-        ros.wait_until_known(f"{ROBOT}/odom")
         yield ros
     finally:
         ros.end()

@@ -15,3 +15,13 @@ CELL = 0.1
 CELLS = (60, 40)
 CORNER = (-1.0, -0.5)
 """The south-west corner of the map."""
+
+TOPICS = f"""\
+/map [nav_msgs/msg/OccupancyGrid]
+/parameter_events [rcl_interfaces/msg/ParameterEvent]
+{ROBOT}/cmd_vel [geometry_msgs/msg/Twist]
+{ROBOT}/odom [nav_msgs/msg/Odometry]
+{ROBOT}/scan [sensor_msgs/msg/LaserScan]
+/rosout [rcl_interfaces/msg/Log]
+"""
+"""As ``ros2 topic list -t`` prints them."""

@@ -1,17 +1,30 @@
 """A real ROS 2 graph behind a rosbridge that this project did not write."""
 
 import math
+import re
+import subprocess
+import sys
 import time
 
 import pytest
 from playwright.sync_api import expect
 from processes import WEB, hold, matrix, running, wait_until
-from ros_facts import ANGLE_MIN, ANGLE_STEP, DRAWN, START
+from ros_facts import (
+    ANGLE_MIN,
+    ANGLE_STEP,
+    CELL,
+    CELLS,
+    CORNER,
+    DRAWN,
+    ROBOT,
+    START,
+    TOPICS,
+)
 
 # Installing what is real may take its time, once.
 pytestmark = [pytest.mark.peer, pytest.mark.browser, pytest.mark.timeout(300)]
 
-ROBOT = "Bob:/robot_0/odom:/robot_0/cmd_vel:/robot_0/scan"
+TOLD = f"Bob:{ROBOT}/odom:{ROBOT}/cmd_vel:{ROBOT}/scan"
 BOB = '.robot[data-name="Bob"]'
 
 SOON = 1.0
@@ -20,7 +33,7 @@ SOON = 1.0
 
 @pytest.fixture(scope="module")
 def server(ros):
-    command = ("view", ros.url, "--robot", ROBOT, "--port", 0, "--no-browser")
+    command = ("view", ros.url, "--robot", TOLD, "--port", 0, "--no-browser")
     with running(*command, pattern=WEB) as process:
         yield process
 
@@ -129,10 +142,71 @@ def test_a_bridge_that_is_killed_under_way_says_zero_first_when_it_is_back(opene
     wait_until(lambda: stands(ros), what="zero")
     assert all(t.is_zero for t in ros.twists()[killed:]), "the held key drove on"
     opened.keyboard.up("w")
-    # A bridge that is asked for a topic before it has found it has to be asked again.
-    drawn_now(opened).wait_for(state="attached", timeout=60_000)
+    drawn_now(opened).wait_for(state="attached")
     expect(opened.locator(f"{BOB} > .laserscan:not(.stale)")).to_be_attached()
     expect_drawn_where_it_is(opened, ros)
     drive(opened, ros)
     opened.keyboard.up("w")
     wait_until(lambda: stands(ros), what="zero after it drove again")
+
+
+def webmap(*arguments):
+    """Run a command of ours that is given the topics as ROS itself lists them."""
+    done = subprocess.run(
+        [sys.executable, "-m", "webmap", *arguments, "--topics", "-"],
+        input=TOPICS,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def box_in_world(picture):
+    """Where an image is drawn: its left, low, right and high edge in metres."""
+    return picture.evaluate(
+        """image => {
+            const world = image.closest(".world");
+            const tf = world.getCTM().inverse().multiply(image.getCTM());
+            const box = image.getBBox();
+            const one = new DOMPoint(box.x, box.y).matrixTransform(tf);
+            const far = new DOMPoint(box.x + box.width, box.y + box.height);
+            const other = far.matrixTransform(tf);
+            return [Math.min(one.x, other.x), Math.min(one.y, other.y),
+                    Math.max(one.x, other.x), Math.max(one.y, other.y)];
+        }"""
+    )
+
+
+def test_a_list_of_its_topics_makes_a_fleet_with_the_map_that_was_published_before(
+    ros, tab, tmp_path
+):
+    code, fleet, said = webmap("discover", ros.url, "--toml")
+    assert code == 0, said
+    file = tmp_path / "fleet.toml"
+    file.write_text(fleet)
+    with running("run", file, "--port", 0, "--no-browser", pattern=WEB) as process:
+        tab.goto(process.url)
+        tab.locator('.robot[data-name="robot_0"]:not(.unplaced)').wait_for(
+            state="attached"
+        )
+        room = tab.locator(".occupancy-grid image")
+        room.wait_for(state="attached")
+        there = pytest.approx(
+            [*CORNER, CORNER[0] + CELL * CELLS[0], CORNER[1] + CELL * CELLS[1]],
+            abs=0.001,
+        )
+        wait_until(lambda: box_in_world(room) == there, what="the room at its place")
+        tab.goto("about:blank")
+
+
+def test_the_readiness_check_says_how_it_stands_with_the_real_robot(ros):
+    code, said, _ = webmap("doctor", ros.url, "--seconds", "2")
+    assert code == 0, said
+    assert "those of the list that was given; robots found: robot_0." in said
+    rate = re.search(rf"{ROBOT}/odom: (\d+\.\d) messages a second", said)
+    assert rate, said
+    assert float(rate[1]) == pytest.approx(20, abs=8)
+    assert f"{ROBOT}/cmd_vel takes Twist" in said
+    assert re.search(rf"Scans come packed as CBOR \({ROBOT}/scan\)", said)
