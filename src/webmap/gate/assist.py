@@ -15,9 +15,8 @@ from typing import Literal
 
 import msgspec
 
+from webmap.gate.sweptway import Fan, Point, looks_ahead
 from webmap.geometry import Twist
-
-Point = tuple[float, float]
 
 FRESH = 0.3
 """The oldest scan that counts, in seconds since it arrived."""
@@ -30,6 +29,7 @@ REACTION = 0.2
 
 _SECTOR = math.radians(60)
 _STRAIGHT = 1e-4
+_ON_THE_SPOT = 1e-6
 _TOUCHING = 1e-9
 
 
@@ -187,12 +187,26 @@ def _blindness(
     known = sum(map(_says_something, towards, (sweep,) * len(towards)))
     if known < KNOWN * len(towards):
         return "most of the scan is unknown"
+    if not _covers_the_way(spec, sweep, wanted):
+        return "the scan covers a part of the way only"
     return None
+
+
+def _covers_the_way(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> bool:
+    """Return whether the scan looks where the robot is until it could stand."""
+    fan = Fan(sweep.angle_min, sweep.angle_increment, len(sweep.ranges))
+    speed = math.hypot(wanted.vx, wanted.vy)
+    if speed < _ON_THE_SPOT:
+        return fan.share >= KNOWN
+    way = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
+    return looks_ahead(
+        fan, spec.footprint, spec.sensor, wanted, way / speed, spec.stop_distance
+    )
 
 
 def _rays_towards(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> list[float]:
     """Return the ranges that look where the robot goes; all of them if it turns."""
-    if math.hypot(wanted.vx, wanted.vy) < 1e-6:
+    if math.hypot(wanted.vx, wanted.vy) < _ON_THE_SPOT:
         return list(sweep.ranges)
     ahead = math.atan2(wanted.vy, wanted.vx) - spec.sensor[2]
     chosen = []

@@ -1,0 +1,127 @@
+"""Scan assist asks whether the scan looks where the robot is about to go."""
+
+import math
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.gate.assist import AssistSpec, Sweep, assist, polygon_around
+from webmap.gate.sweptway import Fan, looks_ahead
+from webmap.geometry import Twist
+
+BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
+PART = "scan assist: the scan covers a part of the way only"
+AHEAD = Twist(0.5)
+
+
+def spec(**more):
+    return AssistSpec(**{"topic": "/scan", "footprint": BOX, **more})
+
+
+def scan(first, last, *, step=1.0):
+    """A scan that sees nothing between two angles in degrees."""
+    count = round((last - first) / step) + 1
+    ranges = [math.inf] * count
+    low, each = math.radians(first), math.radians(step)
+    return Sweep(low, each, 0.05, 8.0, ranges, 0.0)
+
+
+def verdict(sweep, wanted, **more):
+    return assist(spec(**more), sweep, wanted, 0.1)
+
+
+class TestAhead:
+    def test_a_scanner_that_looks_to_the_front_is_enough_to_go_ahead(self):
+        for half in (180, 135, 90, 60):
+            assert verdict(scan(-half, half), AHEAD).scale == 1.0
+
+    def test_one_that_looks_through_a_slit_is_not(self):
+        found = verdict(scan(-20, 20), AHEAD)
+        assert (found.scale, found.why) == (0.0, PART)
+        assert verdict(scan(-20, 20), AHEAD, blind="creep").scale == pytest.approx(0.2)
+
+    def test_one_that_looks_to_one_side_is_not(self):
+        # Its rays are most of what is asked for ahead, and all of them are free.
+        assert verdict(scan(-90, 5), AHEAD).why == PART
+        assert verdict(scan(-5, 90), AHEAD).why == PART
+
+    def test_one_with_a_gap_ahead_is_not(self):
+        assert verdict(scan(15, 345), AHEAD).why == PART
+        assert verdict(scan(15, 345), Twist(-0.5)).scale == 1.0
+
+    def test_where_the_scanner_is_and_looks_counts(self):
+        behind = (-0.3, 0.0, math.pi)
+        assert verdict(scan(-90, 90), AHEAD, sensor=behind).scale == 0.0
+        assert verdict(scan(90, 270), AHEAD, sensor=behind).scale == 1.0
+        # Close behind its front it must look more to the sides.
+        assert verdict(scan(-35, 35), AHEAD).scale == 1.0
+        assert verdict(scan(-35, 35), AHEAD, sensor=(0.3, 0.0, 0.0)).why == PART
+
+    def test_what_is_nearer_than_the_stop_distance_need_not_be_seen(self):
+        front = (0.3, 0.0, 0.0)
+        assert verdict(scan(-60, 60), AHEAD, sensor=front).scale == 1.0
+        near = verdict(scan(-60, 60), AHEAD, sensor=front, stop_distance=0.05)
+        assert near.why == PART
+
+    def test_rays_may_run_the_other_way_round(self):
+        there = scan(-90, 90)
+        back = Sweep(
+            -there.angle_min, -there.angle_increment, 0.05, 8.0, there.ranges, 0
+        )
+        assert verdict(back, AHEAD).scale == 1.0
+        assert verdict(back, Twist(-0.5)).scale == 0.0
+
+
+class TestOtherWays:
+    def test_an_arc_leads_out_of_what_a_narrow_scanner_sees(self):
+        narrow = scan(-40, 40)
+        assert verdict(narrow, Twist(0.5)).scale == 1.0
+        assert verdict(narrow, Twist(0.5, 0.0, 1.2)).why == PART
+        assert verdict(scan(-90, 90), Twist(0.5, 0.0, 1.2)).scale == 1.0
+
+    def test_backwards_and_sideways_need_eyes_there(self):
+        front = scan(-90, 90)
+        assert verdict(front, Twist(-0.5)).scale == 0.0
+        assert verdict(front, Twist(0.0, 0.5)).why == PART
+        assert verdict(scan(-180, 180), Twist(0.0, 0.5)).scale == 1.0
+
+    def test_on_the_spot_half_of_the_circle_is_enough(self):
+        turn = Twist(0.0, 0.0, 0.5)
+        assert verdict(scan(-90, 90), turn).scale == 1.0
+        assert verdict(scan(-60, 60), turn).why == PART
+
+    def test_it_is_quick_enough_to_be_asked_at_every_command(self):
+        round_one = spec(footprint=polygon_around(0.3))
+        all_around = scan(-180, 179)
+        begun = time.process_time()
+        for _ in range(100):
+            assist(round_one, all_around, Twist(2.0, 0.0, 1.5), 0.1)
+        assert (time.process_time() - begun) / 100 < 0.02
+
+
+class TestFan:
+    @given(st.floats(-10, 10), st.floats(0.001, 0.5), st.integers(1, 400))
+    def test_covers_each_of_its_rays_and_the_way_to_the_next(self, first, step, count):
+        fan = Fan(first, step, count)
+        for ray in range(count):
+            assert fan.covers(first + (ray + 0.4) * step)
+            assert fan.covers(first + ray * step - math.tau)
+
+    @given(st.floats(-math.pi, math.pi), st.floats(0.001, 0.1), st.floats(-0.9, 0.9))
+    def test_covers_nothing_on_the_other_side(self, first, step, aside):
+        fan = Fan(first, step, 2)
+        other = first + math.pi + aside * (math.pi - 0.4)
+        assert not fan.covers(other)
+
+    def test_a_whole_circle_covers_everything(self):
+        fan = Fan(-math.pi, math.radians(1), 360)
+        assert fan.share == 1.0
+        assert all(fan.covers(math.radians(angle / 3)) for angle in range(-999, 999))
+
+
+def test_a_robot_that_goes_nowhere_needs_no_eyes():
+    nothing = Fan(3.0, 0.01, 1)
+    assert looks_ahead(nothing, BOX, (0.0, 0.0, 0.0), AHEAD, 0.1, 0.15)
+    assert not looks_ahead(nothing, BOX, (0.0, 0.0, 0.0), AHEAD, 1.0, 0.15)
