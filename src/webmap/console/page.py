@@ -91,6 +91,7 @@ def build(
     map.add_module("StopButton")
     map.add_module("LayerSwitches", off=["Costmaps"])
     map.add_module("MeasureTool")
+    map.add_module("ExportTool", place=".map-tools", classes="button square")
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
     frame = map.add_module(Frame, title, floor)

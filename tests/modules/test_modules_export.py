@@ -1,0 +1,247 @@
+"""The view saved as SVG and PNG: opened alone, it looks as it did on the page."""
+
+import io
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from button_robot import simulator
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
+
+from real_browser import watched_tab
+
+pytestmark = pytest.mark.browser
+
+HERE = Path(__file__).parent
+SVG = "{http://www.w3.org/2000/svg}"
+SIZE = (900, 700)
+
+
+@contextmanager
+def served(file: Path) -> Iterator[str]:
+    command = [sys.executable, "-m", "webmap", "run", str(file)]
+    with subprocess.Popen(
+        [*command, "--port", "0", "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(HERE)},
+    ) as process:
+        try:
+            found = re.search(r"http\S+", process.stdout.readline())
+            assert found
+            yield found[0]
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    with served(HERE / "scene_of_export.py") as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def tab(chromium: Browser, url: str) -> Iterator[Page]:
+    with watched_tab(chromium, *SIZE) as page:
+        page.goto(url)
+        for shown in (".occupancy-grid.map image", ".images image", ".marker.text"):
+            page.wait_for_selector(f"{shown}", state="attached")
+        page.wait_for_function(
+            "[...document.querySelectorAll('.world image')].length === 3 &&"
+            " [...document.querySelectorAll('.world image')].every("
+            "(i) => i.hasAttribute('href'))"
+        )
+        # What is old stays so, and the picture is the same a second later.
+        page.wait_for_selector(".robot.stale > .path.stale", state="attached")
+        page.wait_for_selector(".webmap-export-go")
+        page.wait_for_load_state("networkidle")
+        yield page
+
+
+def saved(tab: Page, kind: str, folder: Path) -> Path:
+    """Save the view with the keyboard alone; return the file."""
+    tab.locator(".webmap-export-go").focus()
+    tab.keyboard.press("Enter")
+    expect(tab.locator(".webmap-export-svg")).to_be_focused()
+    if kind == "png":
+        tab.keyboard.press("Tab")
+    with tab.expect_download() as download:
+        tab.keyboard.press("Enter")
+    name = download.value.suggested_filename
+    assert re.fullmatch(rf"webmap-20\d\d-\d\d-\d\d-\d{{6}}\.{kind}", name)
+    download.value.save_as(folder / name)
+    return folder / name
+
+
+def pixels(png: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+
+
+def drawn_alone(chromium: Browser, file: Path, width: int, height: int) -> np.ndarray:
+    """Return what a browser shows of a file that it opens by itself, offline."""
+    context = chromium.new_context(
+        viewport={"width": width, "height": height}, offline=True
+    )
+    page = context.new_page()
+    page.goto(file.as_uri())
+    picture = pixels(page.screenshot())
+    context.close()
+    return picture
+
+
+def differing(one: np.ndarray, other: np.ndarray) -> float:
+    """Return which part of the pixels differs by more than a shade."""
+    assert one.shape == other.shape
+    return float((np.abs(one - other).max(axis=2) > 24).mean())
+
+
+HIDE = "for (const e of document.querySelectorAll(%r)) e.style.visibility = 'hidden'"
+
+
+def test_the_svg_alone_looks_as_the_page_did(tab, chromium, tmp_path):
+    file = saved(tab, "svg", tmp_path)
+    page = pixels(tab.screenshot())
+    alone = drawn_alone(chromium, file, *SIZE)
+    beside = np.s_[80:660, :]  # the tool is above, the frame of the scale below
+    assert differing(page[beside], alone[beside]) < 0.002
+    for colour in [(0xCF, 0xE8, 0xD5), (250, 120, 0), (0, 0, 255)]:
+        assert (np.abs(alone - colour).max(axis=2) < 4).sum() > 100, colour
+
+
+def test_the_scale_and_its_words_are_in_the_picture(tab, chromium, tmp_path):
+    box = tab.locator(".webmap-scale-bar").bounding_box()
+    words = tab.locator(".webmap-scale-bar-text").inner_text()
+    file = saved(tab, "svg", tmp_path)
+    texts = [t.text for t in ElementTree.parse(file).iter(f"{SVG}text")]
+    assert words in texts
+    alone = drawn_alone(chromium, file, *SIZE)
+    part = np.s_[
+        int(box["y"]) : int(box["y"] + box["height"]),
+        int(box["x"]) : int(box["x"] + box["width"]),
+    ]
+    assert differing(pixels(tab.screenshot())[part], alone[part]) < 0.15
+
+
+def test_the_svg_needs_nothing_else_and_runs_nothing(tab, tmp_path):
+    text = saved(tab, "svg", tmp_path).read_text("utf-8")
+    root = ElementTree.fromstring(text)
+    assert root.tag == f"{SVG}svg"
+    for element in root.iter():
+        assert element.tag.startswith(SVG)
+        assert element.tag not in {f"{SVG}script", f"{SVG}style", f"{SVG}foreignObject"}
+        for name, value in element.attrib.items():
+            assert not name.lower().startswith("on"), name
+            assert name not in ("class", "style"), name
+            if name.endswith("href"):
+                assert value.startswith(("#", "data:image/png;base64,")), value[:40]
+            assert "url(" not in value.replace('url("#', "").replace("url(#", "")
+    images = list(root.iter(f"{SVG}image"))
+    assert len(images) == 3
+    assert "<b>Küche</b>" in [t.text for t in root.iter(f"{SVG}text")]
+    assert tab.url.split("/")[2] not in text
+
+
+def test_the_png_is_the_same_picture(tab, chromium, tmp_path):
+    file = saved(tab, "png", tmp_path)
+    page, image = pixels(tab.screenshot()), pixels(file.read_bytes())
+    beside = np.s_[80:660, :]
+    assert differing(page[beside], image[beside]) < 0.002
+
+
+def test_what_is_not_seen_is_not_in_it(tab, tmp_path):
+    tab.evaluate("document.querySelector('.images image').style.display = 'none'")
+    root = ElementTree.parse(saved(tab, "svg", tmp_path))
+    tab.evaluate("document.querySelector('.images image').style.display = ''")
+    assert len(list(root.iter(f"{SVG}image"))) == 2
+
+
+def test_escape_closes_the_choice_and_gives_the_focus_back(tab):
+    go = tab.locator(".webmap-export-go")
+    go.click()
+    expect(tab.locator(".webmap-export-menu")).to_be_visible()
+    expect(go).to_have_attribute("aria-expanded", "true")
+    tab.keyboard.press("Escape")
+    expect(tab.locator(".webmap-export-menu")).to_be_hidden()
+    expect(go).to_be_focused()
+    go.click()
+    tab.mouse.click(450, 350)
+    expect(tab.locator(".webmap-export-menu")).to_be_hidden()
+
+
+def test_a_picture_that_is_gone_is_left_out_and_that_is_said(tab, tmp_path):
+    tab.evaluate(
+        "document.querySelector('.images image').setAttribute("
+        "'href', '/_webmap/images/gone')"
+    )
+    tab.allowed.append("404")
+    root = ElementTree.parse(saved(tab, "svg", tmp_path))
+    assert len(list(root.iter(f"{SVG}image"))) == 2
+    expect(tab.locator(".webmap-notice")).to_contain_text("without 1 of its images")
+
+
+FLEET = """\
+[bridges]
+hall = "{url}"
+
+[map]
+topic = "/map"
+
+[[robots]]
+name = "Bob"
+odometry = "/robot_0/odom"
+
+[[robots]]
+name = "Ann"
+odometry = "/robot_1/odom"
+"""
+
+
+@pytest.fixture(scope="module")
+def console(tmp_path_factory) -> Iterator[str]:
+    file = tmp_path_factory.mktemp("fleet") / "fleet.toml"
+    with simulator("--robots", "2") as bridge:
+        file.write_text(FLEET.format(url=bridge))
+        with served(file) as found:
+            yield found
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_console_saves_its_map_by_a_button_of_the_view(
+    chromium, console, scheme, tmp_path
+):
+    with watched_tab(chromium, 1280, 800) as tab:
+        tab.emulate_media(color_scheme=scheme)
+        tab.goto(console)
+        expect(tab.locator(".robot:not(.unplaced)")).to_have_count(2)
+        tab.wait_for_selector(".occupancy-grid image[href]", state="attached")
+        tab.locator("#robots .row").first.click()
+        tab.locator("#show-all").click()
+        expect(tab.locator(".map-tools .webmap-export-go")).to_have_count(1)
+        file = saved(tab, "svg", tmp_path)
+        tab.evaluate(HIDE % ".map-tools, .card, .webmap-frame")
+        box = tab.locator("svg.webmap").bounding_box()
+        page = pixels(tab.screenshot(clip=box))
+        alone = drawn_alone(chromium, file, int(box["width"]), int(box["height"]))
+    # The scale is hidden on the page and in the picture.
+    assert differing(page[:-60], alone[:-60]) < 0.003
+
+
+def test_on_a_phone_the_choice_opens_where_there_is_room(chromium, console):
+    with watched_tab(chromium, 390, 844) as tab:
+        tab.goto(console)
+        tab.locator(".webmap-export-go").click()
+        expect(tab.locator(".webmap-export-png")).to_be_visible()
+        box = tab.locator(".webmap-export-menu").bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 390
+        assert tab.evaluate("scrollX") == 0
