@@ -85,16 +85,20 @@ test-parallel: $(DEV) $(NODE)
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial
 
-## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50)
+## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1 goes on)
 .PHONY: test-safety
 TRIALS ?= 50
+RESUME ?=
 FIGURES := docs/_build/safety-figures.jsonl
 test-safety: $(DEV) $(NODE)
 	mkdir -p $(dir $(FIGURES))
-	rm -f $(FIGURES)
-	WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_FIGURES=$(FIGURES) \
-	  $(BIN)/pytest -q --timeout 3600 tests/safety
-	$(PY) tests/safety/safety_figures.py $(FIGURES)
+	[ "$(RESUME)" = 1 ] || rm -f $(FIGURES) $(FIGURES).schedules
+	failed=0; \
+	WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_RESUME=$(RESUME) \
+	  WEBMAP_SAFETY_FIGURES=$(abspath $(FIGURES)) \
+	  $(BIN)/pytest -v --timeout 3600 tests/safety tests/gate/test_gate_machine.py \
+	  || failed=$$?; \
+	$(PY) tests/safety/safety_figures.py $(FIGURES); exit $$failed
 
 ## docs: the documentation, in docs/_build/html
 .PHONY: docs

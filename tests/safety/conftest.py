@@ -16,3 +16,19 @@ def bench(tmp_path_factory):
 
     with ProvingBench(tmp_path_factory.mktemp("safety")) as bench:
         yield bench
+
+
+@pytest.fixture(scope="session", autouse=True)
+def progress(pytestconfig):
+    """Show how far a long run has come, past the capturing of output."""
+    from safety_run import SHOW
+
+    capture = pytestconfig.pluginmanager.getplugin("capturemanager")
+
+    def show(text):
+        with capture.global_and_fixture_disabled():
+            print(f"\n{text}", end=" ", flush=True)
+
+    SHOW.append(show)
+    yield
+    SHOW.remove(show)

@@ -20,8 +20,10 @@ from processes import WEB, Process
 from webmap.testing import FaultProxy, Sentinel, Shape, WitnessRobot
 
 SITE = Path(__file__).with_name("safety_site.py")
-TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "1"))
 V_MAX, W_MAX = 1.0, 1.5
+
+NEUTRAL = 0.3
+"""Seconds for which the key is off before it is pressed: 200 ms must have been seen."""
 
 ROBOT_TIMEOUT = 0.5
 """Seconds until the witness stops by itself."""
@@ -219,7 +221,7 @@ class Bench:
         self.heal()
         deadline = time.monotonic() + within
         while time.monotonic() < deadline:
-            pass_time(0.4)
+            pass_time(NEUTRAL)
             self.press()
             patience = time.monotonic() + 2.5
             while time.monotonic() < patience:

@@ -1,7 +1,8 @@
 """The figures of a run, and the table of them that the documentation shows.
 
 The tests write what they measure as lines of JSON into the file that the environment
-names by WEBMAP_SAFETY_FIGURES. ``python tests/safety/safety_figures.py FILE`` makes
+names by WEBMAP_SAFETY_FIGURES, each as soon as its scenario has ended, so that a run
+may be cut and resumed. ``python tests/safety/safety_figures.py FILE`` makes
 ``docs/safety-figures.md`` and ``docs/safety-figures.json`` of them.
 """
 
@@ -9,8 +10,11 @@ import json
 import os
 import platform
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
+
+from safety_run import TRIALS, version
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -25,6 +29,9 @@ class Figure:
     worst: float
     jitter: float
     trials: int
+    version: str = field(default_factory=version)
+    asked: int = TRIALS
+    """How many trials the whole run was asked for."""
 
 
 def note(figure: Figure) -> None:
@@ -35,22 +42,37 @@ def note(figure: Figure) -> None:
             file.write(json.dumps(asdict(figure)) + "\n")
 
 
-def table(figures: list[Figure]) -> str:
-    """Return the figures as a table in Markdown."""
+def machine() -> dict[str, Any]:
+    """Return what the figures depend on, and nothing that tells whose it is."""
+    return {
+        "processors": os.cpu_count(),
+        "python": platform.python_version(),
+        "kernel": f"{platform.system()} {platform.release()}",
+    }
+
+
+def table(figures: list[Figure], measured_on: dict[str, Any]) -> str:
+    """Return the figures as a table in Markdown, and a line on the machine."""
     lines = [
         "---",
         "orphan: true",
         "---",
         "",
         "| what fails while W is held | stopped by | promised | worst measured "
-        "| machine late by | trials |",
-        "|---|---|---|---|---|---|",
+        "| machine late by | trials | version |",
+        "|---|---|---|---|---|---|---|",
     ]
     by = {"zero": "a zero", "itself": "its own timeout", "key": "a zero"}
     lines += [
         f"| {f.name} | {by[f.stops_by]} | {f.promised * 1000:.0f} ms "
-        f"| {f.worst * 1000:.0f} ms | {f.jitter * 1000:.0f} ms | {f.trials} |"
+        f"| {f.worst * 1000:.0f} ms | {f.jitter * 1000:.0f} ms | {f.trials} "
+        f"| {f.version} |"
         for f in figures
+    ]
+    lines += [
+        "",
+        f"Measured on {measured_on['processors']} processors, "
+        f"{measured_on['kernel']}, Python {measured_on['python']}.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -60,15 +82,8 @@ def main() -> None:
     lines = Path(sys.argv[1]).read_text().splitlines()
     newest = {figure["name"]: Figure(**figure) for figure in map(json.loads, lines)}
     figures = list(newest.values())
-    (DOCS / "safety-figures.md").write_text(table(figures))
-    content = {
-        "machine": {
-            "processors": os.cpu_count(),
-            "python": platform.python_version(),
-            "system": platform.system(),
-        },
-        "figures": [asdict(figure) for figure in figures],
-    }
+    content = {"machine": machine(), "figures": [asdict(f) for f in figures]}
+    (DOCS / "safety-figures.md").write_text(table(figures, content["machine"]))
     (DOCS / "safety-figures.json").write_text(json.dumps(content, indent=2) + "\n")
 
 

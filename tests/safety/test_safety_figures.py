@@ -2,21 +2,47 @@
 
 import json
 
-from safety_figures import DOCS, Figure, table
+from safety_figures import DOCS, Figure, note, table
+from safety_run import TRIALS, is_measured
+
+MACHINE = {"processors": 2, "kernel": "Linux 6.1", "python": "3.11.2"}
 
 
 def test_a_figure_is_a_line_in_milliseconds():
-    figure = Figure("the page is frozen", "zero", 0.3, 0.0124, 0.0081, 50)
-    line = table([figure]).splitlines()[-1]
-    assert line == "| the page is frozen | a zero | 300 ms | 12 ms | 8 ms | 50 |"
+    figure = Figure("the page is frozen", "zero", 0.3, 0.0124, 0.0081, 50, "1.0 (a1b)")
+    lines = table([figure], MACHINE).splitlines()
+    assert lines[-3] == (
+        "| the page is frozen | a zero | 300 ms | 12 ms | 8 ms | 50 | 1.0 (a1b) |"
+    )
+    assert lines[-1] == "Measured on 2 processors, Linux 6.1, Python 3.11.2."
 
 
 def test_what_nobody_can_stop_is_told_from_what_gets_a_zero():
     figure = Figure("the gate is killed", "itself", 0.55, 0.51, 0.0, 1)
-    assert "| its own timeout | 550 ms |" in table([figure])
+    assert "| its own timeout | 550 ms |" in table([figure], MACHINE)
 
 
 def test_the_table_in_the_documentation_is_that_of_the_figures_beside_it():
     content = json.loads((DOCS / "safety-figures.json").read_text())
     figures = [Figure(**figure) for figure in content["figures"]]
-    assert (DOCS / "safety-figures.md").read_text() == table(figures)
+    assert (DOCS / "safety-figures.md").read_text() == table(
+        figures, content["machine"]
+    )
+
+
+def test_a_run_that_was_cut_goes_on_with_what_is_missing(tmp_path, monkeypatch):
+    path = tmp_path / "figures.jsonl"
+    monkeypatch.setenv("WEBMAP_SAFETY_FIGURES", str(path))
+    monkeypatch.setenv("WEBMAP_SAFETY_RESUME", "1")
+    assert not is_measured("the page is frozen"), "nothing is, before the first"
+    note(Figure("the page is frozen", "zero", 0.3, 0.01, 0.0, TRIALS))
+    note(Figure("of another version", "zero", 0.3, 0.01, 0.0, TRIALS, version="0.0"))
+    note(Figure("a broken promise", "zero", 0.3, 0.31, 0.0, TRIALS))
+    note(Figure("a shorter run", "zero", 0.3, 0.01, 0.0, 3, asked=TRIALS + 1))
+    assert is_measured("the page is frozen")
+    assert not is_measured("of another version")
+    assert not is_measured("a shorter run")
+    assert not is_measured("a broken promise")
+    assert not is_measured("the tab is closed")
+    monkeypatch.delenv("WEBMAP_SAFETY_RESUME")
+    assert not is_measured("the page is frozen"), "a new run measures everything"

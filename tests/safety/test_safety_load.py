@@ -110,7 +110,7 @@ def test_under_load_the_dead_man_stops_the_robot_as_quickly(loaded):
         os.killpg(loaded.browser.process.pid, sig)
 
     def back():
-        pass_time(0.5)
+        loaded.linger(0.5)
         send(signal.SIGCONT)
 
     with maps_coming(loaded):
