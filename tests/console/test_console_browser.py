@@ -240,7 +240,7 @@ def test_the_card_shows_what_the_robot_s_camera_sees(open_console):
     page.wait_for_function(
         "document.querySelector('.cameras img').naturalWidth === 320"
     )
-    expect(page.locator(".cameras .age")).to_have_text(re.compile(r"^0\.\d s$"))
+    expect(page.locator(".cameras .picture-age")).to_have_text(re.compile(r"^0\.\d s$"))
     row(page, "Robot 2").click()
     expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
     expect(picture).to_have_count(0)

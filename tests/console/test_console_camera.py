@@ -210,31 +210,40 @@ def test_it_floats_within_the_map_and_its_place_and_camera_are_kept(open_page):
     expect(panel).to_have_attribute("data-dock", "float")
 
 
-@pytest.mark.parametrize("dock", ["Above or below", "Over the map"])
-def test_on_a_phone_it_covers_neither_the_stick_nor_stop(open_page, dock):
-    page = open_page((390, 844), has_touch=True, is_mobile=True)
+def can_be_pressed(what) -> None:
+    """See that what is hit in the middle of a thing is the thing itself."""
+    expect(what).to_be_in_viewport(ratio=0.95)
+    assert what.evaluate(
+        """e => {
+            const r = e.getBoundingClientRect();
+            const [x, y] = [r.x + r.width / 2, r.y + r.height / 2];
+            const hit = document.elementFromPoint(x, y);
+            return e === hit || e.contains(hit);
+        }"""
+    )
+
+
+@pytest.mark.parametrize("device", ["desk", "phone"])
+def test_wherever_it_is_neither_stop_nor_the_stick_is_covered(open_page, device):
+    if device == "desk":
+        page = open_page()
+        docks = ["Beside", "Above or below", "Over the map", "Over the map"]
+    else:
+        page = open_page((390, 844), has_touch=True, is_mobile=True)
+        docks = ["Above or below", "Over the map", "Over the map"]
     panel = large(page)
-    panel.get_by_role("button", name=dock).click()
     stick = page.locator(".webmap-stick")
     if not stick.is_visible():
         page.get_by_role("button", name="Stick").click()
-    for what in (
-        page.get_by_role("button", name="Stop all"),
-        page.get_by_role("button", name="Stop Bob"),
-        stick,
-    ):
-        expect(what).to_be_in_viewport(ratio=0.95)
-        # What is hit there is the thing itself.
-        assert what.evaluate(
-            """e => {
-                const r = e.getBoundingClientRect();
-                const hit = document.elementFromPoint(
-                    r.x + r.width / 2, r.y + r.height / 2);
-                return e === hit || e.contains(hit);
-            }"""
-        )
-    expect(panel.locator("img")).to_be_in_viewport()
-    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    for dock in docks:
+        panel.get_by_role("button", name=dock).click()
+        can_be_pressed(page.get_by_role("button", name="Stop all"))
+        can_be_pressed(page.get_by_role("button", name="Stop Bob"))
+        can_be_pressed(stick)
+        can_be_pressed(panel.get_by_role("button", name="Close the camera"))
+        expect(panel.locator("img")).to_be_in_viewport()
+        width = page.evaluate("document.documentElement.scrollWidth")
+        assert width == page.viewport_size["width"]
 
 
 def test_a_driven_robot_stops_when_its_camera_freezes(open_page, camera):

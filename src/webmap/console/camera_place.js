@@ -72,8 +72,10 @@ export function roomFor(floating, over) {
   const tools = rectangle(".map-tools");
   const card = rectangle("#card");
   const teleop = rectangle(".webmap-teleop");
-  const left = Math.max(map.left, tools.left < map.left + width ? tools.right : 0) + GAP;
-  const right = Math.min(map.right, card.left > left ? card.left : Infinity) - GAP;
+  const middle = (map.left + map.right) / 2;
+  const left = Math.max(map.left, tools.left < middle ? tools.right : 0) + GAP;
+  const ends = [card, tools].map((thing) => (thing.left > middle ? thing.left : Infinity));
+  const right = Math.min(map.right, ...ends) - GAP;
   const top = map.top + TOOLS;
   const bottom = Math.min(map.bottom, teleop.top > top ? teleop.top : Infinity) - GAP;
   return {

@@ -44,7 +44,7 @@ export class CameraView {
     }
     places.append(signButton("close", () => acts.close()));
     this.head = make("div", "camera-head");
-    this.head.append(this._name, this._age, places);
+    this.head.append(this._name, this._choice, this._age, places);
     this._word = make("p", "camera-word");
     this._word.setAttribute("role", "status");
     this._frame = make("div", "camera-frame");
@@ -52,7 +52,7 @@ export class CameraView {
     this.element = make("section", "camera-panel");
     this.element.setAttribute("aria-label", "Camera");
     this.element.hidden = true;
-    this.element.append(this.head, this._choice, this._frame);
+    this.element.append(this.head, this._frame);
     this._listed = "";
   }
 

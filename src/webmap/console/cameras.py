@@ -42,7 +42,7 @@ class View:
     def __init__(self, camera: Any) -> None:
         self.camera = camera
         self._image = html.img(alt=f"{camera.name} of {camera.robot.name}", hidden=True)
-        self._age = html.span(class_="age")
+        self._age = html.span(class_="picture-age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
         button = html.button(
             self._image,
