@@ -17,6 +17,10 @@ from webmap.geometry import Twist
 WRITE_INTERVAL = 0.02
 """The shortest time between two moving commands on the wire, in seconds."""
 
+WAIT_LIMIT = 0.05
+"""The longest time that a moving command waits for its turn, in seconds. Only a gate
+that stood still keeps one longer, and then it is too old to be written (S2)."""
+
 RAMP_INTERVAL = 0.1
 """The longest time that the ramp counts between two commands, in seconds."""
 
@@ -58,7 +62,7 @@ class Motion:
         self._burst = Burst()
         self._held = Burst(HELD_PERIOD, HELD_LENGTH)
         self._left_alone = False
-        self._pending: tuple[Twist, Lease] | None = None
+        self._pending: tuple[Twist, Lease, float] | None = None
         self._tried_at = float("-inf")
         self._sent_at = self._moved_at = float("-inf")
         self._sent_epoch: int | None = None
@@ -79,7 +83,7 @@ class Motion:
             self._burst.end()
             self.driving = True
             self._owe_zero()
-        self._pending = (wanted, lease)
+        self._pending = (wanted, lease, now)
         self._flush(now)
 
     def leave_alone(self) -> None:
@@ -165,7 +169,10 @@ class Motion:
         """Write the newest command, unless one has just been written."""
         if self._pending is None or now < self._tried_at + WRITE_INTERVAL:
             return
-        wanted, lease = self._pending
+        wanted, lease, since = self._pending
+        if now - since > WAIT_LIMIT:
+            self._pending = None
+            return
         if lease.epoch != self._sent_epoch and not self.sent.is_zero:
             self._write_zero()  # between two epochs there is a zero, whatever happened
             return

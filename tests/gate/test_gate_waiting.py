@@ -1,0 +1,29 @@
+"""A command that waits for its turn on the wire while the gate itself stands still."""
+
+import pytest
+from gate_harness import Bench
+
+
+@pytest.mark.parametrize(("seconds", "written"), [(0.03, True), (0.1, False)])
+def test_a_command_that_waited_long_is_not_written(seconds, written):
+    bench = Bench().begin()
+    bench.drive_off()
+    bench.drive(x=0.5)
+    last = bench.written[-1]
+    assert last.at == bench.now, "it has just been written to"
+    bench.drive(x=0.25)
+    assert bench.written[-1] is last, "so the next one waits"
+    bench.now += seconds
+    bench._do(bench.gate.step(bench.now))
+    assert bool(bench.moving_since(last.at + 0.001)) is written
+
+
+def test_a_gate_that_stood_still_goes_on_with_the_next_command():
+    bench = Bench().begin()
+    bench.drive_off()
+    bench.drive(x=0.5)
+    bench.drive(x=0.25)
+    bench.now += 0.1
+    bench.run(0.01)
+    bench.drive(x=0.25)
+    assert bench.written[-1].twist.vx == pytest.approx(0.25)
