@@ -5,11 +5,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
+from typing import TYPE_CHECKING
 
 import click
 
 from webmap.cli.options import PORT, web_options
 from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
 
 READY = "rosbridge is ready at "
 
@@ -56,31 +60,52 @@ def demo(
         as_file(files("webmap.sim") / "data") as data,
     ):
         bridge = webmap.Bridge(url, name="simulator")
-        described = [
-            console.RobotDescription(
-                name=f"Robot {index}",
-                bridge=bridge,
-                odometry=f"/robot_{index}/odom",
-                twist=f"/robot_{index}/cmd_vel",
-                scan=f"/robot_{index}/base_scan",
-                battery=f"/robot_{index}/battery_state",
-                cameras=(f"/robot_{index}/camera/image_raw/compressed",),
-                goal=f"/robot_{index}/move_base_simple/goal",
-                action=(f"/robot_{index}/move_base", "move_base_msgs/MoveBaseAction"),
-                initial_pose=f"/robot_{index}/initialpose",
-                stops_within=0.25,
-            )
-            for index in range(robots)
-        ]
-        console.open_console(
-            [bridge], described, floor=data / "floor.yaml", title="WebMap demo"
-        )
+        floor = data / "floor.yaml"
+        opened = console.open_console([bridge], [], floor=floor, title="WebMap demo")
+        for index in range(robots):
+            opened.add(demo_robot(bridge, index))
         webmap.run(
             host=host,
             port=port,
             open_browser=not no_browser,
             insecure_lan=insecure_lan,
         )
+
+
+def demo_robot(bridge: "Bridge", index: int) -> "Robot":
+    """Return one of the simulator's robots, with what helps to see what it does.
+
+    More of what it says would hide the map; ``webmap view`` shows all of it.
+
+    Args:
+        bridge: The simulator's.
+        index: Which of them, from 0.
+
+    """
+    from webmap.console import RobotDescription
+    from webmap.console.fleet import make_robot
+
+    topics = f"/robot_{index}"
+    robot = make_robot(
+        RobotDescription(
+            name=f"Robot {index}",
+            bridge=bridge,
+            odometry=f"{topics}/odom",
+            twist=f"{topics}/cmd_vel",
+            scan=f"{topics}/base_scan",
+            battery=f"{topics}/battery_state",
+            cameras=(f"{topics}/camera/image_raw/compressed",),
+            goal=f"{topics}/move_base_simple/goal",
+            cancel=f"{topics}/move_base/cancel",
+            action=(f"{topics}/move_base", "move_base_msgs/MoveBaseAction"),
+            initial_pose=f"{topics}/initialpose",
+            stops_within=0.25,
+        )
+    )
+    robot.add_module("Path", bridge, f"{topics}/plan")
+    robot.add_module("Trail", length=10.0)
+    robot.add_module("Diagnostics", bridge, prefix=f"robot_{index}/")
+    return robot
 
 
 @contextmanager
