@@ -40,3 +40,8 @@ def test_a_list_is_of_one_bridge(tmp_path):
         said = webmap(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
         assert said.returncode == 2
         assert "one bridge, and 2 were given" in said.stderr
+
+
+def test_help_shows_each_example_on_a_line_of_its_own():
+    lines = webmap("discover", "--help").stdout.splitlines()
+    assert "  webmap discover ws://robot:9090 --toml > fleet.toml" in lines

@@ -24,7 +24,7 @@ from webmap.cli.topic_list import one_bridge, topics_option
 def discover(
     url: tuple[str, ...], toml: bool, wait: float, topics: dict[str, str] | None
 ) -> None:
-    r"""Print which robots are behind rosbridges, their topics, and why.
+    """Print which robots are behind rosbridges, their topics, and why.
 
     Nothing is driven and nothing is changed. The exit code is 1 if no robot is found.
 
