@@ -6,7 +6,7 @@ from webmap.errors import ConfigError
 
 
 def test_a_layer_that_does_not_exist_is_named_with_those_that_do(map):
-    with pytest.raises(ConfigError, match="no layer 'Scan'; there are Maps, Costmaps"):
+    with pytest.raises(ConfigError, match="no layer 'Scan'; there are Tiles, Maps, Costmaps"):
         map.add_module("LayerSwitches", off=["Scan"])
 
 

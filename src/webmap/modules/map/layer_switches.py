@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from webmap.core.map import Map
 
 LAYERS = {
+    "Tiles": ".tiles",
     "Maps": ".floor, .map-file, .occupancy-grid:not(.costmap)",
     "Costmaps": ".occupancy-grid.costmap",
     "Scans": ".laserscan",
