@@ -11,6 +11,8 @@ from camera_server import BOUNDARY, CameraServer, part
 from webmap import Robot
 from webmap.core.pictures import pictures
 from webmap.errors import ConfigError
+from webmap.lifecycle import Lifecycle
+from webmap.modules.robot import http_camera
 from webmap.modules.robot.http_camera import HttpCamera
 from webmap.ros import image_pull
 from webmap.ros.backoff import Backoff
@@ -30,6 +32,7 @@ def run(scenario) -> None:
 
     async def whole():
         robot = Robot("Bob")
+        http_camera.lifecycle.begin(asyncio.get_running_loop())
         try:
             async with CameraServer() as server:
                 await scenario(server, robot)
@@ -37,8 +40,15 @@ def run(scenario) -> None:
                 await until(lambda: server.open == 0)
         finally:
             robot.destroy()
+            await http_camera.lifecycle.end()
 
     asyncio.run(whole())
+
+
+@pytest.fixture(autouse=True)
+def own_process(monkeypatch):
+    """Start nothing but what a test made."""
+    monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
 
 
 @pytest.fixture(autouse=True)
@@ -72,6 +82,21 @@ def test_a_stream_is_pulled_once_for_all_and_only_while_somebody_watches():
         assert camera.url is None
 
     run(scenario)
+
+
+def test_who_watches_before_the_process_runs_sees_pictures_when_it_does(robot):
+    async def scenario():
+        async with CameraServer() as server:
+            camera = HttpCamera(robot, server.at(STREAM), throttle=0)
+            camera.watch(lambda: None)
+            for _ in range(2):  # a process may stop and start again
+                http_camera.lifecycle.begin(asyncio.get_running_loop())
+                await until(lambda last=camera.stamp: camera.stamp != last)
+                await http_camera.lifecycle.end()
+                await until(lambda: server.open == 0)
+            camera.destroy()
+
+    asyncio.run(scenario())
 
 
 def test_a_single_picture_is_asked_for_again_at_a_polite_rate():
@@ -179,8 +204,9 @@ def test_a_camera_that_drips_without_a_picture_is_given_up_and_tried_again():
             patience=0.1,
             backoff=Backoff(),
         )
+        pull.start(asyncio.get_running_loop())
         await until(lambda: len(server.asked) >= 2)
-        pull.stop()
+        await pull.stop()
         assert said[0] == "no picture came for 0.1 s"
 
     run(scenario)

@@ -17,7 +17,7 @@ _CHUNK = 1 << 16
 
 
 class Pull:
-    """One connection to a camera, made anew whenever it ends.
+    """One connection to a camera, made anew whenever it ends; a service of the process.
 
     A stream is read as quickly as it comes, since a camera that must wait would show
     the past, and its newest picture is handed on. A single picture is asked for again.
@@ -27,7 +27,7 @@ class Pull:
         address: Where the camera is.
         throttle: The least time between two pictures, in seconds.
         show: Takes each picture.
-        complain: Takes what fails, in words; it is tried again until :meth:`stop`.
+        complain: Takes what fails, in words; it is tried again until it is stopped.
         patience: Seconds for the next whole picture.
         backoff: Tells when to try again.
 
@@ -51,11 +51,24 @@ class Pull:
         self._backoff = backoff or Backoff()
         self._shown_at = -float("inf")
         self._newest: bytes | None = None
-        self._task = asyncio.get_running_loop().create_task(self._pull_on())
+        self._task: asyncio.Task[None] | None = None
 
-    def stop(self) -> None:
-        """Hang up, and pull no more; the second call does nothing."""
-        self._task.cancel()
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Connect, and pull."""
+        self._task = loop.create_task(self._pull_on())
+
+    async def stop(self) -> None:
+        """Hang up, and wait until that is done."""
+        task = self._task
+        self.hang_up()
+        if task is not None:
+            await asyncio.wait([task])
+
+    def hang_up(self) -> None:
+        """Pull no more; the second call does nothing."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
 
     async def _pull_on(self) -> None:
         now = asyncio.get_running_loop().time

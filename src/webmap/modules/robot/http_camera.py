@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from webmap.core.camera_feed import CameraFeed
 from webmap.errors import ConfigError, ProtocolError
+from webmap.lifecycle import lifecycle
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import Pull
 from webmap.ros.messages_image import CompressedImageMsg
@@ -54,15 +55,16 @@ class HttpCamera(CameraFeed):
         return self._address.shown
 
     def begin(self) -> None:
-        """Connect to the camera."""
-        # A stream is thinned out; a single picture costs a connection each time.
+        """Connect to the camera, as soon as the process runs."""
         seconds = self._throttle / 1000
         self._pull = Pull(self._address, seconds, self._show, self._complain)
+        lifecycle.add(self._pull)
 
     def end(self) -> None:
         """Hang up."""
         if self._pull is not None:
-            self._pull.stop()
+            lifecycle.discard(self._pull)
+            self._pull.hang_up()
             self._pull = None
 
     def _show(self, data: bytes) -> None:
