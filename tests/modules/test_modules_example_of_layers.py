@@ -1,0 +1,59 @@
+"""The tutorial of layers, as it stands in the documentation, in a real browser."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+from running_simulators import simulators
+
+from real_browser import watched_tab
+
+pytestmark = pytest.mark.browser
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "layers" / "layers.py"
+DRAWN = (
+    ".occupancy-grid.map > image[href]",
+    ".occupancy-grid.costmap > image[href]",
+    ".laserscan > .dot[d]",
+    ".pointcloud > .dot.band-7[d]",
+    ".range > .cone[d]",
+    ".path > polyline",
+    ".trail",
+    ".posearray > .arrow[d]",
+    ".covariance > .ellipse[rx]",
+    ".polygon > polygon[points]",
+    ".navsatfix > .cross:not([visibility])",
+    ".diagnostics.ok",
+    ".markers",
+)
+
+
+def test_the_tutorial_draws_all_that_a_robot_says(chromium: Browser, tmp_path):
+    with simulators("ros1") as found:
+        text = EXAMPLE.read_text()
+        assert text.count("ws://localhost:9090") == 1
+        program = tmp_path / EXAMPLE.name
+        program.write_text(text.replace("ws://localhost:9090", found["ros1"].url))
+        command = [sys.executable, "-m", "webmap", "run", str(program)]
+        process = subprocess.Popen(
+            [*command, "--port", "0", "--no-browser"],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ,
+        )
+        try:
+            url = re.search(r"http\S+", process.stdout.readline())
+            with watched_tab(chromium, 1000, 700) as tab:
+                tab.set_default_timeout(15_000)
+                tab.goto(url.group(0))
+                for selector in DRAWN:
+                    tab.wait_for_selector(selector, state="attached")
+                assert tab.locator(".webmap-notice").count() == 0
+        finally:
+            process.terminate()
+            process.wait(10)
+            process.stdout.close()
