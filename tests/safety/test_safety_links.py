@@ -12,9 +12,8 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""
 
-LATE = 7
-"""Velocities that a stalled link may have taken: what is written at 20 Hz in the 300 ms
-until it is in doubt, and one that was on its way."""
+LATE = 6
+"""Velocities that a stalled link may have taken (S11)."""
 
 BY_ITSELF = ROBOT_TIMEOUT + 0.05
 """Seconds until a robot stands that no zero reaches: its own timeout and its brakes."""
