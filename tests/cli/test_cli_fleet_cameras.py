@@ -3,6 +3,8 @@
 import pytest
 
 from webmap.cli.fleet.show import prepare
+from webmap.discovery import discover
+from webmap.discovery.fleet_toml import fleet_toml
 from webmap.errors import ConfigError
 
 HEAD = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
@@ -75,3 +77,18 @@ def test_a_mistake_is_named_with_its_line(read, cameras, said):
     (line,) = str(refused.value).splitlines()
     assert "fleet.toml:6: robots[0]." in line
     assert said in line
+
+
+def test_what_is_found_is_written_so_that_each_camera_has_a_name(tmp_path):
+    image = "sensor_msgs/msg/CompressedImage"
+    topics = {f"/cam{n}/image_raw/compressed": image for n in (1, 2)}
+    findings = discover({"/odom": "nav_msgs/msg/Odometry"} | topics, "bob")
+    file = tmp_path / "fleet.toml"
+    file.write_text(fleet_toml([("hall", "ws://hall:9090", findings)]))
+    (robot,) = prepare(file).robots
+    cameras = [module for module in robot.modules if hasattr(module, "watch")]
+    assert {camera.name: camera.topic for camera in cameras} == {
+        "Camera 1": "/cam1/image_raw/compressed",
+        "Camera 2": "/cam2/image_raw/compressed",
+    }
+    robot.destroy()

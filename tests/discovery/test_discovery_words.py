@@ -65,7 +65,8 @@ def test_the_first_map_and_every_camera_are_in_the_file():
     data = tomllib.loads(text)
     assert data["map"] == {"bridge": "bob", "topic": "/map"}
     names = [module["name"] for module in data["robots"][0]["modules"]]
-    assert names == ["Path", "Camera"]
+    assert names == ["Path"]
+    assert data["robots"][0]["cameras"] == ["/cam/image_raw/compressed"]
     assert "# found too: costmap /costmap" in text
 
 

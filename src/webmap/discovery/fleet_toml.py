@@ -62,6 +62,10 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
     battery = robot.first("battery")
     if battery is not None:
         lines.append(f"battery = {_text(battery.topic)} # {battery.rule}")
+    cameras = robot.guesses.get("camera", ())
+    if cameras:
+        listed = [f"  {_text(guess.topic)}, # {guess.rule}" for guess in cameras]
+        lines += ["cameras = [", *listed, "]"]
     lines += _motion(robot)
     lines += _modules(robot, bridge)
     for role in ALSO:
@@ -92,7 +96,6 @@ def _map(found: Sequence[tuple[str, str, Findings]]) -> list[str]:
 def _modules(robot: FoundRobot, bridge: str) -> list[str]:
     """Return what is shown of a robot besides."""
     wanted = [("Path", guess) for guess in robot.guesses.get("plan", ())[:1]]
-    wanted += [("Camera", guess) for guess in robot.guesses.get("camera", ())]
     link = f"{{ bridge = {_text(bridge)} }}"
     lines = [
         f'  {{ name = "{module}", args = [{link}, {_text(guess.topic)}] }}, '
