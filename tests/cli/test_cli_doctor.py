@@ -60,7 +60,7 @@ def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
     topics = tmp_path / "topics.txt"
     topics.write_text("/robot_1/odom [nav_msgs/Odometry]\n")
     said = webmap("doctor", ros1, "--seconds", "1", "--topics", str(topics))
-    assert "those of the list that was given; robots found: robot_1." in said.stdout
+    assert "those that were given; robots found: robot_1." in said.stdout
     assert "robot_0" not in said.stdout
 
 

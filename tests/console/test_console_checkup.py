@@ -5,7 +5,8 @@ import asyncio
 import pytest
 
 from webmap import Bridge
-from webmap.console.checkup import Checkup, checkup_of
+from webmap.console import RobotDescription
+from webmap.console.checkup import Checkup, checkup_of, remember
 from webmap.console.doctor import groups
 from webmap.discovery.doctor import Finding, Observed
 
@@ -19,14 +20,14 @@ async def until(condition):
 def test_however_many_ask_there_is_one_look_at_a_time():
     asked, go_on = [], asyncio.Event()
 
-    async def observe(url, *, seconds, progress):
+    async def observe(url, *, seconds, known, progress):
         asked.append(url)
         progress("Listening for 3 s.")
         await go_on.wait()
         return Observed(url, trouble="nothing listens there")
 
     async def run():
-        checkup = Checkup("ws://bob:9090", observe)
+        checkup = Checkup("ws://bob:9090", observe=observe)
         for _ in range(3):
             checkup.start()
         await until(lambda: checkup.doing == "Listening for 3 s.")
@@ -48,11 +49,11 @@ def test_however_many_ask_there_is_one_look_at_a_time():
 
 
 def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
-    async def observe(url, *, seconds, progress):
+    async def observe(url, *, seconds, known, progress):
         raise RuntimeError("broken")
 
     async def run():
-        checkup = Checkup("ws://bob:9090", observe)
+        checkup = Checkup("ws://bob:9090", observe=observe)
         for _ in range(2):
             checkup.start()
             await until(lambda: not checkup.is_running)
@@ -81,6 +82,26 @@ def test_viewers_of_one_bridge_share_its_check():
     one, other = Bridge("ws://a:1"), Bridge("ws://a:1")
     assert checkup_of(one) is checkup_of(one)
     assert checkup_of(one) is not checkup_of(other)
+
+
+def test_robots_that_were_told_are_known_where_a_bridge_says_nothing():
+    asked = []
+
+    async def observe(url, *, seconds, known, progress):
+        asked.append(dict(known))
+        return Observed(url)
+
+    async def run():
+        bridge = Bridge("ws://a:1")
+        checkup = checkup_of(bridge)
+        checkup._observe = observe
+        described = {"name": "Bob", "bridge": bridge}
+        remember([RobotDescription(**described, odometry="/odom", twist="/cmd_vel")])
+        checkup.start()
+        await until(lambda: not checkup.is_running)
+
+    asyncio.run(run())
+    assert asked == [{"/odom": "nav_msgs/Odometry", "/cmd_vel": "geometry_msgs/Twist"}]
 
 
 def test_what_a_robot_is_called_is_only_ever_text():

@@ -188,9 +188,18 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     _, findings, seen = looked_at(site(dialect, rosapi=False), topics=TOPICS)
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
     assert said(findings, "rosapi does not say") == "note"
-    assert said(findings, "The topics are those of the list that was given") == "good"
+    assert said(findings, "The topics are those that were given") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
     assert said(findings, "cannot be told: rosapi did not say") == "note"
+
+
+def test_what_is_known_is_taken_only_where_rosapi_says_nothing():
+    _, findings, seen = looked_at(site(rosapi=False), known=TOPICS)
+    assert said(findings, "/robot_0/cmd_vel is said to take Twist") == "note"
+    assert said(findings, "/robot_0/odom:") == "good"
+    _, findings, seen = looked_at(site(), known={"/bob/odom": "nav_msgs/Odometry"})
+    assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
+    assert not seen.told
 
 
 def test_without_rosapi_and_without_a_list_the_list_is_asked_for():

@@ -4,7 +4,7 @@ import asyncio
 import logging
 import time
 import weakref
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from webmap.discovery.doctor import Finding, Observed, judge
@@ -13,6 +13,7 @@ from webmap.discovery.doctor.verdict import report
 
 if TYPE_CHECKING:
     from webmap import Bridge
+    from webmap.console.fleet import RobotDescription
 
 log = logging.getLogger("webmap.console")
 
@@ -32,12 +33,19 @@ class Checkup:
 
     Args:
         url: The bridge's address.
+        known: Types by topic, for a bridge that does not say which there are.
         observe: Looks at a bridge.
 
     """
 
-    def __init__(self, url: str, observe: Observe = observe) -> None:
+    def __init__(
+        self,
+        url: str,
+        known: Mapping[str, str] | None = None,
+        observe: Observe = observe,
+    ) -> None:
         self.url = url
+        self._known = {} if known is None else known
         self.version = 0
         """A number that grows whenever there is something new to show."""
         self.doing = ""
@@ -82,7 +90,9 @@ class Checkup:
 
     async def _run(self) -> None:
         try:
-            seen = await self._observe(self.url, seconds=SECONDS, progress=self._say)
+            seen = await self._observe(
+                self.url, seconds=SECONDS, known=self._known, progress=self._say
+            )
             self.findings = judge(seen)
         except Exception as error:
             log.exception("the readiness check of %s failed", self.url)
@@ -97,6 +107,28 @@ class Checkup:
         self.version += 1
 
 
+_TYPES = {
+    "odometry": "nav_msgs/Odometry",
+    "twist": "geometry_msgs/Twist",
+    "scan": "sensor_msgs/LaserScan",
+    "battery": "sensor_msgs/BatteryState",
+}
+"""What a robot that was told by hand is taken to have on its topics."""
+
+_known: "weakref.WeakKeyDictionary[Bridge, dict[str, str]]"
+_known = weakref.WeakKeyDictionary()
+
+
+def remember(robots: "Iterable[RobotDescription]") -> None:
+    """Keep the topics of robots for the checks of their bridges."""
+    for robot in robots:
+        topics = _known.setdefault(robot.bridge, {})
+        for role, type in _TYPES.items():
+            topic = getattr(robot, role)
+            if topic:
+                topics[topic] = type
+
+
 _checkups: "weakref.WeakKeyDictionary[Bridge, Checkup]" = weakref.WeakKeyDictionary()
 
 
@@ -104,5 +136,5 @@ def checkup_of(bridge: "Bridge") -> Checkup:
     """Return the check of a bridge, which all viewers share."""
     found = _checkups.get(bridge)
     if found is None:
-        found = _checkups[bridge] = Checkup(bridge.url)
+        found = _checkups[bridge] = Checkup(bridge.url, _known.setdefault(bridge, {}))
     return found

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import webmap
 from webmap.console.bridge_list import BridgeList
 from webmap.console.camera_panel import CameraPanel
+from webmap.console.checkup import remember
 from webmap.console.doctor import DoctorReports
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
@@ -61,6 +62,7 @@ def open_console(
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(about) for about in robots]
+    remember(robots)
     opened = Console()
 
     @webmap.page("/", html="console.html", title=title)

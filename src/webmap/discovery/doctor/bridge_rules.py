@@ -103,7 +103,7 @@ def _rosapi(seen: Observed) -> Iterator[Finding]:
             return
     source = "rosapi answers"
     if seen.told:
-        source = "The topics are those of the list that was given"
+        source = "The topics are those that were given"
     if not robots:
         said = " ".join(seen.findings.notes)
         yield Finding("wrong", ABOUT, f"No robot was found. {said}", TELL)

@@ -30,6 +30,7 @@ async def observe(
     ask_parameters: bool = False,
     try_call: bool = False,
     topics: Mapping[str, str] | None = None,
+    known: Mapping[str, str] | None = None,
     waiting: Callable[[str], object] = lambda _why: None,
     progress: Callable[[str], object] = lambda _what: None,
 ) -> Observed:
@@ -42,7 +43,8 @@ async def observe(
         ask_parameters: Whether rosapi is asked for a parameter of rosbridge.
         try_call: Whether a service is offered and called that hangs for a second, to
             see what that holds up.
-        topics: Types by topic, where a bridge has no rosapi that says them.
+        topics: Types by topic, which are taken in place of what rosapi says.
+        known: Types by topic, which are taken if rosapi says nothing.
         waiting: Called once with the reason if the bridge is waited for.
         progress: Called with what is being done now, in a sentence.
 
@@ -56,6 +58,8 @@ async def observe(
         return Observed(url, trouble=error.why or str(error))
     except BridgeError as error:
         rosapi = str(error)
+        if known and not told:
+            asked, told = dict(known), True
     findings = discover(asked, host_name(url))
     seen = Observed(
         url,

@@ -122,7 +122,7 @@ class Observed:
     """Why rosapi does not say the topics, empty if it does."""
 
     told: bool = False
-    """Whether the topics are those of a list that the user gave."""
+    """Whether the topics are those that the user gave."""
 
     shown: tuple[str, ...] = ()
     """Topics that no client needs and that the bridge shows all the same."""

@@ -124,10 +124,10 @@ def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     short = velocity.type.rpartition("/")[2]
     stamped = is_type(velocity.type, "geometry_msgs/TwistStamped")
     yield Finding(
-        "good",
+        "note" if seen.told else "good",
         robot.name,
-        f"{velocity.topic} takes {short}, and WebMap sends that"
-        f"{', with a stamp of zero' if stamped else ''}.",
+        f"{velocity.topic} {'is said to take' if seen.told else 'takes'} {short}, and "
+        f"WebMap sends that{', with a stamp of zero' if stamped else ''}.",
     )
     yield from _writers(robot, velocity, seen)
     listeners = seen.subscribers.get(velocity.topic)
