@@ -640,7 +640,7 @@ class Robot(Extendable):
         self.problems.pop(about, None)
 
     def on_map(self, map: "Map", shown: bool) -> None:
-        """Note that a map shows this robot, or does so no more."""
+        """Note that a map shows this robot, or does so no more; fire ``on_map``."""
         if shown:
             self.maps.append(map)
             for text in self.problems.values():
@@ -648,6 +648,7 @@ class Robot(Extendable):
         else:
             self.maps.remove(map)
         self.update_selected()
+        self.notify_modules("on_map", map, shown)
 
     def update_selected(self) -> None:
         """Look whether any map has the robot selected and fire ``on_select``."""

@@ -1,0 +1,66 @@
+"""Map modules that a robot brings along."""
+
+import pytest
+from module_fakes import header, pose
+
+from webmap import Map
+from webmap.core.layer import Layer
+from webmap.errors import ModuleNotFound
+
+
+def grids(map: Map) -> list:
+    return [m for m in map.modules if type(m).__name__ == "OccupancyGrid"]
+
+
+def test_every_map_that_shows_the_robot_has_the_module_and_no_other(
+    map, page, robot, link
+):
+    other = Map(page.element("other"), 10, 10)
+    map.add_robot(robot)
+    module = robot.add_module("OnMaps", "OccupancyGrid", link, "/c", palette="costmap")
+    assert (len(grids(map)), len(grids(other))) == (1, 0)
+    other.add_robot(robot)
+    assert grids(other)[0].layer is grids(map)[0].layer, "it is drawn once for both"
+    map.remove_robot(robot)
+    assert (len(grids(map)), len(grids(other))) == (0, 1)
+    robot.remove_module(module)
+    assert grids(other) == []
+    assert Layer._shared == {}
+    assert link.listeners == {}
+
+
+def test_a_page_that_ends_takes_its_own_away(map, page, robot, link):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "Markers", link, "/m")
+    page.close()
+    assert Layer._shared == {}
+    assert robot.maps == []
+
+
+def test_a_module_taken_from_the_map_by_hand_is_not_missed(map, robot, link):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
+    map.remove_module(grids(map)[0])
+    map.remove_robot(robot)
+    assert grids(map) == []
+
+
+def test_what_it_draws_is_drawn(map, robot, link, channel):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
+    info = {"map_load_time": header()["stamp"], "resolution": 1, "width": 1}
+    info |= {"height": 1, "origin": pose(0, 0)}
+    link.say("/c", {"header": header(), "info": info, "data": [100]})
+    assert grids(map)[0].layer.picture.element.get("href")
+
+
+def test_a_module_that_there_is_not_is_named(robot):
+    with pytest.raises(ModuleNotFound, match="OccupancyGird"):
+        robot.add_module("OnMaps", "OccupancyGird")
+
+
+def test_arguments_that_make_no_sense_are_said_on_the_map(map, robot, link, channel):
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c", palette="grey")
+    map.add_robot(robot)
+    (error,) = channel.errors
+    assert "Bob: OccupancyGrid: a palette is one of" in error
