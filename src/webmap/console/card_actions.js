@@ -22,7 +22,7 @@ export function listenToActions(map, send, signal) {
     if (!(event.target instanceof Element) || map.selected === null) return;
     const button = event.target.closest("[data-act]");
     if (!(button instanceof HTMLElement)) return;
-    if (button.dataset.act === "follow" || button.dataset.act === "send") closeSheet();
+    if (["follow", "send", "locate"].includes(button.dataset.act ?? "")) closeSheet();
     if (button.dataset.act === "cancel") map.drive.cancel(map.selected);
     if (button.dataset.act === "release") map.drive.release(map.selected);
     if (button.dataset.act === "stop-test") map.drive.stopTest(map.selected);

@@ -7,6 +7,7 @@ from webmap import html, svg
 from webmap.console.cameras import CameraViews
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.speeds import SpeedTable
+from webmap.console.tasks import GoalLine
 from webmap.console.words import UNKNOWN, describe, heading, number, sentence
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ ACTIONS = (
     ("follow", "icon-follow", "Follow"),
     ("send", "icon-send", "Send to…"),
     ("cancel", "icon-cancel", "Cancel goal"),
+    ("locate", "icon-locate", "Set pose…"),
     ("release", "icon-release", "Hand back"),
 )
 """What ``data-act`` says, the symbol and the words.
@@ -34,6 +36,13 @@ class Goals(Protocol):
         """Take a goal's arrow away."""
 
 
+class Poses(Protocol):
+    """What the card asks of the module that tells robots where they are."""
+
+    def aim(self) -> None:
+        """Let the viewer's next press on the map say where the robot is."""
+
+
 class RobotCard:
     """Shows the robot that is selected on a map; a module of maps.
 
@@ -41,13 +50,17 @@ class RobotCard:
         map: The map.
         element: The page's element to fill; it is hidden while nothing is selected.
         goals: What sends robots somewhere.
+        poses: What tells robots where they are.
 
     """
 
-    def __init__(self, map: "Map", element: "Element", goals: Goals) -> None:
+    def __init__(
+        self, map: "Map", element: "Element", goals: Goals, poses: Poses
+    ) -> None:
         self.map = map
         self.element = element
         self._goals = goals
+        self._poses = poses
         self._robot: Robot | None = None
         self._feed: Feed | None = None
         self._shape = StateShape()
@@ -61,6 +74,7 @@ class RobotCard:
         self._age = html.dd(class_="age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
         self._battery = html.dd()
+        self._goal = GoalLine()
         self._cameras = CameraViews()
         self._speeds = SpeedTable()
         element.append(*self._parts())
@@ -120,6 +134,7 @@ class RobotCard:
         self._state.text = words.text
         self._mine.text = words.mine or words.text
         self._reason.text = sentence((report and report.reason) or "")
+        self._goal.show(robot)
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
         self.element.set("data-tone", words.tone or None)
         self._speeds.show(robot)
@@ -163,12 +178,14 @@ class RobotCard:
         state.set("role", "status")
         buttons = {about[0]: action(*about) for about in ACTIONS}
         buttons["send"].on("click", lambda event: self._goals.aim())
+        buttons["locate"].on("click", lambda event: self._poses.aim())
         buttons["cancel"].on("click", lambda event: self._forget_goal())
         actions = html.div(*buttons.values(), class_="actions")
         return [
             head,
             state,
             self._reason,
+            self._goal.element,
             self._problems,
             self._cameras.element,
             facts,

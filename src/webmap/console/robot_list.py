@@ -53,6 +53,11 @@ class RobotList:
         for row in self._rows.values():
             row.show_selected(self.map.selected is row.robot)
 
+    def on_mark(self) -> None:
+        """Mark the lines of the robots that are selected besides."""
+        for row in self._rows.values():
+            row.show_marked(row.robot in self.map.marked)
+
     def poll(self) -> None:
         """Look again at what no trigger tells: ages, and links that were lost."""
         for row in self._rows.values():
@@ -83,8 +88,15 @@ class Row:
             type="button",
         )
         self._button.set("aria-pressed", "false")
-        self._button.on("click", lambda event: map.set_selected(robot))
-        self.element = html.li(self._button, class_="row")
+        self._button.on("click", lambda event: map.pick(robot, event))
+        self._besides = html.input(type="checkbox")
+        self._besides.set("aria-label", f"{robot.name} besides")
+        self._besides.set("title", "Select it besides, for goals")
+        self._besides.on(
+            "change", lambda event: map.set_marked(robot, bool(event.checked))
+        )
+        label = html.label(self._besides, class_="besides")
+        self.element = html.li(self._button, label, class_="row")
         self.element.set("data-robot", robot.id)
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
         for module in robot.modules:
@@ -110,6 +122,10 @@ class Row:
     def show_selected(self, selected: bool) -> None:
         """Mark the line if its robot is selected."""
         self._button.set("aria-pressed", "true" if selected else "false")
+
+    def show_marked(self, marked: bool) -> None:
+        """Tick the box of a robot that is selected besides."""
+        self._besides.set(checked=marked)
 
     def poll(self) -> None:
         """Look again at the age of the pose, and at the link."""

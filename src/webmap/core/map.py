@@ -15,7 +15,7 @@ from webmap.errors import ConfigError
 from webmap.geometry import Affine
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.events import Handler
+from webmap.scene.events import Event, Handler
 from webmap.scene.fragment import Fragment
 from webmap.scope import Removal, keep
 
@@ -69,6 +69,8 @@ class Map(Extendable):
         self.fragment = Fragment(self.root)
         self.robots: list[Robot] = []
         self.selected: Robot | None = None
+        self.marked: list[Robot] = []
+        """What is selected besides, for what concerns several; never to be driven."""
         self._mounts: dict[int, int] = {}
         self._halves: dict[int, BrowserHalf] = {}
         self._destroyed = False
@@ -143,7 +145,7 @@ class Map(Extendable):
         self.robots.append(robot)
         mount = self.mount(robot.fragment, order=ROBOT_ORDER)
         self.page.listen(
-            mount, robot.svg, "click", lambda event: self.set_selected(robot), stop=True
+            mount, robot.svg, "click", lambda event: self.pick(robot, event), stop=True
         )
         robot.on_map(self, True)
         self.notify_modules("on_add_robot", robot)
@@ -154,6 +156,7 @@ class Map(Extendable):
             return
         if self.selected is robot:
             self.set_selected(None)
+        self.set_marked(robot, False)
         self.robots.remove(robot)
         self.unmount(robot.fragment)
         robot.on_map(self, False)
@@ -203,6 +206,8 @@ class Map(Extendable):
         """
         if robot is not None and robot not in self.robots:
             raise ValueError(f"{robot!r} is not on this map")
+        for other in tuple(self.marked):
+            self.set_marked(other, False)
         before = self.selected
         if robot is before:
             return
@@ -213,6 +218,37 @@ class Map(Extendable):
                 self.page.channel.set_class(mount, "selected", on)
                 changed.update_selected()
         self.notify_modules("on_select")
+
+    def set_marked(self, robot: Robot, on: bool) -> None:
+        """Select a robot besides the selected one, or no more; fires ``on_mark``.
+
+        Selecting a robot by :meth:`set_selected` ends that for every other.
+
+        Raises:
+            ValueError: If the map does not show the robot.
+
+        """
+        if robot not in self.robots:
+            raise ValueError(f"{robot!r} is not on this map")
+        if on == (robot in self.marked) or (on and robot is self.selected):
+            return
+        (self.marked.append if on else self.marked.remove)(robot)
+        self.page.channel.set_class(self._mounts[robot.fragment.id], "marked", on)
+        self.notify_modules("on_mark")
+
+    def toggle_marked(self, robot: Robot) -> None:
+        """Mark a robot or no more; the first one is selected."""
+        if self.selected is None:
+            self.set_selected(robot)
+        else:
+            self.set_marked(robot, robot not in self.marked)
+
+    def pick(self, robot: Robot, event: Event) -> None:
+        """Select a robot that was clicked, or mark it if Shift was held."""
+        if event.shift:
+            self.toggle_marked(robot)
+        else:
+            self.set_selected(robot)
 
     def on(
         self,

@@ -230,24 +230,67 @@ export class Drive {
    * @returns {Promise<void>} Done when the gate has accepted the goal.
    * @throws {Error} When the gate refuses it or does not answer.
    */
-  async goal(robot, { x, y, yaw }) {
+  async goal(robot, pose) {
+    await this._place("goal", robot, pose);
+  }
+
+  /**
+   * Tell a robot where it is, and take its lease for that moment when it is free.
+   *
+   * @param {string} robot
+   * @param {{x: number, y: number, yaw: number}} pose Metres and radians in the
+   *     robot's goal frame.
+   * @returns {Promise<void>} Done when the gate has accepted it.
+   * @throws {Error} When the gate refuses it or does not answer.
+   */
+  async locate(robot, pose) {
+    const taken = await this._place("locate", robot, pose);
+    if (taken) this.release(robot);
+  }
+
+  /**
+   * Whether this page may send a robot somewhere without asking anybody.
+   *
+   * @param {string} robot
+   */
+  holds(robot) {
+    return this._pilot.epoch(robot) !== null;
+  }
+
+  /**
+   * Keep the lease of a robot that this page has, as it goes on being needed.
+   *
+   * @param {string} robot
+   */
+  keep(robot) {
+    this._pilot.keep(robot, performance.now());
+  }
+
+  /**
+   * @param {'goal' | 'locate'} op
+   * @param {string} robot
+   * @param {{x: number, y: number, yaw: number}} pose
+   * @returns {Promise<boolean>} Whether the lease was taken for it.
+   */
+  async _place(op, robot, { x, y, yaw }) {
     if (![x, y, yaw].every(Number.isFinite)) {
-      throw new Error(`A goal needs finite numbers, got ${x}, ${y}, ${yaw}.`);
+      throw new Error(`A ${op} needs finite numbers, got ${x}, ${y}, ${yaw}.`);
     }
     const taken = this._pilot.epoch(robot) === null;
     if (taken) {
       this._send([{ op: "take", robot }]);
       await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
     }
-    const goal = this._pilot.goal(robot, { x, y, yaw }, performance.now());
-    this._send([goal]);
-    this._tell("goal", robot);
+    const command = this._pilot.place(op, robot, { x, y, yaw }, performance.now());
+    this._send([command]);
+    if (op === "goal") this._tell("goal", robot);
     try {
-      await this._until(robot, "goal", () => this._loop.acknowledged(goal.seq));
+      await this._until(robot, op, () => this._loop.acknowledged(command.seq));
     } catch (error) {
       if (taken) this.release(robot);
       throw error;
     }
+    return taken;
   }
 
   /**

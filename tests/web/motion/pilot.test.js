@@ -385,7 +385,7 @@ describe("leases", () => {
   test("for a goal are kept quietly and given back later", () => {
     bench = new Bench({ releaseAfter: 5000 });
     const epoch = bench.grant("r1");
-    const goal = bench.pilot.goal("r1", { x: 1, y: 2, yaw: 0 }, bench.now);
+    const goal = bench.pilot.place("goal", "r1", { x: 1, y: 2, yaw: 0 }, bench.now);
     assert.deepEqual([goal.op, goal.epoch], ["goal", epoch]);
     assert.deepEqual(bench.run(4900), []);
     assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);

@@ -1,4 +1,4 @@
-"""The selected robot is sent to a place on the map."""
+"""The selected robots are sent to a place on the map."""
 
 import logging
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,9 @@ log = logging.getLogger("webmap.modules.goal_tool")
 class GoalTool:
     """A press on the map is where the selected robot goes, a drag how it stands there.
 
+    Robots that are marked besides go there too, in a line across the heading, or in a
+    grid if they are more than four; each to the place that keeps ways short.
+
     It begins by its button, by its key or by :meth:`aim`; nothing is sent before the
     viewer presses on the map, and then the page sends it to the gate by itself.
 
@@ -23,20 +26,31 @@ class GoalTool:
         map: The map.
         button: Whether there is a button for it on the map.
         key: The key that begins.
+        spacing: How far from each other several robots are sent, in metres.
 
     Raises:
-        ValueError: If ``key`` is not one character.
+        ValueError: If ``key`` is not one character, or ``spacing`` is not from 0.3 to
+            20 m.
 
     """
 
-    def __init__(self, map: "Map", *, button: bool = True, key: str = "g") -> None:
+    def __init__(
+        self,
+        map: "Map",
+        *,
+        button: bool = True,
+        key: str = "g",
+        spacing: float = 1.0,
+    ) -> None:
         if len(key) != 1:
             raise ValueError(f"GoalTool: key must be one character, got {key!r}")
+        if not 0.3 <= spacing <= 20.0:
+            raise ValueError(f"GoalTool: spacing is 0.3 to 20 m, got {spacing!r}")
         self.map = map
         self.half = map.add_browser_half(
             self,
             "modules/goal_tool.js",
-            {"button": button, "key": key},
+            {"button": button, "key": key, "spacing": spacing},
             "modules/goal_tool.css",
         )
 
@@ -56,6 +70,10 @@ class GoalTool:
             pose = [goal.get(name) for name in ("x", "y", "yaw")]
             if robot is not None and all(isinstance(n, int | float) for n in pose):
                 self.map.notify_modules("on_goal_sent", robot, *pose)
+        elif isinstance(message.get("mark"), str):
+            robot = self._robot(message["mark"])
+            if robot is not None:
+                self.map.toggle_marked(robot)
         elif isinstance(canceled, str):
             robot = self._robot(canceled)
             if robot is not None:

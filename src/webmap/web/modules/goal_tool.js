@@ -1,30 +1,35 @@
-import { deskOf } from "../inputs/desk.js";
-import { attentive } from "../motion/attention.js";
-import { aim, onScreen } from "./aim.js";
-import { button, html, say, svg } from "./elements.js";
+import { button, html, say } from "./elements.js";
+import { assign, formation } from "./formation.js";
+import { GoalMarks } from "./goal_marks.js";
+import { look, ShownGoals } from "./goal_words.js";
+import { Marking } from "./marking.js";
 import { lay } from "./overlay.js";
+import { PressAim } from "./press_aim.js";
+import { chosen, poseOf } from "./robot_places.js";
 
-/** @typedef {import('../view.js').Point} Point */
 /** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
 /** @typedef {import('../halves.js').Half} Half */
+/** @typedef {{button?: boolean, key?: string, spacing?: number}} Options */
 
-/** Points along x, 44 pixels long, with a ring around the place itself. */
-const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
+/** How long a goal waits, before it is sent, for a link that another goal used up; ms. */
+const LINK_PATIENCE = 2000;
+const LINK_RETRY = 150;
 
 /**
- * Send the selected robot to a place: press there, drag for the heading, release.
+ * Send the selected robots to a place: press there, drag for the heading, release.
  *
  * Begins by its button, by `g`, or by a message `{active: true}`; Escape leaves. Asks
- * for the lease where it needs it. A message `{reached: id}` takes away the arrow of a
- * robot. Sends `{goal: {robot, x, y, yaw}}` when the gate has accepted one, and
- * `{cancel: robot}`.
+ * for the lease where it needs it. A message `{reached: id}` takes away the goal of a
+ * robot. Sends `{goal: {robot, x, y, yaw}}` when the gate has accepted one,
+ * `{cancel: robot}`, and `{mark: robot}` when a robot was pressed for long.
  *
- * Options: `button` (true), whether there are buttons; `key` ("g").
+ * Options: `button` (true), whether there are buttons; `key` ("g"); `spacing` (1), how
+ * far from each other several robots are sent, in metres.
  *
  * @param {MapCanvas} map
- * @param {{button?: boolean, key?: string}} options
+ * @param {Options} options
  * @param {Send} send
  * @returns {Half}
  */
@@ -39,254 +44,286 @@ export default function attach(map, options, send) {
 class GoalTool {
   /**
    * @param {MapCanvas} map
-   * @param {{button?: boolean, key?: string}} options
+   * @param {Options} options
    * @param {Send} send
    */
-  constructor(map, { button: buttons = true, key = "g" }, send) {
+  constructor(map, { button: buttons = true, key = "g", spacing = 1 }, send) {
     this._map = map;
     /** @type {import('../drive.js').Drive} */
     this._drive = map.drive;
     this._send = send;
-    this._key = key;
-    this._active = false;
     /**
-     * A press that is aimed at the moment.
-     * @type {{id: number, robot: string, from: Point} | null}
-     */
-    this._press = null;
-    /**
-     * Where robots were sent, and how far that is.
+     * Where robots are to go, until the gate tells of it.
      * @type {Map<string, {pose: Pose, state: 'aimed' | 'asked' | 'sent'}>}
      */
     this._goals = new Map();
+    this._shown = new ShownGoals();
+    this._aim = new PressAim(map, key, {
+      mayBegin: () => map.selected !== null,
+      changed: (active) => this._changed(active),
+      preview: (pose) => this._preview(pose),
+      done: (pose) => this._done(pose),
+    });
+    this._wanted = false;
     this._go = button("webmap-goal-go", "Send to a place", () => this._toggle());
-    this._cancel = button("webmap-goal-cancel", "Cancel the goal", () =>
-      this._callOff(),
-    );
+    this._go.title = `Key ${key}`;
+    this._cancel = button("webmap-goal-cancel", "Cancel the goal", () => this._callOff());
     this._word = html("span", "webmap-goal-word", { role: "status" });
+    this._spacing = html("input", "webmap-goal-spacing-value", {
+      type: "number",
+      min: "0.3",
+      max: "20",
+      step: "0.1",
+      value: `${spacing}`,
+    });
+    this._apart = html(
+      "label",
+      "webmap-goal-spacing",
+      {},
+      "apart, in m ",
+      this._spacing,
+    );
     this._panel = html(
       "section",
       "webmap-panel webmap-goal",
       { "aria-label": "Goals" },
       this._go,
+      this._apart,
       this._cancel,
       this._word,
     );
-    this._go.title = `Key ${key}`;
-
-    this._arrow = svg("path", { d: ARROW });
-    this._drawing = svg(
-      "svg",
-      { class: "webmap-goal-drawing", "aria-hidden": "true" },
-      this._arrow,
-    );
-    this._ending = new AbortController();
-    this._listen();
+    this._marks = new GoalMarks(map, (robot) => this._end(robot));
+    this._marking = new Marking(map, (robot) => send({ mark: robot }));
     this._offs = [
-      lay(map, this._drawing),
       ...(buttons ? [lay(map, this._panel, "top-left")] : []),
-      deskOf(this._drive).claimEscape(() => this._leave()),
       map.onSelect(() => this._selected()),
-      map.onView(() => this._draw()),
       this._drive.on("stop", (robot) => this._stopped(robot)),
+      this._drive.on("robot", ({ robot, goal }) => this._hear(robot, goal)),
+      this._drive.on("gone", (robot) => this._shown.gone(robot)),
+      this._drive.on("refused", ({ robot, what, why }) => this._refused(robot, what, why)),
     ];
+    // Goals that have ended leave by themselves, and marks come with the scene.
+    this._timer = setInterval(() => this._show(), 250);
+    for (const { robot, goal } of this._drive.robots.values()) this._hear(robot, goal);
     this._show();
   }
 
   destroy() {
-    this._leave();
-    this._ending.abort();
+    clearInterval(this._timer);
+    this._aim.destroy();
+    this._marks.destroy();
+    this._marking.destroy();
     for (const off of this._offs) off();
   }
 
   /** @param {any} message */
   receive(message) {
-    if (typeof message?.active === "boolean") this._activate(message.active);
+    if (typeof message?.active === "boolean") {
+      this._wanted = message.active;
+      this._aim.activate(message.active);
+    }
     if (typeof message?.reached === "string") this._forget(message.reached);
   }
 
-  _listen() {
-    const { signal } = this._ending;
-    const { svg: root } = this._map;
-    // Before anybody else, so that a press while aiming neither moves nor selects.
-    const first = { signal, capture: true };
-    root.addEventListener("pointerdown", (event) => this._down(event), first);
-    root.addEventListener("pointermove", (event) => this._move(event), first);
-    root.addEventListener("pointerup", (event) => this._up(event), first);
-    root.addEventListener("pointercancel", () => this._drop(), first);
-    root.addEventListener("lostpointercapture", () => this._drop(), first);
-    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-  }
-
-  /** @param {KeyboardEvent} event */
-  _keyDown(event) {
-    if (event.key !== this._key || event.repeat || event.isComposing) return;
-    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active } = deskOf(this._drive);
-    if (active !== null && active.map !== this._map) return;
-    this._toggle();
-  }
-
   _toggle() {
-    this._activate(!this._active);
+    this._wanted = !this._aim.active;
+    this._aim.toggle();
   }
 
   /** @param {boolean} active */
-  _activate(active) {
-    this._active = active && this._map.selected !== null;
-    if (active && !this._active) say(this._word, "Select a robot first.");
-    else say(this._word, this._active ? "Press on the map, drag for the heading." : "");
-    if (!this._active) this._drop();
-    this._map.svg.classList.toggle("webmap-aiming", this._active);
-    this._show();
-  }
-
-  /** @returns {boolean} Whether there was something to leave. */
-  _leave() {
-    if (!this._active) return false;
-    this._activate(false);
-    return true;
-  }
-
-  /** @param {PointerEvent} event */
-  _down(event) {
-    if (!this._active) return;
-    event.stopImmediatePropagation();
-    event.preventDefault();
-    const robot = this._map.selected;
-    if (this._press || robot === null || event.button !== 0) {
-      // A second finger is a doubt about the first.
-      this._drop();
-      return;
+  _changed(active) {
+    if (this._wanted && !active && this._map.selected === null) {
+      say(this._word, "Select a robot first.");
+    } else {
+      say(this._word, active ? "Press on the map, drag for the heading." : "");
     }
-    this._press = { id: event.pointerId, robot, from: this._map.pointOf(event) };
-    this._map.svg.setPointerCapture(event.pointerId);
-    this._aim(event);
-  }
-
-  /** @param {PointerEvent} event */
-  _move(event) {
-    if (!this._active) return;
-    event.stopImmediatePropagation();
-    if (event.pointerId === this._press?.id) this._aim(event);
-  }
-
-  /** @param {PointerEvent} event */
-  _up(event) {
-    const press = this._press;
-    if (!press || event.pointerId !== press.id) return;
-    event.stopImmediatePropagation();
-    this._map.suppressNextClick();
-    const pose = this._aim(event);
-    this._press = null;
-    this._activate(false);
-    if (pose) void this._ask(press.robot, pose);
-  }
-
-  /** Give up the press that is aimed, if there is one. */
-  _drop() {
-    const press = this._press;
-    this._press = null;
-    if (!press) return;
-    this._forget(press.robot);
+    this._wanted = false;
+    this._show();
   }
 
   /**
-   * @param {PointerEvent} event
-   * @returns {Pose | null}
+   * @param {Pose} pose
+   * @returns {[string, Pose][]} Where each of the selected robots goes.
    */
-  _aim(event) {
-    const press = this._press;
-    if (!press) return null;
-    const pose = aim(
-      this._map.view,
-      press.from,
-      this._map.pointOf(event),
-      poseOf(this._map, press.robot),
-    );
-    this._goals.set(press.robot, { pose, state: "aimed" });
+  _places(pose) {
+    const robots = chosen(this._map);
+    const apart = Number(this._spacing.value);
+    const spacing = Number.isFinite(apart) && apart >= 0.3 ? Math.min(apart, 20) : 1;
+    const places = formation(pose, robots.length, spacing);
+    const from = robots.map((robot) => poseOf(this._map, robot) ?? pose);
+    return assign(from, places).map((place, i) => [robots[i], place]);
+  }
+
+  /** @param {Pose | null} pose */
+  _preview(pose) {
+    for (const [robot, { state }] of this._goals) {
+      if (state === "aimed") this._goals.delete(robot);
+    }
+    for (const [robot, place] of pose ? this._places(pose) : []) {
+      this._goals.set(robot, { pose: place, state: "aimed" });
+    }
     this._show();
-    return pose;
+  }
+
+  /** @param {Pose} pose */
+  _done(pose) {
+    const places = this._places(pose);
+    this._aim.activate(false);
+    void this._ask(places);
+  }
+
+  /** @param {[string, Pose][]} places */
+  async _ask(places) {
+    /** @type {string[]} */
+    const problems = [];
+    const asked = places.map(([robot, pose]) => {
+      const goal = { pose, state: /** @type {'asked' | 'sent'} */ ("asked") };
+      this._goals.set(robot, goal);
+      return { robot, pose, goal };
+    });
+    this._show();
+    for (const { robot, pose, goal } of asked) {
+      // A STOP, or another goal, that came meanwhile.
+      if (this._goals.get(robot) !== goal) continue;
+      try {
+        await this._sendOne(robot, pose, goal);
+        if (this._goals.get(robot) === goal) goal.state = "sent";
+        if (this._drive.robots.get(robot)?.goal) this._goals.delete(robot);
+        this._send({ goal: { robot, ...pose } });
+      } catch (error) {
+        if (this._goals.get(robot) === goal) this._goals.delete(robot);
+        const why = error instanceof Error ? error.message : String(error);
+        const name = this._drive.robots.get(robot)?.name ?? robot;
+        problems.push(places.length > 1 ? `${name}: ${why}` : why);
+      }
+      this._show();
+    }
+    if (problems.length > 0) say(this._word, `Not sent: ${problems.join("; ")}`);
+  }
+
+  /**
+   * Send one goal. The goal of an action uses its link up, and the gate has a new one a
+   * moment later: the next robot's goal, which was not taken, is offered again.
+   *
+   * @param {string} robot
+   * @param {Pose} pose
+   * @param {object} goal
+   */
+  async _sendOne(robot, pose, goal) {
+    const until = performance.now() + LINK_PATIENCE;
+    for (;;) {
+      try {
+        await this._drive.goal(robot, pose);
+        return;
+      } catch (error) {
+        const linkless = error instanceof Error && error.message.startsWith("no link to");
+        if (!linkless || performance.now() > until) throw error;
+        await new Promise((resolve) => setTimeout(resolve, LINK_RETRY));
+        if (this._goals.get(robot) !== goal) throw new Error("called off");
+      }
+    }
+  }
+
+  _callOff() {
+    for (const robot of chosen(this._map)) this._cancelOne(robot);
+  }
+
+  /** @param {string} robot */
+  _cancelOne(robot) {
+    if (!this._runs(robot)) return;
+    this._drive.cancel(robot);
+    this._send({ cancel: robot });
+    this._goals.delete(robot);
+    this._show();
+  }
+
+  /** @param {string} robot */
+  _end(robot) {
+    if (this._runs(robot)) this._cancelOne(robot);
+    else this._forget(robot);
   }
 
   /**
    * @param {string} robot
-   * @param {Pose} pose
+   * @param {import('../motion/report.js').GoalWord | null | undefined} goal
    */
-  async _ask(robot, pose) {
-    const goal = { pose, state: /** @type {'asked' | 'sent'} */ ("asked") };
-    this._goals.set(robot, goal);
-    this._show();
-    try {
-      await this._drive.goal(robot, pose);
-      if (this._goals.get(robot) === goal) goal.state = "sent";
-      this._send({ goal: { robot, ...pose } });
-    } catch (error) {
-      if (this._goals.get(robot) === goal) this._goals.delete(robot);
-      const why = error instanceof Error ? error.message : String(error);
-      say(this._word, `Not sent: ${why}`);
-    }
+  _hear(robot, goal) {
+    this._shown.report(robot, goal, performance.now());
+    if (goal && this._goals.get(robot)?.state === "sent") this._goals.delete(robot);
     this._show();
   }
 
-  _callOff() {
-    const robot = this._map.selected;
-    if (robot === null) return;
-    this._drive.cancel(robot);
-    this._send({ cancel: robot });
-    this._forget(robot);
+  /**
+   * @param {string | null} robot
+   * @param {string} what
+   * @param {string} why
+   */
+  _refused(robot, what, why) {
+    if (what === "cancel" && robot !== null) say(this._word, `Not cancelled: ${why}`);
   }
 
   /** @param {string} robot */
   _stopped(robot) {
     if (robot === "*") this._goals.clear();
-    this._leave();
-    this._forget(robot);
+    this._aim.leave();
+    this._goals.delete(robot);
+    this._show();
   }
 
   /** @param {string} robot */
   _forget(robot) {
     this._goals.delete(robot);
+    this._shown.dismiss(robot);
     this._show();
   }
 
   _selected() {
-    // What is aimed was meant for the robot that was selected then.
-    this._leave();
+    // What is aimed was meant for the robots that were selected then.
+    this._aim.leave();
     say(this._word, "");
     this._show();
   }
 
+  /** @param {string} robot */
+  _runs(robot) {
+    if (this._goals.get(robot)?.state === "sent") return true;
+    const goal = this._drive.robots.get(robot)?.goal;
+    return goal !== undefined && goal !== null && !look(goal).over;
+  }
+
+  /** @param {string} robot */
+  _mayCancel(robot) {
+    const report = this._drive.robots.get(robot);
+    const asked = report?.goal?.state === "cancelling" && !this._goals.has(robot);
+    return this._runs(robot) && report?.cancels !== false && !asked;
+  }
+
   _show() {
-    const robot = this._map.selected;
-    this._go.disabled = robot === null;
-    this._go.setAttribute("aria-pressed", String(this._active));
-    this._cancel.hidden = robot === null || this._goals.get(robot)?.state !== "sent";
-    this._draw();
+    const robots = chosen(this._map);
+    const way = robots.some((robot) => this._drive.robots.get(robot)?.way !== null);
+    this._go.disabled = robots.length === 0 || !way;
+    const words = robots.length > 1 ? `Send ${robots.length} to a place` : "Send to a place";
+    say(this._go, words);
+    this._go.setAttribute("aria-pressed", String(this._aim.active));
+    this._apart.hidden = robots.length < 2;
+    this._cancel.hidden = !robots.some((robot) => this._mayCancel(robot));
+    this._draw(robots);
   }
 
-  _draw() {
-    const robot = this._map.selected;
-    const goal = robot === null ? undefined : this._goals.get(robot);
-    this._drawing.toggleAttribute("hidden", !goal);
-    if (!goal) return;
-    const { x, y, degrees } = onScreen(this._map.view, goal.pose);
-    this._arrow.setAttribute("transform", `translate(${x} ${y}) rotate(${degrees})`);
-    this._arrow.setAttribute("class", `webmap-goal-arrow ${goal.state}`);
+  /** @param {string[]} robots The selected ones. */
+  _draw(robots) {
+    /** @type {Parameters<GoalMarks['show']>[0]} */
+    const goals = new Map();
+    for (const [robot, goal] of this._shown.shown(performance.now())) {
+      if (poseOf(this._map, robot) === null) continue;
+      const report = this._drive.robots.get(robot);
+      const mine = robot === this._map.selected;
+      const { name = "", cancels = true } = report ?? {};
+      goals.set(robot, { pose: goal, goal, name, mine, cancels });
+    }
+    for (const [robot, { pose, state }] of this._goals) {
+      if (robots.includes(robot)) goals.set(robot, { pose, state, mine: true });
+    }
+    this._marks.show(goals);
   }
-}
-
-/**
- * @param {MapCanvas} map
- * @param {string} robot
- * @returns {Pose | null} Where the map shows the robot.
- */
-function poseOf(map, robot) {
-  const element = map.world.querySelector(`[data-robot="${CSS.escape(robot)}"]`);
-  if (!(element instanceof SVGGraphicsElement)) return null;
-  const onMap = element.getCTM();
-  const world = map.world.getCTM();
-  if (!onMap || !world) return null;
-  const { a, b, e, f } = world.inverse().multiply(onMap);
-  return { x: e, y: f, yaw: Math.atan2(b, a) };
 }

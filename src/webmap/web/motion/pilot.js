@@ -252,16 +252,29 @@ export class Pilot {
   }
 
   /**
-   * Say where a robot should go. Its lease is kept, and given back when it is not used.
+   * Say where a robot should go, or where it is. Its lease is kept, and given back when
+   * it is not used.
    *
+   * @param {'goal' | 'locate'} op
    * @param {string} robot
    * @param {{x: number, y: number, yaw: number}} pose Metres and radians.
    * @param {number} now
    */
-  goal(robot, pose, now) {
+  place(op, robot, pose, now) {
     if (robot !== this.driven) this._parked.set(robot, now);
     const { seq, tick } = this._stamp();
-    return { op: "goal", robot, epoch: this.epoch(robot), seq, tick, ...pose };
+    return { op, robot, epoch: this.epoch(robot), seq, tick, ...pose };
+  }
+
+  /**
+   * Note that the lease of a robot that goes somewhere is used still.
+   *
+   * @param {string} robot
+   * @param {number} now
+   */
+  keep(robot, now) {
+    if (this._parked.has(robot)) this._parked.set(robot, now);
+    if (this._lease?.robot === robot) this._lease.movedAt = now;
   }
 
   /**

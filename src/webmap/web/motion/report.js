@@ -33,6 +33,27 @@
  * @property {number} [brake] How hard it brakes, in m/s², as far as is known.
  * @property {number | null} [age] How old commands are when the gate gets them, in ms.
  * @property {StopTest | null} [test] How the test of its own stopping goes.
+ * @property {string | null} [way] How goals are sent to it; null if they cannot be.
+ * @property {boolean} [cancels] Whether goals can be called off.
+ * @property {boolean} [locates] Whether it can be told where it is.
+ * @property {GoalWord | null} [goal] How it stands with its newest goal.
+ */
+
+/**
+ * @typedef {object} GoalWord
+ * @property {string} id
+ * @property {number} x Metres.
+ * @property {number} y Metres.
+ * @property {number} yaw Radians.
+ * @property {string} by The connection that sent it.
+ * @property {string} way
+ * @property {'sent' | 'accepted' | 'under way' | 'cancelling' | 'unknown' | 'reached'
+ *     | 'failed' | 'cancelled'} state
+ * @property {string} why
+ * @property {number | null} left Metres to go.
+ * @property {number | null} time Seconds under way.
+ * @property {number | null} eta Seconds to go.
+ * @property {number | null} recoveries
  */
 
 /**

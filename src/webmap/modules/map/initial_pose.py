@@ -1,0 +1,60 @@
+"""A person tells the selected robot where it is."""
+
+import logging
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+log = logging.getLogger("webmap.modules.initial_pose")
+
+
+class InitialPoseTool:
+    """A press on the map is where the selected robot is, a drag which way it looks.
+
+    It begins by its button, by its key or by :meth:`aim`. The page tells it to the
+    gate, which refuses it while the robot moves, follows a goal, or is somebody else's.
+
+    Fires ``on_pose_told(robot, x, y, yaw)`` on the map's modules when the gate has
+    taken it.
+
+    Args:
+        map: The map.
+        button: Whether there is a button for it on the map.
+        key: The key that begins.
+
+    Raises:
+        ValueError: If ``key`` is not one character.
+
+    """
+
+    def __init__(self, map: "Map", *, button: bool = True, key: str = "i") -> None:
+        if len(key) != 1:
+            raise ValueError(f"InitialPoseTool: key must be one character, got {key!r}")
+        self.map = map
+        self.half = map.add_browser_half(
+            self,
+            "modules/initial_pose_tool.js",
+            {"button": button, "key": key},
+            "modules/initial_pose_tool.css",
+        )
+
+    def aim(self) -> None:
+        """Let the viewer's next press on the map say where the robot is."""
+        self.half.send({"active": True})
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Take what the page says that it told."""
+        told = message.get("told")
+        if isinstance(told, dict):
+            pose = [told.get(name) for name in ("x", "y", "yaw")]
+            robot = next(
+                (r for r in self.map.robots if r.id == told.get("robot")), None
+            )
+            if robot is not None and all(
+                isinstance(n, int | float) and math.isfinite(n) for n in pose
+            ):
+                self.map.notify_modules("on_pose_told", robot, *pose)
+            return
+        log.warning("%r: an unknown message of the page was ignored", self.map)

@@ -1,0 +1,113 @@
+/** @typedef {import('../motion/report.js').GoalWord} GoalWord */
+
+/**
+ * How a goal reads and looks; a word, a shape and a tone that always go together.
+ *
+ * @typedef {object} GoalLook
+ * @property {string} text
+ * @property {'sent' | 'way' | 'unknown' | 'reached' | 'failed' | 'cancelled'} shape
+ * @property {boolean} over Whether it has ended.
+ */
+
+/** @type {Record<GoalWord['state'], [string, GoalLook['shape']]>} */
+const LOOKS = {
+  sent: ["Sent", "sent"],
+  accepted: ["Accepted", "sent"],
+  "under way": ["Under way", "way"],
+  cancelling: ["Cancelling", "cancelled"],
+  unknown: ["Not known", "unknown"],
+  reached: ["Reached", "reached"],
+  failed: ["Failed", "failed"],
+  cancelled: ["Cancelled", "cancelled"],
+};
+
+/**
+ * @param {GoalWord} goal
+ * @returns {GoalLook}
+ */
+export function look(goal) {
+  const [word, shape] = LOOKS[goal.state] ?? LOOKS.unknown;
+  const over = ["reached", "failed", "cancelled"].includes(goal.state);
+  const parts = [];
+  if (goal.state === "under way" || goal.state === "cancelling") {
+    if (goal.left !== null) parts.push(`${metres(goal.left)} to go`);
+    if (goal.eta !== null) parts.push(`about ${seconds(goal.eta)}`);
+    if (goal.recoveries) parts.push(`${goal.recoveries} × stuck`);
+  }
+  if (goal.why !== "") parts.push(goal.why);
+  return { text: [word, ...parts].join(", "), shape, over };
+}
+
+/** @param {number} number */
+export function metres(number) {
+  return `${number < 10 ? number.toFixed(1) : Math.round(number)} m`;
+}
+
+/** @param {number} number */
+export function seconds(number) {
+  if (number < 90) return `${Math.round(number)} s`;
+  return `${Math.round(number / 60)} min`;
+}
+
+/** For how long a goal that was reached or called off stays on the map, in ms. */
+const LINGER = 4000;
+
+/** Decides which goals a page shows. Times are in milliseconds of one clock. */
+export class ShownGoals {
+  constructor() {
+    /** @type {Map<string, {goal: GoalWord, endedAt: number | null}>} */
+    this._seen = new Map();
+    /** @type {Set<string>} */
+    this._dismissed = new Set();
+  }
+
+  /**
+   * Take what the gate says of a robot's goal.
+   *
+   * @param {string} robot
+   * @param {GoalWord | null | undefined} goal
+   * @param {number} now
+   */
+  report(robot, goal, now) {
+    const known = this._seen.get(robot);
+    if (!goal) {
+      this._seen.delete(robot);
+      return;
+    }
+    const { over } = look(goal);
+    const first = known === undefined || known.goal.id !== goal.id;
+    // What was over when the page came is no news to anybody.
+    const ended = over ? (first ? -Infinity : (known.endedAt ?? now)) : null;
+    this._seen.set(robot, { goal, endedAt: ended });
+  }
+
+  /** @param {string} robot */
+  gone(robot) {
+    this._seen.delete(robot);
+  }
+
+  /**
+   * Show a goal no more.
+   *
+   * @param {string} robot
+   */
+  dismiss(robot) {
+    const seen = this._seen.get(robot);
+    if (seen) this._dismissed.add(seen.goal.id);
+  }
+
+  /**
+   * @param {number} now
+   * @returns {Map<string, GoalWord>} The goals to show, by robot.
+   */
+  shown(now) {
+    const shown = new Map();
+    for (const [robot, { goal, endedAt }] of this._seen) {
+      if (this._dismissed.has(goal.id)) continue;
+      const old = endedAt !== null && now - endedAt > LINGER;
+      const failed = goal.state === "failed" && endedAt !== -Infinity;
+      if (!old || failed) shown.set(robot, goal);
+    }
+    return shown;
+  }
+}

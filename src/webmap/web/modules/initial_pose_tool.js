@@ -1,0 +1,154 @@
+import { onScreen } from "./aim.js";
+import { button, html, say, svg } from "./elements.js";
+import { lay } from "./overlay.js";
+import { PressAim } from "./press_aim.js";
+
+/** @typedef {import('./aim.js').Pose} Pose */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {(message: object) => void} Send */
+/** @typedef {import('../halves.js').Half} Half */
+
+/** A robot's outline with its nose along x, and the way that it looks. */
+const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
+
+/**
+ * Tell the selected robot where it is: press there, drag for the heading, release.
+ *
+ * Begins by its button, by `i`, or by a message `{active: true}`; Escape leaves. Sends
+ * `{told: {robot, x, y, yaw}}` when the gate has taken it.
+ *
+ * Options: `button` (true), whether there is a button; `key` ("i").
+ *
+ * @param {MapCanvas} map
+ * @param {{button?: boolean, key?: string}} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const tool = new InitialPoseTool(map, options, send);
+  return {
+    receive: (message) => tool.receive(message),
+    destroy: () => tool.destroy(),
+  };
+}
+
+class InitialPoseTool {
+  /**
+   * @param {MapCanvas} map
+   * @param {{button?: boolean, key?: string}} options
+   * @param {Send} send
+   */
+  constructor(map, { button: buttons = true, key = "i" }, send) {
+    this._map = map;
+    /** @type {import('../drive.js').Drive} */
+    this._drive = map.drive;
+    this._send = send;
+    /** @type {Pose | null} */
+    this._pose = null;
+    this._aim = new PressAim(map, key, {
+      mayBegin: () => this._may(),
+      changed: (active) => this._changed(active),
+      preview: (pose) => this._preview(pose),
+      done: (pose) => this._done(pose),
+    });
+    this._go = button("webmap-locate-go", "Set its pose", () => this._aim.toggle());
+    this._go.title = `Key ${key}`;
+    this._word = html("span", "webmap-locate-word", { role: "status" });
+    this._panel = html(
+      "section",
+      "webmap-panel webmap-locate",
+      { "aria-label": "Initial pose" },
+      this._go,
+      this._word,
+    );
+    this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
+    this._drawing = svg(
+      "svg",
+      { class: "webmap-locate-drawing", "aria-hidden": "true" },
+      this._outline,
+    );
+    this._offs = [
+      lay(map, this._drawing),
+      ...(buttons ? [lay(map, this._panel, "top-left")] : []),
+      map.onSelect(() => this._selected()),
+      map.onView(() => this._draw()),
+      this._drive.on("stop", () => this._aim.leave()),
+      this._drive.on("robot", () => this._show()),
+    ];
+    this._show();
+  }
+
+  destroy() {
+    this._aim.destroy();
+    for (const off of this._offs) off();
+  }
+
+  /** @param {any} message */
+  receive(message) {
+    if (typeof message?.active !== "boolean") return;
+    this._aim.activate(message.active);
+    if (message.active && !this._aim.active) {
+      say(this._word, "This robot cannot be told where it is.");
+    }
+  }
+
+  _may() {
+    const { selected } = this._map;
+    return selected !== null && this._drive.robots.get(selected)?.locates === true;
+  }
+
+  /** @param {boolean} active */
+  _changed(active) {
+    say(this._word, active ? "Press where the robot is, drag which way it looks." : "");
+    this._show();
+  }
+
+  /** @param {Pose | null} pose */
+  _preview(pose) {
+    this._pose = pose;
+    this._draw();
+  }
+
+  /** @param {Pose} pose */
+  _done(pose) {
+    const { selected: robot } = this._map;
+    this._aim.activate(false);
+    if (robot !== null) void this._tell(robot, pose);
+  }
+
+  /**
+   * @param {string} robot
+   * @param {Pose} pose
+   */
+  async _tell(robot, pose) {
+    try {
+      await this._drive.locate(robot, pose);
+      say(this._word, "Told.");
+      setTimeout(() => this._word.textContent === "Told." && say(this._word, ""), 4000);
+      this._send({ told: { robot, ...pose } });
+    } catch (error) {
+      const why = error instanceof Error ? error.message : String(error);
+      say(this._word, `Not told: ${why}`);
+    }
+    this._preview(null);
+  }
+
+  _selected() {
+    this._aim.leave();
+    say(this._word, "");
+    this._show();
+  }
+
+  _show() {
+    this._go.disabled = !this._may();
+    this._go.setAttribute("aria-pressed", String(this._aim.active));
+    this._draw();
+  }
+
+  _draw() {
+    this._outline.toggleAttribute("hidden", this._pose === null);
+    if (this._pose === null) return;
+    const { x, y, degrees } = onScreen(this._map.view, this._pose);
+    this._outline.setAttribute("transform", `translate(${x} ${y}) rotate(${degrees})`);
+  }
+}

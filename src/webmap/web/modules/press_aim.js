@@ -1,0 +1,160 @@
+import { deskOf } from "../inputs/desk.js";
+import { attentive } from "../motion/attention.js";
+import { aim } from "./aim.js";
+import { poseOf } from "./robot_places.js";
+
+/** @typedef {import('../view.js').Point} Point */
+/** @typedef {import('./aim.js').Pose} Pose */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+
+/**
+ * What a tool does with what is aimed.
+ *
+ * @typedef {object} Aims
+ * @property {() => boolean} mayBegin Whether there is anything to aim for.
+ * @property {(active: boolean) => void} changed Aiming began or ended.
+ * @property {(pose: Pose | null) => void} preview What is aimed now; null when the press
+ *     was given up.
+ * @property {(pose: Pose) => void} done The press was let go of at this pose.
+ * @property {() => Pose | null} [origin] From where one comes, for a press without a
+ *     drag; the selected robot if not given.
+ */
+
+/** @type {WeakMap<MapCanvas, PressAim>} The one that is active on a map. */
+const active = new WeakMap();
+
+/**
+ * Press where, drag which way, release: how a pose is given on a map.
+ *
+ * Begins by a key or {@link PressAim#activate}; Escape leaves. One tool of a map aims at
+ * a time.
+ */
+export class PressAim {
+  /**
+   * @param {MapCanvas} map
+   * @param {string} key
+   * @param {Aims} aims
+   */
+  constructor(map, key, aims) {
+    this._map = map;
+    this._key = key;
+    this._aims = aims;
+    this.active = false;
+    /** @type {{id: number, from: Point, robot: string | null} | null} */
+    this._press = null;
+    this._ending = new AbortController();
+    this._listen();
+    this._offEscape = deskOf(map.drive).claimEscape(() => this.leave());
+  }
+
+  destroy() {
+    this.leave();
+    this._ending.abort();
+    this._offEscape();
+  }
+
+  toggle() {
+    this.activate(!this.active);
+  }
+
+  /** @param {boolean} on */
+  activate(on) {
+    const was = this.active;
+    this.active = on && this._aims.mayBegin();
+    if (this.active) {
+      const other = active.get(this._map);
+      if (other !== this) other?.leave();
+      active.set(this._map, this);
+    } else {
+      this.drop();
+      if (active.get(this._map) === this) active.delete(this._map);
+    }
+    if (this.active !== was) {
+      this._map.svg.classList.toggle("webmap-aiming", active.has(this._map));
+    }
+    this._aims.changed(this.active);
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  leave() {
+    if (!this.active) return false;
+    this.activate(false);
+    return true;
+  }
+
+  /** Give up the press that is aimed, if there is one. */
+  drop() {
+    if (!this._press) return;
+    this._press = null;
+    this._aims.preview(null);
+  }
+
+  _listen() {
+    const { signal } = this._ending;
+    const { svg } = this._map;
+    // Before anybody else, so that a press while aiming neither moves nor selects.
+    const first = { signal, capture: true };
+    svg.addEventListener("pointerdown", (event) => this._down(event), first);
+    svg.addEventListener("pointermove", (event) => this._move(event), first);
+    svg.addEventListener("pointerup", (event) => this._up(event), first);
+    svg.addEventListener("pointercancel", () => this.drop(), first);
+    svg.addEventListener("lostpointercapture", () => this.drop(), first);
+    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+  }
+
+  /** @param {KeyboardEvent} event */
+  _keyDown(event) {
+    if (event.key !== this._key || event.repeat || event.isComposing) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
+    const { active: desk } = deskOf(this._map.drive);
+    if (desk !== null && desk.map !== this._map) return;
+    this.toggle();
+  }
+
+  /** @param {PointerEvent} event */
+  _down(event) {
+    if (!this.active) return;
+    event.stopImmediatePropagation();
+    event.preventDefault();
+    if (this._press || event.button !== 0) {
+      // A second finger is a doubt about the first.
+      this.drop();
+      return;
+    }
+    const { selected: robot } = this._map;
+    this._press = { id: event.pointerId, from: this._map.pointOf(event), robot };
+    this._map.svg.setPointerCapture(event.pointerId);
+    this._preview(event);
+  }
+
+  /** @param {PointerEvent} event */
+  _move(event) {
+    if (!this.active) return;
+    event.stopImmediatePropagation();
+    if (event.pointerId === this._press?.id) this._preview(event);
+  }
+
+  /** @param {PointerEvent} event */
+  _up(event) {
+    if (event.pointerId !== this._press?.id) return;
+    event.stopImmediatePropagation();
+    this._map.suppressNextClick();
+    const pose = this._preview(event);
+    this._press = null;
+    if (pose) this._aims.done(pose);
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @returns {Pose | null}
+   */
+  _preview(event) {
+    const press = this._press;
+    if (!press) return null;
+    const selected = press.robot === null ? null : poseOf(this._map, press.robot);
+    const origin = this._aims.origin ? this._aims.origin() : selected;
+    const pose = aim(this._map.view, press.from, this._map.pointOf(event), origin);
+    this._aims.preview(pose);
+    return pose;
+  }
+}

@@ -1,0 +1,101 @@
+import { onScreen } from "./aim.js";
+import { svg } from "./elements.js";
+import { lay } from "./overlay.js";
+
+/** @typedef {import('./aim.js').Pose} Pose */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+
+/** A ring with a nose that says which way the robot stands there. */
+const NOSE = "M12-6 22 0 12 6z";
+
+/** Numbered points over a map, which can be dragged, and the line from one to the next. */
+export class RoutePoints {
+  /**
+   * @param {MapCanvas} map
+   * @param {(index: number, pose: Pose) => void} moved
+   */
+  constructor(map, moved) {
+    this._map = map;
+    this._moved = moved;
+    /** @type {Pose[]} */
+    this._points = [];
+    this._line = svg("polyline", { class: "webmap-route-line" });
+    this._group = svg("g", {});
+    this._drawing = svg(
+      "svg",
+      { class: "webmap-route-drawing", "aria-hidden": "true" },
+      this._line,
+      this._group,
+    );
+    this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
+  }
+
+  destroy() {
+    for (const off of this._offs) off();
+  }
+
+  /**
+   * @param {Pose[]} points
+   * @param {{loop: boolean, current: number | null, movable: boolean}} how `current`: the
+   *     point that the robot goes to.
+   */
+  show(points, { loop, current, movable }) {
+    this._points = points;
+    this._loop = loop;
+    this._drawing.classList.toggle("movable", movable);
+    while (this._group.childElementCount > points.length) this._group.lastChild?.remove();
+    while (this._group.childElementCount < points.length) this._add();
+    for (const [index, element] of [...this._group.children].entries()) {
+      element.classList.toggle("current", index === current);
+    }
+    this._place();
+  }
+
+  _add() {
+    const index = this._group.childElementCount;
+    const number = svg("text", {});
+    number.textContent = `${index + 1}`;
+    const point = svg(
+      "g",
+      { class: "webmap-route-point" },
+      svg("path", { d: NOSE }),
+      svg("circle", { r: "12" }),
+      number,
+    );
+    point.addEventListener("pointerdown", (event) => this._down(event, point, index));
+    this._group.append(point);
+  }
+
+  /**
+   * @param {PointerEvent} down
+   * @param {SVGGElement} point
+   * @param {number} index
+   */
+  _down(down, point, index) {
+    if (down.button !== 0) return;
+    down.preventDefault();
+    down.stopPropagation();
+    point.setPointerCapture(down.pointerId);
+    const ending = new AbortController();
+    const { signal } = ending;
+    const move = (/** @type {PointerEvent} */ event) => {
+      const { x, y } = this._map.pointOf(event);
+      this._moved(index, { ...this._points[index], ...this._map.toWorld(x, y) });
+    };
+    point.addEventListener("pointermove", move, { signal });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      point.addEventListener(end, () => ending.abort(), { signal });
+    }
+  }
+
+  _place() {
+    const places = this._points.map((pose) => onScreen(this._map.view, pose));
+    for (const [index, { x, y, degrees }] of places.entries()) {
+      const element = this._group.children[index];
+      element.setAttribute("transform", `translate(${x} ${y})`);
+      element.firstElementChild?.setAttribute("transform", `rotate(${degrees})`);
+    }
+    const line = this._loop && places.length > 2 ? [...places, places[0]] : places;
+    this._line.setAttribute("points", line.map(({ x, y }) => `${x},${y}`).join(" "));
+  }
+}

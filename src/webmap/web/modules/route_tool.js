@@ -1,0 +1,323 @@
+import { button, html, say } from "./elements.js";
+import { lay } from "./overlay.js";
+import { PressAim } from "./press_aim.js";
+import { poseOf } from "./robot_places.js";
+import { RoutePoints } from "./route_points.js";
+import { RouteRun } from "./route_run.js";
+import { SavedRoutes } from "./route_saved.js";
+
+/** @typedef {import('./aim.js').Pose} Pose */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {(message: object) => void} Send */
+/** @typedef {import('../halves.js').Half} Half */
+
+/** As many as the server keeps of one route. */
+const MOST_POINTS = 500;
+
+/**
+ * Routes: points that are pressed on the map, and a robot that goes from one to the next.
+ *
+ * Sends `{op: "save", name, route}`, `{op: "load", name}` and `{op: "delete", name}`;
+ * hears `{routes: [name]}`, `{loaded: {name, points, loop}}`, `{saved: name}` and
+ * `{problem: text}`.
+ *
+ * Options: `saves` (true), whether this viewer may keep routes.
+ *
+ * @param {MapCanvas} map
+ * @param {{saves?: boolean}} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const tool = new RouteTool(map, options, send);
+  return {
+    receive: (message) => tool.receive(message),
+    destroy: () => tool.destroy(),
+  };
+}
+
+class RouteTool {
+  /**
+   * @param {MapCanvas} map
+   * @param {{saves?: boolean}} options
+   * @param {Send} send
+   */
+  constructor(map, { saves = true }, send) {
+    this._map = map;
+    /** @type {import('../drive.js').Drive} */
+    this._drive = map.drive;
+    /** @type {Pose[]} */
+    this._points = [];
+    /** @type {Map<string, {run: RouteRun, busy: boolean}>} The robots on their routes. */
+    this._runs = new Map();
+    /** @type {Pose | null} A point that is being aimed. */
+    this._aimed = null;
+    this._listed = "";
+    this._aim = new PressAim(map, "", {
+      mayBegin: () => true,
+      changed: () => this._show(),
+      preview: (pose) => this._preview(pose),
+      done: (pose) => {
+        this._aimed = null;
+        this._add(pose);
+      },
+      origin: () => this._points.at(-1) ?? this._robotPose(),
+    });
+    this._drawing = new RoutePoints(map, (index, pose) => this._change(index, pose));
+    this._edit = button("webmap-route-edit", "Add points", () => this._aim.toggle());
+    this._edit.title = "Press on the map for each point";
+    this._here = button("webmap-route-here", "Its place", () => {
+      const pose = this._robotPose();
+      if (pose) this._add(pose);
+    });
+    this._clear = button("webmap-route-clear", "Clear", () => this._set([], false));
+    this._list = html("ol", "webmap-route-list");
+    this._loop = html("input", "", { type: "checkbox" });
+    this._loop.addEventListener("change", () => this._show());
+    this._here.title = "Add the place of the selected robot";
+    this._run = button("webmap-route-run", "Run", () => this._begin());
+    this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
+    this._skip = button("webmap-route-skip", "Skip", () => this._do("skip"));
+    this._end = button("webmap-route-end", "End", () => this._do("end"));
+    this._word = html("p", "webmap-route-word", { role: "status" });
+    this._saved = new SavedRoutes(saves, send, () => ({
+      points: this._points,
+      loop: this._loop.checked,
+    }));
+    this._details = html(
+      "details",
+      "webmap-panel webmap-route",
+      {},
+      html("summary", "", {}, "Route"),
+      html("div", "webmap-route-row begin", {}, this._edit, this._here, this._clear),
+      this._list,
+      html("label", "webmap-route-loop", {}, this._loop, "Loop"),
+      html("div", "webmap-route-row", {}, this._run, this._pause, this._skip, this._end),
+      this._word,
+      this._saved.element,
+    );
+    this._details.addEventListener("toggle", () => {
+      if (!this._details.open) this._aim.leave();
+      this._show();
+    });
+    this._offs = [
+      lay(map, this._details, "top-left"),
+      map.onSelect(() => this._show()),
+      this._drive.on("robot", ({ robot }) => this._look(robot)),
+      this._drive.on("step", () => this._keep()),
+    ];
+    this._timer = setInterval(() => this._lookAll(), 250);
+    this._show();
+  }
+
+  destroy() {
+    clearInterval(this._timer);
+    // Nobody is left to send the next goal; the one that is under way stays as it is.
+    this._aim.destroy();
+    this._drawing.destroy();
+    for (const off of this._offs) off();
+  }
+
+  /** @param {any} message */
+  receive(message) {
+    const { loaded } = message ?? {};
+    if (loaded) this._set(loaded.points, loaded.loop);
+    this._saved.receive(message);
+  }
+
+  // The points -----------------------------------------------------------------
+
+  _robotPose() {
+    const { selected } = this._map;
+    return selected === null ? null : poseOf(this._map, selected);
+  }
+
+  /** @param {Pose[]} points @param {boolean} loop */
+  _set(points, loop) {
+    this._points = points;
+    this._loop.checked = loop;
+    this._show();
+  }
+
+  /** @param {Pose} pose */
+  _add(pose) {
+    if (this._points.length >= MOST_POINTS) return;
+    this._set([...this._points, pose], this._loop.checked);
+  }
+
+  /** @param {number} index @param {Pose} pose */
+  _change(index, pose) {
+    this._set(
+      this._points.map((point, i) => (i === index ? pose : point)),
+      this._loop.checked,
+    );
+  }
+
+  /** @param {number} index */
+  _remove(index) {
+    this._set(
+      this._points.filter((_, i) => i !== index),
+      this._loop.checked,
+    );
+  }
+
+  /** @param {number} index Exchanged with the one before. */
+  _raise(index) {
+    const points = [...this._points];
+    [points[index - 1], points[index]] = [points[index], points[index - 1]];
+    this._set(points, this._loop.checked);
+  }
+
+  /** @param {Pose | null} pose */
+  _preview(pose) {
+    this._aimed = pose;
+    this._show();
+  }
+
+  // Going along ----------------------------------------------------------------
+
+  _begin() {
+    const { selected } = this._map;
+    if (selected === null || this._points.length === 0) return;
+    this._aim.leave();
+    const run = new RouteRun([...this._points], { loop: this._loop.checked });
+    this._runs.set(selected, { run, busy: false });
+    this._perform(selected, run.go(this._goalOf(selected)));
+  }
+
+  _pauseOrGoOn() {
+    const { run } = this._chosen() ?? {};
+    this._do(run?.state === "going" ? "pause" : "go");
+  }
+
+  /** @param {'go' | 'pause' | 'skip' | 'end'} what */
+  _do(what) {
+    const { selected } = this._map;
+    const { run } = this._chosen() ?? {};
+    if (selected === null || !run) return;
+    this._perform(selected, run[what](this._goalOf(selected)));
+  }
+
+  /**
+   * @param {string} robot
+   * @param {import('./route_run.js').Action} action
+   */
+  _perform(robot, action) {
+    if (action && "send" in action) void this._send(robot, action.send);
+    else if (action) this._drive.cancel(robot);
+    this._show();
+  }
+
+  /** @param {string} robot @param {Pose} pose */
+  async _send(robot, pose) {
+    const going = this._runs.get(robot);
+    if (!going) return;
+    going.busy = true;
+    try {
+      await this._drive.goal(robot, pose);
+      going.run.accepted(performance.now());
+    } catch (error) {
+      going.run.halt(error instanceof Error ? error.message : String(error));
+    }
+    going.busy = false;
+    this._look(robot);
+    this._show();
+  }
+
+  _keep() {
+    for (const [robot, { run }] of this._runs) {
+      if (run.state === "going") this._drive.keep(robot);
+    }
+  }
+
+  _lookAll() {
+    for (const robot of this._runs.keys()) this._look(robot);
+    this._show();
+  }
+
+  /** @param {string} robot */
+  _look(robot) {
+    const { run, busy } = this._runs.get(robot) ?? {};
+    if (!run || busy || run.state !== "going") return;
+    const report = this._drive.robots.get(robot);
+    if (!report) {
+      run.halt("the robot is gone");
+      return;
+    }
+    const at = poseOf(this._map, robot);
+    const point = run.points[run.index];
+    const away = at && Math.hypot(at.x - point.x, at.y - point.y);
+    const told = { ...report, mine: this._drive.holds(robot) };
+    this._perform(robot, run.report(told, away, performance.now()));
+  }
+
+  /** @param {string} robot */
+  _goalOf(robot) {
+    return this._drive.robots.get(robot)?.goal?.id ?? null;
+  }
+
+  _chosen() {
+    const { selected } = this._map;
+    return selected === null ? undefined : this._runs.get(selected);
+  }
+
+  // What is seen ---------------------------------------------------------------
+
+  _show() {
+    const { run, busy = false } = this._chosen() ?? {};
+    const live = run?.live === true;
+    const report = this._drive.robots.get(this._map.selected ?? "");
+    const open = this._details.open;
+    this._edit.setAttribute("aria-pressed", String(this._aim.active));
+    say(this._edit, this._aim.active ? "Done" : "Add points");
+    // So that there is a map to press on, on a phone too.
+    this._details.classList.toggle("adding", this._aim.active);
+    this._here.disabled = this._robotPose() === null;
+    this._clear.disabled = this._points.length === 0;
+    this._run.disabled = this._points.length === 0 || !report?.way || busy;
+    say(this._run, live ? "Run anew" : "Run");
+    for (const each of [this._pause, this._skip, this._end]) each.hidden = !live;
+    for (const each of [this._pause, this._skip]) each.disabled = busy;
+    say(this._pause, run?.state === "going" ? "Pause" : "Go on");
+    say(this._word, this._words(run, report?.name ?? ""));
+    this._word.dataset.state = run?.state ?? "";
+    this._showList();
+    const points = this._aimed ? [...this._points, this._aimed] : this._points;
+    const shown = open ? points : live ? run.points : [];
+    this._drawing.show(shown, {
+      loop: open ? this._loop.checked : (run?.loop ?? false),
+      current: live ? run.index : null,
+      movable: open,
+    });
+  }
+
+  /** @param {RouteRun | undefined} run @param {string} name */
+  _words(run, name) {
+    if (this._aim.active) return "Press on the map for each point, drag for the heading.";
+    if (run === undefined) {
+      return this._map.selected === null ? "Select the robot that is to go." : "";
+    }
+    const point = `point ${run.index + 1} of ${run.points.length}`;
+    const round = run.loop && run.rounds > 0 ? `, round ${run.rounds + 1}` : "";
+    if (run.state === "going") return `${name} goes to ${point}${round}.`;
+    if (run.state === "paused") return `Paused before ${point}.`;
+    if (run.state === "halted") return `Halted before ${point}: ${run.why}.`;
+    return `${name} has ended its route.`;
+  }
+
+  _showList() {
+    const key = JSON.stringify(this._points);
+    if (key === this._listed) return;
+    this._listed = key;
+    const rows = this._points.map(({ x, y }, index) => {
+      const where = `${x.toFixed(1)}, ${y.toFixed(1)} m`;
+      const up = button("webmap-route-up", "↑", () => this._raise(index));
+      up.setAttribute("aria-label", `Move point ${index + 1} up`);
+      up.disabled = index === 0;
+      const away = button("webmap-route-remove", "×", () => this._remove(index));
+      away.setAttribute("aria-label", `Remove point ${index + 1}`);
+      return html("li", "", {}, html("span", "", {}, where), up, away);
+    });
+    this._list.replaceChildren(...rows);
+  }
+}

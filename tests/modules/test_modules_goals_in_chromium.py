@@ -1,0 +1,264 @@
+"""Goals, routes and initial poses, from a real page through the real gate to robots.
+
+The robots are simulated, of ROS 1 and of ROS 2, each behind a rosbridge of its own.
+"""
+
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from real_browser import watched_tab
+from webmap.cli.demo import simulator
+
+pytestmark = pytest.mark.browser
+
+HERE = Path(__file__).parent
+WEBMAP = [sys.executable, "-m", "webmap"]
+QUIET = ["--port", "0", "--no-browser"]
+OUTSIDE = (1180, 400)
+"""A place on the screen that is outside of the house."""
+
+PLACE = """name => {
+  const robot = document.querySelector(`.robot[data-name="${name}"]`);
+  const m = robot.getCTM(), w = robot.ownerSVGElement.getScreenCTM();
+  return [w.e + m.e, w.f + m.f];
+}"""
+
+
+def open_floor(folder: Path) -> Path:
+    """Write a hall of 16 m with nothing in it, in map_server's form."""
+    side = 320
+    wall, inside = bytes(side), b"\0" + b"\xfe" * (side - 2) + b"\0"
+    pixels = wall + inside * (side - 2) + wall
+    (folder / "hall.pgm").write_bytes(b"P5 %d %d 255\n" % (side, side) + pixels)
+    (folder / "hall.yaml").write_text(
+        "image: hall.pgm\nresolution: 0.05\norigin: [-8, -8, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return folder / "hall.yaml"
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("goals")
+    floor = open_floor(folder)
+    with ExitStack() as stack:
+        bridges = {
+            name.upper(): stack.enter_context(
+                simulator(
+                    *("--dialect", name, "--map", floor, "--port", 0),
+                    *("--robots", 2, "--no-extras"),
+                )
+            )
+            for name in ("ros1", "ros2")
+        }
+        process = stack.enter_context(
+            subprocess.Popen(
+                [*WEBMAP, "run", str(HERE / "site_of_goals.py"), *QUIET],
+                stdout=subprocess.PIPE,
+                text=True,
+                env={**os.environ, **bridges, "WEBMAP_STATE_DIR": str(folder)},
+            )
+        )
+        stack.callback(process.wait, 10)
+        stack.callback(process.terminate)
+        found = re.search(r"http\S+", process.stdout.readline())
+        assert found
+        yield found.group(0)
+
+
+@pytest.fixture
+def tab(chromium: Browser, url: str) -> Iterator[Page]:
+    with watched_tab(chromium, 1200, 800) as page:
+        page.goto(url)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(4)
+        page.wait_for_selector(".webmap-route > summary")
+        page.wait_for_selector(".webmap-goal-go", state="attached")
+        yield page
+
+
+def pick(tab: Page, name: str, *, shift: bool = False) -> None:
+    tab.evaluate(
+        """([name, shiftKey]) => document.querySelector(`.robot[data-name="${name}"]`)
+        .dispatchEvent(new MouseEvent("click", { bubbles: true, shiftKey }))""",
+        [name, shift],
+    )
+    kind = "marked" if shift else "selected"
+    expect(tab.locator(f'.robot.{kind}[data-name="{name}"]')).to_have_count(1)
+
+
+def press(tab: Page, x: float, y: float, *, drag: float = 0.0) -> None:
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + drag, y)
+    tab.mouse.up()
+
+
+def beside(tab: Page, name: str, dx: float = 16.0) -> tuple[float, float]:
+    """A place on the screen near a robot, which it soon reaches."""
+    x, y = tab.evaluate(PLACE, name)
+    middle = tab.viewport_size["width"] / 2
+    return x + math.copysign(dx, middle - x), y
+
+
+def send(tab: Page, name: str, to: str = "") -> None:
+    """Send a robot beside another, or to where it soon is."""
+    pick(tab, name)
+    tab.keyboard.press("g")
+    press(tab, *beside(tab, to or name, 45.0 if to else 16.0), drag=30)
+
+
+def label(tab: Page):
+    return tab.locator(".webmap-goal-label.mine")
+
+
+@pytest.mark.parametrize("name", ["Old 0", "New 0"])
+def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name):
+    send(tab, name)
+    expect(label(tab)).to_contain_text("Under way")
+    expect(label(tab)).to_contain_text("m to go")
+    expect(tab.locator(".webmap-goal-arrow.way")).to_have_count(1)
+    expect(label(tab)).to_contain_text("Reached", timeout=15_000)
+
+
+@pytest.mark.parametrize(("name", "to"), [("Old 0", "Plain 1"), ("New 0", "New 1")])
+def test_a_goal_is_called_off_where_it_is_drawn(tab, name, to):
+    send(tab, name, to)
+    expect(label(tab)).to_contain_text("Under way")
+    label(tab).get_by_role("button", name="Cancel the goal").click()
+    expect(label(tab)).to_contain_text("Cancelled")
+
+
+def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
+    pick(tab, "New 0")
+    tab.keyboard.press("g")
+    press(tab, *OUTSIDE, drag=-30)
+    expect(label(tab)).to_have_text(re.compile("Failed, no path to the goal"))
+    expect(tab.locator(".webmap-goal-arrow.failed")).to_have_count(1)
+    label(tab).get_by_role("button", name="Show this goal no more").click()
+    expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
+
+
+def test_stop_cancels_a_goal_and_says_so(tab):
+    send(tab, "Old 0", "Plain 1")
+    expect(label(tab)).to_contain_text("Under way")
+    tab.get_by_role("button", name="Stop all").click()
+    expect(label(tab)).to_contain_text("Cancelled, STOP")
+    reset(tab)
+
+
+def reset(tab: Page) -> None:
+    """End every STOP, by two presses that are too far apart for a double click."""
+    button = tab.locator(".webmap-stop .webmap-reset")
+    button.click()
+    tab.wait_for_timeout(500)
+    button.click()
+    expect(button).to_be_hidden()
+
+
+def test_a_plain_topic_says_that_it_says_nothing(tab):
+    send(tab, "Plain 1", "Old 0")
+    expect(label(tab)).to_have_text(re.compile("Sent, this robot does not say"))
+    label(tab).get_by_role("button", name="Cancel the goal").click()
+    expect(
+        tab.locator(".webmap-goal-arrow.way, .webmap-goal-arrow.sent")
+    ).to_have_count(0)
+
+
+def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab):
+    word = tab.locator(".webmap-locate-word")
+    pick(tab, "Old 0")
+    tab.keyboard.press("i")
+    expect(word).to_contain_text("Press where the robot is")
+    press(tab, *beside(tab, "Old 0", 5), drag=30)
+    expect(word).to_have_text("Told.")
+    send(tab, "Old 0", "Plain 1")
+    expect(label(tab)).to_contain_text("Under way")
+    tab.keyboard.press("i")
+    press(tab, *beside(tab, "Old 0", 5), drag=30)
+    expect(word).to_have_text("Not told: it follows a goal: cancel that first")
+    label(tab).get_by_role("button", name="Cancel the goal").click()
+
+
+def test_several_robots_go_to_places_beside_each_other(tab):
+    pick(tab, "New 0")
+    pick(tab, "New 1", shift=True)
+    expect(tab.locator(".webmap-goal-go")).to_have_text("Send 2 to a place")
+    tab.keyboard.press("g")
+    x, y = beside(tab, "New 0")
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 30, y)
+    expect(tab.locator(".webmap-goal-arrow.aimed")).to_have_count(2)
+    tab.mouse.up()
+    under_way = tab.locator(".webmap-goal-arrow:not(.aimed, .asked)")
+    expect(under_way).to_have_count(2)
+    spots = [
+        list(map(float, re.findall(r"-?[\d.]+", each)))
+        for each in under_way.evaluate_all(
+            "all => all.map(arrow => arrow.getAttribute('transform'))"
+        )
+    ]
+    metre = tab.evaluate("document.querySelector('.world').getCTM().a")
+    (x0, y0, *_), (x1, y1, *_) = spots
+    assert ((x0 - x1) ** 2 + (y0 - y1) ** 2) ** 0.5 == pytest.approx(metre, rel=0.02)
+    tab.locator(".webmap-goal-cancel").click()
+    expect(label(tab)).to_contain_text(re.compile("Cancel"))
+    pick(tab, "Old 0")
+    expect(tab.locator(".robot.marked")).to_have_count(0)
+
+
+def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
+    pick(tab, "New 1")
+    tab.locator(".webmap-route > summary").click()
+    tab.locator(".webmap-route-edit").click()
+    x, y = beside(tab, "New 1", 0)
+    side = x - beside(tab, "New 1", 1.0)[0]
+    for dx in (10, 20, 30):
+        press(tab, x - dx * side, y, drag=20)
+    expect(tab.locator(".webmap-route-point")).to_have_count(3)
+    tab.locator(".webmap-route-edit").click()
+    tab.locator(".webmap-route-name").fill("Round")
+    tab.locator(".webmap-route-save").click()
+    expect(tab.locator(".webmap-route-saved")).to_contain_text("Saved as Round.")
+    word = tab.locator(".webmap-route > .webmap-route-word")
+    tab.locator(".webmap-route-run").click()
+    expect(word).to_have_text("New 1 goes to point 1 of 3.")
+    expect(word).to_have_text("New 1 goes to point 2 of 3.", timeout=15_000)
+    tab.locator(".webmap-route-skip").click()
+    expect(word).to_have_text("New 1 goes to point 3 of 3.")
+    tab.locator(".webmap-route-pause").click()
+    expect(word).to_have_text("Paused before point 3 of 3.")
+    tab.locator(".webmap-route-pause").click()
+    expect(word).to_have_text("New 1 goes to point 3 of 3.")
+    tab.get_by_role("button", name="Stop all").click()
+    expect(word).to_contain_text("Halted before point 3 of 3")
+    reset(tab)
+    expect(word).to_contain_text("Halted before point 3 of 3")
+
+    tab.reload()
+    tab.locator(".webmap-route > summary").click()
+    tab.locator(".webmap-route-load").click()
+    expect(tab.locator(".webmap-route-point")).to_have_count(3)
+    for _ in range(2):
+        tab.get_by_role("button", name="Remove point 1").click()
+    box = tab.locator(".webmap-route-point").bounding_box()
+    tab.mouse.move(box["x"] + 12, box["y"] + 12)
+    tab.mouse.down()
+    tab.mouse.move(*OUTSIDE)
+    tab.mouse.up()
+    pick(tab, "New 1")
+    tab.locator(".webmap-route-run").click()
+    expect(word).to_have_text(
+        "Halted before point 1 of 1: failed: no path to the goal."
+    )
+    tab.locator(".webmap-route-skip").click()
+    expect(word).to_have_text("New 1 has ended its route.")
