@@ -85,19 +85,29 @@ test-parallel: $(DEV) $(NODE)
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial
 
-## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1 goes on)
+## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety
 TRIALS ?= 50
 RESUME ?=
+LANES ?= 1
 FIGURES := docs/_build/safety-figures.jsonl
+SAFETY := WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_RESUME=$(RESUME) \
+  WEBMAP_SAFETY_FIGURES=$(abspath $(FIGURES)) $(BIN)/pytest -v --timeout 3600
+ONE_LANE := tests/safety/test_safety_links.py
+OTHER_LANE := tests/safety/test_safety_browser.py tests/safety/test_safety_processes.py
 test-safety: $(DEV) $(NODE)
 	mkdir -p $(dir $(FIGURES))
 	[ "$(RESUME)" = 1 ] || rm -f $(FIGURES) $(FIGURES).schedules
 	failed=0; \
-	WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_RESUME=$(RESUME) \
-	  WEBMAP_SAFETY_FIGURES=$(abspath $(FIGURES)) \
-	  $(BIN)/pytest -v --timeout 3600 tests/safety tests/gate/test_gate_machine.py \
-	  || failed=$$?; \
+	if [ "$(LANES)" = 2 ]; then \
+	  $(SAFETY) $(ONE_LANE) & one=$$!; \
+	  $(SAFETY) $(OTHER_LANE) || failed=1; \
+	  wait $$one || failed=1; \
+	else \
+	  $(SAFETY) $(ONE_LANE) $(OTHER_LANE) || failed=1; \
+	fi; \
+	$(SAFETY) tests/safety $(addprefix --ignore ,$(ONE_LANE) $(OTHER_LANE)) || failed=1; \
+	$(SAFETY) -n $(JOBS) tests/gate/test_gate_machine.py || failed=1; \
 	$(PY) tests/safety/safety_figures.py $(FIGURES); exit $$failed
 
 ## docs: the documentation, in docs/_build/html

@@ -216,7 +216,7 @@ class Bench:
         if self.tab is None:
             self.open_page()
 
-    def drive_off(self, within=15.0):
+    def drive_off(self, within=30.0):
         """Press W until the robot moves, and keep pressing; like a person, again."""
         self.heal()
         deadline = time.monotonic() + within

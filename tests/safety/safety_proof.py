@@ -106,6 +106,7 @@ class ProvingBench(Bench):
 
     def _get_under_way(self, before):
         """Drive, so that it is the fault that stops the robot and nothing else."""
+        why = None
         for _ in range(5):
             try:
                 self.drive_off()
@@ -113,11 +114,14 @@ class ProvingBench(Bench):
                 # The test before may have left a page that is beyond repair.
                 self.end_browser()
                 self.drive_off()
-            before()
-            if not self.robot.log.told[-1].is_zero:
-                return
+            try:
+                before()
+                if not self.robot.log.told[-1].is_zero:
+                    return
+            except AssertionError as error:
+                why = error
             self.let_go()
-        raise AssertionError("a busy machine stops the robot again and again")
+        raise AssertionError("the robot stops again and again") from why
 
     def _measure(self, within, stops_by):
         """Wait until the robot is stopped, and say how long that took."""

@@ -31,7 +31,7 @@ SCRIPT = [(0.0, "take"), (0.05, "x 0"), (0.5, "x 1"), (1.2, "stop"), (1.5, "x 1"
 
 KILLS = range(1, LAST + 1) if FULL else range(5, LAST, 10)
 
-LANES = 3
+LANES = 4
 """How many robots are driven side by side: most of the time each only waits."""
 
 
