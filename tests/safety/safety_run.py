@@ -61,15 +61,23 @@ def grace(jitter: float) -> float:
 @functools.cache
 def version() -> str:
     """Return what is measured: the version, and the commit if there is one."""
+    commit = _git("describe", "--always")
+    if not commit:
+        return webmap.__version__
+    # The table itself, which a run writes, makes it no other version.
+    changed = "+" if _git("status", "--porcelain", "--", "src", "tests") else ""
+    return f"{webmap.__version__} ({commit}{changed})"
+
+
+def _git(*arguments: str) -> str:
     asked = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
-        cwd=Path(__file__).parent,
+        ["git", *arguments],
+        cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
         check=False,
     )
-    commit = asked.stdout.strip()
-    return f"{webmap.__version__} ({commit})" if commit else webmap.__version__
+    return asked.stdout.strip()
 
 
 def is_measured(name: str) -> bool:
