@@ -50,6 +50,7 @@ def _robot(
         "tf": (line.tf, robot.set_tf),
         "twist": (line.twist, robot.set_twist_topic),
         "move": (line.move, robot.set_move_topic),
+        "initial_pose": (line.initial_pose, robot.set_initial_pose_topic),
         "scan_assist": (
             line.scan_assist,
             lambda bridge, **options: robot.set_scan_assist(**options),

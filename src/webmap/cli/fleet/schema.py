@@ -46,6 +46,14 @@ MOVE: dict[str, Check] = {
     "frame": checks.text,
     "cancel_topic": checks.topic,
     "on_operator_loss": checks.one_of("continue", "cancel"),
+    "action": checks.topic,
+    "action_type": checks.message_type(
+        "nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction"
+    ),
+}
+INITIAL_POSE: dict[str, Check] = {
+    "topic": checks.topic,
+    "covariance": checks.covariance,
 }
 ROBOT = (
     "name",
@@ -55,6 +63,7 @@ ROBOT = (
     "tf",
     "twist",
     "move",
+    "initial_pose",
     "scan",
     "scan_assist",
     "battery",
@@ -87,6 +96,7 @@ class RobotLine:
     tf: dict[str, Any] | None = None
     twist: dict[str, Any] | None = None
     move: dict[str, Any] | None = None
+    initial_pose: dict[str, Any] | None = None
     scans: list[str] = field(default_factory=list)
     scan_assist: dict[str, Any] | None = None
     battery: str = ""
@@ -190,7 +200,12 @@ def _robot(
         if key in value:
             got = checks.one(checks.text, value[key], (*path, key), mistakes)
             setattr(robot, key, got or "")
-    known = {"odometry": ODOMETRY, "twist": TWIST, "move": MOVE}
+    known = {
+        "odometry": ODOMETRY,
+        "twist": TWIST,
+        "move": MOVE,
+        "initial_pose": INITIAL_POSE,
+    }
     for key, fields in known.items():
         if key in value:
             setattr(robot, key, _topic(value[key], fields, (*path, key), mistakes))
@@ -248,7 +263,9 @@ def _topic(
 ) -> dict[str, Any]:
     """Take a topic's name, or a table with it and more."""
     if isinstance(value, dict):
-        return checks.table(value, fields, path, mistakes, needed=("topic",))
+        # Goals may go to an action alone; elsewhere that key is unknown.
+        needed = () if "action" in value else ("topic",)
+        return checks.table(value, fields, path, mistakes, needed=needed)
     return {"topic": checks.one(checks.topic, value, path, mistakes)}
 
 
