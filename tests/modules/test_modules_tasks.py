@@ -1,0 +1,191 @@
+"""The display's halves of the tools that send robots somewhere."""
+
+import asyncio
+
+import pytest
+from module_fakes import Channel, Someone
+
+from webmap import Map, Robot
+from webmap.console.tasks import LOOKS, GoalLine, figures
+from webmap.core.page import Page, PageEntry
+from webmap.gate.messages import GoalReport
+
+
+def goal(state="under way", **fields):
+    about = {"id": "g", "x": 1.0, "y": 2.0, "yaw": 0.0, "by": "c1", "way": "topic"}
+    return GoalReport(state=state, **{**about, **fields})
+
+
+class Told:
+    def __init__(self, map):
+        self.told = []
+
+    def on_pose_told(self, *told):
+        self.told.append(told)
+
+    def on_mark(self):
+        self.told.append("mark")
+
+
+class TestMarked:
+    @pytest.fixture
+    def robots(self, map):
+        robots = [Robot(name) for name in ("Ann", "Bob", "Cid")]
+        for robot in robots:
+            map.add_robot(robot)
+        yield robots
+        for robot in robots:
+            robot.destroy()
+
+    def test_robots_are_selected_besides_the_one(self, map, robots):
+        ann, bob, cid = robots
+        listener = map.add_module(Told)
+        map.toggle_marked(ann)
+        assert map.selected is ann, "the first one is selected"
+        map.toggle_marked(bob)
+        map.set_marked(cid, True)
+        assert map.marked == [bob, cid]
+        assert map.selected is ann, "who is driven stays"
+        map.toggle_marked(bob)
+        assert map.marked == [cid]
+        assert listener.told == ["mark"] * 3
+
+    def test_the_selected_robot_is_not_marked_besides(self, map, robots):
+        map.set_selected(robots[0])
+        map.toggle_marked(robots[0])
+        assert map.marked == []
+
+    def test_selecting_ends_it_for_all(self, map, robots):
+        ann, bob, cid = robots
+        for robot in robots:
+            map.toggle_marked(robot)
+        map.set_selected(bob)
+        assert (map.selected, map.marked) == (bob, [])
+        map.toggle_marked(cid)
+        map.set_selected(bob)
+        assert map.marked == []
+        map.toggle_marked(ann)
+        map.set_selected(None)
+        assert map.marked == []
+
+    def test_a_robot_that_leaves_is_marked_no_more(self, map, robots):
+        for robot in robots[:2]:
+            map.toggle_marked(robot)
+        map.remove_robot(robots[1])
+        assert map.marked == []
+        with pytest.raises(ValueError, match="not on this map"):
+            map.set_marked(robots[1], True)
+
+    def test_a_long_press_in_the_page_marks(self, map, robots):
+        tool = map.add_module("GoalTool", spacing=2)
+        map.set_selected(robots[0])
+        tool.on_message({"mark": robots[1].id})
+        tool.on_message({"mark": "r999999"})
+        assert map.marked == [robots[1]]
+
+
+@pytest.mark.parametrize("spacing", [0.1, 21, float("nan")])
+def test_a_spacing_that_makes_no_sense_is_refused(map, spacing):
+    with pytest.raises(ValueError, match=r"0\.3 to 20 m"):
+        map.add_module("GoalTool", spacing=spacing)
+
+
+class TestInitialPose:
+    def test_what_the_page_told_fires_a_trigger(self, map, robot):
+        map.add_robot(robot)
+        tool, listener = map.add_module("InitialPoseTool"), map.add_module(Told)
+        tool.on_message({"told": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
+        for broken in (
+            {"told": {"robot": robot.id, "x": 1, "y": 2}},
+            {"told": {"robot": "r999", "x": 1, "y": 2, "yaw": 0}},
+            {"told": None},
+            {},
+        ):
+            tool.on_message(broken)
+        assert listener.told == [(robot, 1, 2.0, 0.5)]
+        tool.aim()
+
+    def test_a_key_is_one_character(self, map):
+        with pytest.raises(ValueError, match="one character"):
+            map.add_module("InitialPoseTool", key="in")
+
+
+class TestRoutes:
+    @pytest.fixture
+    def ask(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
+
+        def ask_(*messages, role="operator"):
+            async def scenario():
+                channel, viewer = Channel(), Someone(role=role)
+                entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
+                page = Page(entry, channel, viewer, None, {})
+                tool = Map(page.element("map"), 700, 500).add_module("RouteTool")
+                sent = []
+                monkeypatch.setattr(tool.half, "send", sent.append)
+                for number, message in enumerate(messages):
+                    tool.on_message(message)
+                    async with asyncio.timeout(5):
+                        while len(sent) <= number:
+                            await asyncio.sleep(0)
+                page.close()
+                return sent
+
+            return asyncio.run(scenario())
+
+        return ask_
+
+    ROUTE = {"points": [{"x": 1.0, "y": 2.0, "yaw": 0.5}], "loop": True}
+
+    def test_a_route_is_saved_loaded_and_deleted(self, ask):
+        named = {"name": "Round"}
+        saved, loaded, deleted, gone = ask(
+            {"op": "save", **named, "route": self.ROUTE},
+            {"op": "load", **named},
+            {"op": "delete", **named},
+            {"op": "load", **named},
+        )
+        assert saved == {"saved": "Round", "routes": ["Round"]}
+        assert loaded["loaded"] == {"name": "Round", **self.ROUTE}
+        assert deleted == {"routes": []}
+        assert gone == {"problem": "there is no route 'Round'"}
+
+    def test_who_may_not_drive_may_load_and_not_change(self, ask):
+        ask({"op": "save", "name": "Round", "route": self.ROUTE})
+        answers = ask(
+            {"op": "load", "name": "Round"},
+            {"op": "save", "name": "Round", "route": self.ROUTE},
+            {"op": "delete", "name": "Round"},
+            role="viewer",
+        )
+        assert "loaded" in answers[0]
+        assert all("may not drive" in answer["problem"] for answer in answers[1:])
+
+    def test_bad_words_of_a_page_are_said_and_change_nothing(self, ask):
+        answers = ask(
+            {"op": "save", "name": "", "route": self.ROUTE},
+            {"op": "save", "name": "x", "route": {"points": []}},
+            {"op": "load", "name": 7},
+        )
+        assert all("problem" in answer for answer in answers)
+        assert ask({"op": "delete", "name": "x"}) == [{"routes": []}]
+
+
+class TestOnTheCard:
+    def test_every_state_has_words_a_shape_and_a_figure_only_on_the_way(self):
+        for state in LOOKS:
+            told = figures(goal(state, left=2.0))
+            assert told == (
+                "2.0 m to go" if state in ("under way", "cancelling") else ""
+            )
+
+    def test_what_the_robot_tells_is_said_with_units(self):
+        told = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
+        text = "3.2 m to go, about 12 s, 5 s under way, got stuck 2 times"
+        assert figures(told) == text
+        assert figures(goal(recoveries=1)) == "got stuck once"
+
+    def test_a_robot_without_a_goal_has_no_line(self, robot):
+        line = GoalLine()
+        line.show(robot)
+        assert line.element.get("hidden") is not None
