@@ -451,6 +451,11 @@ class TestHooks:
         with pytest.raises(ConfigError, match="stop hook"):
             checked(spec(stop_hooks=(hook,)))
 
+    @pytest.mark.parametrize("hooks", ["/lock", {"topic": "/lock"}, 5, ["/lock"]])
+    def test_that_are_no_list_of_tables_are_refused(self, hooks):
+        with pytest.raises(ConfigError, match=r"stop_hooks is a list|is a table such"):
+            checked(spec(stop_hooks=hooks))
+
     def test_get_their_type_and_the_full_name(self):
         (hook,) = checked(spec(stop_hooks=({"topic": "lock"},))).stop_hooks
         assert hook == {"topic": "/lock", "type": "std_msgs/Bool"}

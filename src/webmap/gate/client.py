@@ -241,12 +241,7 @@ class GateClient:
                 with self._lock:
                     self._unheard.told(time.monotonic())
                 self._report(messages.GateUp())
-            case (
-                messages.SentTwist()
-                | messages.SentGoal()
-                | messages.SentPose()
-                | messages.RefusedCount()
-            ):
+            case _:  # for listeners alone
                 self._report(message)
 
     def gone(self, down: messages.GateDown) -> None:

@@ -7,7 +7,7 @@ from webmap.gate.connection import Connection
 from webmap.gate.deadman import DeadMan
 from webmap.gate.handover import HandOver
 from webmap.gate.lease import Epochs, Lease
-from webmap.gate.limits import Cap
+from webmap.gate.limits import Cap, page_cap
 from webmap.gate.motion import Motion
 from webmap.gate.refusal import Refusal
 from webmap.gate.robots import Robots
@@ -68,7 +68,7 @@ class Hands:
         self._new_driver(to.cap, now)
         return epoch
 
-    def _new_driver(self, cap: Cap | None, now: float) -> None:
+    def _new_driver(self, cap: Cap, now: float) -> None:
         """Forget what held for the hands before."""
         self._speeds.page_cap = cap
         self._speeds.ages.clear()
@@ -100,7 +100,7 @@ class Hands:
         self._halt(why or "the driver let go of it", now)
         self.lease = None
         self.deadman = DeadMan()
-        self._new_driver(None, now)
+        self._new_driver(page_cap(), now)
         if why is not None:
             self._robots.refuse(lease.connection, "lease", why)
 

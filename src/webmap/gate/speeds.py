@@ -1,7 +1,7 @@
 """How fast one machine may go now, by everything that is known of it. No I/O."""
 
 from webmap.gate.events import StopRecord
-from webmap.gate.limits import Cap, Speed, caps_of, least, speed_in_force
+from webmap.gate.limits import Cap, Speed, caps_of, least, page_cap, speed_in_force
 from webmap.gate.loopage import LoopAge, governed
 from webmap.gate.motion import Bounds
 from webmap.gate.robots import Robots
@@ -20,7 +20,7 @@ class Speeds:
         """How old its driver's picture of it is."""
         self.tested: StopRecord | None = None
         """What the last stop test that came to an end found, whenever that was."""
-        self.page_cap: Cap | None = None
+        self.page_cap = page_cap()
         """What the page of its driver asks for at most."""
         self._robots = robots
 
@@ -36,10 +36,8 @@ class Speeds:
     @property
     def speed(self) -> Speed:
         """The speeds in force now."""
-        caps = self._caps()
-        if self.page_cap is not None:
-            caps.append(self.page_cap)
-        return governed(speed_in_force(caps), self.ages.slow, self.stop_time)
+        speed = speed_in_force([*self._caps(), self.page_cap])
+        return governed(speed, self.ages.slow, self.stop_time)
 
     @property
     def stop_time(self) -> float | None:

@@ -1,0 +1,56 @@
+"""The disk is waited for by nobody, and tells when it has something."""
+
+import asyncio
+import datetime
+
+import pytest
+
+from webmap.gate.actions import KeepLatch, KeepStopTest
+from webmap.gate.disk import Disk
+from webmap.gate.events import Key, LatchKept, LockState, StopTestKept
+from webmap.gate.records import Records
+
+KEY = Key("ws://robot:9090", "/cmd_vel")
+
+
+@pytest.fixture
+def disk(tmp_path):
+    return Disk(Records(tmp_path))
+
+
+def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
+    told = []
+
+    async def scenario():
+        disk.keep(KeepLatch(KEY, 1, "Ann"), told.append)
+        disk.keep(KeepStopTest(KEY, 0.4), told.append)
+        assert told == []
+        await disk.settle()
+        await asyncio.sleep(0)
+
+    asyncio.run(scenario())
+    latched, tested = told
+    assert latched == LatchKept(KEY, 1, None)
+    assert isinstance(tested, StopTestKept)
+    assert tested.record.seconds == 0.4
+    assert datetime.date.fromisoformat(tested.record.date)
+    again = Disk(Records(tmp_path)).recall(LockState(KEY, held=True))
+    assert (again.latched_by, again.tested) == ("Ann", tested.record)
+
+
+def test_with_nothing_under_way_it_is_settled_at_once(disk):
+    asyncio.run(disk.settle())
+
+
+def test_what_was_given_up_tells_nothing(disk):
+    told = []
+
+    async def scenario():
+        disk.keep(KeepLatch(KEY, 1, "Ann"), told.append)
+        (work,) = disk._under_way
+        work.cancel()
+        await disk.settle()
+        await asyncio.sleep(0)
+
+    asyncio.run(scenario())
+    assert told == []

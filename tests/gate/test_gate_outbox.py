@@ -1,0 +1,103 @@
+"""What the gate says to the display and to its log holds nothing up."""
+
+import logging
+import os
+import threading
+
+import pytest
+
+from webmap.gate import framing, outbox
+from webmap.gate.messages import FromGate, GateUp, Ready, Tick
+from webmap.gate.outbox import BackgroundHandler, Outbox
+
+
+@pytest.fixture
+def pipe():
+    ends = os.pipe()
+    yield ends
+    for end in ends:
+        os.close(end)
+
+
+def shut(end):
+    """Close an end of a pipe, and keep its number from being given to another."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nothing, end)
+    os.close(nothing)
+
+
+def heard(read):
+    return framing.Unpacker(FromGate).feed(os.read(read, 1 << 16))
+
+
+class TestOutbox:
+    def test_messages_come_in_order(self, pipe):
+        box = Outbox(pipe[1])
+        for number in range(3):
+            box.put(Ready(number))
+        box.close(5.0)
+        assert heard(pipe[0]) == [Ready(0), Ready(1), Ready(2)]
+
+    def test_what_newer_messages_replace_is_dropped_first(self, pipe, monkeypatch):
+        monkeypatch.setattr(outbox, "FULL", -1)
+        box = Outbox(pipe[1])
+        box.put(Tick(1, {}))
+        box.put(Ready(1))
+        box.close(5.0)
+        assert heard(pipe[0]) == [Ready(1)]
+
+    def test_in_the_end_everything_is_dropped(self, pipe, monkeypatch):
+        monkeypatch.setattr(outbox, "OVERFULL", -1)
+        box = Outbox(pipe[1])
+        box.put(Ready(1))
+        box.close(5.0)
+        shut(pipe[1])
+        assert os.read(pipe[0], 100) == b""
+
+    def test_a_display_that_is_gone_is_no_error(self, pipe):
+        shut(pipe[0])
+        box = Outbox(pipe[1])
+        box.put(Ready(1))
+        box.close(5.0)
+        assert not box._thread.is_alive()
+
+
+class TestLog:
+    def record(self, text):
+        return logging.LogRecord("gate", logging.INFO, "", 0, text, (), None)
+
+    def test_a_terminal_that_stands_still_holds_nothing_up(self, monkeypatch):
+        monkeypatch.setattr(outbox, "FULL", 2)
+        go_on, written = threading.Event(), []
+
+        class Stopped(logging.Handler):
+            def emit(self, record):
+                go_on.wait(10)
+                written.append(record.getMessage())
+
+        handler = BackgroundHandler(Stopped())
+        for number in range(50):
+            handler.emit(self.record(str(number)))
+        handler.drain(0.0)  # there is no room even for that
+        go_on.set()
+        handler.drain(0.0)
+        while not written or handler._thread.is_alive():
+            handler.drain(0.1)
+        assert 1 <= len(written) < 50
+        assert written[0] == "0"
+
+
+class TestFraming:
+    def test_what_is_no_message_is_left_out(self, caplog):
+        data = framing.pack(GateUp()) + framing.pack(Ready(5))
+        assert framing.Unpacker(FromGate).feed(data) == [Ready(5)]
+        assert "not a message" in caplog.text
+
+    def test_bytes_in_pieces_make_the_same_messages(self):
+        unpacker, data = framing.Unpacker(FromGate), framing.pack(Ready(5)) * 2
+        found = [m for byte in data for m in unpacker.feed(bytes([byte]))]
+        assert found == [Ready(5), Ready(5)]
+
+    def test_a_length_that_makes_no_sense_ends_the_pipe(self):
+        with pytest.raises(framing.WireError, match="a message of 4294967295 bytes"):
+            framing.Unpacker(FromGate).feed(b"\xff" * 8)

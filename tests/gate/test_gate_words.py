@@ -1,0 +1,122 @@
+"""What the gate says to a robot's ROS, and what it understands of the answers."""
+
+import json
+import math
+
+import pytest
+from gate_harness import KEY, spec
+
+from webmap.gate import words
+from webmap.gate.actions import SendGoal, TellPose
+from webmap.geometry import Twist
+
+
+def said(data):
+    return json.loads(data)
+
+
+def goal_by(way, **changes):
+    goal = SendGoal(KEY, "r1", "g1", 1.0, 2.0, math.pi, "a", way)
+    return said(words.goal(spec(**changes), goal))
+
+
+@pytest.mark.parametrize(
+    ("type", "stamp"),
+    [
+        ("geometry_msgs/TwistStamped", {"secs": 0, "nsecs": 0}),
+        ("geometry_msgs/msg/TwistStamped", {"sec": 0, "nanosec": 0}),
+    ],
+)
+def test_a_velocity_with_a_header_has_stamp_zero_in_the_dialect(type, stamp):
+    message = said(words.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0)))["msg"]
+    assert message["header"]["stamp"] == stamp
+    assert message["twist"]["linear"] == {"x": 0.5, "y": 0.25, "z": 0.0}
+    assert message["twist"]["angular"] == {"x": 0.0, "y": 0.0, "z": -1.0}
+
+
+def test_a_plain_velocity_has_no_header():
+    message = said(words.velocity("/cmd_vel", "geometry_msgs/Twist", Twist(0.5)))["msg"]
+    assert message.keys() == {"linear", "angular"}
+
+
+def test_a_goal_goes_to_a_topic():
+    told = goal_by("topic", goal_frame="odom")
+    assert (told["op"], told["topic"]) == ("publish", "/goal")
+    assert told["msg"]["header"]["frame_id"] == "odom"
+    assert told["msg"]["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
+    assert told["msg"]["pose"]["orientation"]["z"] == pytest.approx(1.0)
+
+
+def test_a_goal_goes_to_move_base():
+    told = goal_by("move_base", action="/move_base")
+    assert told["topic"] == "/move_base/goal"
+    assert told["msg"]["goal_id"]["id"] == "g1"
+    assert told["msg"]["goal"]["target_pose"]["header"]["frame_id"] == "map"
+
+
+def test_a_goal_goes_to_an_action():
+    told = goal_by("navigate_to_pose", action="/go")
+    assert (told["op"], told["id"], told["action"]) == ("send_action_goal", "g1", "/go")
+    assert told["args"]["pose"]["header"]["stamp"] == {"sec": 0, "nanosec": 0}
+
+
+def test_everything_else_is_said():
+    assert said(words.cancel_by_topic("/cancel"))["msg"] == {}
+    cancel = said(words.cancel_by_service("/go", "c1"))
+    assert cancel["service"] == "/go/_action/cancel_goal"
+    assert said(words.flag("/lock", True))["msg"] == {"data": True}
+    call = said(words.trigger("/e_stop", "std_srvs/Trigger", "t1"))
+    assert (call["op"], call["service"], call["id"]) == (
+        "call_service",
+        "/e_stop",
+        "t1",
+    )
+    located = spec(pose_topic="/initialpose", pose_covariance=(0.1, 0.2, 0.3))
+    pose = said(words.pose_estimate(located, TellPose(KEY, "r1", 1.0, 2.0, 0.0, "a")))
+    covariance = pose["msg"]["pose"]["covariance"]
+    assert (covariance[0], covariance[7], covariance[35]) == (0.1, 0.2, 0.3)
+
+
+def frame(message, **more):
+    fields = {"op": "publish", "topic": "/odom", "msg": message, **more}
+    return json.dumps(fields).encode()
+
+
+FLAT = {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": -1.0}}
+
+
+@pytest.mark.parametrize("message", [FLAT, {"twist": FLAT}, {"twist": {"twist": FLAT}}])
+def test_a_velocity_is_found_in_what_has_one(message):
+    assert words.hear(frame(message)).twist == Twist(0.5, 0.0, -1.0)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        None,
+        {},
+        {"linear": {"x": None}, "angular": {}},
+        {"linear": {"x": 1.0}},
+        {"twist": {"twist": {"twist": FLAT}}},
+        {"twist": None},
+    ],
+)
+def test_no_velocity_is_found_in_what_has_none(message):
+    assert words.hear(frame(message)).twist is None
+
+
+def test_a_bare_nan_is_read_and_is_no_velocity():
+    heard = words.hear(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
+    assert (heard.topic, heard.twist) == ("/odom", None)
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b"\xff", b"[" * 100_000, b"[]", b'{"op": 5}', b'{"op": NaN}']
+)
+def test_what_makes_no_sense_is_nothing(data):
+    assert words.hear(data) is None
+
+
+def test_a_number_for_an_id_is_a_text():
+    assert words.hear(b'{"op": "service_response", "id": 7}').id == "7"
+    assert words.hear(b'{"op": "status"}').id is None
