@@ -8,6 +8,7 @@ import click
 
 from webmap.discovery import Findings, discover
 from webmap.discovery.asking import ask_topics
+from webmap.discovery.hearing import hear_frames
 from webmap.discovery.naming import unique_names
 from webmap.discovery.robots import host_name
 from webmap.errors import BridgeClosed, BridgeError
@@ -60,7 +61,10 @@ async def find(
     if topics is None:
         asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
     else:
-        asked = [(discover(topics, host_name(url)), None) for url in urls]
+        asked = [
+            (discover(topics, host_name(url), await hear_frames(url, topics)), None)
+            for url in urls
+        ]
     named = unique_names(
         [(host_name(url), one) for url, (one, _) in zip(urls, asked, strict=True)]
     )
@@ -93,7 +97,8 @@ async def _ask(url: str, wait: float) -> tuple[Findings, BridgeError | None]:
         topics = await ask_topics(url, wait=wait, waiting=waiting)
     except BridgeError as error:
         return Findings(), error
-    return discover(topics, host_name(url)), None
+    trees = await hear_frames(url, topics)
+    return discover(topics, host_name(url), trees), None
 
 
 def without_named(findings: Findings, names: set[str]) -> Findings:

@@ -69,9 +69,7 @@ def grow(
         "scan": use_scan,
         "battery": lambda: robot.add_module("Battery", bridge, found.topic("battery")),
         "plan": lambda: robot.add_module("Path", bridge, found.topic("plan")),
-        "tf": lambda: robot.set_tf(
-            bridge, namespace=found.tf_namespace or "", quiet=True
-        ),
+        "tf": lambda: robot.set_tf(bridge, **found.tf_options),
     }
     used = []
     with no_scope():

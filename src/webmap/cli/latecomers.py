@@ -56,8 +56,7 @@ class LateRobots:
         with no_scope():
             robot = make_robot(about)
             if found.tf_namespace is not None:
-                # Many robots have frames and no map: that is no mistake.
-                robot.set_tf(about.bridge, namespace=found.tf_namespace, quiet=True)
+                robot.set_tf(about.bridge, **found.tf_options)
             if found.topic("plan"):
                 robot.add_module("Path", about.bridge, found.topic("plan"))
         self._places[about.bridge, found.namespace] = robot

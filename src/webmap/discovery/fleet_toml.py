@@ -51,9 +51,7 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
             f" # {where.rule}"
         )
     if robot.tf_namespace is not None:
-        lines.append("tf.quiet = true # drawn in the frame map, if frames lead there")
-        if robot.tf_namespace:
-            lines.append(f"tf.namespace = {_text(robot.tf_namespace)}")
+        lines += _frames(robot)
     scans = robot.guesses.get("scan", ())
     if scans:
         listed = ", ".join(_text(guess.topic) for guess in scans)
@@ -76,6 +74,19 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
             for guess in robot.guesses.get(role, ())
         ]
     return lines + [f"# {note}" for note in robot.notes]
+
+
+def _frames(robot: FoundRobot) -> list[str]:
+    options = robot.tf_options
+    if robot.tf_alone:
+        lines = ["tf.quiet = false # drawn where its frames have it"]
+    else:
+        lines = ["tf.quiet = true # drawn in the frame map, if frames lead there"]
+    return lines + [
+        f"tf.{key} = {_text(options[key])}"
+        for key in ("namespace", "base_frame", "map_frame")
+        if options.get(key)
+    ]
 
 
 def _map(found: Sequence[tuple[str, str, Findings]]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 Role: TypeAlias = Literal[
     "odometry",
@@ -76,6 +76,12 @@ class FoundRobot:
     notes: tuple[str, ...] = ()
     """What a person should know about these guesses, in sentences."""
 
+    base_frame: str = ""
+    """The frame of its base, as it was heard; empty if it was not."""
+
+    root_frame: str = ""
+    """The frame that its base can be drawn in: a map, or where odometry begins."""
+
     def first(self, role: Role) -> Guess | None:
         """Return the best guess for a role, None if nothing fits."""
         found = self.guesses.get(role, ())
@@ -101,6 +107,25 @@ class FoundRobot:
     def tf_namespace(self) -> str | None:
         """The namespace of the topics with its frames; None if there are none."""
         return self.topic("tf").removesuffix("/tf") if self.topic("tf") else None
+
+    @property
+    def tf_alone(self) -> bool:
+        """Whether nothing but its frames tells where it is."""
+        return self.topic("tf") != "" and not (
+            self.topic("odometry") or self.topic("pose")
+        )
+
+    @property
+    def tf_options(self) -> dict[str, Any]:
+        """The options of ``Robot.set_tf``; of use if there are frames at all."""
+        options: dict[str, Any] = {"namespace": self.tf_namespace or ""}
+        # Many robots have odometry, frames and no map: that is no mistake.
+        options["quiet"] = not self.tf_alone
+        if self.base_frame:
+            options["base_frame"] = self.base_frame
+        if self.tf_alone and self.root_frame:
+            options["map_frame"] = self.root_frame
+        return options
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 from webmap.discovery.found import Findings, FoundRobot, Guess, Role
 from webmap.discovery.grouping import inside, nearest, robot_namespaces
 from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
+from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import is_topic, is_type
 
 SHARED: tuple[Role, ...] = ("map", "tf")
@@ -21,22 +22,28 @@ DIRECTION = (
 )
 
 
-def discover(topics: Mapping[str, str], host: str = "robot") -> Findings:
-    """Return the robots whose topics these are.
+def discover(
+    topics: Mapping[str, str], host: str = "robot", trees: Trees | None = None
+) -> Findings:
+    """Return the robots whose topics and frames these are.
 
     Args:
         topics: Types by topic, in either dialect, as ``Bridge.topics()`` gives them.
             What is no name of a topic is left out.
         host: What a robot without a namespace is called.
+        trees: What was heard of frames, if anything was.
 
     """
     topics = {name: type.strip() for name, type in topics.items() if is_topic(name)}
     found = (match(name, type) for name, type in sorted(topics.items()))
     matches = [each for each in found if each is not None]
     spaces = robot_namespaces(matches)
+    bases, alone = owners(trees.bases() if trees else (), spaces)
+    bases |= {base.space: base for base in alone}
+    spaces = tuple(sorted({*spaces, *bases, *_with_frames(matches, spaces)}))
     mine, twists = _owned(spaces, matches), _twists(spaces, topics)
     robots = tuple(
-        _robot(name, space, mine[space], twists[space])
+        _robot(name, space, mine[space], twists[space], bases.get(space))
         for name, space in zip(_names(spaces, host), spaces, strict=True)
     )
     return Findings(robots, _dialect(topics.values()), _notes(topics, robots))
@@ -53,6 +60,19 @@ def host_name(url: str) -> str:
     except ValueError:
         return host.partition(".")[0] or "robot"
     return host
+
+
+def _with_frames(matches: Iterable[Match], robots: Sequence[str]) -> set[str]:
+    """Return the namespaces that have frames of their own and are in no robot."""
+    known = {space for space in robots if space}
+    return {
+        each.namespace
+        for each in matches
+        if each.role == "tf"
+        and each.namespace
+        and each.namespace not in known
+        and nearest(each.namespace, known) is None
+    }
 
 
 def _owned(spaces: Sequence[str], matches: Iterable[Match]) -> dict[str, list[Match]]:
@@ -92,13 +112,19 @@ def _twists(spaces: Sequence[str], topics: Mapping[str, str]) -> dict[str, list[
 
 
 def _robot(
-    name: str, space: str, matches: Sequence[Match], twists: Sequence[str]
+    name: str,
+    space: str,
+    matches: Sequence[Match],
+    twists: Sequence[str],
+    base: Base | None,
 ) -> FoundRobot:
     guesses: dict[Role, tuple[Guess, ...]] = {}
     for each in matches:
         guess = Guess(each.topic, each.type, _words(each, space))
         guesses[each.role] = (*guesses.get(each.role, ()), guess)
     robot = FoundRobot(name, space, guesses)
+    if base is not None:
+        robot = replace(robot, base_frame=base.frame, root_frame=base.root)
     return replace(robot, notes=_robot_notes(robot, twists))
 
 
@@ -119,6 +145,15 @@ def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
         )
     elif pose:
         notes.append(f"There is no odometry; {pose.topic} is used in its place.")
+    elif not odometry and robot.base_frame:
+        notes.append(
+            f"There is no odometry; it is drawn where its frames have "
+            f"{robot.base_frame} in {robot.root_frame}."
+        )
+    elif robot.tf_alone and robot.tf_namespace:
+        notes.append(
+            f"There is no odometry; it is drawn where {robot.topic('tf')} has its base."
+        )
     elif not odometry:
         notes.append("Nothing says where it is, so it cannot be drawn or driven.")
     for guess in robot.guesses.get("odometry", ())[1:]:
@@ -161,6 +196,7 @@ def _notes(topics: Mapping[str, str], robots: Sequence[FoundRobot]) -> tuple[str
         return ("There are no topics.",)
     return (
         f"There are {len(topics)} topics, and none says where a robot is "
-        f"(nav_msgs/Odometry, or a pose named amcl_pose) or takes its velocity "
+        f"(nav_msgs/Odometry, a pose named amcl_pose, or frames from map or odom to "
+        f"base_link) or takes its velocity "
         f"(a Twist or TwistStamped named cmd_vel).",
     )

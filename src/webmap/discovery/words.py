@@ -45,6 +45,8 @@ def robot_table(robot: FoundRobot) -> list[str]:
     ]
     widths = [max((len(row[column]) for row in rows), default=0) for column in (1, 2)]
     lines = [f"{robot.name} ({where})"]
+    if robot.base_frame:
+        lines.append(f"  {'frames':<9} {robot.base_frame} in {robot.root_frame}")
     lines += [
         f"  {role:<11} {topic:<{widths[0]}}  {type:<{widths[1]}}  {rule}"
         for role, topic, type, rule in rows
@@ -59,4 +61,6 @@ def robot_table(robot: FoundRobot) -> list[str]:
 def in_one_line(robot: FoundRobot) -> str:
     """Return a robot with the topics that are used, for a log."""
     said = [f"{role} {robot.topic(role)}" for role in USED if robot.topic(role)]
+    if robot.tf_alone and robot.base_frame:
+        said.insert(0, f"frame {robot.base_frame}")
     return f"{robot.name}: {', '.join(said)}"

@@ -1,0 +1,126 @@
+"""Robots as the trees of frames show them; rules without I/O."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+Parents = Mapping[str, str]
+"""For each frame the one that it is told in."""
+
+BASE = re.compile(
+    r"(?P<prefix>(?:.*[/_])?)(?:base_footprint|base_link)\Z|(?P<space>(?:.*/)?)base\Z"
+)
+"""What the frame of a robot's base is called, after a prefix of its own."""
+
+WORLD = re.compile(r"(?:.*[/_])?(?:map|world|earth)\Z")
+ODOM = re.compile(r"(?:.*[/_])?odom(?:_[^/]*|etry)?\Z")
+
+MOST = 200
+"""Robots that are taken from the frames of one bridge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """The base of one robot in a tree of frames."""
+
+    frame: str
+    root: str
+    """The frame that it can be drawn in: the map, or where its odometry begins."""
+
+    namespace: str = ""
+    """Of the topic that tells of it."""
+
+    prefix: str = ""
+    """Before the name of the base, without what parts them."""
+
+    @property
+    def space(self) -> str:
+        """The namespace in which its other topics are likely to be."""
+        name = re.sub(r"[^A-Za-z0-9_/]", "_", self.prefix)
+        if not name or self.namespace.endswith(f"/{name}"):
+            return self.namespace
+        return f"{self.namespace}/{name}"
+
+
+@dataclass(slots=True)
+class Trees:
+    """What was told of frames, by the namespace of the topic that told it."""
+
+    parents: dict[str, dict[str, str]] = field(default_factory=dict)
+
+    def take(self, namespace: str, parent: str, child: str) -> None:
+        """Note that one frame was told in another."""
+        parent, child = parent.strip().strip("/"), child.strip().strip("/")
+        if parent and child:
+            self.parents.setdefault(namespace, {})[child] = parent
+
+    def bases(self) -> tuple[Base, ...]:
+        """Return the robots in the trees, sorted by where they are."""
+        found = [
+            base
+            for namespace, parents in self.parents.items()
+            for base in bases(parents, namespace)
+        ]
+        return tuple(sorted(found, key=lambda base: (base.space, base.frame))[:MOST])
+
+
+def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
+    """Return the bases of robots that move in a map or from where they started.
+
+    A base that hangs from another is a part of that one, such as an arm's.
+    """
+    for frame in parents:
+        found = BASE.match(frame)
+        if found is None:
+            continue
+        chain = _above(frame, parents)
+        if any(BASE.match(other) for other in chain):
+            continue
+        worlds = [other for other in chain if WORLD.match(other)]
+        odometry = [other for other in chain if ODOM.match(other)]
+        if worlds or odometry:
+            root = (worlds or odometry)[-1]
+            prefix = (found["prefix"] or found["space"] or "").rstrip("/_")
+            yield Base(frame, root, namespace, prefix)
+
+
+def _above(frame: str, parents: Parents) -> list[str]:
+    """Return what a frame hangs from, up to the root; a loop ends it."""
+    chain = [frame]
+    while chain[-1] in parents and parents[chain[-1]] not in chain:
+        chain.append(parents[chain[-1]])
+    return chain[1:]
+
+
+def owners(
+    found: Iterable[Base], spaces: Iterable[str]
+) -> tuple[dict[str, Base], list[Base]]:
+    """Return whose base each one is, and those that are of robots not known yet.
+
+    Args:
+        found: The bases.
+        spaces: The namespaces that are robots by their topics.
+
+    """
+    known, new = tuple(spaces), []
+    mine: dict[str, Base] = {}
+    for base in found:
+        space = _owner(base, known)
+        if space is None:
+            new.append(base)
+        elif space not in mine:
+            mine[space] = base
+    if len(known) > 1 and "" not in known:
+        # Frames without a prefix may be anybody's.
+        new = [base for base in new if base.space]
+    return mine, new
+
+
+def _owner(base: Base, spaces: tuple[str, ...]) -> str | None:
+    if base.space in spaces:
+        return base.space
+    if not base.space and len(spaces) == 1:
+        return spaces[0]
+    last = base.space.rpartition("/")[2].casefold()
+    alike = [s for s in spaces if last and s.rpartition("/")[2].casefold() == last]
+    return alike[0] if len(alike) == 1 else None

@@ -1,0 +1,77 @@
+"""A rosbridge behind which robots tell of their frames, and of nothing else."""
+
+import asyncio
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from webmap.geometry import Pose, Quaternion
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import parse_quirks
+from webmap.sim.rosbridge.rosapi import Rosapi
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+TF = "tf2_msgs/TFMessage"
+
+Chain = list[tuple[str, str, Pose]]
+"""Transforms: parent, child, and where the child is in the parent."""
+
+
+@contextmanager
+def telling(
+    told: Mapping[str, Chain], dialect: str = "ros1", extra: Mapping[str, str] = {}
+) -> Iterator[str]:
+    """Serve topics with frames, told 20 times a second; yield the address.
+
+    Args:
+        told: What is told on each topic.
+        dialect: ``ros1`` or ``ros2``.
+        extra: Types by name of topics that are there and carry nothing.
+
+    """
+    urls: list[str] = []
+    ready, over = threading.Event(), threading.Event()
+
+    async def serve() -> None:
+        schema = Schema(Dialect(dialect))
+        graph = Graph(schema)
+        quirks = parse_quirks("real", dialect)
+        Rosapi(graph, quirks).start()
+        node = object()
+        for topic in told:
+            graph.advertise(node, topic, TF, node="/robots", latch=False)
+        for topic, kind in extra.items():
+            graph.advertise(node, topic, kind, node="/robots", latch=False)
+        server = RosbridgeServer(graph, Encoder(schema, quirks))
+        urls.append(await server.start("127.0.0.1", 0))
+        ready.set()
+        while not over.is_set():
+            for topic, chain in told.items():
+                message = {"transforms": [_transform(graph, topic, *t) for t in chain]}
+                graph.publish(node, topic, message)
+            await asyncio.sleep(0.05)
+        await server.stop()
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()))
+    thread.start()
+    try:
+        assert ready.wait(10)
+        yield urls[0]
+    finally:
+        over.set()
+        thread.join(10)
+
+
+def _transform(graph: Graph, topic: str, parent: str, child: str, at: Pose) -> dict:
+    turn = Quaternion.from_yaw(at.yaw)
+    return {
+        "header": graph.schema.dialect.header(topic, graph.clock(), parent),
+        "child_frame_id": child,
+        "transform": {
+            "translation": {"x": at.x, "y": at.y, "z": 0.0},
+            "rotation": {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w},
+        },
+    }

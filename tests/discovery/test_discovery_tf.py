@@ -1,0 +1,240 @@
+"""Robots that tell of nothing but their frames."""
+
+import asyncio
+import subprocess
+import sys
+import time
+from itertools import pairwise
+
+import pytest
+from frames_only import telling
+
+from webmap import Bridge, Robot
+from webmap.core.frames import frames_of
+from webmap.discovery import discover
+from webmap.discovery.hearing import frame_topics, hear_frames
+from webmap.discovery.tf_robots import Trees, bases
+from webmap.geometry import Pose
+
+ODOM, TWIST = "nav_msgs/Odometry", "geometry_msgs/Twist"
+TF = "tf2_msgs/TFMessage"
+
+
+def trees(**told) -> Trees:
+    """Trees from chains such as ``"map odom base_link"``, by namespace."""
+    found = Trees()
+    for namespace, chains in told.items():
+        for chain in chains:
+            frames = chain.split()
+            for parent, child in pairwise(frames):
+                found.take(namespace and f"/{namespace}", parent, child)
+    return found
+
+
+def shared(*chains) -> Trees:
+    return trees(**{"": chains})
+
+
+def found(topics, frames):
+    return {
+        robot.name: (robot.namespace, robot.base_frame, robot.root_frame)
+        for robot in discover(topics, "bob", frames).robots
+    }
+
+
+def test_a_tree_from_map_to_base_link_is_a_robot():
+    topics = {"/tf": TF, "/scan": "sensor_msgs/LaserScan"}
+    findings = discover(topics, "bob", shared("map odom base_link laser"))
+    (robot,) = findings.robots
+    assert (robot.name, robot.namespace) == ("bob", "")
+    assert (robot.base_frame, robot.root_frame) == ("base_link", "map")
+    assert robot.tf_alone
+    assert robot.topic("scan") == "/scan"
+    assert robot.tf_options == {
+        "namespace": "",
+        "quiet": False,
+        "base_frame": "base_link",
+        "map_frame": "map",
+    }
+    assert "it is drawn where its frames have base_link in map" in robot.notes[0]
+
+
+def test_prefixes_of_frames_are_robots_of_their_own():
+    frames = shared(
+        "map r1/odom r1/base_link r1/arm_base_link",
+        "map r2/odom r2/base_footprint r2/base_link",
+        "map tb3_odom tb3_base_link",
+    )
+    topics = {"/tf": TF, "/r1/cmd_vel": TWIST}
+    assert found(topics, frames) == {
+        "r1": ("/r1", "r1/base_link", "map"),
+        "r2": ("/r2", "r2/base_footprint", "map"),
+        "tb3": ("/tb3", "tb3_base_link", "map"),
+    }
+
+
+def test_a_robot_with_odometry_keeps_it_and_learns_the_name_of_its_base():
+    topics = {"/tf": TF, "/Bob/odom": ODOM, "/Bob/cmd_vel": TWIST}
+    (robot,) = discover(topics, "host", shared("bob/odom bob/base_footprint")).robots
+    assert robot.topic("odometry") == "/Bob/odom"
+    assert not robot.tf_alone
+    assert robot.tf_options == {
+        "namespace": "",
+        "quiet": True,
+        "base_frame": "bob/base_footprint",
+    }
+
+
+def test_without_a_map_a_robot_is_drawn_from_where_its_odometry_began():
+    (robot,) = discover({"/tf": TF}, "bob", shared("odom base_link")).robots
+    assert robot.tf_options["map_frame"] == "odom"
+
+
+def test_namespaces_with_frames_of_their_own_are_robots_even_unheard():
+    topics = {"/a/tf": TF, "/b/tf": TF, "/b/odom": ODOM, "/b/camera/tf": TF}
+    robots = discover(topics).robots
+    assert [(robot.name, robot.tf_alone) for robot in robots] == [
+        ("a", True),
+        ("b", False),
+    ]
+    assert robots[0].tf_options == {"namespace": "/a", "quiet": False}
+
+
+@pytest.mark.parametrize(
+    "chains",
+    [
+        ("base_link laser",),
+        ("torso arm_base_link gripper",),
+        ("map marker",),
+        ("a b", "b a"),
+    ],
+)
+def test_what_does_not_move_in_a_map_is_no_robot(chains):
+    assert discover({"/tf": TF}, "bob", shared(*chains)).robots == ()
+
+
+def test_frames_without_a_prefix_are_nobodys_where_several_robots_share_them():
+    topics = {"/a/odom": ODOM, "/b/odom": ODOM, "/tf": TF}
+    names = found(topics, shared("map odom base_link"))
+    assert names == {"a": ("/a", "", ""), "b": ("/b", "", "")}
+
+
+def test_a_part_of_a_robot_is_no_robot():
+    assert [base.frame for base in bases({"base_link": "odom", "base": "base_link"})]
+    (base,) = bases({"base_link": "odom", "arm/base_link": "base_link"})
+    assert base.frame == "base_link"
+
+
+def test_a_loop_of_frames_ends():
+    assert list(bases({"map": "base_link", "base_link": "odom", "odom": "map"}))
+
+
+def test_only_topics_with_frames_are_listened_to():
+    topics = {"/tf": TF, "/a/tf": "tf2_msgs/msg/TFMessage", "/b/tf": "odd", "/c": TF}
+    assert frame_topics(topics) == ["/a/tf_static", "/a/tf", "/tf_static", "/tf"]
+
+
+def test_a_bridge_that_is_gone_tells_of_no_frames():
+    heard = asyncio.run(hear_frames("ws://127.0.0.1:1", {"/tf": TF}))
+    assert heard.bases() == ()
+
+
+MAP_TO_BASE = [
+    ("map", "bob/odom", Pose(5.0, 1.0, 0.0)),
+    ("bob/odom", "bob/base_link", Pose(2.0, 0.0, 0.0)),
+]
+
+
+def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
+    with telling({"/tf": MAP_TO_BASE}, "ros2") as url:
+        shown, kept = (
+            subprocess.run(
+                [sys.executable, "-m", "webmap", "discover", url, *option],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+            for option in ([], ["--toml"])
+        )
+    assert "bob (in /bob)" in shown
+    assert "frames    bob/base_link in map" in shown
+    assert "it is drawn where its frames have bob/base_link in map" in shown
+    assert 'tf.base_frame = "bob/base_link"' in kept
+    assert "tf.quiet = false # drawn where its frames have it" in kept
+    file = tmp_path / "fleet.toml"
+    file.write_text(kept)
+    checked = subprocess.run(
+        [sys.executable, "-m", "webmap", "check", str(file)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "1 robot behind 1 bridge, and nothing wrong" in checked.stdout, checked
+
+
+def test_what_was_found_is_drawn_where_its_frames_have_it():
+    with telling({"/tf": MAP_TO_BASE}) as url:
+
+        async def scenario() -> None:
+            heard = await hear_frames(url, {"/tf": TF})
+            (found,) = discover({"/tf": TF}, "host", heard).robots
+            robot, bridge = Robot(found.name), Bridge(url)
+            robot.set_tf(bridge, **found.tf_options)
+            bridge.start(asyncio.get_running_loop())
+            try:
+                await until(lambda: robot.valid)
+                assert (robot.position.x, robot.position.y) == (7.0, 1.0)
+                assert robot.problems == {}
+            finally:
+                robot.destroy()
+                await bridge.stop()
+
+        asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_ten_namespaces_on_one_bridge_are_ten_robots_by_their_own_frames(dialect):
+    told = {
+        f"/r{n}/tf": [
+            ("map", "odom", Pose(10.0 * n, 0.0, 0.0)),
+            ("odom", "base_link", Pose(1.0, 0.1 * n, 0.0)),
+        ]
+        for n in range(10)
+    }
+    with telling(told, dialect) as url:
+
+        async def scenario() -> None:
+            bridge = Bridge(url)
+            bridge.start(asyncio.get_running_loop())
+            robots = []
+            try:
+                await until(lambda: bridge.state == "open")
+                topics = await bridge.topics()
+                findings = discover(topics, "host", await hear_frames(url, topics))
+                assert [each.name for each in findings.robots] == [
+                    f"r{n}" for n in range(10)
+                ]
+                for each in findings.robots:
+                    robot = Robot(each.name)
+                    robots.append(robot)
+                    robot.set_tf(bridge, **each.tf_options)
+                await until(lambda: all(robot.valid for robot in robots))
+                for n, robot in enumerate(robots):
+                    place = (robot.position.x, robot.position.y)
+                    assert place == pytest.approx((10.0 * n + 1.0, 0.1 * n))
+                    assert robot.problems == {}
+                    frames = frames_of(bridge, f"/r{n}").buffer.frames
+                    assert frames == ["map", f"r{n}/base_link", f"r{n}/odom"]
+            finally:
+                for robot in robots:
+                    robot.destroy()
+                await bridge.stop()
+
+        asyncio.run(scenario())
+
+
+async def until(condition) -> None:
+    deadline = time.monotonic() + 20
+    while not condition():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)
