@@ -16,6 +16,8 @@ from real_browser import watched_tab
 
 pytestmark = pytest.mark.browser
 
+expect.set_options(timeout=15_000)
+
 FLEET = """\
 [bridges]
 hall = "{url}"

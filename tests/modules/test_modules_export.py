@@ -20,6 +20,8 @@ from real_browser import watched_tab
 
 pytestmark = pytest.mark.browser
 
+expect.set_options(timeout=15_000)
+
 HERE = Path(__file__).parent
 SVG = "{http://www.w3.org/2000/svg}"
 SIZE = (900, 700)

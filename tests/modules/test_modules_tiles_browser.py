@@ -20,6 +20,8 @@ from webmap.geometry import Affine
 
 pytestmark = pytest.mark.browser
 
+expect.set_options(timeout=15_000)
+
 HERE = Path(__file__).parent
 PLANE = LocalPlane(*DATUM, EAST)
 CTM = """selector => {

@@ -2,6 +2,7 @@
 
 import asyncio
 import atexit
+import hashlib
 import logging
 import tempfile
 from collections.abc import Callable, Sequence
@@ -64,6 +65,7 @@ def open_console(
     fleet = [make_robot(about) for about in robots]
     remember(robots)
     opened = Console()
+    opened.set_module("Labels", name=place_of(bridges))
 
     @webmap.page("/", html="console.html", title=title)
     def console(page: "Page") -> None:
@@ -110,6 +112,12 @@ def build(
     polls += [links.poll, refused.poll, doctor.poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
+
+
+def place_of(bridges: Sequence["Bridge"]) -> str:
+    """Return what labels of places are kept under: the same robots, the same place."""
+    urls = "\n".join(sorted(bridge.url for bridge in bridges))
+    return f"console-{hashlib.sha256(urls.encode()).hexdigest()[:16]}"
 
 
 def _folder_for_this_process() -> Path:

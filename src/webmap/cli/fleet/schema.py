@@ -8,12 +8,13 @@ from webmap.cli.fleet.buttons import read_buttons
 from webmap.cli.fleet.cameras import CameraLine, read_cameras
 from webmap.cli.fleet.checks import Check, Mistakes
 from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.places import Places, read_places, read_tiles
 from webmap.cli.fleet.stopping import read_assist, read_hooks
 from webmap.discovery.naming import same_name
 from webmap.errors import ConfigError
 from webmap.ros.names import normalise_url
 
-TOP = ("title", "floor", "map", "bridges", "robots")
+TOP = ("title", "floor", "map", "tiles", "labels", "bridges", "robots")
 ODOMETRY: dict[str, Check] = {
     "topic": checks.topic,
     "type": checks.message_type(
@@ -118,6 +119,9 @@ class Fleet:
     map: tuple[str, str] | None = None
     """The map under the robots: the name of a bridge, and a topic."""
 
+    tiles: dict[str, Any] | None = None
+    labels: Places | None = None
+
 
 def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
     """Return what a file's table means; what is wrong is noted.
@@ -137,6 +141,10 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
     fleet.bridges = _bridges(data.get("bridges"), mistakes)
     if "map" in data:
         fleet.map = _map(data["map"], fleet.bridges, mistakes)
+    if "tiles" in data:
+        fleet.tiles = read_tiles(data["tiles"], ("tiles",), mistakes)
+    if "labels" in data:
+        fleet.labels = read_places(data["labels"], ("labels",), mistakes)
     robots = data.get("robots")
     if not isinstance(robots, list) or not robots:
         got = "nothing" if robots is None else checks.show(robots)

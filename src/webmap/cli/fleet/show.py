@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from webmap import console
 from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.file import read_fleet
+from webmap.cli.fleet.places import label_options, tile_options
 from webmap.cli.fleet.robots import make_bridges, make_robots
 from webmap.cli.fleet.schema import Fleet
 from webmap.errors import ConfigError
@@ -23,6 +24,8 @@ class ReadyFleet:
     bridges: dict[str, "Bridge"]
     robots: list["Robot"]
     floor: Path | None
+    modules: dict[str, dict[str, Any]]
+    """Modules of the map with their arguments, by their names."""
 
 
 def prepare(file: Path) -> ReadyFleet:
@@ -48,8 +51,13 @@ def prepare(file: Path) -> ReadyFleet:
                 load_floor(floor, Path(folder))
         except (ConfigError, OSError) as error:
             mistakes.add(("floor",), str(error))
+    modules = {}
+    if fleet.tiles is not None:
+        modules["TileLayer"] = tile_options(fleet.tiles, file.parent, mistakes)
+    if fleet.labels is not None:
+        modules["Labels"] = label_options(fleet.labels, file.parent, mistakes)
     text.refuse(mistakes)
-    return ReadyFleet(fleet, bridges, robots, floor)
+    return ReadyFleet(fleet, bridges, robots, floor, modules)
 
 
 def open_fleet(ready: ReadyFleet) -> None:
@@ -57,6 +65,8 @@ def open_fleet(ready: ReadyFleet) -> None:
     options = {"title": ready.fleet.title} if ready.fleet.title else {}
     bridges = list(ready.bridges.values())
     shown = console.open_console(bridges, [], floor=ready.floor, **options)
+    for name, arguments in ready.modules.items():
+        shown.set_module(name, **arguments)
     if ready.fleet.map is not None:
         bridge, topic = ready.fleet.map
         shown.add_grid(ready.bridges[bridge], topic)

@@ -22,6 +22,8 @@ LAYERS = {
     "Ranges": ".range",
     "Markers": ".markers",
     "Satellite fixes": ".navsatfix",
+    "Tiles": ".tiles",
+    "Labels": ".labels",
     "Health": ".diagnostics",
 }
 """What the built-in modules draw: what people call it, and its CSS selector."""

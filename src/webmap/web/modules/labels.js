@@ -1,0 +1,272 @@
+import { deskOf } from "../inputs/desk.js";
+import { attentive } from "../motion/attention.js";
+import { unapply } from "../view.js";
+import { button, html, say } from "./elements.js";
+import { keepLabels } from "./label_sizes.js";
+import { lay } from "./overlay.js";
+
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../halves.js').Half} Half */
+/** @typedef {{editable?: boolean, key?: string, icons?: string[], longest?: number}} Options */
+/** @typedef {(message: Record<string, unknown>) => void} Send */
+
+/**
+ * Labels: kept upright, pressed to send a robot there, added and taken away.
+ *
+ * Options: `editable`, whether this viewer may; `key`, which begins to add one; `icons`
+ * to choose from; `longest`, characters of a name.
+ *
+ * @param {MapCanvas} map
+ * @param {Options} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const labels = new Labels(map, options, send);
+  return {
+    receive: (message) => labels.receive(message),
+    destroy: () => labels.destroy(),
+  };
+}
+
+class Labels {
+  /**
+   * @param {MapCanvas} map
+   * @param {Options} options
+   * @param {Send} send
+   */
+  constructor(map, { editable = false, key = "l", icons = ["pin"], longest = 60 }, send) {
+    this._map = map;
+    this._send = send;
+    this._editable = editable;
+    this._key = key;
+    this._icons = icons;
+    this._longest = longest;
+    this._active = false;
+    /** @type {SVGGraphicsElement | null} The label whose sheet is open. */
+    this._chosen = null;
+    this._go = button("webmap-labels-go", "Label", () => this._activate(!this._active));
+    this._go.title = `Key ${key}`;
+    this._go.hidden = !editable;
+    this._word = html("span", "webmap-labels-word", { role: "status" });
+    this._sheet = html("div", "webmap-labels-sheet");
+    this._panel = html(
+      "section",
+      "webmap-panel webmap-labels",
+      { "aria-label": "Labels" },
+      this._go,
+      this._word,
+      this._sheet,
+    );
+    this._ending = new AbortController();
+    this._listen();
+    this._offs = [
+      keepLabels(map),
+      lay(map, this._panel, "top-left"),
+      deskOf(map.drive).claimEscape(() => this._leave()),
+      map.onSelect(() => this._refresh()),
+    ];
+    this._activate(false);
+  }
+
+  destroy() {
+    this._map.svg.classList.remove("webmap-labelling");
+    this._chosen?.classList.remove("chosen");
+    this._ending.abort();
+    for (const off of this._offs) off();
+  }
+
+  /** @param {{done?: boolean, refused?: string}} message */
+  receive({ done, refused }) {
+    if (done) this._close("");
+    if (typeof refused === "string") say(this._word, refused);
+    this._fit();
+  }
+
+  _listen() {
+    const { signal } = this._ending;
+    const first = { signal, capture: true };
+    const { svg: root } = this._map;
+    // Before the map hears of it, which would select no robot.
+    root.addEventListener("click", (event) => this._clicked(event), first);
+    root.addEventListener("keydown", (event) => this._pressed(event), first);
+    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+    this._panel.addEventListener("keydown", (event) => this._inPanel(event), { signal });
+  }
+
+  /** @param {KeyboardEvent} event */
+  _keyDown(event) {
+    if (event.key !== this._key || event.repeat || event.isComposing) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
+    const { active } = deskOf(this._map.drive);
+    if (!this._editable || (active !== null && active.map !== this._map)) return;
+    this._activate(!this._active);
+  }
+
+  /** @param {KeyboardEvent} event */
+  _inPanel(event) {
+    if (event.key === "Escape") this._leave();
+  }
+
+  /** @param {KeyboardEvent} event Enter, on a label that has the focus. */
+  _pressed(event) {
+    const label = labelOf(event.target);
+    if (!label || event.key !== "Enter") return;
+    event.stopPropagation();
+    this._open(label);
+  }
+
+  /** @param {MouseEvent} event */
+  _clicked(event) {
+    const label = labelOf(event.target);
+    if (this._active) {
+      event.stopPropagation();
+      const { x, y } = this._map.pointOf(event);
+      this._openNew(unapply(this._map.view, x, y));
+    } else if (label) {
+      event.stopPropagation();
+      this._open(label);
+    }
+  }
+
+  /** @param {boolean} active */
+  _activate(active) {
+    this._close("");
+    this._active = active && this._editable;
+    this._go.setAttribute("aria-pressed", String(this._active));
+    this._map.svg.classList.toggle("webmap-labelling", this._active);
+    say(this._word, this._active ? "Press where the label is to be." : "");
+    this._fit();
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  _leave() {
+    if (!this._active && this._sheet.hidden) return false;
+    this._activate(false);
+    return true;
+  }
+
+  /** @param {string} words */
+  _close(words) {
+    this._chosen?.classList.remove("chosen");
+    this._chosen = null;
+    this._sheet.replaceChildren();
+    this._sheet.hidden = true;
+    say(this._word, words);
+    this._fit();
+  }
+
+  /** Take no room on the map while there is nothing in the panel. */
+  _fit() {
+    this._panel.hidden =
+      Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._word.textContent;
+  }
+
+  /** @param {SVGGraphicsElement} label */
+  _open(label) {
+    this._close("");
+    this._chosen = label;
+    label.classList.add("chosen");
+    this._sheet.hidden = false;
+    this._refresh();
+    this._fit();
+    this._sheet.querySelector("button")?.focus({ preventScroll: true });
+  }
+
+  /** Show what can be done with the label that is chosen. */
+  _refresh() {
+    const label = this._chosen;
+    if (!label) return;
+    const title = html("p", "title wide", {}, label.dataset.name ?? "");
+    const send = button("webmap-labels-send wide", "Send the robot here", () => {
+      void this._sendRobot(label);
+    });
+    const { selected } = this._map;
+    send.disabled = selected === null;
+    if (selected === null) send.textContent = "Select a robot to send it here";
+    const close = button("webmap-labels-close", "Close", () => this._close(""));
+    const remove = button("webmap-labels-remove", "Delete", () => {
+      this._send({ remove: label.dataset.label ?? "" });
+    });
+    remove.hidden = !this._editable || label.dataset.kept !== "true";
+    this._sheet.replaceChildren(title, send, close, remove);
+  }
+
+  /** @param {{x: number, y: number}} place In metres. */
+  _openNew(place) {
+    this._activate(false);
+    const name = html("input", "", {
+      type: "text",
+      maxlength: String(this._longest),
+      autocomplete: "off",
+    });
+    const icon = html("select", "");
+    for (const each of this._icons) icon.append(html("option", "", { value: each }, each));
+    const save = () => {
+      const add = { name: name.value, icon: icon.value, x: place.x, y: place.y };
+      if (name.value.trim()) this._send({ add });
+      else say(this._word, "A label needs a name.");
+    };
+    name.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && !event.isComposing) save();
+    });
+    const cancel = button("webmap-labels-cancel", "Cancel", () => this._close(""));
+    const keep = button("webmap-labels-save", "Save", save);
+    this._sheet.hidden = false;
+    this._sheet.replaceChildren(
+      html("label", "", {}, "Name", name),
+      html("label", "", {}, "Icon", icon),
+      cancel,
+      keep,
+    );
+    this._fit();
+    name.focus({ preventScroll: true });
+  }
+
+  /** @param {SVGGraphicsElement} label */
+  async _sendRobot(label) {
+    const robot = this._map.selected;
+    const place = placeOf(label);
+    if (robot === null || !place) return;
+    const given = Number.parseFloat(label.dataset.yaw ?? "");
+    const yaw = Number.isFinite(given) ? given : this._wayTo(robot, place);
+    try {
+      await this._map.drive.goal(robot, { ...place, yaw });
+      this._send({ goal: { robot, ...place, yaw } });
+      this._close(`Sent to ${label.dataset.name ?? "the label"}.`);
+    } catch (error) {
+      say(this._word, `Not sent: ${error instanceof Error ? error.message : error}`);
+      this._fit();
+    }
+  }
+
+  /**
+   * @param {string} robot
+   * @param {{x: number, y: number}} place
+   * @returns {number} The direction in which the robot comes there.
+   */
+  _wayTo(robot, place) {
+    const element = this._map.world.querySelector(`[data-robot="${CSS.escape(robot)}"]`);
+    const from = element instanceof SVGGraphicsElement ? placeOf(element) : null;
+    return from ? Math.atan2(place.y - from.y, place.x - from.x) : 0;
+  }
+}
+
+/**
+ * @param {EventTarget | null} target
+ * @returns {SVGGraphicsElement | null}
+ */
+function labelOf(target) {
+  const label = target instanceof Element ? target.closest(".labels > .label") : null;
+  return label instanceof SVGGraphicsElement ? label : null;
+}
+
+/**
+ * @param {SVGGraphicsElement} element Of the world.
+ * @returns {{x: number, y: number} | null} Where it is, in metres.
+ */
+function placeOf(element) {
+  const list = element.transform.baseVal;
+  const matrix = list.numberOfItems > 0 ? list.getItem(0).matrix : null;
+  return matrix && { x: matrix.e, y: matrix.f };
+}

@@ -1,0 +1,94 @@
+"""Labels and tiles in a fleet file: read strictly, each mistake with its line."""
+
+import io
+
+import pytest
+from PIL import Image
+
+from webmap.cli.fleet.show import prepare
+from webmap.errors import ConfigError
+
+HEAD = """\
+[bridges]
+hall = "ws://hall:9090"
+
+[[robots]]
+name = "Bob"
+
+"""
+TILES = '[tiles]\nsource = "tiles"\nlatitude = 50\nlongitude = 14.5\neast = 90\n'
+
+
+@pytest.fixture
+def prepared(tmp_path):
+    (tmp_path / "tiles" / "3" / "4").mkdir(parents=True)
+    data = io.BytesIO()
+    Image.new("RGB", (256, 256)).save(data, "PNG")
+    (tmp_path / "tiles" / "3" / "4" / "2.png").write_bytes(data.getvalue())
+    made = []
+
+    def prepared_(text, head=HEAD):
+        file = tmp_path / "fleet.toml"
+        file.write_text(text if head is None else f"{text}{head}")
+        made.append(prepare(file))
+        return made[-1]
+
+    yield prepared_
+    for fleet in made:
+        for robot in fleet.robots:
+            robot.destroy()
+
+
+def test_tiles_lie_where_the_file_says(prepared, tmp_path):
+    assert prepared(TILES).modules == {
+        "TileLayer": {
+            "source": str(tmp_path / "tiles"),
+            "datum": (50.0, 14.5),
+            "east": 90.0,
+        }
+    }
+
+
+def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
+    label = {"name": "Dock", "x": 1.5, "y": -2}
+    table = '[[labels]]\nname = "Dock"\nx = 1.5\ny = -2\n'
+    assert prepared(table).modules == {"Labels": {"labels": [label]}}
+    (tmp_path / "places.yaml").write_text("- {name: Dock, x: 1, y: 2}")
+    assert prepared('labels = "places.yaml"\n').modules == {
+        "Labels": {"file": str(tmp_path / "places.yaml")}
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "labels = 3\n",
+            "fleet.toml:1: labels: got the whole number 3, expected a file",
+        ),
+        ('labels = "no.yaml"\n', "fleet.toml:1: labels: labels '"),
+        (
+            '[[labels]]\nname = "A"\nx = 1\ny = "2"\n',
+            "fleet.toml:1: labels[0]: y: expected a number of metres, got '2'",
+        ),
+        (
+            TILES.replace("50", "91"),
+            "fleet.toml:3: tiles.latitude: got the whole number 91, expected a number "
+            "of degrees from -89.999 to 89.999",
+        ),
+        (
+            TILES.replace("latitude", "lattitude"),
+            'there is no key "lattitude" here; did you mean "latitude"?',
+        ),
+        (
+            TILES.replace('"tiles"', '"https://tiles.example/{z}/{x}/{y}.png"'),
+            "fleet.toml:2: tiles.source: tiles 'https://tiles.example/{z}/{x}/{y}.png':"
+            " tiles are read from this machine's disk alone",
+        ),
+        (TILES.replace('"tiles"', '"no"'), "no such folder and no such file"),
+    ],
+)
+def test_what_makes_no_sense_is_named_with_its_line(prepared, text, said):
+    with pytest.raises(ConfigError) as error:
+        prepared(text)
+    assert said in str(error.value)

@@ -1,0 +1,221 @@
+"""Labels in a real browser: upright, added, kept, and a place to send a robot to."""
+
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from button_robot import robot_node, simulator
+from playwright.sync_api import Browser, Page, expect
+
+from real_browser import watched_tab
+
+pytestmark = pytest.mark.browser
+
+expect.set_options(timeout=15_000)
+
+COMMAND = ["-m", "webmap", "run", "--port", "0", "--no-browser"]
+
+FLEET = """\
+[bridges]
+hall = "{url}"
+
+[[robots]]
+name = "Bob"
+odometry = "/robot_0/odom"
+twist = {{ topic = "/robot_0/cmd_vel", stops_within = 0.25 }}
+move = "/robot_0/move_base_simple/goal"
+
+[map]
+topic = "/map"
+
+[[labels]]
+name = "Äpfel <b>"
+x = 3.0
+y = 2.0
+icon = "shelf"
+kind = "fruit"
+
+[[labels]]
+name = "Next to it"
+x = 3.1
+y = 2.1
+"""
+
+
+@pytest.fixture(scope="module")
+def bridge() -> Iterator[str]:
+    with simulator("--robots", "1") as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def state(tmp_path_factory):
+    return tmp_path_factory.mktemp("state")
+
+
+@pytest.fixture(scope="module")
+def serve(bridge, state, tmp_path_factory):
+    """Start the console; another one has the same state."""
+    file = tmp_path_factory.mktemp("fleet") / "fleet.toml"
+    file.write_text(FLEET.format(url=bridge))
+    running = []
+
+    def serve_() -> str:
+        process = subprocess.Popen(
+            [sys.executable, *COMMAND, str(file)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env={**os.environ, "WEBMAP_STATE_DIR": str(state)},
+        )
+        running.append(process)
+        found = re.search(r"ready at (\S+)", process.stdout.readline())
+        assert found
+        serve_.url = found[1]  # with the token
+        return serve_.url
+
+    def end() -> None:
+        while running:
+            process = running.pop()
+            process.terminate()
+            process.wait(15)
+            process.stdout.close()
+
+    serve_.end = end
+    yield serve_
+    end()
+
+
+@pytest.fixture(scope="module")
+def tab(chromium: Browser, serve) -> Iterator[Page]:
+    with watched_tab(chromium, 1280, 800) as page:
+        opened(page, serve())
+        yield page
+
+
+def opened(tab: Page, url: str) -> None:
+    tab.goto(url)
+    expect(tab.locator("#link")).to_have_attribute("data-link", "open")
+    expect(tab.locator(".robot:not(.unplaced)")).to_have_count(1)
+    expect(tab.locator(".occupancy-grid image")).to_have_attribute(
+        "href", re.compile(".")
+    )
+    tab.locator("#show-all").click()
+
+
+def label(tab: Page, name: str):
+    return tab.locator(f'.labels > .label[data-name="{name}"]')
+
+
+def turn_and_size(tab: Page, name: str) -> tuple[float, float]:
+    """How far a label is turned on the screen, in radians, and how large it is."""
+    a, b, c, d = (
+        label(tab, name)
+        .locator(".upright")
+        .evaluate("e => { const m = e.getScreenCTM(); return [m.a, m.b, m.c, m.d]; }")
+    )
+    assert math.hypot(a, b) == pytest.approx(math.hypot(c, d), rel=1e-3)
+    assert a * d - b * c > 0, "it is not mirrored"
+    return math.atan2(b, a), math.hypot(a, b)
+
+
+def test_labels_are_upright_and_as_large_at_every_zoom_and_turn(tab):
+    expect(label(tab, "Äpfel <b>").locator("text.name")).to_have_text("Äpfel <b>")
+    assert "fruit" in label(tab, "Äpfel <b>").get_attribute("class").split()
+    tab.mouse.move(800, 450)
+    views = set()
+    for shift, delta in [(False, 0), (False, -900), (True, 400), (False, 1200)]:
+        if shift:
+            tab.keyboard.down("Shift")
+        tab.mouse.wheel(0, delta)
+        if shift:
+            tab.keyboard.up("Shift")
+        tab.wait_for_timeout(150)  # the frame in which labels are turned back
+        turn, size = turn_and_size(tab, "Äpfel <b>")
+        assert turn == pytest.approx(0, abs=0.01)
+        assert size == pytest.approx(1, rel=0.01)
+        views.add(tab.locator("svg.webmap .world").evaluate("e => e.getCTM().a"))
+    assert len(views) >= 3
+    tab.locator("#show-all").click()
+
+
+def test_a_name_that_would_lie_on_another_waits_until_it_is_pointed_at(tab):
+    beside = label(tab, "Next to it")
+    expect(beside).to_have_class(re.compile("crowded"))
+    expect(label(tab, "Äpfel <b>")).not_to_have_class(re.compile("crowded"))
+    expect(beside.locator(".name")).to_be_hidden()
+    x, y = place(tab, 3.1, 2.1)
+    tab.mouse.move(x + 9, y - 9)  # of the two spots only this one is there
+    expect(beside.locator(".name")).to_be_visible()
+
+
+def place(tab: Page, x: float, y: float) -> tuple[float, float]:
+    """Where a place of the world is in the window."""
+    return tab.locator("svg.webmap .world").evaluate(
+        "(e, [x, y]) => { const m = e.getScreenCTM();"
+        " return [m.a * x + m.c * y + m.e, m.b * x + m.d * y + m.f]; }",
+        [x, y],
+    )
+
+
+def added(tab: Page, name: str, x: float, y: float) -> None:
+    tab.locator("svg.webmap").focus()
+    tab.keyboard.press("l")
+    expect(tab.locator(".webmap-labels-word")).to_have_text(
+        "Press where the label is to be."
+    )
+    tab.mouse.click(*place(tab, x, y))
+    tab.keyboard.type(name)
+    tab.locator(".webmap-labels-sheet select").select_option("charger")
+    tab.locator(".webmap-labels-save").click()
+
+
+def test_a_label_that_is_added_is_on_other_pages_and_there_after_a_restart(
+    tab, chromium, serve
+):
+    added(tab, "Wall <i>", 6.0, 3.0)
+    expect(label(tab, "Wall <i>")).to_have_count(1)
+    expect(tab.locator(".webmap-labels-sheet")).to_be_hidden()
+    with watched_tab(chromium, 1280, 800) as other:
+        opened(other, serve.url)
+        expect(label(other, "Wall <i>")).to_have_count(1)
+    serve.end()
+    tab.allowed.extend(["WebSocket", "ERR_CONNECTION"])
+    with watched_tab(chromium, 1280, 800) as later:
+        opened(later, serve())
+        wall = label(later, "Wall <i>")
+        expect(wall).to_have_count(1)
+        expect(wall).to_have_class(re.compile("charger"))
+        m = wall.evaluate("e => e.transform.baseVal.getItem(0).matrix.e")
+        assert m == pytest.approx(6.0, abs=0.1)
+        wall.locator(".spot").click()
+        later.locator(".webmap-labels-remove").click()
+        expect(wall).to_have_count(0)
+        label(later, "Äpfel <b>").press("Enter")
+        expect(later.locator(".webmap-labels-send")).to_be_visible()
+        expect(later.locator(".webmap-labels-remove")).to_be_hidden()
+
+
+def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, bridge):
+    goal = "/robot_0/move_base_simple/goal"
+    with (
+        robot_node(bridge, {}, {goal: "geometry_msgs/PoseStamped"}) as node,
+        watched_tab(chromium, 1280, 800) as tab,
+    ):
+        opened(tab, serve.url)
+        label(tab, "Äpfel <b>").press("Enter")
+        send = tab.locator(".webmap-labels-send")
+        expect(send).to_be_disabled()
+        tab.locator("#robots .row").click()
+        expect(send).to_have_text("Send the robot here")
+        send.click()
+        expect(tab.locator(".webmap-labels-word")).to_have_text("Sent to Äpfel <b>.")
+        expect(tab.locator(".robot.selected")).to_have_count(1)
+        tab.wait_for_timeout(200)
+        ((_, message),) = node.heard
+        position = message["pose"]["position"]
+        assert (position["x"], position["y"]) == pytest.approx((3.0, 2.0))
