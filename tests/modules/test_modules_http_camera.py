@@ -16,6 +16,7 @@ from webmap.modules.robot import http_camera
 from webmap.modules.robot.http_camera import HttpCamera
 from webmap.ros import image_pull
 from webmap.ros.backoff import Backoff
+from webmap.scope import Scope, current_scope
 
 STREAM = "/stream?topic=/camera/image_raw&type=mjpeg"
 
@@ -80,6 +81,22 @@ def test_a_stream_is_pulled_once_for_all_and_only_while_somebody_watches():
             watching.remove()
         await until(lambda: server.open == 0)
         assert camera.url is None
+
+    run(scenario)
+
+
+def test_pictures_go_on_when_the_scope_of_the_first_who_watched_has_ended():
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
+        first, scopes = Scope("first"), []
+        with first.active():
+            camera.watch(lambda: None)
+            camera.watch(lambda: None).remove()
+        assert len(first) == 1
+        camera.watch(lambda: scopes.append(current_scope()))
+        first.close()
+        await until(lambda: len(scopes) > 2)
+        assert set(scopes) == {None}
 
     run(scenario)
 

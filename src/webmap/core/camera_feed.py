@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from webmap.core.pictures import pictures
-from webmap.scope import Removable, Removal, keep
+from webmap.scope import Removable, Removal, current_scope, keep, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -77,13 +77,19 @@ class CameraFeed:
         first = not self._watchers
         self._watchers[key] = fn
         if first:
-            self.begin()
+            # Not a thing of the first who watches: it goes on for the others.
+            with no_scope():
+                self.begin()
+        scope = current_scope()
 
         def undo() -> None:
+            if scope is not None:
+                scope.discard(watching)
             if self._watchers.pop(key, None) is not None and not self._watchers:
                 self._finish()
 
-        return keep(Removal(undo))
+        watching = keep(Removal(undo))
+        return watching
 
     def show(self, data: bytes, media_type: str) -> None:
         """Show a picture to everybody who watches, in place of the one before."""
