@@ -68,6 +68,7 @@ def view(
     import webmap
     from webmap import console
     from webmap.cli.found_fleet import find_fleet
+    from webmap.cli.found_layers import draw_layers
 
     bridges = [webmap.Bridge(text) for text in url]
     told = [
@@ -80,6 +81,7 @@ def view(
     opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:
         fleet.show(opened, grid=plan is None)
+        draw_layers(bridges, opened.robots)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -64,6 +64,7 @@ class Range:
             "sensor_msgs/Range",
             throttle=throttle,
             decode=RangeMsg,
+            compression="cbor",  # JSON takes infinity, which is a reading, for none
         )
 
     def on_range(self, message: RangeMsg) -> None:

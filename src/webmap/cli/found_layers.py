@@ -1,0 +1,147 @@
+"""What else is drawn of robots that were found: all that their topics offer."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from webmap.discovery import FoundRobot, discover
+from webmap.discovery.layers import FoundLayer, Kind, find_layers
+from webmap.discovery.robots import host_name
+from webmap.errors import BridgeError, WebMapError
+from webmap.lifecycle import lifecycle
+from webmap.scope import no_scope
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+log = logging.getLogger("webmap.cli")
+
+SOON, LATER = 1.0, 15.0
+"""Seconds between two looks: until something was found, and from then on."""
+
+_services: list[object] = []
+"""What runs as long as the process does; nobody else holds it."""
+
+
+def draw_layers(bridges: Sequence["Bridge"], robots: Sequence["Robot"]) -> None:
+    """Draw, as long as the process runs, what the robots of bridges offer.
+
+    Args:
+        bridges: The bridges.
+        robots: The robots that are shown; more may come.
+
+    """
+    _services.extend(DrawnLayers(bridge, robots) for bridge in bridges)
+
+
+class DrawnLayers:
+    """Looks what can be drawn behind a bridge; a service of the process.
+
+    Args:
+        bridge: The bridge.
+        robots: The robots that are shown; more may come.
+
+    """
+
+    def __init__(self, bridge: "Bridge", robots: Sequence["Robot"]) -> None:
+        self.bridge = bridge
+        self._robots = robots
+        self._drawn: set[tuple[int, str]] = set()
+        self._task: asyncio.Task[None] | None = None
+        lifecycle.add(self)
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to look."""
+        self._task = loop.create_task(self._look_on())
+
+    async def stop(self) -> None:
+        """Look no more."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+
+    async def _look_on(self) -> None:
+        while True:
+            try:
+                if self.bridge.state == "open":
+                    self.take(await self.bridge.topics())
+            except BridgeError as error:
+                log.debug("%s: %s", self.bridge.url, error)
+            await asyncio.sleep(LATER if self._drawn else SOON)
+
+    def take(self, topics: dict[str, str]) -> None:
+        """Draw what is new among the topics behind the bridge."""
+        found = discover(topics, host_name(self.bridge.url)).robots
+        layers = find_layers(topics, [robot.namespace for robot in found])
+        for one in found:
+            robot = self._shown(one)
+            if robot is None:
+                continue
+            for layer in layers[one.namespace]:
+                key = (id(robot), layer.topic)
+                if key not in self._drawn:
+                    self._drawn.add(key)
+                    self._draw(robot, layer, one.namespace)
+            if (id(robot), "") not in self._drawn:
+                self._drawn.add((id(robot), ""))
+                with no_scope():
+                    robot.add_module("Trail", length=10.0)
+
+    def _shown(self, found: FoundRobot) -> "Robot | None":
+        """Return the robot that is shown for one that was found."""
+        topic = found.topic("odometry") or found.topic("pose")
+        for robot in self._robots:
+            feed = robot.feed
+            if feed is None and robot.name == found.name:
+                return robot
+            if feed is not None and feed.bridge is self.bridge and feed.topic == topic:
+                return robot
+        return None
+
+    def _draw(self, robot: "Robot", layer: FoundLayer, namespace: str) -> None:
+        bridge, topic = self.bridge, layer.topic
+        frames = robot.tf
+        placed = (
+            {}
+            if frames is None
+            else {"map_frame": frames["map_frame"], "namespace": frames["namespace"]}
+        )
+        add = robot.add_module
+        draw: dict[Kind, Callable[[], object]] = {
+            "costmap": lambda: add(
+                "OnMaps",
+                "OccupancyGrid",
+                bridge,
+                topic,
+                palette="costmap",
+                throttle=500,
+                **placed,
+            ),
+            "cloud": lambda: add(
+                "PointCloud", bridge, topic, throttle=1000, colour_by="z"
+            ),
+            "local plan": lambda: add("Path", bridge, topic, name="local"),
+            "particles": lambda: add("PoseArray", bridge, topic, type=layer.type),
+            "doubt": lambda: add("PoseWithCovariance", bridge, topic),
+            "footprint": lambda: add("Polygon", bridge, topic),
+            "range": lambda: add("Range", bridge, topic),
+            "markers": lambda: add(
+                "OnMaps", "Markers", bridge, topic, type=layer.type, **placed
+            ),
+            "fix": lambda: add("NavSatFix", bridge, topic),
+            "health": lambda: add(
+                "Diagnostics", bridge, topic, prefix=_prefix(topic, namespace)
+            ),
+        }
+        try:
+            with no_scope():
+                draw[layer.kind]()
+        except WebMapError as error:
+            log.warning("%s: %s is not drawn: %s", robot.name, topic, error)
+
+
+def _prefix(topic: str, namespace: str) -> str:
+    """Return what the names of a robot's parts begin with on a topic of all robots."""
+    shared = namespace and not topic.startswith(namespace + "/")
+    return namespace.strip("/") + "/" if shared else ""

@@ -1,0 +1,94 @@
+"""Which topics are drawn besides, by rules of names and types."""
+
+import pytest
+
+from webmap.discovery.layers import find_layers
+
+NAV2 = {
+    "/tb/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    "/tb/local_costmap/costmap_updates": "map_msgs/msg/OccupancyGridUpdate",
+    "/tb/local_costmap/costmap_raw": "nav2_msgs/msg/Costmap",
+    "/tb/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
+    "/tb/local_costmap/published_footprint": "geometry_msgs/msg/PolygonStamped",
+    "/tb/global_costmap/published_footprint": "geometry_msgs/msg/PolygonStamped",
+    "/tb/particle_cloud": "nav2_msgs/msg/ParticleCloud",
+    "/tb/amcl_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "/tb/initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "/tb/local_plan": "nav_msgs/msg/Path",
+    "/tb/plan": "nav_msgs/msg/Path",
+    "/tb/camera/depth/points": "sensor_msgs/msg/PointCloud2",
+    "/tb/waypoints": "visualization_msgs/msg/MarkerArray",
+    "/tb/gps/fix": "sensor_msgs/msg/NavSatFix",
+    "/tb/ir_left": "sensor_msgs/msg/Range",
+    "/tb/map": "nav_msgs/msg/OccupancyGrid",
+    "/tb/odd": "no type",
+    "not a topic": "sensor_msgs/msg/Range",
+}
+
+
+def kinds(found) -> dict[str, str]:
+    return {layer.topic.removeprefix("/tb"): layer.kind for layer in found}
+
+
+def test_what_nav2_publishes_is_drawn_once_each():
+    found = find_layers(NAV2, ["/tb"])["/tb"]
+    assert kinds(found) == {
+        "/local_costmap/costmap": "costmap",
+        "/global_costmap/costmap": "costmap",
+        "/local_costmap/published_footprint": "footprint",
+        "/particle_cloud": "particles",
+        "/amcl_pose": "doubt",
+        "/local_plan": "local plan",
+        "/camera/depth/points": "cloud",
+        "/waypoints": "markers",
+        "/gps/fix": "fix",
+        "/ir_left": "range",
+    }
+    assert found[0].topic.endswith("local_costmap/costmap"), "the best first"
+
+
+def test_move_base_has_other_names():
+    topics = {
+        "/move_base/local_costmap/costmap": "nav_msgs/OccupancyGrid",
+        "/move_base/local_costmap/footprint": "geometry_msgs/PolygonStamped",
+        "/move_base/DWAPlannerROS/local_plan": "nav_msgs/Path",
+        "/particlecloud": "geometry_msgs/PoseArray",
+    }
+    found = find_layers(topics, [""])[""]
+    assert sorted(layer.kind for layer in found) == [
+        "costmap",
+        "footprint",
+        "local plan",
+        "particles",
+    ]
+
+
+def test_each_robot_gets_its_own_and_health_is_everybodys():
+    topics = {
+        "/a/sonar": "sensor_msgs/Range",
+        "/b/sonar": "sensor_msgs/Range",
+        "/sonar": "sensor_msgs/Range",
+        "/diagnostics": "diagnostic_msgs/DiagnosticArray",
+    }
+    found = find_layers(topics, ["/a", "/b"])
+    for space, layers in found.items():
+        assert [layer.topic for layer in layers] == [f"{space}/sonar", "/diagnostics"]
+    alone = find_layers({"/sonar": "sensor_msgs/Range"}, ["/a"])["/a"]
+    assert [layer.topic for layer in alone] == ["/sonar"], "whose else could it be"
+
+
+@pytest.mark.parametrize(
+    ("type", "most"),
+    [
+        ("sensor_msgs/Range", 8),
+        ("sensor_msgs/PointCloud2", 2),
+        ("visualization_msgs/MarkerArray", 3),
+    ],
+)
+def test_a_robot_gets_so_many_of_a_kind_and_no_more(type, most):
+    topics = {f"/cloud_points_{number}": type for number in range(20)}
+    assert len(find_layers(topics, [""])[""]) == most
+
+
+def test_without_robots_nothing_is_drawn():
+    assert find_layers(NAV2, []) == {}
