@@ -9,6 +9,7 @@ import click
 
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
+from webmap.core.alignment_store import store
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.naming import same_name
 from webmap.discovery.newcomers import Newcomers, News
@@ -59,6 +60,7 @@ class LateRobots:
                 robot.set_tf(about.bridge, **found.tf_options)
             if found.topic("plan"):
                 robot.add_module("Path", about.bridge, found.topic("plan"))
+            store.restore(robot)
         self._places[about.bridge, found.namespace] = robot
         self._console.add(robot)
 

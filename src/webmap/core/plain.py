@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
+from webmap.core.alignment import numbers
 from webmap.core.goal_topics import COVARIANCE, NAVIGATE_TO_POSE
 from webmap.core.plain_assist import ScanAssistData, assist_data
 from webmap.core.plain_svg import element_from_dict, element_to_dict
@@ -87,6 +88,9 @@ class RobotData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     model: dict[str, Any] | None = None
     odometry: OdometryData | None = None
     tf: TfData | None = None
+    alignment: tuple[float, float, float] | None = None
+    """Of the robot's own: metres, metres and degrees."""
+
     twist: TwistData | None = None
     move: MoveData | None = None
     initial_pose: InitialPoseData | None = None
@@ -120,6 +124,8 @@ def robot_from_dict(
     if plain.tf is not None:
         f = msgspec.structs.asdict(plain.tf)
         robot.set_tf(link(f.pop("bridge")), **f)
+    if plain.alignment is not None:
+        robot.set_alignment(*plain.alignment)
     if plain.twist is not None:
         t = msgspec.structs.asdict(plain.twist)
         robot.set_twist_topic(link(t.pop("bridge")), t.pop("topic"), **t)
@@ -142,6 +148,7 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
     """Return a robot as plain data; see :meth:`Robot.to_dict`."""
     feed, twist, move = robot.feed, robot.motion.twist_topic, robot.motion.move_topic
     pose = robot.motion.pose_topic
+    own = robot.whereabouts.own_alignment
     known = {"robot", "unplaced", "selected", "stale"}
     plain = RobotData(
         name=robot.name,
@@ -154,6 +161,7 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
         tf=None
         if robot.tf is None
         else TfData(**{**robot.tf, "bridge": robot.tf["bridge"].url}),
+        alignment=None if own is None else numbers(own),
         twist=None
         if twist is None
         else TwistData(

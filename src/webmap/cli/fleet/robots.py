@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import webmap
+from webmap.cli.fleet.alignments import align_bridges
 from webmap.cli.fleet.cameras import add_cameras
 from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.schema import Fleet, ModuleLine, RobotLine
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
 
 def make_bridges(fleet: Fleet) -> dict[str, "Bridge"]:
     """Return the bridges of a file, by name."""
-    return {name: webmap.Bridge(url, name=name) for name, url in fleet.bridges.items()}
+    bridges = {
+        name: webmap.Bridge(url, name=name) for name, url in fleet.bridges.items()
+    }
+    align_bridges(fleet.alignments, bridges)
+    return bridges
 
 
 def make_robots(
@@ -40,6 +45,8 @@ def _robot(
         )
     )
     robot.base_link = line.base_link
+    if line.alignment is not None:
+        robot.set_alignment(*line.alignment)
     for topic in others:
         scanner = robot.add_module(
             "LaserScanner", bridge, topic, max_dots=None, throttle=100
@@ -50,11 +57,11 @@ def _robot(
         "tf": (line.tf, robot.set_tf),
         "twist": (line.twist, robot.set_twist_topic),
         "move": (line.move, robot.set_move_topic),
-        "initial_pose": (line.initial_pose, robot.set_initial_pose_topic),
         "scan_assist": (
             line.scan_assist,
             lambda bridge, **options: robot.set_scan_assist(**options),
         ),
+        "initial_pose": (line.initial_pose, robot.set_initial_pose_topic),
     }
     for key, (options, setter) in setters.items():
         if options is not None:

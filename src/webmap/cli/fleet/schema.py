@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from webmap.cli.fleet import checks
+from webmap.cli.fleet.alignments import Alignment, alignment, bridge_table
 from webmap.cli.fleet.buttons import read_buttons
 from webmap.cli.fleet.cameras import CameraLine, read_cameras
 from webmap.cli.fleet.checks import Check, Mistakes
@@ -62,6 +63,7 @@ ROBOT = (
     "base_link",
     "odometry",
     "tf",
+    "alignment",
     "twist",
     "move",
     "initial_pose",
@@ -95,6 +97,7 @@ class RobotLine:
     base_link: str = "base_link"
     odometry: dict[str, Any] | None = None
     tf: dict[str, Any] | None = None
+    alignment: Alignment | None = None
     twist: dict[str, Any] | None = None
     move: dict[str, Any] | None = None
     initial_pose: dict[str, Any] | None = None
@@ -112,6 +115,9 @@ class Fleet:
 
     bridges: dict[str, str] = field(default_factory=dict)
     """Addresses by name."""
+
+    alignments: dict[str, Alignment] = field(default_factory=dict)
+    """Of bridges, by name."""
 
     robots: list[RobotLine] = field(default_factory=list)
     title: str = ""
@@ -138,7 +144,7 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
     for key in ("title", "floor"):
         if key in data:
             setattr(fleet, key, checks.one(checks.text, data[key], (key,), mistakes))
-    fleet.bridges = _bridges(data.get("bridges"), mistakes)
+    fleet.bridges, fleet.alignments = _bridges(data.get("bridges"), mistakes)
     if "map" in data:
         fleet.map = _map(data["map"], fleet.bridges, mistakes)
     if "tiles" in data:
@@ -156,16 +162,24 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
     return fleet
 
 
-def _bridges(value: Any, mistakes: Mistakes) -> dict[str, str]:
+def _bridges(
+    value: Any, mistakes: Mistakes
+) -> tuple[dict[str, str], dict[str, Alignment]]:
     if not isinstance(value, dict) or not value:
         got = "nothing" if value is None else checks.show(value)
         example = 'a table [bridges] with lines such as hall = "ws://robot:9090"'
         mistakes.add(("bridges",), f"got {got}, expected {example}")
-        return {}
-    return {
-        name: checks.one(_address, url, ("bridges", name), mistakes) or ""
-        for name, url in value.items()
-    }
+        return {}, {}
+    urls, alignments = {}, {}
+    for name, bridge in value.items():
+        path: Path = ("bridges", name)
+        if isinstance(bridge, dict):
+            urls[name], stated = bridge_table(bridge, _address, path, mistakes)
+            if stated is not None:
+                alignments[name] = stated
+        else:
+            urls[name] = checks.one(_address, bridge, path, mistakes) or ""
+    return urls, alignments
 
 
 def _map(
@@ -227,6 +241,9 @@ def _robot(
         robot.scan_assist = read_assist(value["scan_assist"], where, driven, mistakes)
     if "tf" in value:
         robot.tf = _frames(value["tf"], (*path, "tf"), mistakes)
+    if "alignment" in value:
+        where = (*path, "alignment")
+        robot.alignment = checks.one(alignment, value["alignment"], where, mistakes)
     if "battery" in value:
         where = (*path, "battery")
         robot.battery = checks.one(checks.topic, value["battery"], where, mistakes)

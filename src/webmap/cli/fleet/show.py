@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from webmap import console
+from webmap.cli.fleet.alignments import restore
 from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.file import read_fleet
 from webmap.cli.fleet.places import label_options, tile_options
@@ -70,5 +71,6 @@ def open_fleet(ready: ReadyFleet) -> None:
     if ready.fleet.map is not None:
         bridge, topic = ready.fleet.map
         shown.add_grid(ready.bridges[bridge], topic)
+    restore(ready.robots)
     for robot in ready.robots:
         shown.add(robot)
