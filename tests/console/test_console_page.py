@@ -74,7 +74,7 @@ def lines(page: Page) -> list[str]:
     return [
         button.children[2].text
         for item in page.element("robots").children
-        for button in item.children
+        for button in item.children[:1]
     ]
 
 
