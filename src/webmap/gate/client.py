@@ -24,6 +24,8 @@ from webmap.gate.unheard import Unheard
 from webmap.geometry import Twist
 from webmap.scope import Removal
 
+__all__ = ["DriveConnection", "GateClient"]
+
 log = logging.getLogger("webmap.gate")
 
 
