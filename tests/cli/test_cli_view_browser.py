@@ -43,7 +43,7 @@ def shown(chromium, *arguments):
 def expect_two_robots_on_their_map(page, within=15_000):
     expect(page.locator("#robots .row")).to_have_count(2, timeout=within)
     expect(page.locator(".robot:not(.unplaced)")).to_have_count(2, timeout=within)
-    expect(page.locator(".occupancy-grid image")).to_have_count(1, timeout=within)
+    expect(page.locator(".occupancy-grid.map image")).to_have_count(1, timeout=within)
     expect(page.locator(".laserscan > .dot").first).to_be_attached(timeout=within)
 
 
