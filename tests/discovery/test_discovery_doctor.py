@@ -1,6 +1,8 @@
 """What the readiness check decides."""
 
+import ipaddress
 import json
+import sys
 from dataclasses import replace
 
 import pytest
@@ -10,6 +12,7 @@ from webmap.discovery.doctor import Heard, Observed, is_ready, judge
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
 from webmap.discovery.doctor.observed import Clock, Way
+from webmap.discovery.doctor.ports import is_loopback, listening_addresses
 from webmap.discovery.doctor.verdict import report
 from webmap.ros.events import Publish
 
@@ -25,6 +28,7 @@ LISTENED = {
 GOOD = Observed(
     "ws://localhost:9090",
     peer="127.0.0.1",
+    listens=("127.0.0.1",),
     findings=discover(TOPICS, "bob"),
     clock=Clock(0.01, 0.004),
     publishers={"/cmd_vel": ()},
@@ -62,18 +66,82 @@ def test_a_bridge_that_is_away_is_all_there_is_to_say():
 @pytest.mark.parametrize(
     ("url", "peer", "level"),
     [
-        ("ws://localhost:9090", "::1", "good"),
-        ("ws://localhost:9090", "", "good"),
+        ("ws://localhost:9090", "::1", "note"),
+        ("ws://localhost:9090", "", "note"),
         ("ws://bob:9090", "192.168.1.7", "warning"),
         ("ws://bob:9090", "fe80::1%eth0", "warning"),
         ("wss://bob:9090", "192.168.1.7", "note"),
     ],
 )
 def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
-    findings = judge(replace(GOOD, url=url, peer=peer))
+    findings = judge(replace(GOOD, url=url, peer=peer, listens=()))
     (found,) = [f for f in findings if "open to the" in f.words or "reached" in f.words]
     assert found.level == level
-    assert ("topics_glob" in found.advice) is (level != "good")
+    assert ("topics_glob" in found.advice) is (not url.startswith("ws://localhost"))
+
+
+@pytest.mark.parametrize(
+    ("listens", "level", "words"),
+    [
+        (("127.0.0.1",), "good", "listens on this machine alone"),
+        (("127.0.0.1", "::1"), "good", "listens on this machine alone"),
+        (("0.0.0.0",), "warning", "listens at 0.0.0.0: it asks nobody"),
+        (("127.0.0.1", "::"), "warning", "listens at ::: it asks nobody"),
+    ],
+)
+def test_a_bridge_on_this_machine_may_be_open_to_others(listens, level, words):
+    assert said(replace(GOOD, listens=listens), words) == level
+
+
+TCP = """\
+  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid
+   0: 0100007F:2382 00000000:0000 0A 00000000:00000000 00:00000000 00000000     0
+   1: 00000000:2383 00000000:0000 0A 00000000:00000000 00:00000000 00000000     0
+   2: 0100007F:2384 0100007F:D0F2 01 00000000:00000000 00:00000000 00000000     0
+   nonsense
+"""
+TCP6 = f"""\
+  sl  local_address                         remote_address                        st
+   0: {"0" * 32}:2382 {"0" * 32}:0000 0A
+   1: 0000000000000000FFFF00000100007F:2385 {"0" * 32}:0000 0A
+"""
+
+
+@pytest.mark.skipif(
+    sys.byteorder != "little", reason="the tables are of such a machine"
+)
+@pytest.mark.parametrize(
+    ("port", "addresses"),
+    [
+        (9090, ("127.0.0.1", "::")),
+        (9091, ("0.0.0.0",)),
+        (9092, ()),
+        (9093, ("::ffff:127.0.0.1",)),
+        (1, ()),
+    ],
+)
+def test_where_a_port_listens_is_read_from_the_kernels_tables(port, addresses):
+    found = listening_addresses(port, [TCP, TCP6])
+    assert [ipaddress.ip_address(each) for each in found] == [
+        ipaddress.ip_address(each) for each in addresses
+    ]
+
+
+@pytest.mark.parametrize(
+    ("address", "here"),
+    [
+        ("127.0.0.1", True),
+        ("::1", True),
+        ("::ffff:7f00:1", True),
+        ("localhost", True),
+        ("0.0.0.0", False),
+        ("::", False),
+        ("fe80::1%eth0", False),
+        ("bob", False),
+    ],
+)
+def test_only_some_addresses_are_of_this_machine_alone(address, here):
+    assert is_loopback(address) is here
 
 
 def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():

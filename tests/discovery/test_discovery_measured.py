@@ -1,6 +1,7 @@
 """That each thing the readiness check says is measured, on systems with that fault."""
 
 import asyncio
+from pathlib import Path
 
 import pytest
 from faulty_site import site
@@ -58,6 +59,13 @@ def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
 def test_the_type_of_velocity_is_the_one_that_the_base_takes(dialect, twist):
     _, findings, _ = looked_at(site(dialect, twist=twist))
     assert said(findings, f"/robot_0/cmd_vel takes {twist}, and") == "good"
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux tells it there")
+def test_where_a_bridge_of_this_machine_listens_is_seen():
+    _, findings, seen = looked_at(site())
+    assert seen.listens == ("127.0.0.1",)
+    assert said(findings, "listens on this machine alone") == "good"
 
 
 @DIALECTS

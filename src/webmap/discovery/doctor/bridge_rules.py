@@ -1,6 +1,5 @@
 """What the readiness check says of a bridge."""
 
-import ipaddress
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
@@ -10,6 +9,7 @@ from webmap.discovery.doctor.observed import (
     Finding,
     Observed,
 )
+from webmap.discovery.doctor.ports import is_loopback
 
 ABOUT = "bridge"
 
@@ -54,14 +54,6 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
     yield _compression(seen)
 
 
-def is_loopback(address: str) -> bool:
-    """Tell whether only this machine reaches an address."""
-    try:
-        return ipaddress.ip_address(address.partition("%")[0]).is_loopback
-    except ValueError:
-        return address == "localhost"
-
-
 def _openness(seen: Observed) -> Finding:
     parts = urlsplit(seen.url)
     hidden = (
@@ -69,9 +61,25 @@ def _openness(seen: Observed) -> Finding:
         if seen.shown
         else ""
     )
-    if is_loopback(seen.peer or parts.hostname or ""):
+    here = is_loopback(seen.peer or parts.hostname or "")
+    outward = [each for each in seen.listens if not is_loopback(each)]
+    if here and seen.listens and not outward:
+        return Finding("good", ABOUT, "The rosbridge listens on this machine alone.")
+    if here and outward:
         return Finding(
-            "good", ABOUT, "The rosbridge was reached at an address of this machine."
+            "warning",
+            ABOUT,
+            f"The rosbridge is on this machine and listens at {', '.join(outward)}: it "
+            f"asks nobody who they are, so whoever reaches this machine can drive.",
+            "Let it listen on this machine alone (address: 127.0.0.1), or shut its "
+            "port in the firewall.",
+        )
+    if here:
+        return Finding(
+            "note",
+            ABOUT,
+            "The rosbridge was reached at an address of this machine; whether others "
+            "reach it too cannot be seen.",
         )
     secret = (
         "the way there is encrypted"
@@ -173,7 +181,7 @@ def _blocking(seen: Observed) -> Finding:
             ABOUT,
             "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
             "does unless told otherwise; it was not tried.",
-            f"webmap doctor --try-call finds out. {advice}",
+            f"webmap doctor {seen.url} --try-call finds out. {advice}",
         )
     return Finding(
         "good",

@@ -6,6 +6,7 @@ services of rosapi are called that were seen to answer on every bridge.
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from urllib.parse import urlsplit
 
 from webmap.discovery.asking import ask_topics
 from webmap.discovery.doctor.asking import Asking
@@ -13,6 +14,7 @@ from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.hanging import try_a_call
 from webmap.discovery.doctor.heard_from import listen
 from webmap.discovery.doctor.observed import MOST_ROBOTS, Heard, Observed, Way
+from webmap.discovery.doctor.ports import is_loopback, listening_addresses
 from webmap.discovery.found import FoundRobot
 from webmap.discovery.robots import discover, host_name
 from webmap.errors import BridgeClosed, BridgeError
@@ -120,7 +122,11 @@ async def _listen(seen: Observed, seconds: float) -> Observed:
         way = _way(robot, heard, frames)
         if way is not None:
             ways[robot.name] = way
-    return replace(seen, peer=peer, deflate=deflate, heard=heard, ways=ways)
+    port = urlsplit(seen.url).port
+    listens = listening_addresses(port) if port and is_loopback(peer) else ()
+    return replace(
+        seen, peer=peer, listens=listens, deflate=deflate, heard=heard, ways=ways
+    )
 
 
 def place_of(robot: FoundRobot) -> str:

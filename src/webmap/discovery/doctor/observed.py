@@ -115,6 +115,9 @@ class Observed:
     peer: str = ""
     """The address that answered."""
 
+    listens: tuple[str, ...] = ()
+    """Where the bridge listens, if it is on this machine and that is known."""
+
     deflate: bool = False
     """Whether the bridge would compress its socket."""
 
