@@ -62,8 +62,8 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
         lines.append(f"battery = {_text(battery.topic)} # {battery.rule}")
     cameras = robot.guesses.get("camera", ())
     if cameras:
-        listed = [f"  {_text(guess.topic)}, # {guess.rule}" for guess in cameras]
-        lines += ["cameras = [", *listed, "]"]
+        rows = [f"  {_text(guess.topic)}, # {guess.rule}" for guess in cameras]
+        lines += ["cameras = [", *rows, "]"]
     lines += _motion(robot)
     lines += _modules(robot, bridge)
     for role in ALSO:
