@@ -64,6 +64,19 @@ def test_a_bridge_that_is_away_is_all_there_is_to_say():
 
 
 @pytest.mark.parametrize(
+    ("trouble", "advice"),
+    [
+        ("the host's name is not known (gaierror)", "how the host is spelled"),
+        ("the connection was refused, nothing listens there", "address and port"),
+        ("no answer within 5 s", "address and firewall"),
+    ],
+)
+def test_why_a_bridge_is_away_says_what_to_do(trouble, advice):
+    (finding,) = judge(Observed("ws://bob:9090", trouble=trouble))
+    assert advice in finding.advice
+
+
+@pytest.mark.parametrize(
     ("url", "peer", "level"),
     [
         ("ws://localhost:9090", "::1", "note"),

@@ -31,6 +31,22 @@ TELL = (
     "to webmap view with --robot NAME:ODOM:CMD_VEL:SCAN."
 )
 
+_AWAY = (
+    (
+        "name is not known",
+        "Look how the host is spelled, or give its number, as in ws://192.168.1.20:9090.",
+    ),
+    (
+        "nothing listens",
+        "Start rosbridge_server on the robot, and look at its address and port.",
+    ),
+    (
+        "",
+        "Start rosbridge_server on the robot, and look at address and firewall.",
+    ),
+)
+"""What to do, by what is in the reason; the last holds for any."""
+
 
 def bridge_findings(seen: Observed) -> Iterator[Finding]:
     """Say what holds for the link and for everything behind it."""
@@ -39,7 +55,7 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
             "wrong",
             ABOUT,
             f"The rosbridge cannot be reached: {seen.trouble}.",
-            "Start rosbridge_server on the robot, and look at address and firewall.",
+            next(said for words, said in _AWAY if words in seen.trouble),
         )
         return
     yield _openness(seen)
