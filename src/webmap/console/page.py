@@ -96,6 +96,7 @@ def build(
     map.add_module("StopButton")
     map.add_module("LayerSwitches", off=["Costmaps"])
     map.add_module("MeasureTool")
+    map.add_module("AlignTool")
     map.add_module("RouteTool", title)
     map.add_module("ExportTool", place=".map-tools", classes="button square")
     map.add_module("ScaleBar")

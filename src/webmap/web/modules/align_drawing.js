@@ -41,7 +41,6 @@ export class AlignDrawing {
     this.element = svg(
       "svg",
       { class: "webmap-align-drawing", hidden: "" },
-      this._shadow,
       this._arm,
       this.handle,
     );
@@ -60,12 +59,15 @@ export class AlignDrawing {
     ];
     const found = wanted.flatMap((one) => [...this._map.world.querySelectorAll(one)]);
     this._shadow.replaceChildren(...found.map((element) => this._twice(element)));
+    // Within the map's own `<svg>`, as its styles tell how large things are drawn.
+    this._map.overlay.append(this._shadow);
     this.element.removeAttribute("hidden");
   }
 
   hide() {
     this._unname();
     this._shadow.replaceChildren();
+    this._shadow.remove();
     this.element.setAttribute("hidden", "");
     this.pivot = null;
   }

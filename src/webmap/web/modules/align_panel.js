@@ -60,11 +60,18 @@ export class AlignPanel {
     });
     this._word = html("span", "webmap-align-word", { role: "status" });
     this._line = html("code", "webmap-align-line", { hidden: "" });
+    /** The button, and what is said: it shares the room with those of other tools. */
     this.element = html(
       "section",
       "webmap-panel webmap-align",
       { "aria-label": "Alignment" },
       this._go,
+    );
+    /** What is open while a map is aligned, and tells what came of it. */
+    this.form = html(
+      "section",
+      "webmap-panel webmap-align-form",
+      { "aria-label": "Alignment in numbers", hidden: "" },
       this._body,
       this._word,
       this._line,
@@ -75,6 +82,17 @@ export class AlignPanel {
   say(words) {
     say(this._word, words);
     this._line.toggleAttribute("hidden", true);
+    this._showForm();
+  }
+
+  _showForm() {
+    const empty = this._body.hidden && this._word.textContent === "";
+    this.form.toggleAttribute("hidden", empty);
+    if (empty) return;
+    // Below the buttons, in however many rows they are.
+    const buttons = (this.element.parentElement ?? this.element).getBoundingClientRect();
+    const around = this.form.parentElement?.getBoundingClientRect();
+    if (around) this.form.style.top = `${Math.max(0, buttons.bottom - around.top) + 8}px`;
   }
 
   /** @param {Subject} subject */
@@ -111,6 +129,7 @@ export class AlignPanel {
     say(this._word, lost || "Saved. In a fleet file it is this line:");
     this._line.textContent = line;
     this._line.toggleAttribute("hidden", false);
+    this._showForm();
   }
 
   /**

@@ -29,6 +29,9 @@ import { lay } from "./overlay.js";
 const KEY_MOVE = 0.05;
 const KEY_TURN = 1;
 
+/** Milliseconds between two looks where the robot is. */
+const FOLLOW_PERIOD = 200;
+
 /** @type {Record<string, [number, number]>} Right and down, as it is seen. */
 const ARROWS = {
   ArrowRight: [1, 0],
@@ -68,6 +71,8 @@ class AlignTool {
     /** @type {Subject | null} */
     this._subject = null;
     this._whole = false;
+    /** @type {ReturnType<typeof setInterval> | undefined} */
+    this._following = undefined;
     /** @type {Alignment} */
     this._before = { x: 0, y: 0, angle: 0 };
     this._now = this._before;
@@ -89,8 +94,12 @@ class AlignTool {
     this._offs = [
       lay(map, this._drawing.element),
       lay(map, this._panel.element, "top-left"),
+      lay(map, this._panel.form),
       deskOf(map.drive).claimEscape(() => this._leave()),
-      map.onSelect(() => this._leave()),
+      map.onSelect(() => {
+        this._leave();
+        this._panel.close();
+      }),
       map.onView(() => this._draw()),
     ];
   }
@@ -125,9 +134,9 @@ class AlignTool {
       target.addEventListener("pointercancel", () => this._giveUp(), first);
     }
     handle.addEventListener("keydown", (event) => this._key(event), { signal });
-    this._panel.element.addEventListener("keydown", (event) => this._escape(event), {
-      signal,
-    });
+    for (const part of [this._panel.element, this._panel.form]) {
+      part.addEventListener("keydown", (event) => this._escape(event), { signal });
+    }
   }
 
   _toggle() {
@@ -155,6 +164,7 @@ class AlignTool {
     if (!this._subject) return false;
     this._subject = null;
     this._drag = null;
+    clearInterval(this._following);
     this._panel.close();
     this._drawing.hide();
     this._map.svg.classList.remove("webmap-aligning");
@@ -192,9 +202,8 @@ class AlignTool {
 
   /** The robot goes on moving meanwhile. */
   _follow() {
-    if (!this._subject) return;
-    this._draw();
-    requestAnimationFrame(() => this._follow());
+    clearInterval(this._following);
+    this._following = setInterval(() => this._draw(), FOLLOW_PERIOD);
   }
 
   _draw() {
