@@ -30,7 +30,7 @@ OF_A_ROBOT = (
 )
 ON_THE_MAP = {
     ".occupancy-grid.map > image[href]": 1,
-    ".occupancy-grid.costmap > image[href]": 4,
+    ".occupancy-grid.costmap > image[href]": 2,
     ".markers": 2,
 }
 

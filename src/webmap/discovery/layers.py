@@ -56,8 +56,8 @@ class FoundLayer:
 POLYGON = ("geometry_msgs/PolygonStamped",)
 
 RULES: tuple[LayerRule, ...] = (
-    LayerRule("costmap", ("nav_msgs/OccupancyGrid",), r"local_costmap/costmap\Z", 2),
-    LayerRule("costmap", ("nav_msgs/OccupancyGrid",), r"costmap/costmap\Z", 2),
+    LayerRule("costmap", ("nav_msgs/OccupancyGrid",), r"local_costmap/costmap\Z", 1),
+    LayerRule("costmap", ("nav_msgs/OccupancyGrid",), r"costmap/costmap\Z", 1),
     LayerRule("cloud", ("sensor_msgs/PointCloud2",), r"points|cloud", 2),
     LayerRule("local plan", ("nav_msgs/Path",), r"/local_plan\Z", 1),
     LayerRule(
