@@ -14,7 +14,7 @@ from pathlib import Path
 
 import webmap
 
-TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "1"))
+TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "3"))
 FULL = TRIALS >= 50
 
 SHOW: list[Callable[[str], None]] = [print]
