@@ -56,7 +56,8 @@ def test_a_compressed_picture_is_shown_as_it_is(link, robot, cbor):
         message["data"] = data
     link.say(TOPIC, message, cbor=cbor)
     assert told == [camera.url]
-    assert pictures.get(camera.url.rpartition("/")[2]) == (data, "image/jpeg")
+    picture = pictures.get(camera.url.rpartition("/")[2])
+    assert picture == (data, "image/jpeg", True)
     assert link.options[TOPIC]["throttle"] == 200
 
 

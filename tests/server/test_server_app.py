@@ -6,6 +6,7 @@ from starlette.applications import Starlette
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
+from webmap.core.pictures import pictures
 from webmap.server.app import create_app
 from webmap.server.headers import CONTENT_SECURITY_POLICY
 from webmap.server.settings import Settings
@@ -251,6 +252,13 @@ def test_what_was_published_is_served(app, client, folder):
     assert "immutable" in image.headers["cache-control"]
     assert image.headers["content-security-policy"].endswith("; sandbox")
     app.published.withdraw_image(url)
+    assert client.get(url).status_code == 404
+
+
+def test_what_a_camera_saw_is_kept_by_no_browser(client):
+    url = pictures.publish(PNG + b"seen", "image/png", fleeting=True)
+    assert client.get(url).headers["cache-control"] == "no-store"
+    pictures.withdraw(url)
     assert client.get(url).status_code == 404
 
 

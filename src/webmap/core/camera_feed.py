@@ -93,7 +93,8 @@ class CameraFeed:
 
     def show(self, data: bytes, media_type: str) -> None:
         """Show a picture to everybody who watches, in place of the one before."""
-        self.url = pictures.publish(data, media_type)
+        # What a camera saw is nothing to be found on an operator's disk later.
+        self.url = pictures.publish(data, media_type, fleeting=True)
         self.stamp = now = time.monotonic()
         kept = self._kept
         kept.append((self.url, now, len(data)))

@@ -28,6 +28,8 @@ class Published(NamedTuple):
 
     data: bytes
     media_type: str
+    fleeting: bool = False
+    """Whether another takes its place at once, so that no browser need keep it."""
 
 
 class Pictures:
@@ -41,12 +43,14 @@ class Pictures:
     def __len__(self) -> int:
         return len(self._images)
 
-    def publish(self, data: bytes, media_type: str = "image/png") -> str:
+    def publish(
+        self, data: bytes, media_type: str = "image/png", *, fleeting: bool = False
+    ) -> str:
         """Let pages load an image until it was withdrawn as often; return its URL."""
         mixed = media_type.encode() + b"\0" + data
         tag = hashlib.sha256(mixed).hexdigest()[:32]
         with self._lock:
-            self._images.setdefault(tag, Published(data, media_type))
+            self._images.setdefault(tag, Published(data, media_type, fleeting))
             self._uses[tag] = self._uses.get(tag, 0) + 1
         return PREFIX + tag
 

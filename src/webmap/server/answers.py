@@ -45,6 +45,8 @@ async def answer_file(
         if unchanging
         else "no-cache",
     }
+    if file.fleeting:
+        headers["cache-control"] = "no-store"
     if file.media_type.startswith("image/"):
         headers["content-security-policy"] = SANDBOX
     if tag in request.headers.get("if-none-match", ""):

@@ -41,6 +41,8 @@ class File:
     media_type: str
     tag: str
     """Changes when the file does; without quotes."""
+    fleeting: bool = False
+    """Whether it is worth no room in a browser's store."""
 
 
 def media_type_of(path: Path) -> str | None:

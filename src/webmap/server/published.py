@@ -111,7 +111,7 @@ class Published:
         image = self._images.get(tag) or drawn.pictures.get(tag)
         if image is None:
             raise NoSuchFile
-        return File(image.data, image.media_type, tag)
+        return File(image.data, image.media_type, tag, image.fleeting)
 
 
 def _existing(path: Path) -> Path:
