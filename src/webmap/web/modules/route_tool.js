@@ -72,8 +72,11 @@ class RouteTool {
     });
     this._clear = button("webmap-route-clear", "Clear", () => this._set([], false));
     this._list = html("ol", "webmap-route-list");
-    this._loop = html("input", "", { type: "checkbox" });
-    this._loop.addEventListener("change", () => this._show());
+    this._loops = false;
+    this._loop = button("webmap-route-loop", "Loop", () =>
+      this._set(this._points, !this._loops),
+    );
+    this._loop.title = "Begin anew after the last point";
     this._here.title = "Add the place of the selected robot";
     this._run = button("webmap-route-run", "Run", () => this._begin());
     this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
@@ -82,7 +85,7 @@ class RouteTool {
     this._word = html("p", "webmap-route-word", { role: "status" });
     this._saved = new SavedRoutes(saves, send, () => ({
       points: this._points,
-      loop: this._loop.checked,
+      loop: this._loops,
     }));
     this._details = html(
       "details",
@@ -91,8 +94,7 @@ class RouteTool {
       html("summary", "", {}, "Route"),
       html("div", "webmap-route-row begin", {}, this._edit, this._here, this._clear),
       this._list,
-      html("label", "webmap-route-loop", {}, this._loop, "Loop"),
-      html("div", "webmap-route-row", {}, this._run, this._pause, this._skip, this._end),
+      html("div", "webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
       this._word,
       this._saved.element,
     );
@@ -135,21 +137,21 @@ class RouteTool {
   /** @param {Pose[]} points @param {boolean} loop */
   _set(points, loop) {
     this._points = points;
-    this._loop.checked = loop;
+    this._loops = loop;
     this._show();
   }
 
   /** @param {Pose} pose */
   _add(pose) {
     if (this._points.length >= MOST_POINTS) return;
-    this._set([...this._points, pose], this._loop.checked);
+    this._set([...this._points, pose], this._loops);
   }
 
   /** @param {number} index @param {Pose} pose */
   _change(index, pose) {
     this._set(
       this._points.map((point, i) => (i === index ? pose : point)),
-      this._loop.checked,
+      this._loops,
     );
   }
 
@@ -157,7 +159,7 @@ class RouteTool {
   _remove(index) {
     this._set(
       this._points.filter((_, i) => i !== index),
-      this._loop.checked,
+      this._loops,
     );
   }
 
@@ -165,7 +167,7 @@ class RouteTool {
   _raise(index) {
     const points = [...this._points];
     [points[index - 1], points[index]] = [points[index], points[index - 1]];
-    this._set(points, this._loop.checked);
+    this._set(points, this._loops);
   }
 
   /** @param {Pose | null} pose */
@@ -180,7 +182,7 @@ class RouteTool {
     const { selected } = this._map;
     if (selected === null || this._points.length === 0) return;
     this._aim.leave();
-    const run = new RouteRun([...this._points], { loop: this._loop.checked });
+    const run = new RouteRun([...this._points], { loop: this._loops });
     this._runs.set(selected, { run, busy: false });
     this._perform(selected, run.go(this._goalOf(selected)));
   }
@@ -272,6 +274,7 @@ class RouteTool {
     say(this._edit, this._aim.active ? "Done" : "Add points");
     // So that there is a map to press on, on a phone too.
     this._details.classList.toggle("adding", this._aim.active);
+    this._loop.setAttribute("aria-pressed", String(this._loops));
     this._here.disabled = this._robotPose() === null;
     this._clear.disabled = this._points.length === 0;
     this._run.disabled = this._points.length === 0 || !report?.way || busy;
@@ -285,7 +288,7 @@ class RouteTool {
     const points = this._aimed ? [...this._points, this._aimed] : this._points;
     const shown = open ? points : live ? run.points : [];
     this._drawing.show(shown, {
-      loop: open ? this._loop.checked : (run?.loop ?? false),
+      loop: open ? this._loops : (run?.loop ?? false),
       current: live ? run.index : null,
       movable: open,
     });
