@@ -165,7 +165,7 @@ class Bench:
     def renderers(self):
         """The processes that draw pages."""
         everybody = psutil.Process(self.browser.process.pid).children(recursive=True)
-        return [p for p in everybody if "--type=renderer" in p.cmdline()]
+        return [process for process in everybody if is_renderer(process)]
 
     # The person.
 
@@ -250,3 +250,11 @@ def send_only(tab: Tab, method, **parameters):
     """Call a method whose answer will never come."""
     message = {"id": next(tab._numbers), "method": method, "params": parameters}
     tab._socket.send(json.dumps(message))
+
+
+def is_renderer(process: psutil.Process) -> bool:
+    """Return whether a process draws pages, and has not ended meanwhile."""
+    try:
+        return "--type=renderer" in process.cmdline()
+    except (psutil.ZombieProcess, psutil.NoSuchProcess):
+        return False
