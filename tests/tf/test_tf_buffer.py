@@ -251,3 +251,43 @@ def test_a_way_over_any_frame_is_the_same_way(tree, target, over, source, time):
 def test_the_way_back_undoes_the_way(tree, target, source, time):
     there, back = tree.lookup(target, source, time), tree.lookup(source, target, time)
     same(there @ back, Transform())
+
+
+# Beyond what was told.
+
+
+def test_a_frame_goes_on_as_it_did_for_a_while(robot):
+    assert place(robot.lookup("odom", "base_link", 12.15, ahead=0.2)) == (2.15, 0.0)
+    with pytest.raises(NotKnownThen, match="later"):
+        robot.lookup("odom", "base_link", 12.25, ahead=0.2)
+
+
+def test_one_that_turned_goes_on_turning():
+    buffer = Buffer()
+    for step in range(5):
+        buffer.add("odom", "base", at(0, 0, step / 10), 10.0 + step / 10)
+    ahead = buffer.lookup("odom", "base", 10.5, ahead=0.2)
+    assert ahead.planar.yaw == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        [(10.0, 0.0, 0.0)],  # once only
+        [(10.0, 0.0, 0.0), (10.1, 3.0, 0.0)],  # it leapt
+        [(10.0, 0.0, 0.0), (10.1, 3.0, 3.0)],  # it was turned round
+        [(9.0, 2.0, 0.0), (10.1, 3.0, 0.0)],  # too long ago
+        [(10.09, 2.99, 0.0), (10.1, 3.0, 0.0)],  # too close together to tell
+    ],
+)
+def test_what_does_not_tell_how_it_goes_on_stays(told):
+    buffer = Buffer()
+    for stamp, x, yaw in told:
+        buffer.add("odom", "base", at(x, 0.0, yaw), stamp)
+    stamp, x, _ = told[-1]
+    assert place(buffer.lookup("odom", "base", stamp + 0.1, ahead=0.2)) == (x, 0.0)
+
+
+def test_a_frame_hangs_from_a_chain_of_others(robot):
+    assert robot.chain("laser") == ["laser", "base_link", "odom", "map"]
+    assert robot.chain("nowhere") == ["nowhere"]

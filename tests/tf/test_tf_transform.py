@@ -110,3 +110,22 @@ def test_a_rotation_that_is_nearly_one_is_set_right():
 def test_what_is_no_transform_is_refused(transform, words):
     with pytest.raises(TransformError, match=words):
         transform.checked()
+
+
+def test_from_above_a_frame_that_hangs_upside_down_is_mirrored():
+    over = Transform(Vector3(1.0, 2.0, 3.0), Quaternion(1.0, 0.0, 0.0, 0.0))
+    assert over.from_above.apply(1.0, 0.5) == pytest.approx((2.0, 1.5))
+    assert over.from_above.determinant == pytest.approx(-1.0)
+
+
+def test_from_above_a_frame_that_stands_upright_is_a_line():
+    half = math.sqrt(0.5)
+    upright = Transform(Vector3(), Quaternion(half, 0.0, 0.0, half))
+    assert upright.from_above.apply(1.0, 7.0) == pytest.approx((1.0, 0.0))
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-9, 9), st.floats(-9, 9))
+def test_from_above_a_plane_turn_is_that_turn(yaw, x, y):
+    flat = Transform.from_pose(Pose(1.0, -1.0, yaw))
+    there = flat.apply(Vector3(x, y))
+    assert flat.from_above.apply(x, y) == pytest.approx((there.x, there.y))
