@@ -27,6 +27,8 @@ CANNOT = 3
 
 def installed():
     """Install ROS unless it is there; return what is where, or why it cannot be."""
+    if sys.prefix == sys.base_prefix:
+        return None, "the tests do not run in a virtual environment to put it into"
     done = subprocess.run(
         [sys.executable, ROOT / "tools" / "make_ros.py", FOLDER],
         capture_output=True,

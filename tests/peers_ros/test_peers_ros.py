@@ -78,7 +78,7 @@ def drive(tab, ros):
         newest = ros.twists()[-1:]
         return bool(newest) and not newest[0].is_zero and away(ros, x, y) > 0.05
 
-    hold(tab.keyboard, "w", comes_along)
+    hold(tab.keyboard, "w", comes_along, within=60.0)
 
 
 def place(ros):
