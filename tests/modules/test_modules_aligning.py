@@ -94,7 +94,9 @@ def begin(tab) -> None:
 
 
 def numbers(tab) -> list[float]:
-    fields = (tab.locator(f".webmap-align-form [name={n}]") for n in ("x", "y", "angle"))
+    fields = (
+        tab.locator(f".webmap-align-form [name={n}]") for n in ("x", "y", "angle")
+    )
     return [float(field.input_value()) for field in fields]
 
 
