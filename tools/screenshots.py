@@ -1,8 +1,10 @@
-"""Take the pictures of the README from the running demo, into docs/images.
+"""Take the pictures of the documentation from what really runs, into docs/images.
 
 Usage: tools/screenshots.py [NAME ...]
 
-Needs Chromium; without names all pictures are taken.
+``console-...`` shows the demo while a robot is driven, ``layers-...`` all that robots
+of the simulator say, as ``webmap view`` draws it. Needs Chromium; without names all
+pictures are taken.
 """
 
 import re
@@ -25,42 +27,64 @@ ARGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"]
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of the console."""
+    """One picture."""
 
-    name: str
+    scene: Literal["console", "layers"]
     scheme: Literal["light", "dark"]
     phone: bool = False
 
     @property
+    def name(self) -> str:
+        """What it is called."""
+        return f"{self.scene}-{'phone-' if self.phone else ''}{self.scheme}"
+
+    @property
     def file(self) -> Path:
         """Where it goes."""
-        return FOLDER / f"console-{self.name}.png"
+        return FOLDER / f"{self.name}.png"
 
 
+SCENES: tuple[Literal["console", "layers"], ...] = ("console", "layers")
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 PICTURES = [
-    Picture("light", "light"),
-    Picture("dark", "dark"),
-    Picture("phone-light", "light", phone=True),
-    Picture("phone-dark", "dark", phone=True),
+    Picture(scene, scheme, phone)
+    for scene in SCENES
+    for phone in (False, True)
+    for scheme in SCHEMES
 ]
+
+
+@contextmanager
+def running(*arguments: str) -> Iterator[str]:
+    """Run a command of WebMap and give the address that it prints."""
+    command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            found = re.search(r"ready at (\S+)", process.stdout.readline())
+            if found is None:
+                raise SystemExit(f"{command} did not start; what it said is above")
+            yield found[1]
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(60)
 
 
 @contextmanager
 def demo() -> Iterator[str]:
     """Run the demo and give its page's address."""
-    command = [sys.executable, "-m", "webmap", "demo", "--no-browser", "--port", "0"]
-    with subprocess.Popen(
-        [*command, "--robots", "6"], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        try:
-            found = re.search(r"ready at (\S+)", process.stdout.readline())
-            if found is None:
-                raise SystemExit("the demo did not start; what it said is above")
-            yield found[1]
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.wait(10)
+    with running("demo", "--no-browser", "--robots", "6") as url:
+        yield url
+
+
+@contextmanager
+def everything() -> Iterator[str]:
+    """Run robots that drive about, show all that they say, and give the address."""
+    with (
+        running("sim", "--robots", "3", "--wander", "--seed", "3") as bridge,
+        running("view", bridge, "--no-browser", "--stops-within", "0.25") as url,
+    ):
+        yield url
 
 
 def open_page(browser: Browser, picture: Picture, url: str) -> Page:
@@ -74,11 +98,48 @@ def open_page(browser: Browser, picture: Picture, url: str) -> Page:
         has_touch=picture.phone,
     )
     page = context.new_page()
+    page.set_default_timeout(90_000)
     page.goto(url)
-    page.locator(".robot:not(.unplaced)").nth(5).wait_for()
-    page.locator("path.dot[d]").nth(5).wait_for(state="attached")
+    page.locator(".robot:not(.unplaced)").nth(2).wait_for()
+    page.locator(".laserscan > path.dot[d]").nth(2).wait_for(state="attached")
     page.locator('#link[data-link="open"]').wait_for()
     return page
+
+
+def take_layers(browser: Browser, picture: Picture, url: str) -> None:
+    """Switch everything on, look closely at a robot, and take the picture."""
+    page = open_page(browser, picture, url)
+    for selector in (
+        ".posearray > .arrow[d]",
+        ".range > .cone[d]",
+        ".pointcloud > [d]",
+    ):
+        page.locator(f'.robot[data-name="robot_1"] {selector}').first.wait_for(
+            state="attached"
+        )
+    page.locator(".webmap-layers > summary").dispatch_event("click")
+    page.get_by_label("Costmaps").dispatch_event("click")
+    page.locator(".occupancy-grid.costmap > image[href]").nth(2).wait_for(
+        state="attached"
+    )
+    if picture.phone:
+        page.locator(".webmap-layers > summary").dispatch_event("click")
+    page.locator('.robot[data-name="robot_1"] .hit').dispatch_event("click")
+    page.locator("#card h2", has_text="robot_1").wait_for(state="attached")
+    page.locator("[data-act=follow]").dispatch_event("click")
+    page.locator("[data-act=follow][aria-pressed=true]").wait_for(state="attached")
+    for _ in range(4 if picture.phone else 1):
+        page.locator("#zoom-in").dispatch_event("click")
+    page.locator('.robot[data-name="robot_1"] .path > polyline[points]').wait_for(
+        state="attached"
+    )
+    page.wait_for_timeout(4000)
+    # What a machine says that is busy with taking pictures.
+    page.locator(".webmap-notice button").evaluate_all(
+        "buttons => buttons.forEach((button) => button.click())"
+    )
+    page.screenshot(path=picture.file)
+    page.context.close()
 
 
 def take(browser: Browser, picture: Picture, url: str) -> None:
@@ -94,7 +155,6 @@ def take(browser: Browser, picture: Picture, url: str) -> None:
         for _ in range(3):
             page.locator("#zoom-in").click()
     drive(page)
-    picture.file.parent.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=picture.file)
     page.keyboard.up("w")
     page.context.close()
@@ -119,14 +179,23 @@ def main(names: list[str]) -> None:
     unknown = set(names) - {picture.name for picture in PICTURES}
     if unknown:
         raise SystemExit(f"there is no picture {', '.join(sorted(unknown))}")
-    with demo() as url, sync_playwright() as playwright:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    wanted = [picture for picture in PICTURES if not names or picture.name in names]
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=which("chromium"), args=ARGS
         )
-        for picture in PICTURES:
-            if not names or picture.name in names:
-                take(browser, picture, url)
-                print(picture.file)
+        for scene, show, shoot in (
+            ("console", demo, take),
+            ("layers", everything, take_layers),
+        ):
+            mine = [picture for picture in wanted if picture.scene == scene]
+            if not mine:
+                continue
+            with show() as url:
+                for picture in mine:
+                    shoot(browser, picture, url)
+                    print(picture.file)
         browser.close()
 
 
