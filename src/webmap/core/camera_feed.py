@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 AGE_LIMIT = 1.0
 """Seconds after which a picture is old."""
 
-LEAST_KEPT, MOST_KEPT = 3, 16
+LEAST_KEPT, MOST_KEPT = 3, 64
 """Pictures that may be asked for: pages that lag still ask for the ones before."""
 
-KEPT_FOR = 2.0
+KEPT_FOR = 5.0
 """Seconds for which one more than the least is kept."""
 
 KEPT_BYTES = 8 << 20
