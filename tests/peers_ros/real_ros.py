@@ -76,7 +76,7 @@ class Program:
         for line in self.popen.stdout:
             self.lines.append(line)
 
-    def wait_for(self, pattern, within=20.0):
+    def wait_for(self, pattern, within=60.0):
         """Return the match in the first line that has one."""
         deadline = time.monotonic() + within
         while time.monotonic() < deadline:
@@ -152,7 +152,7 @@ class Ros:
         self._door.end()
 
 
-def wait_until_known(url, topic, within=20.0):
+def wait_until_known(url, topic, within=60.0):
     """Wait until a bridge has found a topic."""
     subscribe = json.dumps({"op": "subscribe", "topic": topic})
     deadline = time.monotonic() + within
