@@ -13,18 +13,24 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from real_browser import watched_tab
 from webmap.cli.demo import simulator
 
-pytestmark = pytest.mark.browser
+# Alone, as the gate takes no goal that is older than 0.3 s when it comes.
+pytestmark = [pytest.mark.browser, pytest.mark.serial]
+
+expect.set_options(timeout=10_000)
 
 HERE = Path(__file__).parent
 WEBMAP = [sys.executable, "-m", "webmap"]
 QUIET = ["--port", "0", "--no-browser"]
 OUTSIDE = (1180, 400)
 """A place on the screen that is outside of the house."""
+
+WORDS = ".webmap-goal-word, .webmap-locate-word, .webmap-route > .webmap-route-word"
+SLOW = re.compile("older than|is silent|not hold|does not have the robot")
 
 PLACE = """name => {
   const robot = document.querySelector(`.robot[data-name="${name}"]`);
@@ -109,11 +115,38 @@ def beside(tab: Page, name: str, dx: float = 16.0) -> tuple[float, float]:
     return x + math.copysign(dx, middle - x), y
 
 
+def taken(tab: Page, act, said: Locator) -> None:
+    """Do something that the gate takes, and again where its way was too long.
+
+    On a machine that is too busy a command may be older than the gate allows, and then
+    it is refused. Like a person, this tries again.
+    """
+    for _ in range(10):
+        act()
+        tab.wait_for_function(
+            """selector => {
+              const words = [...document.querySelectorAll(selector)];
+              return words.some(word => /^Not |^Told|^Halted|goes to/.test(
+                word.textContent)) || document.querySelector(
+                ".webmap-goal-arrow:not(.aimed, .asked)");
+            }""",
+            arg=WORDS,
+            timeout=20_000,
+        )
+        if not SLOW.search(said.inner_text()):
+            return
+    raise AssertionError(f"too slow again and again: {said.inner_text()}")
+
+
 def send(tab: Page, name: str, to: str = "") -> None:
     """Send a robot beside another, or to where it soon is."""
     pick(tab, name)
-    tab.keyboard.press("g")
-    press(tab, *beside(tab, to or name, 45.0 if to else 16.0), drag=30)
+
+    def act():
+        tab.keyboard.press("g")
+        press(tab, *beside(tab, to or name, 45.0 if to else 16.0), drag=30)
+
+    taken(tab, act, tab.locator(".webmap-goal-word"))
 
 
 def label(tab: Page):
@@ -179,6 +212,13 @@ def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab):
     tab.keyboard.press("i")
     expect(word).to_contain_text("Press where the robot is")
     press(tab, *beside(tab, "Old 0", 5), drag=30)
+
+    def again():
+        if SLOW.search(word.inner_text()):
+            tab.keyboard.press("i")
+            press(tab, *beside(tab, "Old 0", 5), drag=30)
+
+    taken(tab, again, word)
     expect(word).to_have_text("Told.")
     send(tab, "Old 0", "Plain 1")
     expect(label(tab)).to_contain_text("Under way")
@@ -192,13 +232,20 @@ def test_several_robots_go_to_places_beside_each_other(tab):
     pick(tab, "New 0")
     pick(tab, "New 1", shift=True)
     expect(tab.locator(".webmap-goal-go")).to_have_text("Send 2 to a place")
-    tab.keyboard.press("g")
-    x, y = beside(tab, "New 0")
-    tab.mouse.move(x, y)
-    tab.mouse.down()
-    tab.mouse.move(x + 30, y)
-    expect(tab.locator(".webmap-goal-arrow.aimed")).to_have_count(2)
-    tab.mouse.up()
+
+    def act():
+        tab.keyboard.press("g")
+        x, y = beside(tab, "New 0")
+        tab.mouse.move(x, y)
+        tab.mouse.down()
+        tab.mouse.move(x + 30, y)
+        expect(tab.locator(".webmap-goal-arrow.aimed")).to_have_count(2)
+        tab.mouse.up()
+        expect(tab.locator(".webmap-goal-arrow:is(.aimed, .asked)")).to_have_count(
+            0, timeout=20_000
+        )
+
+    taken(tab, act, tab.locator(".webmap-goal-word"))
     under_way = tab.locator(".webmap-goal-arrow:not(.aimed, .asked)")
     expect(under_way).to_have_count(2)
     spots = [
@@ -230,9 +277,13 @@ def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
     tab.locator(".webmap-route-save").click()
     expect(tab.locator(".webmap-route-saved")).to_contain_text("Saved as Round.")
     word = tab.locator(".webmap-route > .webmap-route-word")
-    tab.locator(".webmap-route-run").click()
-    expect(word).to_have_text("New 1 goes to point 1 of 3.")
-    expect(word).to_have_text("New 1 goes to point 2 of 3.", timeout=15_000)
+    taken(tab, tab.locator(".webmap-route-run").click, word)
+    for _ in range(10):
+        expect(word).to_have_text(re.compile("point 2 of 3|^Halted"), timeout=15_000)
+        if not SLOW.search(word.inner_text()):
+            break
+        tab.locator(".webmap-route-pause").click()  # it says "Go on"
+    expect(word).to_have_text("New 1 goes to point 2 of 3.")
     tab.locator(".webmap-route-skip").click()
     expect(word).to_have_text("New 1 goes to point 3 of 3.")
     tab.locator(".webmap-route-pause").click()
