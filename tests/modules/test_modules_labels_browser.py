@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -85,7 +86,7 @@ def serve(bridge, state, tmp_path_factory):
             process.wait(15)
             process.stdout.close()
 
-    serve_.end = end
+    serve_.end, serve_.url = end, ""
     yield serve_
     end()
 
@@ -129,12 +130,25 @@ def test_labels_are_upright_and_as_large_at_every_zoom_and_turn(tab):
     tab.mouse.move(800, 450)
     views = set()
     for shift, delta in [(False, 0), (False, -900), (True, 400), (False, 1200)]:
+        at = tab.locator("svg.webmap .world").evaluate(
+            "e => { const m = e.getCTM(); return [m.a, m.b]; }"
+        )
         if shift:
             tab.keyboard.down("Shift")
         tab.mouse.wheel(0, delta)
         if shift:
             tab.keyboard.up("Shift")
-        tab.wait_for_timeout(150)  # the frame in which labels are turned back
+        # Labels are turned back in the next frame.
+        tab.wait_for_function(
+            "([name, before]) => {"
+            " const world = document.querySelector('svg.webmap .world').getCTM();"
+            " const label = document.querySelector(`[data-name='${name}'] .upright`);"
+            " const m = label.getScreenCTM();"
+            " const moved = before === null || Math.hypot(world.a - before[0],"
+            " world.b - before[1]) > 1e-6;"
+            " return moved && Math.abs(m.b) < 0.005 && Math.abs(m.a - 1) < 0.005; }",
+            arg=["Äpfel <b>", at if delta else None],
+        )
         turn, size = turn_and_size(tab, "Äpfel <b>")
         assert turn == pytest.approx(0, abs=0.01)
         assert size == pytest.approx(1, rel=0.01)
@@ -206,7 +220,7 @@ def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, brid
         robot_node(bridge, {}, {goal: "geometry_msgs/PoseStamped"}) as node,
         watched_tab(chromium, 1280, 800) as tab,
     ):
-        opened(tab, serve.url)
+        opened(tab, serve.url or serve())
         label(tab, "Äpfel <b>").press("Enter")
         send = tab.locator(".webmap-labels-send")
         expect(send).to_be_disabled()
@@ -215,7 +229,9 @@ def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, brid
         send.click()
         expect(tab.locator(".webmap-labels-word")).to_have_text("Sent to Äpfel <b>.")
         expect(tab.locator(".robot.selected")).to_have_count(1)
-        tab.wait_for_timeout(200)
+        deadline = time.monotonic() + 10
+        while not node.heard and time.monotonic() < deadline:
+            tab.wait_for_timeout(20)
         ((_, message),) = node.heard
         position = message["pose"]["position"]
         assert (position["x"], position["y"]) == pytest.approx((3.0, 2.0))
