@@ -119,6 +119,8 @@ def test_a_scan_without_a_stamp_goes_along_with_the_robot(link, scanner):
 
 
 def test_a_scan_by_another_clock_goes_along_and_that_is_said(link, scanner, robot):
+    robot.set_tf(link, quiet=True)
+    tell(link, transform("base_link", "laser", 0.0, 0.0, 0.0, 0), static=True)
     odometry(link, 100.0)
     odometry(link, 100.1)
     link.say("/scan", scan(WALL, 163.0))
@@ -129,6 +131,14 @@ def test_a_scan_by_another_clock_goes_along_and_that_is_said(link, scanner, robo
     assert "are the clocks of the sensor and of the odometry the same?" in problem
     assert "62.900 s later" in problem
     link.say("/scan", scan(WALL, 100.15))
+    assert robot.problems == {}
+
+
+def test_of_a_robot_without_frames_another_clock_is_not_said(link, scanner, robot):
+    odometry(link, 100.0)
+    link.say("/scan", scan(WALL, 163.0))
+    odometry(link, 100.2)
+    assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.2))
     assert robot.problems == {}
 
 

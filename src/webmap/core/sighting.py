@@ -137,8 +137,8 @@ class Sightings:
             found = where.at(reach, AHEAD) @ mount
             return Sighting(found.from_above, settled=False)
         age = self._robot.pose_age
-        if age is None or age > FLOWING:
-            return on_robot
+        if age is None or age > FLOWING or self._robot.tf is None:
+            return on_robot  # who has no frames does not ask for more
         return Sighting(
             mount.from_above,
             on_robot=True,
