@@ -25,6 +25,12 @@ FOLDER = Path(__file__).parents[1] / "docs" / "images"
 ARGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"]
 
 
+CALM = """() => {
+  for (const said of document.querySelectorAll(".webmap-notice button")) said.click();
+  return !document.querySelector(".robot.stale, .laserscan.stale, .webmap-notice");
+}"""
+
+
 @dataclass(frozen=True)
 class Picture:
     """One picture."""
@@ -81,7 +87,7 @@ def demo() -> Iterator[str]:
 def everything() -> Iterator[str]:
     """Run robots that drive about, show all that they say, and give the address."""
     with (
-        running("sim", "--robots", "3", "--wander", "--seed", "3") as bridge,
+        running("sim", "--robots", "2", "--wander", "--seed", "3") as bridge,
         running("view", bridge, "--no-browser", "--stops-within", "0.25") as url,
     ):
         yield url
@@ -100,8 +106,8 @@ def open_page(browser: Browser, picture: Picture, url: str) -> Page:
     page = context.new_page()
     page.set_default_timeout(90_000)
     page.goto(url)
-    page.locator(".robot:not(.unplaced)").nth(2).wait_for()
-    page.locator(".laserscan > path.dot[d]").nth(2).wait_for(state="attached")
+    page.locator(".robot:not(.unplaced)").nth(1).wait_for()
+    page.locator(".laserscan > path.dot[d]").nth(1).wait_for(state="attached")
     page.locator('#link[data-link="open"]').wait_for()
     return page
 
@@ -119,7 +125,7 @@ def take_layers(browser: Browser, picture: Picture, url: str) -> None:
         )
     page.locator(".webmap-layers > summary").dispatch_event("click")
     page.get_by_label("Costmaps").dispatch_event("click")
-    page.locator(".occupancy-grid.costmap > image[href]").nth(2).wait_for(
+    page.locator(".occupancy-grid.costmap > image[href]").nth(1).wait_for(
         state="attached"
     )
     if picture.phone:
@@ -133,11 +139,10 @@ def take_layers(browser: Browser, picture: Picture, url: str) -> None:
     page.locator('.robot[data-name="robot_1"] .path > polyline[points]').wait_for(
         state="attached"
     )
-    page.wait_for_timeout(4000)
-    # What a machine says that is busy with taking pictures.
-    page.locator(".webmap-notice button").evaluate_all(
-        "buttons => buttons.forEach((button) => button.click())"
-    )
+    page.wait_for_timeout(2000)
+    # A machine that is busy with other things shows old data and complaints: wait for
+    # a moment in which it is not.
+    page.wait_for_function(CALM, polling=200)
     page.screenshot(path=picture.file)
     page.context.close()
 
