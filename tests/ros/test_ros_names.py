@@ -1,4 +1,5 @@
 import contextlib
+import re
 
 import pytest
 from hypothesis import given
@@ -96,3 +97,9 @@ def test_any_text_is_a_name_or_refused(text):
     for function in (names.normalise_topic, names.split_type, names.normalise_url):
         with contextlib.suppress(ConfigError):
             function(text)
+
+
+@pytest.mark.parametrize("bare", ["robot:9090", "10.0.0.7:9090", "[::1]:9090", "robot"])
+def test_an_address_without_its_scheme_is_told_what_it_may_have_meant(bare):
+    with pytest.raises(ConfigError, match=re.escape(f"did you mean 'ws://{bare}'?")):
+        names.normalise_url(bare)

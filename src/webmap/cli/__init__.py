@@ -44,7 +44,7 @@ class LazyGroup(click.Group):
 )
 @click.version_option(webmap.__version__, "-V", "--version", prog_name="webmap")
 def cli() -> None:
-    r"""See and drive robots that run ROS, on a map in the browser.
+    """See and drive robots that run ROS, on a map in the browser.
 
     \b
     webmap demo                    two simulated robots, to try everything

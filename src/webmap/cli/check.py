@@ -7,7 +7,7 @@ import click
 from webmap.cli.options import verbose_option
 
 
-@click.command()
+@click.command(short_help="Say what is wrong in a fleet file.")
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @verbose_option
 def check(file: Path) -> None:

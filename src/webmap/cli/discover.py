@@ -9,7 +9,7 @@ from webmap.cli.options import verbose_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
-@click.command()
+@click.command(short_help="Print the robots behind a bridge, their topics, and why.")
 @click.argument("url", nargs=-1, required=True)
 @click.option("--toml", is_flag=True, help="Print a fleet file, to be kept.")
 @click.option(

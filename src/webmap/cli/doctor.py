@@ -9,7 +9,7 @@ from webmap.cli.options import verbose_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
-@click.command()
+@click.command(short_help="Say what is in the way of driving the robots of a bridge.")
 @click.argument("url", nargs=-1, required=True)
 @click.option(
     "--seconds",

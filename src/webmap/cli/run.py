@@ -9,7 +9,7 @@ import click
 from webmap.cli.options import web_options
 
 
-@click.command()
+@click.command(short_help="Serve your own pages, or the robots of a fleet file.")
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @web_options
 def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) -> None:

@@ -54,7 +54,7 @@ def view(
     no_browser: bool,
     insecure_lan: bool,
 ) -> None:
-    r"""See and drive the robots behind one rosbridge or several.
+    """See and drive the robots behind one rosbridge or several.
 
     URL is a rosbridge's: ws://robot:9090. The robots behind it are found by their
     topics, also those that appear later; say with --robot what is found wrongly.

@@ -12,6 +12,7 @@ _TYPE = re.compile(
     r"(?:/(?P<kind>msg|srv|action))?"
     r"/(?P<name>[A-Za-z][A-Za-z0-9_]*)\Z"
 )
+_HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
 _DEFAULT_PORT = {"ws": 80, "wss": 443}
 _MAX_NAME = 255
 
@@ -123,6 +124,8 @@ def normalise_url(url: str) -> str:
         raise ConfigError(
             f"{url!r} is not the address of a rosbridge ({error}): {hint}"
         ) from None
+    if "://" not in url and _HOST.fullmatch(url.strip()):
+        hint = f"did you mean 'ws://{url.strip()}'?"
     if parts.scheme not in _DEFAULT_PORT or not host or port == 0:
         raise ConfigError(f"{url!r} is not the address of a rosbridge: {hint}")
     if parts.username is not None or parts.fragment:
