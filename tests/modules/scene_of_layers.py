@@ -11,6 +11,9 @@ from module_fakes import Link, header, pose
 import webmap
 
 link = Link()
+UNSTAMPED = {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "base_link"}
+"""Of what goes along with the robot."""
+
 bob = webmap.Robot("Bob")
 bob.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
 bob.add_module("Path", link, "/plan")
@@ -63,7 +66,7 @@ def first() -> None:
     link.say("/plan", {"header": header(), "poses": poses})
     foot = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
     points = [{"x": x, "y": y, "z": 0} for x, y in foot]
-    link.say("/footprint", {"header": header(), "polygon": {"points": points}})
+    link.say("/footprint", {"header": UNSTAMPED, "polygon": {"points": points}})
     cube = marker(1, 1, (-1.5, 0.25, 0.3), (0.5, 0.5, 0.5))
     words = marker(2, 9, (0, 0.4, 0), (0, 0, 0.3), "<b>Küche</b>")
     link.say("/markers", {"markers": [cube, words]})
@@ -73,7 +76,7 @@ def first() -> None:
         for i, name in enumerate("xyz")
     ]
     step = {"point_step": 12, "row_step": 12, "is_bigendian": False}
-    cloud = {"header": header(), "height": 1, "width": 1, "fields": fields, **step}
+    cloud = {"header": UNSTAMPED, "height": 1, "width": 1, "fields": fields, **step}
     link.say("/points", {**cloud, "data": list(data.tobytes()), "is_dense": True})
 
 
