@@ -187,8 +187,8 @@ class TestAfterACrash:
     def test_a_machine_that_was_driven_gets_zeros_on_first_contact(self):
         bench = Bench(was_driven=True).begin()
         assert bench.written[0].twist == ZERO
-        bench.run(2.0)
-        assert len(bench.written) in (10, 11)
+        bench.run(5.0)
+        assert len(bench.written) in (60, 61), "a bridge may find the robot late"
         assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 
     def test_also_if_the_link_was_there_before_the_lock(self):
@@ -224,5 +224,5 @@ class TestAfterACrash:
         bench.run(5.0)
         assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
         bench.connect_links()
-        bench.run(1.0)
+        bench.run(4.0)
         assert len(bench.did(actions.MarkDriven)) == 2

@@ -6,6 +6,13 @@ PERIOD = 0.05
 LENGTH = 0.5
 """Seconds from the first zero to silence."""
 
+NEW_LINK_LENGTH = 3.0
+"""The same on a link that is new, where a zero is owed.
+
+A bridge that was only just started has yet to find the robot, and loses what it is told
+until then: up to 1.6 s were seen.
+"""
+
 
 HELD_PERIOD = 0.1
 """Seconds between two zeros while STOP stands (S8)."""
@@ -30,14 +37,21 @@ class Burst:
 
     def __init__(self, period: float = PERIOD, length: float = LENGTH) -> None:
         self._period = period
-        self._length = length
+        self._length = self._usual = length
         self.running = False
         self.started_at = float("-inf")
         self._due = float("-inf")
 
-    def start(self, now: float) -> None:
-        """Begin, or begin again; the first zero is due at once."""
+    def start(self, now: float, length: float | None = None) -> None:
+        """Begin, or begin again; the first zero is due at once.
+
+        Args:
+            now: Seconds, monotonic.
+            length: Seconds from here to silence, in place of the usual ones.
+
+        """
         self.running = True
+        self._length = self._usual if length is None else length
         self.started_at = self._due = now
 
     def end(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
-from webmap.gate.burst import HELD_LENGTH, HELD_PERIOD, Burst
+from webmap.gate.burst import HELD_LENGTH, HELD_PERIOD, NEW_LINK_LENGTH, Burst
 from webmap.gate.events import Key, Wrote
 from webmap.gate.health import Health
 from webmap.gate.lease import Lease
@@ -101,12 +101,18 @@ class Motion:
         if self.driving:
             self.zero(now)
 
-    def zero(self, now: float) -> None:
-        """Write zero at once, whatever was before, and for a moment from here on."""
+    def zero(self, now: float, length: float | None = None) -> None:
+        """Write zero at once, whatever was before, and for a moment from here on.
+
+        Args:
+            now: Seconds, monotonic.
+            length: Seconds of that moment, in place of the usual ones.
+
+        """
         if self.stopping and self._burst.started_at == now:
             return
         self.driving, self._pending, self._left_alone = False, None, False
-        self._burst.start(now)
+        self._burst.start(now, length)
         self._owe_zero()
         self._write_zero_if_due(now)
 
@@ -128,7 +134,7 @@ class Motion:
         """Write the zero that is owed, now that there is a link again."""
         if self.owes_zero:
             self._burst.end()  # what it wrote just now went to the link before
-            self.zero(now)
+            self.zero(now, NEW_LINK_LENGTH)
 
     def owe_from_before(self) -> None:
         """Note that an earlier gate may have left the machine moving."""
