@@ -51,11 +51,17 @@ class RobotCard:
         element: The page's element to fill; it is hidden while nothing is selected.
         goals: What sends robots somewhere.
         poses: What tells robots where they are.
+        most: What this page drives a robot at, in m/s and rad/s.
 
     """
 
     def __init__(
-        self, map: "Map", element: "Element", goals: Goals, poses: Poses
+        self,
+        map: "Map",
+        element: "Element",
+        goals: Goals,
+        poses: Poses,
+        most: tuple[float, float],
     ) -> None:
         self.map = map
         self.element = element
@@ -76,7 +82,7 @@ class RobotCard:
         self._battery = html.dd()
         self._goal = GoalLine()
         self._cameras = CameraViews()
-        self._speeds = SpeedTable()
+        self._speeds = SpeedTable(most)
         element.append(*self._parts())
         self.on_select()
 
@@ -187,10 +193,10 @@ class RobotCard:
             self._reason,
             self._goal.element,
             self._problems,
+            actions,
             self._cameras.element,
             facts,
             *self._speeds.elements,
-            actions,
         ]
 
     def _forget_goal(self) -> None:

@@ -15,10 +15,20 @@ Velocity = tuple[float, float, float]
 COLUMNS = ("Sent", "Echoed", "Measured")
 
 
-class SpeedTable:
-    """Three views of one motion, which agree as long as all is well."""
+OF_THE_PAGE = "limit of the page"
+"""Why a robot is driven no faster that might be."""
 
-    def __init__(self) -> None:
+
+class SpeedTable:
+    """Three views of one motion, which agree as long as all is well.
+
+    Args:
+        most: What this page asks for at most, in m/s and rad/s.
+
+    """
+
+    def __init__(self, most: tuple[float, float]) -> None:
+        self._most = most
         self._linear = [html.td() for _ in COLUMNS]
         self._turn = [html.td() for _ in COLUMNS]
         self._cap = html.span()
@@ -42,8 +52,12 @@ class SpeedTable:
             )
         self.elements[1].set(hidden=report is None)
         if report is not None:
-            self._cap.text = cap(report.v, report.w)
-            self._show_reasons(tuple(report.why))
+            # Before somebody has it, its own limits alone are in the report.
+            self._cap.text = cap(
+                min(report.v, self._most[0]), min(report.w, self._most[1])
+            )
+            lower = report.v > self._most[0] or report.w > self._most[1]
+            self._show_reasons((*report.why, OF_THE_PAGE) if lower else report.why)
 
     def _show_reasons(self, reasons: tuple[str, ...]) -> None:
         if reasons == self._reasons:
@@ -96,9 +110,4 @@ def turn(velocity: Velocity | None) -> str:
 
 def cap(v: float, w: float) -> str:
     """Return the speeds in force as people read them."""
-    parts = [
-        f"{number(value)} {unit}"
-        for value, unit in ((v, "m/s"), (w, "rad/s"))
-        if math.isfinite(value)
-    ]
-    return ", ".join(parts) or "none"
+    return f"{number(v)} m/s, {number(w)} rad/s"
