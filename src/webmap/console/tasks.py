@@ -1,12 +1,11 @@
 """How it stands with the selected robot's goal, on its card."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from webmap import html, svg
 
 if TYPE_CHECKING:
     from webmap import Robot
-    from webmap.gate.messages import GoalReport
 
 LOOKS = {
     "sent": ("Goal sent", "goal-sent", "active"),
@@ -19,6 +18,30 @@ LOOKS = {
     "cancelled": ("Goal cancelled", "goal-cancelled", ""),
 }
 """The words, the symbol of console.html and the tone of each state."""
+
+
+class Goal(Protocol):
+    """What a robot's report says of its goal, as far as it is told in numbers."""
+
+    @property
+    def state(self) -> str:
+        """How it stands."""
+
+    @property
+    def left(self) -> float | None:
+        """The rest of the way, in metres."""
+
+    @property
+    def eta(self) -> float | None:
+        """The rest of the time, in seconds."""
+
+    @property
+    def time(self) -> float | None:
+        """How long it has been under way, in seconds."""
+
+    @property
+    def recoveries(self) -> int | None:
+        """How often the robot had to free itself."""
 
 
 class GoalLine:
@@ -46,7 +69,7 @@ class GoalLine:
         self._figures.text = figures(goal)
 
 
-def figures(goal: "GoalReport") -> str:
+def figures(goal: Goal) -> str:
     """Return what the robot tells of a goal that it follows, in numbers with units."""
     if goal.state not in ("under way", "cancelling"):
         return ""

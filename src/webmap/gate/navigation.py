@@ -190,7 +190,7 @@ def _complaint(text: str, goal: SendGoal) -> GoalEnded | None:
     """Return what the bridge's error means, if it is about the goal."""
     if "send_action_goal" not in text:
         return None
-    if "nknown operation" in text:
+    if "unknown operation" in text.lower():
         why = "the bridge is too old for goals of an action"
         return GoalEnded(goal.robot, goal.id, "failed", why, no_actions=True)
     return _ended(goal, "failed", text)

@@ -116,18 +116,16 @@ class Line:
             if message["type"] == "websocket.disconnect":
                 self._gone = True
                 return
-            text = message.get("text")
-            broken = self._broken(text)
+            text: str | None = message.get("text")
+            if text is None:
+                broken: str | None = "a binary message; only text is taken"
+            else:
+                broken = self._allowance.spend(text, time.monotonic())
             if broken is not None:
                 on_broken(broken)
                 self._end(BROKEN_RULE, broken)
                 return
-            on_text(text)
-
-    def _broken(self, text: str | None) -> str | None:
-        if text is None:
-            return "a binary message; only text is taken"
-        return self._allowance.spend(text, time.monotonic())
+            on_text(text or "")
 
     async def _write(self) -> None:
         while True:

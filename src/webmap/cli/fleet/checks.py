@@ -95,7 +95,9 @@ def above_zero(unit: str) -> Check:
 
 def covariance(value: Any) -> list[float]:
     """Take the variances of x, y and yaw."""
-    numbers = value if isinstance(value, list) and len(value) == 3 else [None]
+    numbers: list[Any] = [None]
+    if isinstance(value, list) and len(value) == 3:
+        numbers = value
     for number in numbers:
         plain = isinstance(number, int | float) and not isinstance(number, bool)
         if not plain or not 0 <= number <= LARGEST:

@@ -22,7 +22,6 @@ LAYERS = {
     "Ranges": ".range",
     "Markers": ".markers",
     "Satellite fixes": ".navsatfix",
-    "Tiles": ".tiles",
     "Labels": ".labels",
     "Health": ".diagnostics",
 }

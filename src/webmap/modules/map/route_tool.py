@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from webmap.core.route_store import RouteStore, read_name, read_route
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
 from webmap.gate.locks import state_folder
-from webmap.modules.map.route_store import RouteStore, read_name, read_route
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
