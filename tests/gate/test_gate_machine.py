@@ -366,7 +366,7 @@ class Motion(RuleBasedStateMachine):
     def everybody_rests(self):
         if self.bench.report().asker is not None:
             self._rest(10.0)  # it is granted by itself
-        self._rest(3.0)
+        self._rest(4.0)  # zeros on a new link go on for three seconds
         assert not self.bench.report().changing or not self.bench.up
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
         if self.stands:

@@ -86,7 +86,7 @@ def test_addresses_have_one_spelling(url, normal):
 )
 def test_what_is_no_address_is_refused(bad):
     with pytest.raises(
-        ConfigError, match=r"expected one such as|no user name"
+        ConfigError, match=r"expected one such as|no user name|did you mean"
     ) as caught:
         names.normalise_url(bad)
     assert "secret" not in str(caught.value)

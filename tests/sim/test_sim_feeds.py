@@ -320,13 +320,13 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
 
 
 def test_a_fix_is_where_the_robot_is_on_the_globe():
-    from webmap.modules.robot.nav_sat_fix import metres_from
+    from webmap.core.local_plane import LocalPlane
     from webmap.sim.feeds.satellites import DATUM
 
     bench = Bench(robots=1)
     robot = bench.world.robots[0]
     fix = heard(bench, "/robot_0/fix")[0]
-    east, north = metres_from(DATUM, (fix["latitude"], fix["longitude"]))
+    east, north = LocalPlane(*DATUM).from_globe(fix["latitude"], fix["longitude"])
     assert (east, north) == pytest.approx((robot.pose.x, robot.pose.y), abs=1e-3)
 
 
