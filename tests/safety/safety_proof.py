@@ -8,6 +8,7 @@ from safety_bench import V_MAX, W_MAX, Bench, pass_time, wait_for
 from safety_figures import Figure, note
 from safety_run import FULL, TRIALS, Progress, grace, is_measured
 
+from webmap.gate.burst import LENGTH, NEW_LINK_LENGTH
 from webmap.testing import Bounds, Quiet, check_invariants
 
 EVERY = 5
@@ -48,6 +49,7 @@ class ProvingBench(Bench):
         watch=0.5,
         few_late=0,
         before=lambda: None,
+        new_link=False,
     ):
         """Inflict a fault on a robot that is driven, as often as is asked for.
 
@@ -63,8 +65,11 @@ class ProvingBench(Bench):
             few_late: How many moving velocities may still come when it is mended, if
                 the robot is driven through a link that keeps what it cannot pass on.
             before: Happens while the robot moves, before the fault.
+            new_link: Whether the zeros may be owed on a new link, where they go on for
+                longer; so they are if nobody can send one.
 
         """
+        zeros = NEW_LINK_LENGTH if new_link or stops_by == "itself" else LENGTH
         if is_measured(name):
             pytest.skip("the run that is resumed has it")
         begin, figures, progress = time.monotonic(), [], Progress(name, TRIALS)
@@ -79,11 +84,17 @@ class ProvingBench(Bench):
             self._mend(figure, back, held_after, watched, few_late)
             figures.append(figure)
             progress.add(figure["late"], figure["jitter"])
-        pass_time(0.7)
+        pass_time(zeros + 0.2)
         log = [told for told in self.robot.log.told if told.at >= begin]
         wrong = check_invariants(
             log,
-            Bounds(V_MAX, W_MAX, late=few_late, slack=0.1 + self.sentinel.worst(begin)),
+            Bounds(
+                V_MAX,
+                W_MAX,
+                zeros=zeros,
+                late=few_late,
+                slack=0.1 + self.sentinel.worst(begin),
+            ),
             quiet=self.quiet,
             unreachable=self.unreachable,
             causes=self.causes,

@@ -32,6 +32,7 @@ def test_the_end_of_the_display_stops_the_robot(bench, name, sig):
         lambda: bench.display.popen.send_signal(sig),
         within=PROMISED,
         back=back,
+        new_link=True,  # the next gate's, if this one did not get to write its last
     )
 
 
