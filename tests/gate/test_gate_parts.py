@@ -324,3 +324,22 @@ class TestConnection:
         assert not news("r1", "drive", "why", 0.9)
         assert news("r1", "drive", "another", 0.9)
         assert news("r1", "drive", "why", 1.0)
+
+
+def test_a_burst_that_begins_again_ends_no_earlier_than_it_would_have():
+    burst = Burst(period=0.05, length=0.5)
+    burst.start(0.0, 3.0)
+    burst.start(1.0)
+    assert due_until(burst, 1.0, 5.0) == pytest.approx(3.0, abs=0.06)
+    burst.start(6.0)
+    assert due_until(burst, 6.0, 9.0) == pytest.approx(6.5, abs=0.06)
+
+
+def due_until(burst: Burst, now: float, end: float) -> float:
+    """Return when a burst wrote its last zero."""
+    last = now
+    while now < end:
+        if burst.zero_due(now):
+            last = now
+        now += 0.01
+    return last

@@ -45,13 +45,17 @@ class Burst:
     def start(self, now: float, length: float | None = None) -> None:
         """Begin, or begin again; the first zero is due at once.
 
+        Silence never comes earlier by that than it would have come without.
+
         Args:
             now: Seconds, monotonic.
             length: Seconds from here to silence, in place of the usual ones.
 
         """
+        length = self._usual if length is None else length
+        left = self.started_at + self._length - now if self.running else 0.0
+        self._length = max(length, left)
         self.running = True
-        self._length = self._usual if length is None else length
         self.started_at = self._due = now
 
     def end(self) -> None:
