@@ -85,11 +85,9 @@ class ProgramRoad:
             MotionError: If the pose is not made of finite numbers.
 
         """
-        if not all(map(math.isfinite, (x, y, yaw))):
-            raise MotionError(f"a pose is made of finite numbers, got {(x, y, yaw)}")
+        pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            pose = (float(x), float(y), float(yaw))
             self._tell(messages.ProgramMove(robot_id, epoch, tick, pose))
 
     def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
@@ -100,11 +98,9 @@ class ProgramRoad:
             MotionError: If the pose is not made of finite numbers.
 
         """
-        if not all(map(math.isfinite, (x, y, yaw))):
-            raise MotionError(f"a pose is made of finite numbers, got {(x, y, yaw)}")
+        pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            pose = (float(x), float(y), float(yaw))
             self._tell(messages.ProgramLocate(robot_id, epoch, tick, pose))
 
     def cancel(self, robot_id: str) -> None:
@@ -153,3 +149,9 @@ class ProgramRoad:
             self._epochs.clear()
         for future in takes.values():
             future.set_exception(NoLease(why))
+
+
+def _finite(x: float, y: float, yaw: float) -> tuple[float, float, float]:
+    if not all(map(math.isfinite, (x, y, yaw))):
+        raise MotionError(f"a pose is made of finite numbers, got {(x, y, yaw)}")
+    return float(x), float(y), float(yaw)
