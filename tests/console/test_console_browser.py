@@ -279,3 +279,44 @@ def test_a_layer_is_switched_off_for_one_viewer_and_stays_off(open_console):
     page.get_by_role("checkbox", name="Scans").check()
     expect(scans.first).to_be_visible()
     expect(page.get_by_role("checkbox", name="Costmaps")).to_have_count(0)
+
+
+def test_points_of_a_route_are_added_by_touch_after_a_pose_was_set_in_between(
+    open_console,
+):
+    page = open_console("phone")
+    page.locator("#sheet").tap()
+    page.locator("#robots .row").first.tap()
+    page.locator("#sheet").tap()
+    page.locator(".webmap-route > summary").tap()
+    edit = page.locator(".webmap-route-edit")
+    edit.tap()
+    points = page.locator(".webmap-route-list > li")
+    floor = page.locator("image.floor.day").bounding_box()
+
+    def tap_floor(count: int) -> None:
+        # In the lower left, which neither a panel nor the stick covers.
+        page.touchscreen.tap(
+            floor["x"] + 0.1 * count * floor["width"],
+            floor["y"] + 0.8 * floor["height"],
+        )
+
+    tap_floor(1)
+    expect(points).to_have_count(1)
+    page.locator("#sheet").tap()
+    page.get_by_role("button", name="Set pose").tap()
+    expect(page.locator(".webmap-route > .webmap-route-word")).to_have_text(
+        "More points afterwards."
+    )
+    tap_floor(2)
+    expect(page.locator(".webmap-locate-word")).to_contain_text(
+        re.compile("^Told|^Not told")
+    )
+    expect(edit).to_have_text("Done")
+    for count in (2, 3):
+        tap_floor(count)
+        expect(points).to_have_count(count)
+    expect(page.locator(".robot.selected")).to_have_count(1)
+    edit.tap()
+    tap_floor(4)
+    expect(page.locator(".robot.selected")).to_have_count(0)

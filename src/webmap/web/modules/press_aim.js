@@ -18,6 +18,8 @@ import { poseOf } from "./robot_places.js";
  * @property {(pose: Pose) => void} done The press was let go of at this pose.
  * @property {() => Pose | null} [origin] From where one comes, for a press without a
  *     drag; the selected robot if not given.
+ * @property {boolean} [lasting] It aims press after press until it is left: a tool that
+ *     aims once in between hands the map back to it.
  */
 
 /** @type {WeakMap<MapCanvas, PressAim>} The one that is active on a map. */
@@ -27,7 +29,7 @@ const active = new WeakMap();
  * Press where, drag which way, release: how a pose is given on a map.
  *
  * Begins by a key or {@link PressAim#activate}; Escape leaves. One tool of a map aims at
- * a time.
+ * a time; one that aims press after press goes on when another has aimed in between.
  */
 export class PressAim {
   /**
@@ -40,6 +42,8 @@ export class PressAim {
     this._key = key;
     this._aims = aims;
     this.active = false;
+    /** @type {PressAim | null} What goes on when this one has ended. */
+    this._interrupted = null;
     /** @type {{id: number, from: Point, robot: string | null} | null} */
     this._press = null;
     this._ending = new AbortController();
@@ -48,6 +52,7 @@ export class PressAim {
   }
 
   destroy() {
+    this._interrupted = null;
     this.leave();
     this._ending.abort();
     this._offEscape();
@@ -57,22 +62,42 @@ export class PressAim {
     this.activate(!this.active);
   }
 
+  /** Whether it goes on as soon as another has aimed. */
+  get waits() {
+    return active.get(this._map)?._interrupted === this;
+  }
+
   /** @param {boolean} on */
   activate(on) {
     const was = this.active;
-    this.active = on && this._aims.mayBegin();
-    if (this.active) {
-      const other = active.get(this._map);
-      if (other !== this) other?.leave();
-      active.set(this._map, this);
-    } else {
-      this.drop();
-      if (active.get(this._map) === this) active.delete(this._map);
-    }
+    this.active = on && !this._ending.signal.aborted && this._aims.mayBegin();
+    if (this.active) this._takeMap();
+    const back = this.active ? null : this._leaveMap();
     if (this.active !== was) {
       this._map.svg.classList.toggle("webmap-aiming", active.has(this._map));
     }
     this._aims.changed(this.active);
+    // Else the next press of whom it was in would select no robot.
+    if (!active.has(this._map)) back?.activate(true);
+  }
+
+  _takeMap() {
+    const other = active.get(this._map);
+    active.set(this._map, this);
+    if (!other || other === this) return;
+    const back = other._aims.lasting ? other : other._interrupted;
+    other._interrupted = null;
+    this._interrupted = back === this ? null : back;
+    other.leave();
+  }
+
+  /** @returns {PressAim | null} What goes on now. */
+  _leaveMap() {
+    const back = this._interrupted;
+    this._interrupted = null;
+    this.drop();
+    if (active.get(this._map) === this) active.delete(this._map);
+    return back;
   }
 
   /** @returns {boolean} Whether there was something to leave. */

@@ -54,7 +54,7 @@ class RouteTool {
     this._aimed = null;
     this._listed = "";
     this._aim = new PressAim(map, "", {
-      mayBegin: () => true,
+      mayBegin: () => this._details.open,
       changed: () => this._show(),
       preview: (pose) => this._preview(pose),
       done: (pose) => {
@@ -62,6 +62,7 @@ class RouteTool {
         this._add(pose);
       },
       origin: () => this._points.at(-1) ?? this._robotPose(),
+      lasting: true,
     });
     this._drawing = new RoutePoints(map, (index, pose) => this._change(index, pose));
     this._edit = button("webmap-route-edit", "Add points", () => this._aim.toggle());
@@ -273,7 +274,7 @@ class RouteTool {
     this._edit.setAttribute("aria-pressed", String(this._aim.active));
     say(this._edit, this._aim.active ? "Done" : "Add points");
     // So that there is a map to press on, on a phone too.
-    this._details.classList.toggle("adding", this._aim.active);
+    this._details.classList.toggle("adding", this._aim.active || this._aim.waits);
     this._loop.setAttribute("aria-pressed", String(this._loops));
     this._here.disabled = this._robotPose() === null;
     this._clear.disabled = this._points.length === 0;
@@ -297,6 +298,7 @@ class RouteTool {
   /** @param {RouteRun | undefined} run @param {string} name */
   _words(run, name) {
     if (this._aim.active) return "Press on the map for each point, drag for the heading.";
+    if (this._aim.waits) return "More points afterwards.";
     if (run === undefined) {
       return this._map.selected === null ? "Select the robot that is to go." : "";
     }
