@@ -4,11 +4,12 @@ import { Hands } from "./motion/hands.js";
 import { Line } from "./motion/line.js";
 import { Loop } from "./motion/loop.js";
 import { Onset } from "./motion/onset.js";
-import { Pilot, TAKE_PATIENCE } from "./motion/pilot.js";
+import { Pilot } from "./motion/pilot.js";
+import { TAKE_PATIENCE } from "./motion/reach.js";
 import { Stopping } from "./motion/stopping.js";
 
 /** @typedef {import('./motion/axes.js').Axes} Axes */
-/** @typedef {import('./motion/pilot.js').Command} Command */
+/** @typedef {import('./motion/stream.js').Command} Command */
 /** @typedef {import('./motion/report.js').RobotReport} RobotReport */
 /** @typedef {import('./motion/stopping.js').Verdict} Verdict */
 /** @typedef {'connecting' | 'open' | 'late' | 'lost'} LinkState */
@@ -147,10 +148,7 @@ export class Drive {
    * @returns {() => void} The operator goes by it no more.
    */
   goBy(robot, age) {
-    this._pilot.video.set(robot, age);
-    return () => {
-      if (this._pilot.video.get(robot) === age) this._pilot.video.delete(robot);
-    };
+    return this._pilot.pictures.goBy(robot, age);
   }
 
   /** Forget what is held and go neutral at once: for inputs that are in doubt. */

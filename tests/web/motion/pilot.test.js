@@ -3,7 +3,8 @@ import { beforeEach, describe, test } from "node:test";
 
 import { Hands } from "../../../src/webmap/web/motion/hands.js";
 import { Loop } from "../../../src/webmap/web/motion/loop.js";
-import { Pilot, TAKE_PATIENCE } from "../../../src/webmap/web/motion/pilot.js";
+import { Pilot } from "../../../src/webmap/web/motion/pilot.js";
+import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/reach.js";
 
 const FORWARD = { x: 1, y: 0, turn: 0 };
 
@@ -489,23 +490,23 @@ describe("a camera that the operator goes by", () => {
   const last = () => bench.sent.filter((m) => m.op === "drive").at(-1);
 
   test("is spoken of in each command, and only while there is one", () => {
-    bench.pilot.video.set("r1", () => 123.4);
+    const end = bench.pilot.pictures.goBy("r1", () => 123.4);
     bench.drive();
     assert.equal(last().video, 123);
-    bench.pilot.video.delete("r1");
+    end();
     bench.run(50);
     assert.ok(!("video" in last()));
   });
 
   test("of another robot says nothing of this one", () => {
-    bench.pilot.video.set("r2", () => 9999);
+    bench.pilot.pictures.goBy("r2", () => 9999);
     bench.drive();
     assert.ok(!("video" in last()));
   });
 
   test("stops the robot when it freezes, until hands are off and press again", () => {
     let age = 100;
-    bench.pilot.video.set("r1", () => age);
+    bench.pilot.pictures.goBy("r1", () => age);
     bench.drive();
     age = 1001;
     assert.deepEqual(moves(bench.run(500)), []);
@@ -518,7 +519,7 @@ describe("a camera that the operator goes by", () => {
   });
 
   test("that never had a picture is as old as a number can tell", () => {
-    bench.pilot.video.set("r1", () => Infinity);
+    bench.pilot.pictures.goBy("r1", () => Infinity);
     bench.press();
     bench.grant("r1");
     assert.deepEqual(moves(bench.run(600)), []);

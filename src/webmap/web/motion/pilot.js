@@ -1,29 +1,11 @@
-import { NEUTRAL, isNeutral } from "./axes.js";
-import { heldByAnother, mayReach } from "./report.js";
+import { Leases } from "./leases.js";
+import { Reach } from "./reach.js";
+import { Stream } from "./stream.js";
 
-/** @typedef {import('./axes.js').Axes} Axes */
 /** @typedef {import('./hands.js').Hands} Hands */
 /** @typedef {import('./loop.js').Loop} Loop */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
-
-/** @typedef {{op: string, robot: string, [field: string]: unknown}} Command */
-
-/**
- * For how long neutral is streamed, counted from the gate's first acknowledgement of
- * it, before a new lease moves anything; ms. The gate asks for 200 ms of neutral as
- * it saw them; counting from the acknowledgement makes sure that it did, whatever
- * the delay on the way.
- */
-export const SETTLE = 250;
-
-/** A take that was not answered for this long is given up; ms. */
-export const TAKE_PATIENCE = 1500;
-
-/** The oldest picture that a robot is driven by, once a camera was chosen; ms. */
-export const BLIND = 1000;
-
-/** Steps come every 50 ms; after a longer gap than this the page was not awake; ms. */
-export const ASLEEP = 250;
+/** @typedef {import('./stream.js').Command} Command */
 
 /**
  * Decides what this page says to the gate: which lease to take, keep and give back,
@@ -44,73 +26,54 @@ export class Pilot {
    */
   constructor(hands, loop, now, { releaseAfter = 30_000 } = {}) {
     this.hands = hands;
-    this.loop = loop;
     this.releaseAfter = releaseAfter;
-    /**
-     * The newest report of each robot.
-     * @type {Map<string, RobotReport>}
-     */
-    this.robots = new Map();
-    /**
-     * The robot that a press drives.
-     * @type {string | null}
-     */
-    this.choice = null;
-    /**
-     * Why the gate refused the last thing that was asked for the chosen robot.
-     * @type {string | null}
-     */
-    this.refusal = null;
-    /** What it was that was refused. */
-    this.refused = "";
-    this._seq = 0;
-    this._steppedAt = now;
-    /**
-     * A lease that was asked for.
-     * @type {{robot: string, since: number, alive: boolean} | null}
-     */
-    this._asked = null;
-    /**
-     * The lease that drives.
-     * @type {{robot: string, epoch: number, firstNeutral: number | null,
-     *     seenSince: number | null, movedAt: number} | null}
-     */
-    this._lease = null;
-    /**
-     * Robots that another holds and that were asked for.
-     * @type {Set<string>}
-     */
-    this._begged = new Set();
-    /**
-     * When leases that serve a goal were last used.
-     * @type {Map<string, number>}
-     */
-    this._parked = new Map();
-    /**
-     * Epochs that were given back, of which late reports must not be believed.
-     * @type {Map<string, number>}
-     */
-    this._given = new Map();
-    /**
-     * The ages of the pictures that the operator goes by, in ms, by robot.
-     * @type {Map<string, () => number>}
-     */
-    this.video = new Map();
+    this._stream = new Stream(hands, loop, now);
+    this._leases = new Leases();
+    this._reach = new Reach(hands, this._leases, this._stream);
+  }
+
+  /** The newest report of each robot. */
+  get robots() {
+    return this._leases.robots;
+  }
+
+  /** The ages of the pictures that the operator goes by. */
+  get pictures() {
+    return this._stream.pictures;
   }
 
   /** The robot that this page drives, moving or not; null without a lease. */
   get driven() {
-    return this._lease?.robot ?? null;
+    return this._stream.lease?.robot ?? null;
   }
 
   /** Whether the gate has seen enough neutral to let a press through. */
   get settled() {
-    const lease = this._lease;
-    if (lease === null || lease.seenSince === null) return false;
-    return (
-      this.robots.get(lease.robot)?.armed !== false &&
-      this._steppedAt - lease.seenSince >= SETTLE
-    );
+    return this._armed && this._stream.settled;
+  }
+
+  /** Whether the gate lets the driven robot move, as far as it said. */
+  get _armed() {
+    const { driven } = this;
+    return driven !== null && this.robots.get(driven)?.armed !== false;
+  }
+
+  /** What the operator should know of the chosen robot and of the hands. */
+  get status() {
+    const { choice, refusal, refused, robot } = this._reach;
+    return {
+      choice,
+      report: choice === null ? null : (this.robots.get(choice) ?? null),
+      driven: this.driven,
+      taking: robot !== null,
+      settled: this.settled,
+      pressed: this.hands.pressed,
+      dead: this.hands.dead,
+      axes: this.hands.axes,
+      refusal,
+      refused,
+      delay: this._stream.delay,
+    };
   }
 
   /**
@@ -118,41 +81,7 @@ export class Pilot {
    * @returns {number | null} The epoch of this page's lease on the robot.
    */
   epoch(robot) {
-    const report = this.robots.get(robot);
-    if (!report?.mine || this._given.get(robot) === report.epoch) return null;
-    return report.epoch;
-  }
-
-  /** Whether the picture that the operator goes by is too old to drive by (S16). */
-  get blind() {
-    return this._lease !== null && (this._pictureAge(this._lease.robot) ?? 0) > BLIND;
-  }
-
-  /**
-   * @param {string} robot
-   * @returns {number | undefined} In whole ms; undefined if no camera was chosen.
-   */
-  _pictureAge(robot) {
-    const age = this.video.get(robot)?.();
-    return age === undefined ? undefined : Math.round(Math.min(Math.max(age, 0), 1e9));
-  }
-
-  /** What the operator should know of the chosen robot and of the hands. */
-  get status() {
-    const waited = this.loop.age(this._steppedAt);
-    return {
-      choice: this.choice,
-      report: this.choice === null ? null : (this.robots.get(this.choice) ?? null),
-      driven: this.driven,
-      taking: this._asked !== null,
-      settled: this.settled,
-      pressed: this.hands.pressed,
-      dead: this.hands.dead,
-      axes: this.hands.axes,
-      refusal: this.refusal,
-      refused: this.refused,
-      delay: this.loop.delay === null ? null : Math.max(this.loop.delay, waited),
-    };
+    return this._leases.epoch(robot);
   }
 
   /**
@@ -164,10 +93,9 @@ export class Pilot {
    * @returns {Command[]}
    */
   choose(robot, now) {
-    if (robot === this.choice) return [];
+    if (robot === this._reach.choice) return [];
     const messages = this.letGo(now);
-    this.choice = robot;
-    this.refusal = null;
+    this._reach.choose(robot);
     if (this.hands.pressed) this.hands.kill(now);
     return messages;
   }
@@ -177,26 +105,18 @@ export class Pilot {
    *
    * @param {string} robot
    * @param {number} now
-   * @returns {Command[]}
    */
   take(robot, now) {
-    if (robot === this.choice) {
-      this._asked = { robot, since: now, alive: false };
-      this.refusal = null;
-    }
-    return [{ op: "take", robot }];
+    return this._reach.take(robot, now);
   }
 
   /**
    * Ask the holder for a robot.
    *
    * @param {string} robot
-   * @returns {Command[]}
    */
   ask(robot) {
-    this._begged.add(robot);
-    if (robot === this.choice) this.refusal = null;
-    return [{ op: "ask", robot }];
+    return this._reach.ask(robot);
   }
 
   /**
@@ -210,9 +130,10 @@ export class Pilot {
    * @returns {Command[]}
    */
   grant(robot, now) {
-    if (robot !== this._lease?.robot) return [{ op: "grant", robot }];
+    const grant = { op: "grant", robot };
+    if (robot !== this.driven) return [grant];
     this.doubt(now);
-    return [this._drive(NEUTRAL, now), { op: "grant", robot }];
+    return [...this._stream.neutral(now), grant];
   }
 
   /**
@@ -223,13 +144,11 @@ export class Pilot {
    * @returns {Command[]}
    */
   release(robot, now) {
-    if (robot === this._lease?.robot || robot === this._asked?.robot) {
-      return this.letGo(now);
-    }
+    if (this._concerns(robot)) return this.letGo(now);
     const epoch = this.epoch(robot);
-    this._parked.delete(robot);
+    this._leases.unpark(robot);
     if (epoch === null) return [];
-    this._given.set(robot, epoch);
+    this._leases.giveBack(robot, epoch);
     return [{ op: "release", robot }];
   }
 
@@ -240,15 +159,12 @@ export class Pilot {
    * @returns {Command[]}
    */
   letGo(now) {
-    const robot = this._lease?.robot ?? this._asked?.robot;
-    if (robot === undefined) return [];
-    /** @type {Command[]} */
-    const messages = this._lease ? [this._drive(NEUTRAL, now)] : [];
-    if (this._lease) this._given.set(robot, this._lease.epoch);
+    const robot = this.driven ?? this._reach.robot;
+    if (robot === null) return [];
+    const last = this._stream.neutral(now);
     if (this.hands.pressed) this.hands.kill(now);
-    this._asked = null;
-    this._drop();
-    return [...messages, { op: "release", robot }];
+    this._end();
+    return [...last, { op: "release", robot }];
   }
 
   /**
@@ -261,8 +177,8 @@ export class Pilot {
    * @param {number} now
    */
   place(op, robot, pose, now) {
-    if (robot !== this.driven) this._parked.set(robot, now);
-    const { seq, tick } = this._stamp();
+    if (robot !== this.driven) this._leases.park(robot, now);
+    const { seq, tick } = this._stream.stamp();
     return { op, robot, epoch: this.epoch(robot), seq, tick, ...pose };
   }
 
@@ -273,8 +189,9 @@ export class Pilot {
    * @param {number} now
    */
   keep(robot, now) {
-    if (this._parked.has(robot)) this._parked.set(robot, now);
-    if (this._lease?.robot === robot) this._lease.movedAt = now;
+    this._leases.use(robot, now);
+    const { lease } = this._stream;
+    if (lease?.robot === robot) lease.usedAt = now;
   }
 
   /**
@@ -284,10 +201,8 @@ export class Pilot {
    * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
    *     may never be heard of here.
    */
-  doubt(now, { drop = false } = {}) {
-    if (drop) this.hands.drop(now);
-    else this.hands.kill(now);
-    this._unsettle();
+  doubt(now, how) {
+    this._stream.doubt(now, how);
   }
 
   /**
@@ -297,16 +212,9 @@ export class Pilot {
    * @param {number} now
    */
   stopped(robot, now) {
-    this.hands.kill(now);
-    this._unsettle();
-    if (robot === "*") this._parked.clear();
-    this._parked.delete(robot);
-    if (robot !== "*" && robot !== this._lease?.robot && robot !== this._asked?.robot) {
-      return;
-    }
-    if (this._lease) this._given.set(this._lease.robot, this._lease.epoch);
-    this._asked = null;
-    this._drop();
+    this.doubt(now);
+    this._leases.unpark(robot);
+    if (robot === "*" || this._concerns(robot)) this._end();
   }
 
   /**
@@ -316,21 +224,15 @@ export class Pilot {
    * @param {number} now
    */
   reset(robot, now) {
-    if (robot === "*" || robot === this.choice) this.refusal = null;
+    this._reach.reset(robot);
     this.hands.kill(now);
   }
 
   /** Forget all leases: they ended with the connection. */
   disconnect() {
-    this._asked = null;
-    this._drop();
-    this._parked.clear();
-    this._given.clear();
-    this._begged.clear();
-    this._seq = 0;
-    for (const [id, report] of this.robots) {
-      this.robots.set(id, { ...report, mine: false });
-    }
+    this._reach.forget();
+    this._leases.forget();
+    this._stream.restart();
   }
 
   /**
@@ -340,24 +242,16 @@ export class Pilot {
    * @param {number} now
    */
   report(report, now) {
-    const before = this.robots.get(report.robot);
-    this.robots.set(report.robot, report);
-    if (!report.mine) {
-      this._parked.delete(report.robot);
-      this._given.delete(report.robot);
+    const { robot, armed } = report;
+    const before = this._leases.report(report);
+    const { lease } = this._stream;
+    if (lease?.robot === robot) {
+      const lost = lease.epoch !== this.epoch(robot);
+      if (lost) this._stream.close();
+      // If it disarms, the gate saw a reason to stop that we did not.
+      if (lost || (before?.armed && !armed)) this.doubt(now);
     }
-    const epoch = this.epoch(report.robot);
-    if (this._lease?.robot === report.robot && this._lease.epoch !== epoch) {
-      this._drop();
-      this.doubt(now);
-    } else if (this._lease?.robot === report.robot && before?.armed && !report.armed) {
-      // The gate saw a reason to stop that we did not.
-      this.doubt(now);
-    }
-    if (epoch !== null && this._begged.delete(report.robot)) this._handed(report, now);
-    if (this._asked?.robot !== report.robot) return;
-    if (epoch !== null) this._granted(epoch, before, now);
-    else if (heldByAnother(report) && this._asked.alive) this._giveUp(now);
+    this._reach.report(report, before, now);
   }
 
   /**
@@ -367,12 +261,11 @@ export class Pilot {
    * @param {number} now
    */
   gone(robot, now) {
-    this.robots.delete(robot);
-    this._begged.delete(robot);
-    this._parked.delete(robot);
-    if (robot !== this._lease?.robot && robot !== this._asked?.robot) return;
-    this._asked = null;
-    this._drop();
+    this._leases.gone(robot);
+    this._reach.gone(robot);
+    if (!this._concerns(robot)) return;
+    this._reach.end();
+    this._stream.close();
     this.doubt(now);
   }
 
@@ -385,14 +278,7 @@ export class Pilot {
    * @param {number} now
    */
   refuse(robot, what, why, now) {
-    if (what === "ask" && robot !== null) this._begged.delete(robot);
-    if (robot !== this.choice) return;
-    // A command that met the end of its lease on the way is no news.
-    if (what === "drive" && !this._lease) return;
-    this.refusal = why;
-    this.refused = what;
-    if (what === "take" && this._asked?.robot === robot) this._giveUp(now);
-    if (what === "drive") this.doubt(now);
+    this._reach.refuse(robot, what, why, now);
   }
 
   /**
@@ -404,57 +290,9 @@ export class Pilot {
    * @returns {Command[]}
    */
   step(now, attentive) {
-    const gap = now - this._steppedAt;
-    this._steppedAt = now;
-    if (!attentive || gap < 0 || gap > ASLEEP) this.doubt(now, { drop: true });
-    if (this.loop.tick === null || this.loop.state(now) !== "open") this.doubt(now);
-    if (this.blind) this.doubt(now);
-    return [...this._reach(now), ...this._stream(now), ...this._tidy(now)];
-  }
-
-  /**
-   * A press reaches for a lease where there is none.
-   *
-   * @param {number} now
-   * @returns {Command[]}
-   */
-  _reach(now) {
-    if (this._asked) {
-      if (now - this._asked.since > TAKE_PATIENCE) {
-        this.refusal = "no answer";
-        this._giveUp(now);
-      }
-      return [];
-    }
-    if (this._lease || !this.choice || isNeutral(this.hands.axes)) return [];
-    const report = this.robots.get(this.choice);
-    const epoch = this.epoch(this.choice);
-    if (epoch !== null) {
-      this._open(this.choice, epoch, now);
-      return [];
-    }
-    if (!report || !mayReach(report)) {
-      this.hands.kill(now);
-      return [];
-    }
-    this.refusal = null;
-    this._asked = { robot: this.choice, since: now, alive: !heldByAnother(report) };
-    return [{ op: "take", robot: this.choice }];
-  }
-
-  /**
-   * @param {number} now
-   * @returns {Command[]}
-   */
-  _stream(now) {
-    const lease = this._lease;
-    if (!lease) return [];
-    if (lease.firstNeutral !== null && this.loop.acknowledged(lease.firstNeutral)) {
-      lease.seenSince ??= now;
-    }
-    const axes = this.settled ? this.hands.axes : NEUTRAL;
-    if (!isNeutral(this.hands.axes)) lease.movedAt = now;
-    return [this._drive(axes, now)];
+    this._stream.look(now, attentive);
+    const reached = this._reach.step(now);
+    return [...reached, ...this._stream.step(this._armed, now), ...this._tidy(now)];
   }
 
   /**
@@ -464,97 +302,26 @@ export class Pilot {
    * @returns {Command[]}
    */
   _tidy(now) {
-    /** @type {Command[]} */
-    const messages = [];
-    const unused = this._lease ? now - this._lease.movedAt : 0;
-    if (unused >= this.releaseAfter) messages.push(...this.letGo(now));
-    for (const [robot, since] of this._parked) {
-      if (now - since >= this.releaseAfter) messages.push(...this.release(robot, now));
-    }
-    return messages;
+    const { lease } = this._stream;
+    const idle = lease !== null && now - lease.usedAt >= this.releaseAfter;
+    const driven = idle ? this.letGo(now) : [];
+    const parked = this._leases.unused(now, this.releaseAfter);
+    return [...driven, ...parked.flatMap((robot) => this.release(robot, now))];
   }
 
-  /**
-   * @param {Readonly<Axes>} axes
-   * @param {number} now
-   * @returns {Command}
-   */
-  _drive(axes, now) {
-    const lease = /** @type {NonNullable<typeof this._lease>} */ (this._lease);
-    const stamp = this._stamp();
-    this.loop.sent(stamp.seq, now);
-    lease.firstNeutral ??= stamp.seq;
-    const { x, y, turn } = axes;
-    const video = this._pictureAge(lease.robot);
-    return {
-      op: "drive",
-      robot: lease.robot,
-      epoch: lease.epoch,
-      ...stamp,
-      x,
-      y,
-      turn,
-      ...(video === undefined ? {} : { video }),
-    };
-  }
-
-  /**
-   * A robot came that was asked for some time ago: what is held now was not meant for it.
-   *
-   * @param {RobotReport} report
-   * @param {number} now
-   */
-  _handed({ robot, epoch }, now) {
-    if (this._asked?.robot === robot) return;
-    if (this.hands.pressed) this.hands.kill(now);
-    if (robot === this.choice && epoch !== null) this._open(robot, epoch, now);
-    // The operator has turned to another one; it is given back unless they return.
-    else this._parked.set(robot, now);
-  }
-
-  /**
-   * @param {number} epoch
-   * @param {RobotReport | undefined} before
-   * @param {number} now
-   */
-  _granted(epoch, before, now) {
-    const asked = /** @type {NonNullable<typeof this._asked>} */ (this._asked);
-    this._asked = null;
-    // Taken over, or not taken by a press: what is held now was meant for nothing.
-    if (!asked.alive || (before && heldByAnother(before))) this.hands.kill(now);
-    this._open(asked.robot, epoch, now);
+  /** What this page drives or is about to drive is over, and reports of it are old. */
+  _end() {
+    const { lease } = this._stream;
+    if (lease) this._leases.giveBack(lease.robot, lease.epoch);
+    this._reach.end();
+    this._stream.close();
   }
 
   /**
    * @param {string} robot
-   * @param {number} epoch
-   * @param {number} now
+   * @returns {boolean} Whether this page drives it or is about to.
    */
-  _open(robot, epoch, now) {
-    this.loop.rest();
-    this._parked.delete(robot);
-    this._lease = { robot, epoch, firstNeutral: null, seenSince: null, movedAt: now };
-  }
-
-  /** Number a message, so that the gate knows the newest. */
-  _stamp() {
-    return { seq: this._seq++, tick: this.loop.tick ?? 0 };
-  }
-
-  _drop() {
-    this._lease = null;
-    this.loop.rest();
-  }
-
-  _unsettle() {
-    if (!this._lease) return;
-    this._lease.firstNeutral = null;
-    this._lease.seenSince = null;
-  }
-
-  /** @param {number} now */
-  _giveUp(now) {
-    this._asked = null;
-    this.hands.kill(now);
+  _concerns(robot) {
+    return robot === this.driven || robot === this._reach.robot;
   }
 }

@@ -1,0 +1,41 @@
+/** The oldest picture that a robot is driven by, once a camera was chosen; ms. */
+export const BLIND = 1000;
+
+/**
+ * How old the pictures are that the operator goes by, of each robot with a camera.
+ */
+export class Pictures {
+  constructor() {
+    /** @type {Map<string, () => number>} */
+    this._ages = new Map();
+  }
+
+  /**
+   * @param {string} robot
+   * @param {() => number} age How old the picture is that is shown now, in ms.
+   * @returns {() => void} The operator goes by it no more.
+   */
+  goBy(robot, age) {
+    this._ages.set(robot, age);
+    return () => {
+      if (this._ages.get(robot) === age) this._ages.delete(robot);
+    };
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {number | undefined} In whole ms; undefined if no camera was chosen.
+   */
+  age(robot) {
+    const age = this._ages.get(robot)?.();
+    return age === undefined ? undefined : Math.round(Math.min(Math.max(age, 0), 1e9));
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {boolean} Whether the picture is too old to drive by (S16).
+   */
+  blind(robot) {
+    return (this.age(robot) ?? 0) > BLIND;
+  }
+}

@@ -1,0 +1,79 @@
+import assert from "node:assert/strict";
+import { beforeEach, test } from "node:test";
+
+import { Leases } from "../../../src/webmap/web/motion/leases.js";
+
+/** @type {Leases} */
+let leases;
+beforeEach(() => {
+  leases = new Leases();
+});
+
+/**
+ * @param {string} robot
+ * @param {boolean} mine
+ * @param {number | null} epoch
+ */
+function say(robot, mine, epoch) {
+  return leases.report(/** @type {any} */ ({ robot, mine, epoch }));
+}
+
+test("a lease has its epoch while the gate says that it is this page's", () => {
+  assert.equal(leases.epoch("r1"), null);
+  say("r1", true, 7);
+  assert.equal(leases.epoch("r1"), 7);
+  say("r1", false, 8);
+  assert.equal(leases.epoch("r1"), null);
+});
+
+test("a lease that was given back is believed in again only with another epoch", () => {
+  say("r1", true, 7);
+  leases.giveBack("r1", 7);
+  say("r1", true, 7);
+  assert.equal(leases.epoch("r1"), null);
+  say("r1", true, 9);
+  assert.equal(leases.epoch("r1"), 9);
+});
+
+test("the report before is told, to see what changed", () => {
+  assert.equal(say("r1", false, null), undefined);
+  assert.equal(say("r1", true, 3)?.mine, false);
+});
+
+test("a parked lease is due after a while without use", () => {
+  leases.park("r1", 0);
+  leases.park("r2", 0);
+  leases.use("r2", 600);
+  leases.use("r3", 600);
+  assert.deepEqual(leases.unused(999, 1000), []);
+  assert.deepEqual(leases.unused(1000, 1000), ["r1"]);
+  assert.deepEqual(leases.unused(1600, 1000), ["r1", "r2"]);
+});
+
+test("a lease that is gone in any way is parked no more", () => {
+  for (const end of [
+    () => leases.unpark("r1"),
+    () => leases.unpark("*"),
+    () => leases.gone("r1"),
+    () => leases.forget(),
+    () => say("r1", false, null),
+  ]) {
+    leases.park("r1", 0);
+    end();
+    assert.deepEqual(leases.unused(1000, 1000), []);
+  }
+});
+
+test("with the connection all leases end, and robots stay known", () => {
+  say("r1", true, 7);
+  leases.forget();
+  assert.equal(leases.epoch("r1"), null);
+  assert.deepEqual([...leases.robots.keys()], ["r1"]);
+});
+
+test("a robot that is gone is not known any more", () => {
+  say("r1", true, 7);
+  leases.gone("r1");
+  assert.equal(leases.robots.size, 0);
+  assert.equal(leases.epoch("r1"), null);
+});

@@ -1,0 +1,42 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { BLIND, Pictures } from "../../../src/webmap/web/motion/pictures.js";
+
+test("a robot without a camera is never driven blind", () => {
+  const pictures = new Pictures();
+  assert.equal(pictures.age("r1"), undefined);
+  assert.equal(pictures.blind("r1"), false);
+});
+
+test("a picture is too old after a second", () => {
+  const pictures = new Pictures();
+  let age = BLIND;
+  pictures.goBy("r1", () => age);
+  assert.equal(pictures.blind("r1"), false);
+  age = BLIND + 1;
+  assert.equal(pictures.blind("r1"), true);
+  assert.equal(pictures.blind("r2"), false);
+});
+
+test("an age is a whole number that JSON can carry", () => {
+  const pictures = new Pictures();
+  for (const [age, said] of [
+    [12.6, 13],
+    [-5, 0],
+    [Infinity, 1e9],
+  ]) {
+    pictures.goBy("r1", () => age);
+    assert.equal(pictures.age("r1"), said);
+  }
+});
+
+test("the end of one camera does not end the one that was chosen after it", () => {
+  const pictures = new Pictures();
+  const end = pictures.goBy("r1", () => 1);
+  const endOther = pictures.goBy("r1", () => 2);
+  end();
+  assert.equal(pictures.age("r1"), 2);
+  endOther();
+  assert.equal(pictures.age("r1"), undefined);
+});

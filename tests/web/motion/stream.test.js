@@ -1,0 +1,136 @@
+import assert from "node:assert/strict";
+import { beforeEach, describe, test } from "node:test";
+
+import { Hands } from "../../../src/webmap/web/motion/hands.js";
+import { Loop } from "../../../src/webmap/web/motion/loop.js";
+import { ASLEEP, SETTLE, Stream } from "../../../src/webmap/web/motion/stream.js";
+
+const FORWARD = { x: 1, y: 0, turn: 0 };
+
+/** @type {{hands: Hands, loop: Loop, stream: Stream, now: number}} */
+let it;
+beforeEach(() => {
+  const hands = new Hands(-1000);
+  const loop = new Loop();
+  it = { hands, loop, stream: new Stream(hands, loop, 0), now: 0 };
+  loop.open(0);
+  loop.receive(100, -1, 0);
+  it.stream.open("r1", 7, 0);
+  hands.set("keys", FORWARD, 0);
+});
+
+/**
+ * Take steps of 50 ms with a gate that ticks, and acknowledges what it got.
+ *
+ * @param {number} ms
+ * @param {{armed?: boolean, attentive?: boolean, acking?: boolean}} [how]
+ * @returns {any[]} What went out.
+ */
+function run(ms, { armed = true, attentive = true, acking = true } = {}) {
+  const said = [];
+  for (const end = it.now + ms; it.now < end; ) {
+    it.now += 50;
+    it.stream.look(it.now, attentive);
+    said.push(...it.stream.step(armed, it.now));
+    const ack = acking ? Number(said.at(-1)?.seq ?? -1) : -1;
+    it.loop.receive(100 + it.now / 50, ack, it.now);
+  }
+  return said;
+}
+
+describe("a stream", () => {
+  test("is silent without a lease", () => {
+    it.stream.close();
+    assert.deepEqual(run(200), []);
+    assert.deepEqual(it.stream.neutral(it.now), []);
+  });
+
+  test("says under which lease, in which order and to which tick it goes out", () => {
+    const [first, second] = run(100);
+    assert.deepEqual(first, {
+      op: "drive",
+      robot: "r1",
+      epoch: 7,
+      seq: 0,
+      tick: 100,
+      x: 0,
+      y: 0,
+      turn: 0,
+    });
+    assert.deepEqual([second.seq, second.tick], [1, 101]);
+  });
+
+  test("is neutral until the gate has seen neutral for a stretch", () => {
+    const said = run(600);
+    const first = said.findIndex(({ x }) => x === 1);
+    assert.ok(50 * first >= SETTLE, `moved after ${50 * first} ms`);
+    assert.ok(said.slice(first).every(({ x }) => x === 1));
+  });
+
+  test("stays neutral while the gate acknowledges nothing", () => {
+    assert.ok(run(250, { acking: false }).every(({ x }) => x === 0));
+    assert.equal(it.stream.settled, false);
+  });
+
+  test("stays neutral while the gate is not armed", () => {
+    assert.ok(run(600, { armed: false }).every(({ x }) => x === 0));
+  });
+
+  test("is numbered from the start on another connection", () => {
+    run(200);
+    it.stream.restart();
+    assert.equal(it.stream.lease, null);
+    assert.equal(it.stream.stamp().seq, 0);
+  });
+
+  test("counts as used while hands ask for motion", () => {
+    run(200);
+    assert.equal(it.stream.lease?.usedAt, 200);
+    it.hands.set("keys", null, 200);
+    run(200);
+    assert.equal(it.stream.lease?.usedAt, 200);
+  });
+
+  test("knows how long its oldest command waits to be acknowledged", () => {
+    run(200);
+    assert.equal(it.stream.delay, 0);
+    run(200, { acking: false });
+    assert.equal(it.stream.delay, 150);
+  });
+});
+
+describe("a stream that moves a robot", () => {
+  beforeEach(() => {
+    run(600);
+    assert.equal(it.hands.dead, false, "it moves");
+  });
+
+  const doubts = {
+    "the page is not attended to": () => run(50, { attentive: false }),
+    "the page slept": () => it.stream.look((it.now += ASLEEP + 1), true),
+    "the clock was set back": () => it.stream.look((it.now -= 1), true),
+    "the picture is old": () => {
+      it.stream.pictures.goBy("r1", () => 1001);
+      run(50);
+    },
+    "the loop is late": () => it.stream.look((it.now += 301), true),
+    "there is no tick": () => {
+      it.loop.open(it.now);
+      it.stream.look(it.now, true);
+    },
+    "somebody says so": () => it.stream.doubt(it.now),
+  };
+  for (const [what, happen] of Object.entries(doubts)) {
+    test(`is neutral and settles anew when ${what}`, () => {
+      happen();
+      assert.equal(it.hands.dead, true);
+      assert.equal(it.stream.settled, false);
+      const [said] = it.stream.step(true, it.now);
+      assert.deepEqual([said.x, said.turn], [0, 0]);
+    });
+  }
+
+  test("can say neutral at once, as its last word", () => {
+    assert.equal(it.stream.neutral(it.now)[0].x, 0);
+  });
+});
