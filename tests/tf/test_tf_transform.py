@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from webmap.geometry import Pose, Quaternion, Vector3
 from webmap.tf import Transform, TransformError
-from webmap.tf.transform import between
+from webmap.tf.transform import alike, between
 
 METRES = st.floats(-100, 100)
 POINTS = st.builds(Vector3, METRES, METRES, METRES)
@@ -129,3 +129,45 @@ def test_from_above_a_plane_turn_is_that_turn(yaw, x, y):
     flat = Transform.from_pose(Pose(1.0, -1.0, yaw))
     there = flat.apply(Vector3(x, y))
     assert flat.from_above.apply(x, y) == pytest.approx((there.x, there.y))
+
+
+@given(TRANSFORMS, POINTS)
+def test_heading_and_tilt_together_are_the_whole(transform, point):
+    pose, tilt = transform.heading_and_tilt
+    both = Transform.from_pose(pose).apply(tilt.apply(point))
+    assert near(both, transform.apply(point), 1e-3), "a tilt of a microradian is none"
+    assert (tilt.translation.x, tilt.translation.y) == (0.0, 0.0)
+    assert pose == transform.planar
+
+
+@given(POSES, METRES)
+def test_what_stands_upright_has_no_tilt_at_all(pose, height):
+    lifted = Transform(Vector3(0.0, 0.0, height)) @ Transform.from_pose(pose)
+    assert lifted.upright
+    assert lifted.heading_and_tilt[1] == Transform(Vector3(0.0, 0.0, height))
+
+
+def test_what_hangs_upside_down_is_tilted_by_half_a_turn():
+    over = Transform(Vector3(1.0, 2.0, 0.5), Quaternion(1.0, 0.0, 0.0, 0.0))
+    assert not over.upright
+    pose, tilt = over.heading_and_tilt
+    assert pose == Pose(1.0, 2.0, 0.0)
+    assert near(tilt.apply(Vector3(1.0, 1.0, 0.0)), Vector3(1.0, -1.0, 0.5))
+
+
+@given(TRANSFORMS, POINTS)
+def test_the_rows_of_the_matrix_do_the_same(transform, point):
+    x, y, z = (
+        a * point.x + b * point.y + c * point.z + by for a, b, c, by in transform.rows
+    )
+    assert near(Vector3(x, y, z), transform.apply(point))
+
+
+@given(TRANSFORMS, st.floats(0.01, math.pi), st.floats(0.01, 10.0))
+def test_transforms_are_alike_up_to_what_does_not_matter(transform, turn, way):
+    turned = transform @ Transform(rotation=Quaternion.from_yaw(turn))
+    moved = Transform(Vector3(way)) @ transform
+    assert alike(transform, turned, 0.0001, turn + 0.001)
+    assert not alike(transform, turned, 0.0001, turn - 0.001)
+    assert alike(transform, moved, way + 0.0001, 0.001)
+    assert not alike(transform, moved, way - 0.0001, 0.001)

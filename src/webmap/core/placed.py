@@ -1,21 +1,32 @@
 """Where a robot's module draws: on the robot, or in the world under it."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from webmap.core.pose_troubles import Lasting
 from webmap.core.sighting import Sighting, Sightings
 from webmap.core.whereabouts import affine
 from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry import Affine, Pose
+from webmap.geometry import Affine, Pose, Vector3
 from webmap.scene import svg
 from webmap.scene.element import Child, Element
 from webmap.scope import Removal, keep
+from webmap.tf import Transform
+from webmap.tf.transform import alike
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 FRAMES = ("map", "robot")
+
+Draw = Callable[[Transform], object]
+"""Draws data in the plane, given what takes its coordinates to those of a level frame:
+z points up there, and heights begin at the robot's base, or at the map's plane."""
+
+SEEN_TILT, SEEN_LIFT = 0.002, 0.005
+"""Radians and metres by which data has to tilt and rise to be drawn anew."""
 
 
 class Placed:
@@ -29,6 +40,9 @@ class Placed:
     at that time, so that a wall does not turn along with who looks at it.
 
     A group in the map's frame lies under the robot's model.
+
+    The group itself only ever turns in the plane: what is tilted, upside down or on its
+    side is drawn as it looks from above, by who gives a function for that.
 
     Args:
         robot: The robot.
@@ -65,6 +79,8 @@ class Placed:
         mount = Pose(x, y, math.radians(angle))
         self._sightings = Sightings(robot, frame, mount if mount != Pose() else None)
         self._seen: tuple[str, float] | None = None
+        self._draw: Draw | None = None
+        self._drawn: Transform | None = None
         self._offset = affine(mount)
         """What takes the group's coordinates to those of the robot's own map, or to the
         robot's; or to the common map if no message was ever taken."""
@@ -81,7 +97,7 @@ class Placed:
         self._hears = robot.whereabouts.join(self._news)
         keep(Removal(self._end))
 
-    def stand_in(self, frame_id: str, stamp: float) -> None:
+    def stand_in(self, frame_id: str, stamp: float, draw: Draw | None = None) -> None:
         """Take coordinates to be in the frame that a message names, as it was then.
 
         Where that frame was at the stamp is told by the frames that the robot was given
@@ -95,27 +111,32 @@ class Placed:
         Args:
             frame_id: The frame of the message; empty if it does not say.
             stamp: When it was measured, in seconds of the robot's clock; 0 if not said.
+            draw: Draws the data as it looks from above. It is called at once, and again
+                when it turns out that the frame is tilted otherwise. Without it the
+                group has to lie in the plane of the frame.
 
         """
         self._seen = (frame_id, stamp)
+        self._draw, self._drawn = draw, None
         self._settle()
 
-    def moved_within(self, seconds: float) -> Affine:
-        """Return where the sensor is that time after the stamp, as it was at the stamp.
+    def moved_within(self, frame_id: str, stamp: float, seconds: float) -> Pose:
+        """Return where a sensor gets in a time, in its own plane as it was before.
 
         Args:
+            frame_id: The sensor's frame.
+            stamp: When the time begins, in seconds of the robot's clock; 0 if not said.
             seconds: How long; 0.5 s at the most are looked ahead.
 
         """
-        if self._seen is None or not self._seen[1] or self._on_robot:
-            return Affine()
-        frame_id, stamp = self._seen
+        if not stamp:
+            return Pose()
         then, later = (
             self._sightings.look(frame_id, stamp + after) for after in (0.0, seconds)
         )
-        if then.on_robot or later.on_robot or not then.offset.determinant:
-            return Affine()
-        return then.offset.inverse @ later.offset
+        if then.on_robot or later.on_robot:
+            return Pose()
+        return (then.offset.inverse @ later.offset).planar
 
     def follow(self) -> None:
         """Stay in place on the map while the robot goes along."""
@@ -132,10 +153,22 @@ class Placed:
         if self._seen is None:
             return
         found = self._sightings.look(*self._seen)
-        self._offset, self._on_robot = found.offset, found.on_robot
-        self._settled = found.settled
+        self._on_robot, self._settled = found.on_robot, found.settled
+        if self._draw is None:
+            self._offset = found.offset.from_above
+        else:
+            pose, tilt = found.offset.heading_and_tilt
+            lift = Vector3(0.0, 0.0, tilt.translation.z - found.ground)
+            self._tilt(self._draw, replace(tilt, translation=lift))
+            self._offset = affine(pose)
         self._say(found)
         self._put()
+
+    def _tilt(self, draw: Draw, tilt: Transform) -> None:
+        """Draw again what looks otherwise now."""
+        if self._drawn is None or not alike(self._drawn, tilt, SEEN_LIFT, SEEN_TILT):
+            self._drawn = tilt
+            draw(tilt)
 
     def _put(self) -> None:
         place = self._offset

@@ -1,12 +1,11 @@
 """Where the frame of a message was when the message was measured."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.frames import frames_of
-from webmap.core.whereabouts import affine
-from webmap.geometry import Affine, Pose
+from webmap.geometry import Pose
 from webmap.tf import Buffer, NotKnownThen, Transform, TransformError
 
 if TYPE_CHECKING:
@@ -26,8 +25,11 @@ FLOWING = 1.0
 class Sighting:
     """Where data is, as well as that is known by now."""
 
-    offset: Affine
+    offset: Transform
     """What takes its coordinates to those of the robot's own map; or to the robot's."""
+
+    ground: float = 0.0
+    """Where heights begin: how high the robot's base is there, in metres."""
 
     on_robot: bool = False
     """Whether :attr:`offset` is on the robot, and goes with it."""
@@ -70,7 +72,7 @@ class Sightings:
         """
         tf = self._robot.tf
         if self._in_map and (tf is None or self._mount or not frame_id):
-            return Sighting(affine(self._mount or Pose()))
+            return Sighting(_mounted(self._mount))
         if tf is None:
             return self._by_poses(_mounted(self._mount), stamp)
         buffer = frames_of(tf["bridge"], tf["namespace"]).buffer
@@ -90,9 +92,9 @@ class Sightings:
             found, settled = newest_or_at(buffer, target, source, stamp)
         except TransformError as error:
             found = self._known.get(source, Transform())
-            return self._lost(tf, source, error, Sighting(found.from_above))
+            return self._lost(tf, source, error, Sighting(found))
         self._known[source] = found
-        return Sighting(found.from_above, settled=settled)
+        return Sighting(found, settled=settled)
 
     def _carried(
         self, buffer: Buffer, tf: Mapping[str, Any], source: str, stamp: float
@@ -103,7 +105,8 @@ class Sightings:
         if stamp:
             try:
                 found = buffer.lookup(world, source, stamp)
-                return Sighting((found @ mount).from_above)
+                ground = _height(buffer, world, base, stamp)
+                return Sighting(found @ mount, ground)
             except TransformError:
                 pass  # The poses may tell what the frames do not.
         if source != base:
@@ -119,28 +122,29 @@ class Sightings:
         ahead = _ahead(buffer, world, base, stamp)
         if ahead is None:
             return by_poses
-        return Sighting((ahead @ mount).from_above, settled=False)
+        return Sighting(ahead @ mount, ahead.translation.z, settled=False)
 
     def _by_poses(self, mount: Transform, stamp: float) -> Sighting:
         """Return where the robot's poses have a sensor."""
-        on_robot = Sighting(mount.from_above, on_robot=True)
+        on_robot = Sighting(mount, on_robot=True)
         where = self._robot.whereabouts
         newest = where.newest_stamp
         if not stamp or newest is None:
             return on_robot
         try:
-            return Sighting((where.at(stamp) @ mount).from_above)
+            base = where.at(stamp)
+            return Sighting(base @ mount, base.translation.z)
         except NotKnownThen as error:
             reason = error
         if newest < stamp <= newest + SOON:
             reach = min(stamp, newest + AHEAD)
-            found = where.at(reach, AHEAD) @ mount
-            return Sighting(found.from_above, settled=False)
+            base = where.at(reach, AHEAD)
+            return Sighting(base @ mount, base.translation.z, settled=False)
         age = self._robot.pose_age
         if age is None or age > FLOWING or self._robot.tf is None:
             return on_robot  # who has no frames does not ask for more
         return Sighting(
-            mount.from_above,
+            mount,
             on_robot=True,
             settled=stamp <= newest,
             trouble="then",
@@ -158,9 +162,8 @@ class Sightings:
     ) -> Sighting:
         if tf["quiet"]:
             return otherwise
-        return Sighting(
-            otherwise.offset,
-            otherwise.on_robot,
+        return replace(
+            otherwise,
             settled=False,
             trouble=f"{type(error).__name__} {source}",
             words=f"it is not known where {source!r} is: {error}",
@@ -188,6 +191,14 @@ def newest_or_at(
     newest = buffer.newest(target, source)
     coming = bool(stamp) and newest is not None and newest < stamp <= newest + SOON
     return buffer.lookup(target, source), not coming
+
+
+def _height(buffer: Buffer, target: str, base: str, stamp: float) -> float:
+    """Return how high the base is; as if it were on the ground if nobody tells."""
+    try:
+        return newest_or_at(buffer, target, base, stamp)[0].translation.z
+    except TransformError:
+        return 0.0
 
 
 def _ahead(buffer: Buffer, target: str, source: str, stamp: float) -> Transform | None:

@@ -12,6 +12,9 @@ NEARLY = 0.1
 _PARALLEL = 0.9995
 """Cosine of half an angle above which a straight line between rotations will do."""
 
+_LEVEL = 1e-6
+"""Sine of half an angle below which nobody could tell a tilt from none."""
+
 _HERE = Vector3()
 _STRAIGHT = Quaternion()
 
@@ -49,6 +52,39 @@ class Transform:
         q, by = self.rotation, self.translation
         x, y = _turn(q, Vector3(1.0)), _turn(q, Vector3(0.0, 1.0))
         return Affine(x.x, x.y, y.x, y.y, by.x, by.y)
+
+    @property
+    def upright(self) -> bool:
+        """Whether z points up: it turns about z alone."""
+        return abs(self.rotation.x) < _LEVEL and abs(self.rotation.y) < _LEVEL
+
+    @property
+    def heading_and_tilt(self) -> tuple[Pose, "Transform"]:
+        """Place and heading seen from above, and the rest.
+
+        The rest tilts and lifts, and comes first: ``Transform.from_pose(pose) @ tilt``
+        is the whole. Of a frame that stands upright it only lifts.
+        """
+        pose = self.planar
+        lift = Vector3(0.0, 0.0, self.translation.z)
+        if self.upright:
+            return pose, Transform(lift)
+        back = Quaternion.from_yaw(-pose.yaw)
+        return pose, Transform(lift, _times(back, self.rotation))
+
+    @property
+    def rows(self) -> tuple[tuple[float, float, float, float], ...]:
+        """The upper three rows of its matrix: turn, and in the last column move."""
+        q, by = self.rotation, self.translation
+        x, y, z = (
+            _turn(q, axis)
+            for axis in (Vector3(1.0), Vector3(0.0, 1.0), Vector3(0.0, 0.0, 1.0))
+        )
+        return (
+            (x.x, y.x, z.x, by.x),
+            (x.y, y.y, z.y, by.y),
+            (x.z, y.z, z.z, by.z),
+        )
 
     def apply(self, point: Vector3) -> Vector3:
         """Return where a point is in the other frame."""
@@ -101,6 +137,24 @@ def between(one: Transform, other: Transform, share: float) -> Transform:
         rest * a.x + share * b.x, rest * a.y + share * b.y, rest * a.z + share * b.z
     )
     return Transform(place, _slerp(one.rotation, other.rotation, share))
+
+
+def alike(one: Transform, other: Transform, apart: float, turned: float) -> bool:
+    """Tell whether two transforms are the same as far as anybody sees.
+
+    Args:
+        one: The one.
+        other: The other.
+        apart: Metres that do not matter.
+        turned: Radians that do not matter.
+
+    """
+    a, b, p, q = one.translation, other.translation, one.rotation, other.rotation
+    if math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) > apart:
+        return False
+    # Half an angle, of which the sine is exact where the cosine is not.
+    rest = _times(_conjugate(p), q)
+    return math.hypot(rest.x, rest.y, rest.z) <= math.sin(min(turned, math.pi) / 2)
 
 
 def _slerp(p: Quaternion, q: Quaternion, share: float) -> Quaternion:

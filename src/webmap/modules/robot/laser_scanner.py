@@ -1,8 +1,10 @@
 """The readings of a laser scanner, as dots."""
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
+from webmap.core.from_above import levelled
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ProtocolError
@@ -15,7 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from webmap.core.robot import Robot
-    from webmap.geometry import Affine
+    from webmap.geometry import Pose
+    from webmap.tf import Transform
 
 UNIT = 0.001
 """Metres per unit of the dots on the wire, as long as they fit in 16 bits."""
@@ -42,8 +45,9 @@ class LaserScanner:
 
     A scan stays on the map where the robot was at its stamp, and what the robot turned
     and moved while the scan was taken is made up for, so that walls stand still. Of a
-    robot that knows frames the sensor is where those have it, also upside down, unless
-    its place is told here.
+    robot that knows frames the sensor is where those have it, unless its place is told
+    here. One that hangs upside down, is tilted or stands on its side is drawn as its
+    plane looks from above.
 
     The dots can be styled by CSS: ``.laserscan > .dot``; their size is the custom
     property ``--dot-size``, in metres.
@@ -104,18 +108,22 @@ class LaserScanner:
         if found is None:
             return
         points, rays = found
-        self._placed.stand_in(scan.frame_id, scan.stamp)
         took = len(scan.ranges) * getattr(scan, "time_increment", 0.0)
         if 0.0 < took <= LONGEST_SWEEP and len(points):
-            moved = self._placed.moved_within(took)
+            moved = self._placed.moved_within(scan.frame_id, scan.stamp, took)
             points = straightened(points, rays / len(scan.ranges), moved)
+        draw = partial(self._draw, points)
+        self._placed.stand_in(scan.frame_id, scan.stamp, draw)
+        self.svg.set_age(0.0, limit=AGE_LIMIT)
+
+    def _draw(self, points: "NDArray[np.float64]", tilt: "Transform") -> None:
+        points, _ = levelled(points, tilt)
         unit = UNIT
         if len(points):
             reach = float(abs(points).max())
             unit = max(UNIT, reach / 32767)
         dots = (points / unit).round().astype("<i2")
         self._dots.set_dots(dots.tobytes(), unit)
-        self.svg.set_age(0.0, limit=AGE_LIMIT)
 
 
 def check_rays(scan: LaserScanMsg) -> None:
@@ -141,7 +149,7 @@ def check_rays(scan: LaserScanMsg) -> None:
 
 
 def straightened(
-    points: "NDArray[np.float64]", shares: "NDArray[np.float64]", moved: "Affine"
+    points: "NDArray[np.float64]", shares: "NDArray[np.float64]", moved: "Pose"
 ) -> "NDArray[np.float64]":
     """Return points as they would have been seen at the beginning of a sweep.
 
@@ -153,11 +161,11 @@ def straightened(
     """
     import numpy as np
 
-    turn = shares * math.atan2(moved.b, moved.a)
+    turn = shares * moved.yaw
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = points[:, 0], points[:, 1]
     return np.column_stack(
-        (cos * x - sin * y + shares * moved.e, sin * x + cos * y + shares * moved.f)
+        (cos * x - sin * y + shares * moved.x, sin * x + cos * y + shares * moved.y)
     )
 
 

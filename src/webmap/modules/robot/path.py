@@ -1,9 +1,11 @@
 """The way that a robot's planner has in mind."""
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from webmap.core.from_above import flat, in_space
 from webmap.core.placed import Placed, check_finite, rounded, thinned
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
@@ -13,6 +15,8 @@ from webmap.scene import svg
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+    from webmap.geometry import Vector3
+    from webmap.tf import Transform
 
 
 class Path:
@@ -88,12 +92,16 @@ class Path:
         points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
         check_finite(points, "a path")
         self.points = points
-        self._placed.stand_in(path.frame_id, path.stamp)
-        drawn = (points[index] for index in thinned(len(points), self.max_points))
-        self.line.set(points=[(rounded(x), rounded(y)) for x, y in drawn])
+        kept = thinned(len(points), self.max_points)
+        drawn = in_space(path.poses[index].pose.position for index in kept)
+        self._placed.stand_in(path.frame_id, path.stamp, partial(self._draw, drawn))
         self.svg.set_age(0.0, limit=self.age_limit)
         self.robot.notify_modules("on_path_update", self)
 
     def on_odometry_update(self) -> None:
         """Keep the path where it is while the robot goes along."""
         self._placed.follow()
+
+    def _draw(self, points: "list[Vector3]", tilt: "Transform") -> None:
+        line = flat(points, tilt)
+        self.line.set(points=[(rounded(x), rounded(y)) for x, y in line])

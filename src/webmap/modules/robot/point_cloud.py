@@ -1,8 +1,10 @@
 """Clouds of points, seen from above."""
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
+from webmap.core.from_above import levelled
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
@@ -16,12 +18,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from webmap.core.robot import Robot
+    from webmap.tf import Transform
 
 UNIT = 0.001
 """Metres per unit of the dots on the wire, as long as they fit in 16 bits."""
 
 MANY = 100_000
 """Points of which no more are looked at one by one."""
+
+FARTHEST = 1e7
+"""Metres; what a sensor of depth puts farther than a planet is no point."""
 
 COLOURS = (
     "#30318f", "#2f6fde", "#1aa5c8", "#1fbf7a", "#8fcf2f", "#e8c51c", "#f08a1d",
@@ -31,7 +37,18 @@ COLOURS = (
 
 
 class PointCloud:
-    """Draws a ``sensor_msgs/PointCloud2``, flattened, as dots.
+    """Draws a ``sensor_msgs/PointCloud2`` as dots, as it looks from above.
+
+    Points are first taken from the cloud's frame to the map as both were at its stamp,
+    with all of its turns and its height: a lidar may be tilted or hang upside down, and
+    a camera's optical frame has z forward. Then heights are looked at, and only then
+    is the cloud flattened.
+
+    Heights are in metres above the robot's base frame (``base_link``, or what
+    ``base_frame`` says), straight up whatever way the robot leans: 0 is the floor where
+    that frame is on the floor. In a cloud with ``frame="map"`` they are above the map's
+    plane. Where no frames tell how the sensor is mounted, its z is taken to point up
+    and to begin at the base.
 
     Of points above one another one dot is drawn. With ``colour_by`` the dots are in
     eight bands of a field's values, each with a class: ``band-0`` is the lowest.
@@ -46,13 +63,13 @@ class PointCloud:
         x: Where the sensor is on the robot, in metres forward.
         y: In metres to the left.
         angle: Where it looks, in degrees from the robot's x, counter-clockwise.
-        z_min: The lowest point that is drawn, in metres in the sensor's frame.
-        z_max: The highest.
+        z_min: The height of the lowest point that is drawn, in metres above the base.
+        z_max: The height of the highest.
         cell: Of points in one square of this side, in metres, one is drawn; 0 for
             all.
         max_points: How many dots are drawn at the most, evenly chosen.
         colour_by: The name of the field whose values give the colours, such as
-            ``"z"`` or ``"intensity"``.
+            ``"intensity"``; ``"z"`` is the height above the base.
         low: The value that begins the lowest band; the least of a cloud if not given.
         high: The value that ends the highest band; the greatest if not given.
         frame: ``"robot"``, or ``"map"`` for a cloud that is given in the map's.
@@ -128,66 +145,84 @@ class PointCloud:
             ProtocolError: If its sizes do not fit, or it has not the fields.
 
         """
-        points, values = self._flat(cloud)
-        bands = self._bands(values)
-        self._placed.stand_in(cloud.frame_id, cloud.stamp)
-        center, unit = (0.0, 0.0), UNIT
-        if len(points):
-            middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            center = (float(round(middle[0])), float(round(middle[1])))
-            points = points - center
-            unit = max(UNIT, float(abs(points).max()) / 32767)
-        packed = (points / unit).round().astype("<i2")
-        for number, path in enumerate(self.dots):
-            path.set_pose(*center, 0.0)
-            mine = packed if bands is None else packed[bands == number]
-            path.set_dots(mine.tobytes(), unit)
+        points, values = self._read(cloud)
+        draw = partial(self._draw, points, values)
+        self._placed.stand_in(cloud.frame_id, cloud.stamp, draw)
         self.svg.set_age(0.0, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:
         """Keep a cloud in the map's frame where it is while the robot goes along."""
         self._placed.follow()
 
-    def _flat(
+    def _read(
         self, cloud: PointCloud2Msg
     ) -> "tuple[NDArray[np.float64], NDArray[np.float64] | None]":
-        """Return what is to be drawn, of shape (N, 2), and the values for colours."""
+        """Return points of the cloud's frame, and a field's values.
+
+        Points are of shape (N, 3), or (N, 2) if the cloud has no heights.
+        """
         import numpy as np
 
-        names = ["x", "y"]
-        for name in ("z", self.colour_by):
-            if name is not None and name not in names:
-                if name == "z" != self.colour_by and not cloud.has("z"):
-                    continue
-                names.append(name)
+        high = cloud.has("z") or self.colour_by == "z"
+        axes = ["x", "y", "z"] if high else ["x", "y"]
+        names = list(axes)
+        if self.colour_by is not None and self.colour_by not in names:
+            names.append(self.colour_by)
         columns = dict(zip(names, cloud.columns(*names), strict=True))
-        keep = np.isfinite(columns["x"]) & np.isfinite(columns["y"])
-        # What a sensor of depth puts farther than a planet is no point.
-        keep &= (abs(columns["x"]) < 1e7) & (abs(columns["y"]) < 1e7)
-        z_min, z_max = self.window
-        if "z" in columns:
-            with np.errstate(invalid="ignore"):
-                keep &= (columns["z"] >= z_min) & (columns["z"] <= z_max)
-        chosen = np.flatnonzero(keep)
-        chosen = chosen[:: 1 + len(chosen) // MANY]
-        points = np.column_stack((columns["x"][chosen], columns["y"][chosen]))
-        if self.cell and len(points):
-            kept = one_a_cell(points, self.cell)
-            points, chosen = points[kept], chosen[kept]
-        if len(points) > self.max_points:
-            step = len(points) / self.max_points
-            kept = (np.arange(self.max_points) * step).astype(int)
-            points, chosen = points[kept], chosen[kept]
-        values = None if self.colour_by is None else columns[self.colour_by][chosen]
-        return points, values
+        keep = np.ones(len(columns["x"]), dtype=bool)
+        for axis in axes:
+            keep &= abs(columns[axis]) < FARTHEST  # nor is what is not finite
+        points = np.column_stack([columns[axis][keep] for axis in axes])
+        if self.colour_by in (None, "z"):
+            return points, None
+        return points, columns[str(self.colour_by)][keep]
 
-    def _bands(
-        self, values: "NDArray[np.float64] | None"
-    ) -> "NDArray[np.int64] | None":
+    def _draw(
+        self,
+        points: "NDArray[np.float64]",
+        values: "NDArray[np.float64] | None",
+        tilt: "Transform",
+    ) -> None:
+        """Draw what is left of the points when they are flat."""
+        places, heights = levelled(points, tilt)
+        if self.colour_by == "z":
+            values = heights
+        chosen = self._choose(places, heights if points.shape[1] == 3 else None)
+        places = places[chosen]
+        bands = None if values is None else self._bands(values[chosen])
+        center, unit = (0.0, 0.0), UNIT
+        if len(places):
+            middle = (places.min(axis=0) + places.max(axis=0)) / 2
+            center = (float(round(middle[0])), float(round(middle[1])))
+            places = places - center
+            unit = max(UNIT, float(abs(places).max()) / 32767)
+        packed = (places / unit).round().astype("<i2")
+        for number, path in enumerate(self.dots):
+            path.set_pose(*center, 0.0)
+            mine = packed if bands is None else packed[bands == number]
+            path.set_dots(mine.tobytes(), unit)
+
+    def _choose(
+        self, places: "NDArray[np.float64]", heights: "NDArray[np.float64] | None"
+    ) -> "NDArray[np.int64]":
+        """Return which points to draw."""
         import numpy as np
 
-        if values is None:
-            return None
+        chosen = np.arange(len(places))
+        if heights is not None:
+            z_min, z_max = self.window
+            chosen = np.flatnonzero((heights >= z_min) & (heights <= z_max))
+        chosen = chosen[:: 1 + len(chosen) // MANY]
+        if self.cell and len(chosen):
+            chosen = chosen[one_a_cell(places[chosen], self.cell)]
+        if len(chosen) > self.max_points:
+            step = len(chosen) / self.max_points
+            chosen = chosen[(np.arange(self.max_points) * step).astype(int)]
+        return chosen
+
+    def _bands(self, values: "NDArray[np.float64]") -> "NDArray[np.int64]":
+        import numpy as np
+
         known = values[np.isfinite(values)]
         low, high = self.range
         if low is None:

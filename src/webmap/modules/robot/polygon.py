@@ -1,7 +1,9 @@
 """Polygons, such as a robot's footprint."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
+from webmap.core.from_above import flat, in_space
 from webmap.core.placed import Placed, check_finite, rounded
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError
@@ -11,6 +13,8 @@ from webmap.scene import svg
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+    from webmap.geometry import Vector3
+    from webmap.tf import Transform
 
 MAX_POINTS = 10_000
 
@@ -84,10 +88,14 @@ class Polygon:
             )
         check_finite(points, "a polygon")
         self.points = points
-        self._placed.stand_in(message.frame_id, message.stamp)
-        self.outline.set(points=[(rounded(x), rounded(y)) for x, y in points])
+        draw = partial(self._draw, in_space(message.polygon.points))
+        self._placed.stand_in(message.frame_id, message.stamp, draw)
         self.svg.set_age(0.0, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:
         """Keep it where it is while the robot goes along."""
         self._placed.follow()
+
+    def _draw(self, points: "list[Vector3]", tilt: "Transform") -> None:
+        corners = flat(points, tilt)
+        self.outline.set(points=[(rounded(x), rounded(y)) for x, y in corners])

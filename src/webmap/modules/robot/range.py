@@ -1,8 +1,10 @@
 """Sonars and other sensors that measure one distance."""
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
+from webmap.core.from_above import cone
 from webmap.core.placed import Placed, sector
 from webmap.core.refusals import refusing
 from webmap.errors import ProtocolError
@@ -12,6 +14,10 @@ from webmap.scene import svg
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+    from webmap.tf import Transform
+
+LEVEL = 0.02
+"""Sine of the angle up or down below which a sensor is said to look ahead."""
 
 
 class Range:
@@ -19,7 +25,9 @@ class Range:
 
     The cone ends where something is, or at the sensor's reach if nothing is there;
     then it has the class ``clear``. Without a reading there is no cone. A sensor of
-    fixed distance says -inf for "something" and +inf for "nothing" (REP 117).
+    fixed distance says -inf for "something" and +inf for "nothing" (REP 117). One that
+    looks up or down has the outline that its cone has from above; how it is turned
+    about its own axis does not matter.
 
     Style it by CSS: ``.range > .cone`` and ``.range > .cone.clear``.
 
@@ -82,7 +90,6 @@ class Range:
             raise ProtocolError(
                 f"field_of_view must be radians from 0 to a whole turn, got {view}"
             )
-        self._placed.stand_in(message.frame_id, message.stamp)
         measured = message.range
         low = nearest if math.isfinite(nearest) else 0.0
         if math.isnan(measured):
@@ -91,7 +98,16 @@ class Range:
             self.distance = max(low, measured)
         else:
             self.distance = math.inf if measured > reach else None
-        drawn = None if self.distance is None else min(self.distance, reach)
-        self.cone.set(d=None if drawn is None else sector(drawn, view / 2))
+        drawn = 0.0 if self.distance is None else min(self.distance, reach)
+        draw = partial(self._draw, drawn, view / 2)
+        self._placed.stand_in(message.frame_id, message.stamp, draw)
         self.cone.classes.toggle("clear", self.distance == math.inf)
         self.svg.set_age(0.0, limit=self.age_limit)
+
+    def _draw(self, reach: float, half: float, tilt: "Transform") -> None:
+        if abs(tilt.rows[2][0]) < LEVEL:
+            self.cone.set(d=sector(reach, half))
+            return
+        outline = cone(reach, half, tilt) if reach > 0 else []
+        corners = "L".join(f"{x:.4f} {y:.4f}" for x, y in outline)
+        self.cone.set(d=f"M{corners}z" if len(outline) > 2 else None)
