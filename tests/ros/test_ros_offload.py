@@ -51,6 +51,19 @@ def test_a_large_message_decodes_elsewhere_as_it_would_here(view):
     run(scenario)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="nice is what POSIX calls it")
+def test_what_decodes_large_messages_leaves_the_processor_to_what_is_urgent():
+    async def scenario():
+        aside, done = Offload(), asyncio.Event()
+        aside.decode(large(), frozenset({None}), done.set)
+        await done.wait()
+        pid = offload._shared._process.pid
+        assert os.getpriority(os.PRIO_PROCESS, pid) == min(19, os.nice(0) + 10)
+        await aside.stop()
+
+    run(scenario)
+
+
 def test_a_large_message_of_another_type_says_the_same_elsewhere():
     async def scenario():
         message = Publish("/map", MAP)

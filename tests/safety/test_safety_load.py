@@ -31,12 +31,26 @@ DOTS = """[...document.querySelectorAll('.laserscan .dot')]
     .filter((dots) => dots.getAttribute('d')).length"""
 
 
+def stand_apart():
+    """Be another computer as far as one can: robots and viewers are not on this one.
+
+    What they send and take is the load; the processor that they need for it is not.
+    """
+    os.setsid()
+    os.nice(19)
+    with contextlib.suppress(OSError):
+        # Where each session gets the same share, it is the session that must be nice.
+        Path("/proc/self/autogroup").write_text("19")
+
+
 @contextlib.contextmanager
 def helper(script, *arguments):
     """Run a script of this folder until its standard input ends."""
     command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen(command, text=True, **pipes) as process:
+    with subprocess.Popen(
+        command, text=True, preexec_fn=stand_apart, **pipes
+    ) as process:
         try:
             yield process
             assert process.poll() is None, f"{script} has ended"

@@ -6,6 +6,7 @@ little-endian, and that much MessagePack.
 """
 
 import importlib
+import os
 import signal
 import struct
 import sys
@@ -20,6 +21,9 @@ from webmap.ros.events import Publish
 
 LENGTH = struct.Struct("<I")
 MAX_MESSAGE = 512 << 20
+
+BACKGROUND = 10
+"""How nice the process is: a map may come later, what drives a robot may not."""
 
 
 class Request(msgspec.Struct, array_like=True):
@@ -92,6 +96,8 @@ def main() -> None:
     """Serve until the input ends."""
     # An interrupt from the keyboard is for the display, which then ends the input.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if os.name == "posix":
+        os.nice(BACKGROUND)
     decoder = msgspec.msgpack.Decoder(Request)
     encoder = msgspec.msgpack.Encoder()
     while (body := read(sys.stdin.buffer)) is not None:
