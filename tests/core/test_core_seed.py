@@ -77,14 +77,17 @@ def find(path):
         cls = OWNERS[owner]
         if hasattr(cls, name):
             return getattr(cls, name)
-        source = inspect.getsource(cls.__init__)
-        source += inspect.getsource(Extendable.__init__)
-        assert re.search(rf"self\.{name}\b", source), path
+        assert re.search(rf"self\.{name}\b", source_of(cls)), path
         return None
     value = webmap
     for name in names:
         value = getattr(value, name)
     return value
+
+
+def source_of(cls):
+    """Return what stands in a class and in those that it is made from."""
+    return "".join(inspect.getsource(each) for each in cls.__mro__[:-1])
 
 
 def check_arguments(found, arguments):
@@ -96,7 +99,7 @@ def check_arguments(found, arguments):
 
 
 def check_trigger(section, name, arguments):
-    source = inspect.getsource(OWNERS[section.lower()])
+    source = source_of(OWNERS[section.lower()])
     count = len([text for text in arguments.split(",") if text.strip()])
     fired = 'f"on_send_{kind}"' if name.startswith("on_send") else f'"{name}"'
     call = re.search(rf"notify_modules\({re.escape(fired)}(.*?)\)", source)

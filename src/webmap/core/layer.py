@@ -4,6 +4,7 @@ import logging
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from webmap.core.problems import Problems
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.fragment import Fragment
@@ -33,9 +34,10 @@ class Layer:
         self.fragment = Fragment(self.svg)
         self.users = 0
         self.scope = Scope(type(self).__name__, self._failed)
-        self.maps: list[Map] = []
+        self._told = Problems(log)
+        self.maps: list[Map] = self._told.maps
         """Those that hear what fails: see :meth:`show_on`."""
-        self.problems: dict[object, str] = {}
+        self.problems: dict[object, str] = self._told.standing
         """What fails for now, in sentences, by what they are about."""
         self._key: Hashable = None
 
@@ -79,12 +81,10 @@ class Layer:
 
         """
         shown = map.add_layer(self, order=order)
-        self.maps.append(map)
-        for text in self.problems.values():
-            map.show_error(text)
+        self._told.join(map)
 
         def undo() -> None:
-            self.maps.remove(map)
+            self._told.leave(map)
             shown.remove()
 
         return keep(Removal(undo))
@@ -97,13 +97,11 @@ class Layer:
             text: A sentence for people.
 
         """
-        if self.problems.get(about) != text:
-            self.problems[about] = text
-            self._report(text)
+        self._told.set(about, text)
 
     def clear_problem(self, about: object) -> None:
         """Note that what was said of ``about`` is true no more."""
-        self.problems.pop(about, None)
+        self._told.clear(about)
 
     def release(self) -> None:
         """Have one user less; with none left the layer ends."""
@@ -116,9 +114,4 @@ class Layer:
         if lasting:
             self.set_problem(self.scope, text)
         else:
-            self._report(text)
-
-    def _report(self, text: str) -> None:
-        log.warning("%s", text)
-        for map in self.maps:
-            map.show_error(text)
+            self._told.report(text)

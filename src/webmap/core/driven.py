@@ -1,0 +1,356 @@
+"""What a robot can be told to do: its verbs of motion, all of which the gate obeys."""
+
+import asyncio
+import math
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from webmap.core.extendable import Extendable
+from webmap.core.given_pose import Orientation, Position
+from webmap.core.goal_topics import (
+    COVARIANCE,
+    NAVIGATE_TO_POSE,
+    InitialPoseTopic,
+    MoveTopic,
+)
+from webmap.core.motion import MotionRoad, TwistTopic
+from webmap.core.registry import Namespace
+from webmap.errors import MotionError
+from webmap.gate.assist import AssistSpec, polygon_around
+from webmap.gate.messages import RobotReport
+from webmap.geometry import Quaternion, Twist
+from webmap.ros.bridge import Bridge
+from webmap.scope import no_scope
+
+
+class Driven(Extendable):
+    """An extendable that is moved, through the gate: what every robot is.
+
+    It says where velocity and goals go and hands them over; nothing here writes to a
+    robot, and nothing here knows where one is or how it looks.
+
+    Args:
+        name: What people call it.
+        namespace: Where its modules are looked up.
+
+    """
+
+    def __init__(self, name: str, namespace: Namespace) -> None:
+        super().__init__(namespace)
+        self.name = str(name)
+        self.motion = MotionRoad(self.name, self.report_error)
+        self.report: RobotReport | None = None
+
+    @property
+    def id(self) -> str:
+        """What the gate and the page call this robot; unique in the process."""
+        return self.motion.id
+
+    # Where velocity and goals go.
+
+    def set_twist_topic(
+        self,
+        bridge: Bridge,
+        topic: str,
+        *,
+        type: str | None = None,
+        stops_within: float | None = None,
+        v_max: float | None = None,
+        w_max: float | None = None,
+        a_max: float | None = None,
+        holonomic: bool = False,
+        stop_hooks: Sequence[Mapping[str, str]] = (),
+    ) -> None:
+        """Say where velocity goes, and what the base behind it does and can.
+
+        Args:
+            bridge: The link to the robot's ROS system.
+            topic: The topic, of ``geometry_msgs`` Twist or TwistStamped.
+            type: The message type; asked of rosapi, or Twist, if not given.
+            stops_within: The time in seconds within which the base stops by itself
+                when velocity ceases. Without it nobody knows whether the robot stops
+                when WebMap cannot tell it to, and it is driven at no more than
+                0.3 m/s and 0.6 rad/s.
+            v_max: The highest speed, in metres per second.
+            w_max: The highest rate of turn, in radians per second.
+            a_max: The highest acceleration, in metres per second squared. Slowing
+                down is never delayed by it.
+            holonomic: Whether the base can move sideways.
+            stop_hooks: What else ``bridge`` is told on STOP:
+                ``{"topic": "/lock", "type": "std_msgs/Bool"}`` publishes true, and
+                false on reset; ``{"service": "/e_stop", "type": "std_srvs/Trigger"}``
+                calls the service.
+
+        Raises:
+            ConfigError: If ``type`` carries no velocity, or a stop hook cannot be
+                meant.
+
+        """
+        with no_scope():
+            self.motion.set_twist(
+                TwistTopic(
+                    bridge,
+                    topic,
+                    type,
+                    stops_within,
+                    v_max,
+                    w_max,
+                    a_max,
+                    holonomic,
+                    stop_hooks,
+                )
+            )
+
+    def set_scan_assist(
+        self,
+        topic: str,
+        footprint: Sequence[tuple[float, float]] | float,
+        *,
+        x: float = 0.0,
+        y: float = 0.0,
+        angle: float = 0.0,
+        stop_distance: float = 0.15,
+        brake: float = 0.5,
+        blind: Literal["stop", "creep"] = "stop",
+        creep: float = 0.1,
+    ) -> None:
+        """Have the robot slowed down, when driven, before what a laser scan sees.
+
+        It assists a driver and is no safety function: a planar scanner does not see
+        glass, stairs or a table's edge, and what it says comes over a network.
+
+        Args:
+            topic: Of ``sensor_msgs/LaserScan``, on the bridge of the twist topic.
+            footprint: The robot's corners in its own frame, in order, or its radius,
+                in metres.
+            x: Where the scanner is on the robot, in metres forward.
+            y: In metres to the left.
+            angle: Where it looks, in degrees from the robot's x, counter-clockwise.
+            stop_distance: What stays free before the robot, in metres.
+            brake: How hard the robot slows down, in metres per second squared.
+            blind: Whether it stops or creeps while the scan is older than 0.3 s, is
+                empty or mostly unknown.
+            creep: How fast it creeps, in metres per second.
+
+        Raises:
+            ConfigError: If something of that cannot be meant.
+
+        """
+        corners = (
+            polygon_around(footprint)
+            if isinstance(footprint, int | float)
+            else tuple((float(cx), float(cy)) for cx, cy in footprint)
+        )
+        self.motion.set_assist(
+            AssistSpec(
+                topic=topic,
+                footprint=corners,
+                sensor=(x, y, math.radians(angle)),
+                stop_distance=stop_distance,
+                brake=brake,
+                blind=blind,
+                creep=creep,
+            )
+        )
+
+    def clear_scan_assist(self) -> None:
+        """Let the robot be driven as before; nothing happens if nothing was set."""
+        self.motion.set_assist(None)
+
+    def unadvertise_twist_topic(self) -> None:
+        """Give up the twist topic; does nothing if there is none."""
+        self.motion.set_twist(None)
+
+    def set_move_topic(
+        self,
+        bridge: Bridge,
+        topic: str = "",
+        *,
+        frame: str = "map",
+        cancel_topic: str | None = None,
+        on_operator_loss: str = "continue",
+        action: str | None = None,
+        action_type: str = NAVIGATE_TO_POSE,
+    ) -> None:
+        """Say where goals go.
+
+        They go to the action, if there is one: it says how they go and how they end.
+
+        Args:
+            bridge: The link to the ROS system of the robot's navigation.
+            topic: A topic of ``geometry_msgs/PoseStamped``; besides an action it is
+                for bridges that take no goals of actions.
+            frame: The frame of the goals.
+            cancel_topic: actionlib's topic by which goals are called off.
+            on_operator_loss: ``"continue"`` if a goal goes on when its operator is
+                lost, ``"cancel"`` if it is called off.
+            action: The name of the action, such as ``"/navigate_to_pose"``.
+            action_type: ``"nav2_msgs/action/NavigateToPose"``, of ROS 2, or
+                ``"move_base_msgs/MoveBaseAction"``, of ROS 1.
+
+        Raises:
+            ConfigError: If there is neither a topic nor an action.
+
+        """
+        with no_scope():
+            self.motion.set_move(
+                MoveTopic(
+                    bridge,
+                    topic,
+                    frame,
+                    cancel_topic,
+                    on_operator_loss,
+                    action,
+                    action_type,
+                )
+            )
+
+    def set_initial_pose_topic(
+        self,
+        bridge: Bridge,
+        topic: str = "/initialpose",
+        *,
+        covariance: Sequence[float] = COVARIANCE,
+    ) -> None:
+        """Say where the robot is told where it is, in the frame of its goals.
+
+        Args:
+            bridge: The link to its localisation; the bridge of its goals.
+            topic: A topic of ``geometry_msgs/PoseWithCovarianceStamped``.
+            covariance: How sure one is: the variances of x and y in m², of yaw in
+                rad². RViz's are given if not said.
+
+        Raises:
+            ConfigError: If the covariance is not three numbers from 0 on, or goals go
+                to another bridge.
+
+        """
+        with no_scope():
+            self.motion.set_pose(InitialPoseTopic.of(bridge, topic, covariance))
+
+    def unadvertise_move_topic(self) -> None:
+        """Give up the move topic; does nothing if there is none."""
+        self.motion.set_move(None)
+
+    # What a program says.
+
+    async def acquire_lease(self, *, timeout: float = 5.0) -> int:
+        """Take the right to drive this robot, on behalf of this program.
+
+        Any operator takes it away by driving.
+
+        Args:
+            timeout: Seconds to wait until the robot can be driven: the links over
+                which it is driven open now, and its odometry must be heard.
+
+        Returns:
+            The lease's epoch.
+
+        Raises:
+            NoLease: If somebody else drives.
+            MotionError: If the robot cannot be driven, and why.
+
+        """
+        epoch = await asyncio.wrap_future(self.motion.take())
+        deadline = time.monotonic() + timeout
+        while (why := self._not_drivable(epoch)) is not None:
+            if time.monotonic() > deadline:
+                self.release_lease()
+                raise MotionError(f"robot {self.name!r} cannot be driven: {why}")
+            await asyncio.sleep(0.02)
+        return epoch
+
+    def _not_drivable(self, epoch: int) -> str | None:
+        report = self.report
+        if report is None or report.epoch != epoch:
+            return "the gate has not said that it can"
+        return report.reason
+
+    def release_lease(self) -> None:
+        """Give the right to drive back; the robot is stopped if it moves."""
+        self.motion.release()
+
+    def twist(
+        self,
+        x: float,
+        y: float = 0.0,
+        z: float = 0.0,
+        rx: float = 0.0,
+        ry: float = 0.0,
+        rz: float = 0.0,
+    ) -> None:
+        """Give one velocity, which holds until it is old: 0.2 s at the most.
+
+        It goes through the gate like every other, so the program needs the lease, and
+        the speed in force bounds it. Whoever wants the robot to go on calls again, at
+        20 Hz, say.
+
+        Args:
+            x: Metres per second forward.
+            y: Metres per second to the left.
+            z: Upward; the gate moves robots in the plane and leaves it out.
+            rx: About x; left out likewise.
+            ry: About y; left out likewise.
+            rz: Radians per second, counter-clockwise.
+
+        Raises:
+            NoLease: If the program does not hold the lease.
+
+        """
+        self.motion.twist(Twist(x, y, rz))
+
+    def move(self, position: Position, orientation: Orientation) -> None:
+        """Send the robot to a pose, by its own navigation.
+
+        Args:
+            position: Where the base link is to be, in metres on the common map.
+            orientation: Its orientation there.
+
+        Raises:
+            NoLease: If the program does not hold the lease.
+
+        """
+        o = orientation
+        self.motion.move(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+
+    def locate(self, position: Position, orientation: Orientation) -> None:
+        """Tell the robot where it is, while it neither moves nor follows a goal.
+
+        Args:
+            position: Where the base link is, in metres on the common map.
+            orientation: Its orientation there.
+
+        Raises:
+            NoLease: If the program does not hold the lease.
+
+        """
+        o = orientation
+        self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+
+    def cancel(self) -> None:
+        """Call off the robot's goals."""
+        self.motion.cancel()
+
+    def stop(self) -> None:
+        """Stop the robot, whoever drives it, and call off its goals.
+
+        It stays stopped, for everybody and also after a restart, until
+        :meth:`reset_stop` or a person's reset.
+        """
+        self.motion.stop()
+
+    def reset_stop(self) -> None:
+        """End a STOP that stands; moves nothing and gives nobody the robot."""
+        self.motion.reset_stop()
+
+    # What the gate says.
+
+    def on_gate_report(self, report: RobotReport) -> None:
+        """Keep what the gate says of this robot and fire ``on_report``."""
+        self.report = report
+        self.notify_modules("on_report", report)
+
+    def on_written(self, kind: str, message: dict[str, Any]) -> None:
+        """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote."""
+        self.notify_modules(f"on_send_{kind}", message)

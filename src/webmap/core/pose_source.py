@@ -1,0 +1,182 @@
+"""Where the poses of a robot come from: a topic, the frames, or one by the other."""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from webmap.core.frames import Frames, frames_of
+from webmap.core.motion import MotionRoad
+from webmap.core.odometry import OdometryFeed, PoseReading
+from webmap.core.placing import Placing
+from webmap.core.pose_troubles import PoseTroubles
+from webmap.core.refusals import Owner
+from webmap.core.whereabouts import Whereabouts
+from webmap.geometry import Pose
+from webmap.ros.bridge import Bridge
+from webmap.scope import Removal, no_scope
+
+TF_PERIOD = 0.05
+"""Least seconds between two poses that are taken from frames alone."""
+
+
+class PoseSource:
+    """Takes a robot's poses from where they come to the common map.
+
+    Args:
+        owner: The robot, which is told what is wrong with its poses.
+        motion: Its road to the gate, which looks at the odometry for itself.
+        heard: Called whenever a pose came in, and before it is shown.
+        show: Called with each pose, on the common map.
+
+    """
+
+    def __init__(
+        self,
+        owner: Owner,
+        motion: MotionRoad,
+        heard: Callable[[], object],
+        show: Callable[[PoseReading], object],
+    ) -> None:
+        self.whereabouts = Whereabouts()
+        self.stamp: float | None = None
+        """When the newest came in, in seconds of :func:`time.monotonic`."""
+        self.feed: OdometryFeed | None = None
+        """The topic, if there is one."""
+        self._owner = owner
+        self._motion = motion
+        self._heard = heard
+        self._show = show
+        self._frames: Frames | None = None
+        self._placing: Placing | None = None
+        self._quiet = False
+        self._hears_frames = Removal(lambda: None)
+        self._troubles = PoseTroubles(owner)
+
+    def follow(
+        self, bridge: Bridge, topic: str, throttle: int, type: str | None
+    ) -> None:
+        """Take poses from a topic; see :meth:`Robot.set_odometry_topic`."""
+        self.unfollow()
+        with no_scope():
+            self.feed = OdometryFeed(
+                bridge, topic, throttle, type, self._on_pose, self._on_feed_problem
+            )
+        self._find_bridge()
+
+    def unfollow(self) -> None:
+        """Take poses from no topic; does nothing if it is so."""
+        if self.feed is not None:
+            self.feed.remove()
+            self.feed = None
+            self._owner.clear_problem("odometry")
+            self._motion.clear_odometry()
+            self._find_bridge()
+
+    def place(
+        self,
+        bridge: Bridge,
+        map_frame: str,
+        base_frame: str,
+        namespace: str,
+        quiet: bool,
+    ) -> None:
+        """Take poses to the frame of the map; see :meth:`Robot.set_tf`."""
+        self.unplace()
+        frames = frames_of(bridge, namespace)
+        self._frames = frames
+        self._placing = Placing(frames.buffer, map_frame, base_frame, frames.namespace)
+        self._quiet = quiet
+        self._hears_frames = frames.join(self._on_frames)
+        self._find_bridge()
+
+    def unplace(self) -> None:
+        """Take poses as they come; does nothing if it is so."""
+        self._hears_frames.remove()
+        self._frames = self._placing = None
+        self._find_bridge()
+
+    @property
+    def tf(self) -> Mapping[str, Any] | None:
+        """The arguments of :meth:`Robot.set_tf`, None if it is not set."""
+        if self._frames is None or self._placing is None:
+            return None
+        return {
+            "bridge": self._frames.bridge,
+            "map_frame": self._placing.map_frame,
+            "base_frame": self._placing.base_frame,
+            "namespace": self._frames.namespace,
+            "quiet": self._quiet,
+        }
+
+    def align(self, pose: Pose | None) -> None:
+        """Lay the robot's own map somewhere; with None it goes with its bridge."""
+        self.whereabouts.align(pose)
+        self._on_alignment()
+
+    def end(self) -> None:
+        """Hear of no pose any more."""
+        self.unfollow()
+        self.unplace()
+
+    def _on_pose(self, reading: PoseReading) -> None:
+        now = self._hear()
+        feed = self.feed
+        if feed is not None and feed.type == "nav_msgs/Odometry":
+            self._motion.set_odometry(feed.bridge, feed.topic, feed.type)
+        if self._placing is not None:
+            reading = self._placing.of_reading(reading, now)
+        self._take(reading)
+        self._tell_trouble()
+
+    def _on_frames(self) -> None:
+        """Look where the frames have the base, if no topic says where it is."""
+        now = time.monotonic()
+        soon = self.stamp is not None and now - self.stamp < TF_PERIOD
+        if self.feed is None and self._placing is not None and not soon:
+            reading = self._placing.of_base(now)
+            if reading is not None:
+                self._hear()
+                self._take(reading)
+        self._tell_trouble()
+        self.whereabouts.tell()
+
+    def _on_alignment(self) -> None:
+        """Go where a new alignment has the robot, and all that it knows."""
+        if self.whereabouts.newest is not None:
+            self._show(self.whereabouts.on_map(self.whereabouts.newest))
+        self._motion.set_alignment(self.whereabouts.alignment)
+        self.whereabouts.tell()
+
+    def _on_feed_problem(self, text: str | None) -> None:
+        if text is None:
+            self._owner.clear_problem("odometry")
+        else:
+            self._owner.set_problem("odometry", text)
+
+    def _find_bridge(self) -> None:
+        """Note where poses come from now: the alignment of that bridge holds."""
+        self.whereabouts.forget()
+        self._troubles.forget()
+        source = self._frames if self.feed is None else self.feed
+        bridge = None if source is None else source.bridge
+        if bridge is not self.whereabouts.bridge:
+            self.whereabouts.come_from(bridge, self._on_alignment)
+            self._on_alignment()
+
+    def _tell_trouble(self) -> None:
+        """Say what is wrong with the frames or the poses; take back what is mended."""
+        self._troubles.look(
+            self._placing, self._frames, self.whereabouts.jumps, quiet=self._quiet
+        )
+
+    def _hear(self) -> float:
+        self.stamp = now = time.monotonic()
+        self._heard()
+        return now
+
+    def _take(self, reading: PoseReading) -> None:
+        """Take the newest pose, in the robot's own map."""
+        period = 0.0 if self.feed is None else self.feed.throttle / 1000
+        self.whereabouts.jumps.look(reading, time.monotonic())
+        self._show(self.whereabouts.take(reading, period))
+        self.whereabouts.tell()
