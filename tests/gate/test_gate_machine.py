@@ -38,7 +38,7 @@ from webmap.gate import actions, events, messages
 from webmap.gate.gate import Gate
 from webmap.gate.lease import Epochs
 from webmap.gate.messages import PROGRAM
-from webmap.gate.process import STEP
+from webmap.gate.shell import STEP
 from webmap.gate.ticks import Ticks
 from webmap.geometry import Twist
 

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import msgspec
 
@@ -30,23 +30,27 @@ class Child:
     Args:
         hear: Called with each message, in a thread of the child's own.
         ended: Called once, in that thread, when the gate has closed its end.
+        command: What is run.
 
     """
+
+    # -P: no file that lies about in the working folder is taken for a module.
+    COMMAND = (sys.executable, "-P", "-m", "webmap.gate")
 
     def __init__(
         self,
         hear: Callable[["Child", FromGate], None],
         ended: Callable[["Child"], None],
+        command: Sequence[str] = COMMAND,
     ) -> None:
         self._hear = hear
         self._ended = ended
         self._lock = threading.Lock()
         self._unsent = bytearray()
-        # -P: no file that lies about in the working folder is taken for a module.
         # A session of its own: Ctrl-C in the terminal reaches the display, which
         # lets the gate stop the robots in order.
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "webmap.gate"],
+            command,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

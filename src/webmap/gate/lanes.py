@@ -113,12 +113,12 @@ class Lane:
         if self._socket is not None:
             self._socket.abort(why)
 
-    def spend(self, ears: Ears) -> Socket | None:
+    def spend(self, ears: Ears) -> Socket:
         """Hand over the open socket to somebody else and connect anew."""
         link = self._socket
-        if link is not None:
-            link.ears = ears
-            self._drop()
+        assert link is not None  # it has just been written to
+        link.ears = ears
+        self._drop()
         return link
 
     def close(self) -> None:
@@ -163,12 +163,14 @@ class Lane:
                 wait = min(2 * wait, LONGEST_WAIT)
                 continue
             wait, complained = FIRST_WAIT, ""
-            if not self._socket.is_open:
-                continue
-            for held in list(self._holds.values()):
-                self._say(held.hello)
-            self._up()
-            await self._keep_pinging()
+            if self._socket.is_open:  # and not closed again in the same breath
+                for held in list(self._holds.values()):
+                    self._say(held.hello)
+                self._up()
+                await self._keep_pinging()
+            # A bridge that closes the link while it reads nothing would keep it, and
+            # what waits in it, beside the next one.
+            self.cut("the bridge is closing it")
             await asyncio.sleep(FIRST_WAIT * random.uniform(0.5, 1.0))  # noqa: S311
 
     async def _keep_pinging(self) -> None:

@@ -154,11 +154,12 @@ class Socket(asyncio.Protocol):
                 self._transport.write_eof()
 
     def _lose(self, why: str) -> None:
+        if self._over:
+            return
+        self._over = True
         if not self.opened.done():
             self.opened.set_exception(BridgeClosed(f"{self.url}: {why}"))
-            self._over = True
-        elif not self._over:
-            self._over = True
+        elif not self.opened.cancelled():  # given up before it was open
             self.ears.lost(why)
 
 
@@ -195,5 +196,5 @@ async def open_socket(url: str, ears: Ears) -> Socket:
 
 def _retrieve(future: "asyncio.Future[None]") -> None:
     """Look at the outcome, so that asyncio does not complain that nobody did."""
-    if future.done() and not future.cancelled():
+    if not future.cancelled():
         future.exception()

@@ -62,7 +62,8 @@ class TasksLane:
     def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
         self._url = url
         self._tell = tell
-        self._spent: list[Socket] = []
+        self._spent: dict[Socket, SendGoal] = {}
+        """The sockets of action goals that are under way, the oldest first."""
         self._calling: set[asyncio.Task[None]] = set()
         self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
         """The goals of move_base that are under way, by robot."""
@@ -151,30 +152,29 @@ class TasksLane:
     def _keep_for_result(self, goal: SendGoal) -> None:
         polite = Pace()
 
+        # A socket is taken out once: of one that was closed or lost nothing is heard.
         def hear(data: bytes) -> None:
             word = navigation.of_action(data, goal)
             if isinstance(word, GoalEnded):
+                del self._spent[link]
                 link.close()
-                forget()
             if word is not None and polite(word):
                 self._tell(word)
 
-        def forget() -> None:
-            if link in self._spent:
-                self._spent.remove(link)
-
         def lost(why: str) -> None:
-            forget()
+            del self._spent[link]
             self._tell(GoalLost(goal.robot, goal.id, f"the link is lost: {why}"))
 
         self._spending = True
-        found = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=lost))
+        link = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=lost))
         self._spending = False
-        assert found is not None  # it has just been written to
-        link = found
-        self._spent.append(link)
+        self._spent[link] = goal
         if len(self._spent) > MAX_SPENT:
-            self._spent.pop(0).close()
+            oldest, given_up = next(iter(self._spent.items()))
+            del self._spent[oldest]
+            oldest.close()
+            why = f"more than {MAX_SPENT} goals are under way at {self._url}"
+            self._tell(GoalLost(given_up.robot, given_up.id, why))
 
     # move_base.
 

@@ -1,0 +1,154 @@
+"""The gate's shell: brings the decisions what happens and does what they ask for.
+
+It takes its time from the event loop, and everything else from those it is given: the
+links to the bridges, the disk, the locks, and the pipe to the display.
+"""
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+
+from webmap.gate import actions, events, messages
+from webmap.gate.clock import now
+from webmap.gate.disk import Disk
+from webmap.gate.gate import Gate
+from webmap.gate.links import Links
+from webmap.gate.locks import Locks
+from webmap.gate.outbox import Outbox
+
+log = logging.getLogger("webmap.gate")
+
+STEP = 0.01
+"""Seconds between two looks at the clock while a machine is held or moves."""
+
+IDLE_STEP = 0.02
+"""Seconds between two looks at the clock otherwise."""
+
+DRAIN = 0.5
+"""The longest time for zeros at the end, in seconds (S14)."""
+
+LOOK = 0.1
+"""Seconds between two looks at the files of STOPs, which another gate may write."""
+
+LOCK_RETRY = 1.0
+"""Seconds between two attempts to have a machine that another gate has."""
+
+
+class Shell:
+    """Runs the decisions: brings them what happens and does what they ask for.
+
+    Args:
+        outbox: Takes what the display is told.
+        locks: The machines of this computer.
+        disk: What outlives the process.
+
+    """
+
+    def __init__(self, outbox: Outbox, locks: Locks, disk: Disk) -> None:
+        self.failed = False
+        self._gate = Gate()
+        self._outbox = outbox
+        self._locks = locks
+        self._disk = disk
+        self._links = Links(self.tell)
+        self._inbox: deque[messages.ToGate | events.Event] = deque()
+        self._working = False
+        self._ending = asyncio.Event()
+        self._silent = asyncio.Event()
+        self._waiting_for_lock: dict[events.Key, asyncio.TimerHandle] = {}
+
+    def tell(self, event: messages.ToGate | events.Event) -> None:
+        """Bring an event; called from within an action, it waits its turn."""
+        if isinstance(event, events.Shutdown):
+            self._ending.set()
+        self._inbox.append(event)
+        if self._working:
+            return
+        self._working = True
+        try:
+            while self._inbox:
+                self._do(self._gate.handle(self._inbox.popleft(), now()))
+        except Exception:
+            self._fail()
+        finally:
+            self._working = False
+
+    async def run(self) -> None:
+        """Go on until told to end, then send zeros and close the links."""
+        stepping = asyncio.create_task(self._keep_stepping())
+        looking = asyncio.create_task(self._keep_looking())
+        await self._ending.wait()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(DRAIN):
+                await self._silent.wait()
+                await self._links.settle()
+                await self._disk.settle()
+        stepping.cancel()
+        looking.cancel()
+        self._links.close()
+        await asyncio.sleep(0)  # the loop's chance to write what it still holds
+
+    async def _keep_stepping(self) -> None:
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while not self.failed:
+            try:
+                self._do(self._gate.step(now()))
+            except Exception:
+                self._fail()
+            if self._ending.is_set() and self._gate.silent:
+                self._silent.set()
+            due += STEP if self._gate.busy else IDLE_STEP
+            due = max(due, loop.time())  # what is late is not caught up on
+            await asyncio.sleep(due - loop.time())
+
+    async def _keep_looking(self) -> None:
+        while True:
+            await asyncio.sleep(LOOK)
+            for seen in await self._disk.look():
+                self.tell(seen)
+
+    def _do(self, todo: list[actions.Action]) -> None:
+        for action in todo:
+            result = self._perform(action)
+            if result is not None:
+                self._do(self._gate.handle(result, now()))
+
+    def _perform(self, action: actions.Action) -> events.Event | None:
+        match action:
+            case actions.Say(message):
+                self._outbox.put(message)
+            case actions.Lock(key):
+                return self._lock(key)
+            case actions.Unlock(key):
+                timer = self._waiting_for_lock.pop(key, None)
+                if timer is not None:
+                    timer.cancel()
+                self._locks.release(key)
+                self._disk.forget(key)
+            case actions.MarkDriven(key, driven):
+                self._locks.mark(key, driven)
+            case actions.KeepLatch() | actions.KeepStopTest():
+                self._disk.keep(action, self.tell)
+            case _:
+                return self._links.perform(action)
+        return None
+
+    def _lock(self, key: events.Key) -> events.LockState:
+        state = self._disk.recall(self._locks.acquire(key))
+        self._waiting_for_lock.pop(key, None)
+        if not state.held:
+            loop = asyncio.get_running_loop()
+            self._waiting_for_lock[key] = loop.call_later(
+                LOCK_RETRY, lambda: self.tell(self._lock(key))
+            )
+        return state
+
+    def _fail(self) -> None:
+        """An error of our own: stop everything and let the display start anew."""
+        log.exception("the gate has failed; every driven robot is stopped")
+        self.failed = True
+        self._links.zero_all()
+        self._ending.set()
+        self._silent.set()

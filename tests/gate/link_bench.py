@@ -1,0 +1,190 @@
+"""Bridges in a test's own event loop: a real one, and one that says any bytes."""
+
+import asyncio
+import base64
+import contextlib
+import functools
+import hashlib
+import inspect
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from webmap.gate.lanes import Lane
+from webmap.gate.sockets import Ears
+from webmap.testing.rosbridge import WitnessBridge
+
+TIMEOUT = 30.0
+"""Seconds until something that has not come is taken never to come."""
+
+
+def in_loop(test):
+    """Run an async test in an event loop of its own, and never for ever."""
+
+    @functools.wraps(test)
+    def run(*args, **kwargs):
+        async def within():
+            async with asyncio.timeout(3 * TIMEOUT):
+                await test(*args, **kwargs)
+
+        asyncio.run(within())
+
+    run.__signature__ = inspect.signature(test)
+    return run
+
+
+async def until(check, what):
+    """Wait until ``check`` gives something true, and return that."""
+    deadline = time.monotonic() + TIMEOUT
+    while not (found := check()):
+        assert time.monotonic() < deadline, f"never came: {what}"
+        await asyncio.sleep(0.002)
+    return found
+
+
+@dataclass
+class Told:
+    link: int
+    message: dict[str, Any]
+
+    @property
+    def op(self):
+        return self.message["op"]
+
+    @property
+    def topic(self):
+        return self.message.get("topic")
+
+
+class NotingBridge(WitnessBridge):
+    """The witness's rosbridge, which also notes what it was told."""
+
+    def __init__(self):
+        self.told: list[Told] = []
+        super().__init__(lambda link, message: self.told.append(Told(link, message)))
+
+    @property
+    def url(self):
+        return f"ws://127.0.0.1:{self.port}"
+
+    @property
+    def links(self):
+        """The numbers of the links that are open now."""
+        return set(self._sockets)
+
+    def of(self, op, topic=None):
+        return [
+            t for t in self.told if t.op == op and (topic is None or t.topic == topic)
+        ]
+
+    async def send(self, link, text):
+        await self._sockets[link].connection.send(text)
+
+    def transport_of(self, link):
+        return self._sockets[link].connection.transport
+
+
+@contextlib.asynccontextmanager
+async def noting_bridge():
+    bridge = NotingBridge()
+    await bridge.start()
+    try:
+        yield bridge
+    finally:
+        await bridge.stop()
+
+
+class RawLink:
+    """One link of a :class:`RawBridge`: bytes in, bytes out."""
+
+    def __init__(self, reader, writer):
+        self.reader = reader
+        self.writer = writer
+
+    async def request(self):
+        """Read the request for a WebSocket and return what accepts it."""
+        request = await self.reader.readuntil(b"\r\n\r\n")
+        lines = request.decode().split("\r\n")
+        key = next(
+            line.split(":")[1].strip()
+            for line in lines
+            if "sec-websocket-key" in line or "Sec-WebSocket-Key" in line
+        )
+        magic = key.encode() + b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+        accept = base64.b64encode(hashlib.sha1(magic).digest())
+        return (
+            b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n"
+            b"Connection: Upgrade\r\nSec-WebSocket-Accept: " + accept + b"\r\n\r\n"
+        )
+
+    async def accept(self, and_then=b""):
+        """Answer the request, with bytes that come in the same breath."""
+        self.say(await self.request() + and_then)
+
+    def say(self, data):
+        self.writer.write(data)
+
+
+@contextlib.asynccontextmanager
+async def raw_bridge(talk):
+    """Serve with ``talk(link)`` for each link; gives the address."""
+    writers, talks = [], []
+
+    async def serve(link):
+        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
+            await talk(link)
+
+    def take(reader, writer):
+        writers.append(writer)
+        talks.append(asyncio.create_task(serve(RawLink(reader, writer))))
+
+    server = await asyncio.start_server(take, "127.0.0.1", 0)
+    try:
+        yield f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+    finally:
+        server.close()
+        for task in talks:
+            task.cancel()
+        for writer in writers:
+            writer.transport.abort()
+        await asyncio.gather(*talks, return_exceptions=True)
+        await asyncio.sleep(0.01)  # for the transports to say that they are closed
+
+
+def frame(opcode, body=b"", *, final=True):
+    """Return a WebSocket frame of a server."""
+    assert len(body) < 126
+    return bytes([opcode | 0x80 * final, len(body)]) + body
+
+
+TEXT, MORE, CLOSE, PING, PONG = 1, 0, 8, 9, 10
+"""Kinds of frames."""
+
+
+@dataclass
+class Heard:
+    """Notes what comes on a socket."""
+
+    texts: list[bytes] = field(default_factory=list)
+    pongs: list[bytes] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+
+    @property
+    def ears(self):
+        return Ears(self.texts.append, self.pongs.append, self.lost.append)
+
+
+@contextlib.contextmanager
+def noting_lane(url, happened, **more):
+    """A lane that notes what happens to it."""
+    lane = Lane(
+        url,
+        up=lambda: happened.append("up"),
+        down=lambda: happened.append("down"),
+        text=lambda data: happened.append(data),
+        **more,
+    )
+    try:
+        yield lane
+    finally:
+        lane.close()

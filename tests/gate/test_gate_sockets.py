@@ -1,0 +1,322 @@
+"""One WebSocket to a bridge: how it is opened, refused, cut and closed."""
+
+import asyncio
+import socket
+import ssl
+import subprocess
+
+import pytest
+from link_bench import (
+    CLOSE,
+    MORE,
+    PING,
+    PONG,
+    TEXT,
+    Heard,
+    frame,
+    in_loop,
+    noting_bridge,
+    raw_bridge,
+    until,
+)
+from websockets.asyncio.server import serve
+
+from webmap.errors import BridgeClosed
+from webmap.gate import sockets
+from webmap.gate.sockets import Socket, open_socket
+
+
+async def opened(url, heard):
+    return await open_socket(url, heard.ears)
+
+
+async def forever(link):
+    """Read to the end."""
+    while await link.reader.read(1 << 16):
+        pass
+
+
+class TestOpen:
+    @in_loop
+    async def test_what_is_sent_arrives_and_the_answer_is_heard(self):
+        heard = Heard()
+        async with noting_bridge() as bridge:
+            link = await opened(bridge.url, heard)
+            assert link.is_open
+            link.send(b'{"op": "call_service", "id": "7", "service": "/s"}')
+            await until(lambda: heard.texts, "the answer")
+            assert b'"id": "7"' in heard.texts[0]
+            link.ping(b"12345678")
+            await until(lambda: heard.pongs == [b"12345678"], "the pong")
+            link.close()
+            await until(lambda: not bridge.links, "its end")
+        assert not link.is_open
+        assert heard.lost == [], "what is closed on purpose is not lost"
+
+    @in_loop
+    async def test_a_message_in_pieces_is_heard_once_and_whole(self):
+        heard = Heard()
+
+        async def talk(link):
+            await link.accept()
+            link.say(frame(TEXT, b"on", final=False))
+            link.say(frame(PONG, b"between"))
+            link.say(frame(MORE, b"e") + frame(TEXT, b"two"))
+            await forever(link)
+
+        async with raw_bridge(talk) as url:
+            link = await opened(url, heard)
+            await until(lambda: len(heard.texts) == 2, "both messages")
+            assert heard.texts == [b"one", b"two"]
+            assert heard.pongs == [b"between"]
+            link.close()
+
+    @in_loop
+    async def test_a_ping_of_the_bridge_is_answered_and_heard_by_nobody(self):
+        heard, answers = Heard(), []
+
+        async def talk(link):
+            await link.accept(frame(PING, b"there?"))
+            answers.append(await link.reader.readexactly(2 + 4 + 6))
+            await forever(link)
+
+        async with raw_bridge(talk) as url:
+            link = await opened(url, heard)
+            await until(lambda: answers, "the pong")
+            assert answers[0][0] == 0x80 | PONG
+            assert (heard.texts, heard.pongs) == ([], [])
+            link.close()
+
+    def test_a_bridge_behind_tls_is_spoken_to_if_its_name_is_vouched_for(
+        self, tmp_path, monkeypatch
+    ):
+        key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
+        subprocess.run(
+            ["openssl", "req", "-x509", "-newkey", "ec", "-nodes", "-keyout", key,
+             "-pkeyopt", "ec_paramgen_curve:prime256v1", "-out", cert, "-days", "2",
+             "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"],
+            check=True,
+            capture_output=True,
+        )  # fmt: skip
+
+        async def hang_up(connection):
+            await connection.recv()
+            connection.transport.close()
+
+        async def story():
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(cert, key)
+            async with serve(hang_up, "localhost", 0, ssl=context) as server:
+                port = server.sockets[0].getsockname()[1]
+                url = f"wss://localhost:{port}"
+                with pytest.raises(BridgeClosed, match="certificate"):
+                    await opened(url, Heard())
+                monkeypatch.setenv("SSL_CERT_FILE", cert)
+                heard = Heard()
+                link = await opened(url, heard)
+                link.send(b"hello")
+                await until(lambda: heard.lost, "the end of it")
+                assert not link.is_open
+
+        asyncio.run(story())
+
+
+class TestRefused:
+    @in_loop
+    async def test_where_nobody_listens_the_reason_is_told(self):
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            url = f"ws://127.0.0.1:{taken.getsockname()[1]}"
+            with pytest.raises(BridgeClosed, match=f"{url}: .*Connect call failed"):
+                await opened(url, Heard())
+
+    @pytest.mark.parametrize(
+        "answer",
+        [
+            b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\n\r\n",
+            b"SSH-2.0-OpenSSH_9.6\r\n",
+            b"HTTP/1.1 101 Switching Protocols\r\n\r\n",
+        ],
+    )
+    @in_loop
+    async def test_what_speaks_no_websocket_is_refused_with_the_reason(self, answer):
+        heard = Heard()
+
+        async def talk(link):
+            await link.request()
+            link.say(answer)
+            await forever(link)
+
+        async with raw_bridge(talk) as url:
+            with pytest.raises(BridgeClosed, match="no WebSocket there"):
+                await opened(url, heard)
+        assert heard.lost == [], "what was never open cannot be lost"
+
+    @in_loop
+    async def test_a_bridge_that_hangs_up_before_the_handshake_is_refused(self):
+        heard = Heard()
+
+        async def talk(link):
+            await link.request()
+            link.writer.close()
+
+        async with raw_bridge(talk) as url:
+            with pytest.raises(BridgeClosed):
+                await opened(url, heard)
+        assert heard.lost == []
+
+    @in_loop
+    async def test_a_bridge_that_says_nothing_is_given_up_and_was_never_lost(
+        self, monkeypatch
+    ):
+        monkeypatch.setattr(sockets, "CONNECT_TIMEOUT", 0.1)
+        heard, ended = Heard(), []
+
+        async def talk(link):
+            await link.request()
+            try:
+                await link.reader.read()
+            except ConnectionResetError:
+                ended.append("reset")
+
+        async with raw_bridge(talk) as url:
+            with pytest.raises(BridgeClosed, match=r"no answer within 0\.1 s"):
+                await opened(url, heard)
+            await until(lambda: ended == ["reset"], "the end of the attempt")
+        assert heard.lost == []
+
+    @in_loop
+    async def test_an_attempt_that_is_no_longer_wanted_leaves_nothing_behind(self):
+        heard, asked, ended = Heard(), asyncio.Event(), []
+
+        async def talk(link):
+            await link.request()
+            asked.set()
+            try:
+                await link.reader.read()
+            except ConnectionResetError:
+                ended.append("reset")
+
+        async with raw_bridge(talk) as url:
+            attempt = asyncio.create_task(opened(url, heard))
+            await asked.wait()
+            attempt.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await attempt
+            await until(lambda: ended == ["reset"], "the end of the attempt")
+        assert heard.lost == []
+
+    @in_loop
+    async def test_a_socket_that_never_connected_is_closed_without_a_word(self):
+        heard = Heard()
+        link = Socket("ws://127.0.0.1:1", heard.ears)
+        assert link.unsent == 0
+        link.close()
+        assert not link.is_open
+        link.connection_lost(None)
+        assert heard.lost == []
+
+
+class TestEnd:
+    @in_loop
+    async def test_of_a_socket_that_is_cut_what_was_not_sent_never_arrives(self):
+        heard, arrived, go_on = Heard(), [], asyncio.Event()
+
+        async def talk(link):
+            await link.accept()
+            link.writer.transport.pause_reading()
+            await go_on.wait()
+            link.writer.transport.resume_reading()
+            try:
+                while data := await link.reader.read(1 << 20):
+                    arrived.append(len(data))
+            except ConnectionResetError:
+                arrived.append("reset")
+
+        async with raw_bridge(talk) as url:
+            link = await opened(url, heard)
+            sent = 0
+            while not link.unsent:
+                link.send(b"x" * (1 << 20))
+                sent += 1 << 20
+            link.abort("it carries nothing")
+            assert heard.lost == ["it carries nothing"]
+            go_on.set()
+            await until(lambda: "reset" in arrived, "the reset")
+            assert sum(arrived[:-1]) < sent
+            link.abort("again")
+        assert heard.lost == ["it carries nothing"], "it is lost once"
+
+    @in_loop
+    async def test_a_goodbye_is_said_and_what_comes_after_it_is_heard_by_nobody(self):
+        heard, goodbyes, go_on = Heard(), [], asyncio.Event()
+
+        async def talk(link):
+            await link.accept()
+            goodbyes.append(await link.reader.readexactly(2 + 4 + 2))
+            await go_on.wait()
+
+        async with raw_bridge(talk) as url:
+            link = await opened(url, heard)
+            link.close()
+            link.data_received(frame(TEXT, b"late"))
+            await until(lambda: goodbyes, "the goodbye")
+            assert goodbyes[0][0] == 0x80 | CLOSE
+            go_on.set()
+            link.close()  # again, which is nothing
+        assert (heard.texts, heard.lost) == ([], [])
+
+    @in_loop
+    async def test_a_bridge_that_says_goodbye_is_lost(self):
+        heard = Heard()
+
+        async def talk(link):
+            await link.accept()
+            link.say(frame(CLOSE, b"\x03\xe9"))
+            await forever(link)
+
+        async with raw_bridge(talk) as url:
+            await opened(url, heard)
+            await until(lambda: heard.lost, "the loss")
+            assert heard.lost == ["the bridge closed the link"]
+
+    @in_loop
+    async def test_a_bridge_that_only_stops_sending_is_lost(self):
+        heard = Heard()
+
+        async def talk(link):
+            await link.accept()
+            link.writer.write_eof()
+            await forever(link)
+
+        async with raw_bridge(talk) as url:
+            await opened(url, heard)
+            await until(lambda: heard.lost == ["the bridge closed the link"], "it")
+
+    @in_loop
+    async def test_a_bridge_that_dies_is_lost_with_the_reason_of_the_system(self):
+        heard = Heard()
+        async with noting_bridge() as bridge:
+            link = await opened(bridge.url, heard)
+            link.send(b'{"op": "x"}')
+            await until(lambda: bridge.told, "the first word")
+            raw = bridge.transport_of(1).get_extra_info("socket")
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, sockets._LINGER)
+            bridge.transport_of(1).abort()
+            await until(lambda: heard.lost, "the loss")
+            assert "reset" in heard.lost[0]
+
+    @in_loop
+    async def test_a_message_that_is_too_long_ends_the_link(self, monkeypatch):
+        monkeypatch.setattr(sockets, "MAX_FRAME", 100)
+        heard = Heard()
+
+        async def talk(link):
+            await link.accept()
+            link.say(frame(TEXT, b"x" * 101))
+            await forever(link)
+
+        async with raw_bridge(talk) as url:
+            link = await opened(url, heard)
+            await until(lambda: heard.lost, "the loss")
+            assert (heard.texts, link.is_open) == ([], False)
