@@ -4,12 +4,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from webmap.core.button_spec import (
-    ButtonSpec,
-    declared_motion,
-    motion_of,
-    value_kind,
-)
+from webmap.core.button_spec import ButtonSpec, declared_motion, motion_of
+from webmap.core.parameter_values import value_kind
 from webmap.errors import BridgeError, MotionRefused, ServiceError, WebMapError
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import same_type

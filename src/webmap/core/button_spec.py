@@ -1,12 +1,12 @@
 """What a button does, from its configuration: one call, one message or one value."""
 
 import difflib
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from webmap.core.motion import roads
+from webmap.core.parameter_values import value_kind
 from webmap.errors import ConfigError
 from webmap.ros import ops
 from webmap.ros.form_fields import UnknownType, fields_of
@@ -178,21 +178,12 @@ def declared_motion(spec: ButtonSpec, url: str) -> str | None:
     if spec.kind == "parameter":
         return None
     for road in list(roads):
-        twist, move = road.twist_topic, road.move_topic
-        theirs: list[tuple[str | None, str]] = []
-        if twist is not None and twist.bridge.url == url:
-            theirs.append((twist.topic, "a velocity"))
-            hooks = [hook.get("topic") for hook in twist.stop_hooks]
-            theirs += [(topic, "what STOP says") for topic in hooks]
-        if move is not None and move.bridge.url == url:
-            theirs.append((move.topic, "a goal"))
-            theirs.append((move.cancel_topic, "the end of a goal"))
-        for name, moved in theirs:
-            if name and normalise_topic(name) == spec.name:
-                return (
-                    f"{spec.name} carries {moved}, and a button may not write that: "
-                    "the gate does"
-                )
+        carried = road.writes(url).get(spec.name)
+        if carried is not None:
+            return (
+                f"{spec.name} carries {carried}, and a button may not write that: "
+                "the gate does"
+            )
     return None
 
 
@@ -313,37 +304,3 @@ def _check_value(spec: ButtonSpec) -> None:
         raise ButtonMistake("value", str(error)) from None
     if spec.form and isinstance(spec.value, list):
         raise ButtonMistake("form", "there is no form for a list of values")
-
-
-def value_kind(value: Any) -> tuple[int, str]:
-    """Return how ROS 2 calls the kind of a parameter's value: number and field.
-
-    Raises:
-        ConfigError: If a parameter cannot have such a value.
-
-    """
-    for cls, number, name in (
-        (bool, 1, "bool_value"),
-        (int, 2, "integer_value"),
-        (float, 3, "double_value"),
-        (str, 4, "string_value"),
-    ):
-        if isinstance(value, cls):
-            _check_number(value)
-            return number, name
-    if isinstance(value, list) and value:
-        kinds = {value_kind(each)[0] for each in value}
-        if kinds <= {1, 2, 3, 4} and (len(kinds) == 1 or kinds == {2, 3}):
-            kind = 3 if kinds == {2, 3} else kinds.pop()
-            names = {1: "bool", 2: "integer", 3: "double", 4: "string"}
-            return kind + 5, f"{names[kind]}_array_value"
-    raise ConfigError(
-        f"got {value!r}, expected true, false, a number, a text or a list of one kind"
-    )
-
-
-def _check_number(value: Any) -> None:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ConfigError(f"got {value}, expected a finite number")
-    if isinstance(value, int) and abs(value) >= 2**63:
-        raise ConfigError("a whole number has 64 bits")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from webmap.errors import ConfigError
+from webmap.ros.names import normalise_topic
 
 if TYPE_CHECKING:
     from webmap.ros.bridge import Bridge
@@ -33,14 +34,21 @@ class MoveTopic:
         if not self.topic and not self.action:
             raise ConfigError("goals go to a topic or to an action: neither is given")
 
+    def writes(self) -> dict[str, str]:
+        """Return what the gate alone writes: topics, and what each carries."""
+        action = self.action
+        names = (
+            (self.topic, "a goal"),
+            (self.cancel_topic, "the end of a goal"),
+            (action and f"{action}/goal", "a goal"),
+            (action and f"{action}/cancel", "the end of a goal"),
+        )
+        return {normalise_topic(name): carried for name, carried in names if name}
+
     def protect(self) -> None:
         """Have the bridge refuse to publish where the gate writes."""
-        names = [self.topic, self.cancel_topic]
-        if self.action:
-            names += [f"{self.action}/goal", f"{self.action}/cancel"]
-        for name in names:
-            if name:
-                self.bridge.protect(name)
+        for name in self.writes():
+            self.bridge.protect(name)
 
     def spelled(self, name: str) -> str:
         """Return a type of ``geometry_msgs`` as the dialect of the action has it."""
@@ -90,6 +98,10 @@ class InitialPoseTopic:
                 f"and y in m² and of yaw in rad²; got {covariance!r}"
             )
         return cls(bridge, topic, (numbers[0], numbers[1], numbers[2]))
+
+    def writes(self) -> dict[str, str]:
+        """Return what the gate alone writes: the topic, and what it carries."""
+        return {normalise_topic(self.topic): "an initial pose"}
 
     def fields(self, goals: MoveTopic | None) -> dict[str, Any]:
         """Return what the gate must know of it.

@@ -17,7 +17,7 @@ from webmap.gate.specs import checked_assist
 from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
-from webmap.ros.names import same_type
+from webmap.ros.names import normalise_topic, same_type
 from webmap.scope import Removable
 
 if TYPE_CHECKING:
@@ -43,6 +43,12 @@ class TwistTopic:
     a_max: float | None
     holonomic: bool
     stop_hooks: Sequence[Mapping[str, str]] = ()
+
+    def writes(self) -> dict[str, str]:
+        """Return what the gate alone writes: topics, and what each carries."""
+        hooks = [hook["topic"] for hook in self.stop_hooks if "topic" in hook]
+        said = {normalise_topic(topic): "what STOP says" for topic in hooks}
+        return {**said, normalise_topic(self.topic): "a velocity"}
 
 
 class MotionRoad:
@@ -199,6 +205,19 @@ class MotionRoad:
             own_map=(self._own_map.x, self._own_map.y, self._own_map.yaw),
             **goals,
         )
+
+    def writes(self, url: str) -> dict[str, str]:
+        """Return what the gate alone writes over a bridge: topics, and what they carry.
+
+        Args:
+            url: The address of the bridge.
+
+        """
+        written: dict[str, str] = {}
+        for way in (self._pose, self._move, self._twist):
+            if way is not None and way.bridge.url == url:
+                written.update(way.writes())
+        return written
 
     def close(self) -> None:
         """Let the gate forget the robot; it stops if it was driven."""
