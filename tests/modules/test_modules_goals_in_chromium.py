@@ -211,7 +211,19 @@ def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab):
     pick(tab, "Old 0")
     tab.keyboard.press("i")
     expect(word).to_contain_text("Press where the robot is")
-    press(tab, *beside(tab, "Old 0", 5), drag=30)
+    expect(word).to_contain_text("(± 1.0 m, ± 30°)")
+    x, y = beside(tab, "Old 0", 5)
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + 30, y)
+    ellipse = tab.locator(".webmap-locate-ellipse")
+    metre = tab.evaluate("document.querySelector('.world').getCTM().a")
+    # Two standard deviations of 0.25 m² are a metre to each side.
+    box = ellipse.bounding_box()
+    assert box["width"] == pytest.approx(2 * metre, abs=2)
+    assert box["x"] + box["width"] / 2 == pytest.approx(x, abs=2)
+    tab.mouse.up()
+    expect(ellipse).to_be_hidden()
 
     def again():
         if SLOW.search(word.inner_text()):

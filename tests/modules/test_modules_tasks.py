@@ -1,11 +1,12 @@
 """The display's halves of the tools that send robots somewhere."""
 
 import asyncio
+import math
 
 import pytest
 from module_fakes import Channel, Someone
 
-from webmap import Map, Robot
+from webmap import Bridge, Map, Robot
 from webmap.console.tasks import LOOKS, GoalLine, figures
 from webmap.core.page import Page, PageEntry
 from webmap.gate.messages import GoalReport
@@ -104,6 +105,28 @@ class TestInitialPose:
             tool.on_message(broken)
         assert listener.told == [(robot, 1, 2.0, 0.5)]
         tool.aim()
+
+    def test_the_page_hears_how_sure_the_robot_is_told_to_be(
+        self, map, robot, monkeypatch
+    ):
+        map.add_robot(robot)
+        tool, said = map.add_module("InitialPoseTool"), []
+        bridge = Bridge("ws://127.0.0.1:9")
+        monkeypatch.setattr(tool.half, "send", said.append)
+        tool.on_message({"doubt": robot.id})
+        robot.set_initial_pose_topic(bridge, "/initialpose", covariance=(1, 4, 0.25))
+        robot.set_alignment(3, 0, 90)
+        tool.on_message({"doubt": robot.id})
+        tool.on_message({"doubt": "r999"})
+        tool.on_message({"doubt": None})
+        assert said.pop(1)["doubt"] == {
+            "robot": robot.id,
+            "x": 1,
+            "y": 4,
+            "yaw": 0.25,
+            "turn": pytest.approx(math.pi / 2),
+        }
+        assert said == [{"doubt": None}] * 3
 
     def test_a_key_is_one_character(self, map):
         with pytest.raises(ValueError, match="one character"):

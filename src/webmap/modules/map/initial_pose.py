@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
+    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.initial_pose")
 
@@ -13,8 +14,10 @@ log = logging.getLogger("webmap.modules.initial_pose")
 class InitialPoseTool:
     """A press on the map is where the selected robot is, a drag which way it looks.
 
-    It begins by its button, by its key or by :meth:`aim`. The page tells it to the
-    gate, which refuses it while the robot moves, follows a goal, or is somebody else's.
+    It begins by its button, by its key or by :meth:`aim`. What is aimed is drawn with
+    the ellipse and the wedge of two standard deviations that the robot will be told.
+    The page tells it to the gate, which refuses it while the robot moves, follows a
+    goal, or is somebody else's.
 
     Fires ``on_pose_told(robot, x, y, yaw)`` on the map's modules when the gate has
     taken it.
@@ -45,16 +48,30 @@ class InitialPoseTool:
         self.half.send({"active": True})
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Take what the page says that it told."""
+        """Take what the page says that it told, or tell it how sure that will be."""
+        if "doubt" in message:
+            self._tell_doubt(message["doubt"])
+            return
         told = message.get("told")
         if isinstance(told, dict):
             pose = [told.get(name) for name in ("x", "y", "yaw")]
-            robot = next(
-                (r for r in self.map.robots if r.id == told.get("robot")), None
-            )
+            robot = self._robot(told.get("robot"))
             if robot is not None and all(
                 isinstance(n, int | float) and math.isfinite(n) for n in pose
             ):
                 self.map.notify_modules("on_pose_told", robot, *pose)
             return
         log.warning("%r: an unknown message of the page was ignored", self.map)
+
+    def _robot(self, id: Any) -> "Robot | None":
+        return next((r for r in self.map.robots if r.id == id), None)
+
+    def _tell_doubt(self, id: Any) -> None:
+        robot = self._robot(id)
+        spec = robot.motion.spec() if robot is not None else None
+        if robot is None or spec is None or spec.pose_topic is None:
+            self.half.send({"doubt": None})
+            return
+        x, y, yaw = spec.pose_covariance
+        doubt = {"robot": robot.id, "x": x, "y": y, "yaw": yaw, "turn": spec.own_map[2]}
+        self.half.send({"doubt": doubt})

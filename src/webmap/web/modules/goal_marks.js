@@ -44,7 +44,7 @@ export class GoalMarks {
     this._onEnd = onEnd;
     /** @type {Map<string, Mark>} */
     this._marks = new Map();
-    this._drawing = svg("svg", { class: "webmap-goal-drawing", "aria-hidden": "true" });
+    this._drawing = svg("svg", { class: "webmap-aim-drawing", "aria-hidden": "true" });
     this._labels = html("div", "webmap-goal-labels");
     this._offs = [
       lay(map, this._drawing),

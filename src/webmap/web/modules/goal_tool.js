@@ -65,10 +65,10 @@ class GoalTool {
       done: (pose) => this._done(pose),
     });
     this._wanted = false;
-    this._go = button("webmap-goal-go", "Send to a place", () => this._toggle());
+    this._go = button("webmap-aim-go webmap-goal-go", "Send to a place", () => this._toggle());
     this._go.title = `Key ${key}`;
     this._cancel = button("webmap-goal-cancel", "Cancel the goal", () => this._callOff());
-    this._word = html("span", "webmap-goal-word", { role: "status" });
+    this._word = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
       min: "0.3",
@@ -85,7 +85,7 @@ class GoalTool {
     );
     this._panel = html(
       "section",
-      "webmap-panel webmap-goal",
+      "webmap-panel webmap-aim webmap-goal",
       { "aria-label": "Goals" },
       this._go,
       this._apart,

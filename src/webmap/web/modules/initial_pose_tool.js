@@ -1,5 +1,6 @@
 import { onScreen } from "./aim.js";
 import { button, html, say, svg } from "./elements.js";
+import { Doubt } from "./initial_pose_doubt.js";
 import { lay } from "./overlay.js";
 import { PressAim } from "./press_aim.js";
 
@@ -15,7 +16,10 @@ const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
  * Tell the selected robot where it is: press there, drag for the heading, release.
  *
  * Begins by its button, by `i`, or by a message `{active: true}`; Escape leaves. Sends
- * `{told: {robot, x, y, yaw}}` when the gate has taken it.
+ * `{told: {robot, x, y, yaw}}` when the gate has taken it. Asks by `{doubt: robot}` what
+ * the robot is told of how sure that is; the answer is `{doubt: {robot, x, y, yaw,
+ * turn}}` with variances in m² and rad², or null, and how far the axes of the robot's own
+ * map are turned on this one, in radians.
  *
  * Options: `button` (true), whether there is a button; `key` ("i").
  *
@@ -51,20 +55,22 @@ class InitialPoseTool {
       preview: (pose) => this._preview(pose),
       done: (pose) => this._done(pose),
     });
-    this._go = button("webmap-locate-go", "Set its pose", () => this._aim.toggle());
+    this._go = button("webmap-aim-go webmap-locate-go", "Set its pose", () => this._aim.toggle());
     this._go.title = `Key ${key}`;
-    this._word = html("span", "webmap-locate-word", { role: "status" });
+    this._word = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
     this._panel = html(
       "section",
-      "webmap-panel webmap-locate",
+      "webmap-panel webmap-aim webmap-locate",
       { "aria-label": "Initial pose" },
       this._go,
       this._word,
     );
+    this._doubt = new Doubt();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
     this._drawing = svg(
       "svg",
-      { class: "webmap-locate-drawing", "aria-hidden": "true" },
+      { class: "webmap-aim-drawing", "aria-hidden": "true" },
+      this._doubt.element,
       this._outline,
     );
     this._offs = [
@@ -85,6 +91,12 @@ class InitialPoseTool {
 
   /** @param {any} message */
   receive(message) {
+    if (message && "doubt" in message) {
+      const { doubt } = message;
+      this._doubt.know(doubt?.robot === this._map.selected ? doubt : null);
+      this._explain();
+      this._draw();
+    }
     if (typeof message?.active !== "boolean") return;
     this._aim.activate(message.active);
     if (message.active && !this._aim.active) {
@@ -99,8 +111,17 @@ class InitialPoseTool {
 
   /** @param {boolean} active */
   _changed(active) {
-    say(this._word, active ? "Press where the robot is, drag which way it looks." : "");
+    if (active) this._send({ doubt: this._map.selected });
+    if (!active) say(this._word, "");
+    this._explain();
     this._show();
+  }
+
+  _explain() {
+    if (!this._aim.active) return;
+    const sure = this._doubt.words;
+    const words = "Press where the robot is, drag which way it looks";
+    say(this._word, sure === "" ? `${words}.` : `${words} (${sure}).`);
   }
 
   /** @param {Pose | null} pose */
@@ -134,6 +155,7 @@ class InitialPoseTool {
   }
 
   _selected() {
+    this._doubt.know(null);
     this._aim.leave();
     say(this._word, "");
     this._show();
@@ -146,6 +168,7 @@ class InitialPoseTool {
   }
 
   _draw() {
+    this._doubt.draw(this._map.view, this._pose);
     this._outline.toggleAttribute("hidden", this._pose === null);
     if (this._pose === null) return;
     const { x, y, degrees } = onScreen(this._map.view, this._pose);
