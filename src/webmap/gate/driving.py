@@ -83,7 +83,7 @@ class Driving:
 
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         if not self._motion.driving:
-            self._robots.make_way()
+            self._robots.make_way(now)
         bounds = self._speeds.bounds()
         fitted = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
         self._motion.drive(self._guard.limit(fitted, now), lease, now)

@@ -13,6 +13,9 @@ from webmap.ros.names import is_type
 MOVE_BASE = "move_base_msgs/MoveBaseAction"
 """The type of the action of ROS 1."""
 
+LATELY = 2.0
+"""Seconds after such a cancel in which another one is not worth it."""
+
 OVER = ("reached", "failed", "cancelled")
 """The states of a goal that nothing follows any more."""
 
@@ -40,6 +43,7 @@ class Goals:
         # An earlier gate may have sent a goal that still runs.
         self._perhaps = True
         self._cancel_owed = False
+        self._made_way_at: float | None = None
         self._no_actions = False
         """Whether the bridge said that it takes no goals of actions."""
 
@@ -170,9 +174,15 @@ class Goals:
             waits = self._cancel_owed or self.report.way != "topic"
             self._show("cancelling" if waits else "cancelled", why)
 
-    def make_way(self) -> None:
-        """Cancel a goal that may be running, because somebody is going to drive."""
-        if self._perhaps and self.can_cancel:
+    def make_way(self, now: float) -> None:
+        """Cancel a goal that may be running, because somebody is going to drive.
+
+        Others send goals to a robot too, and nobody tells the gate. So whoever drives
+        off cancels what may run, but not again with each touch of a key.
+        """
+        lately = self._made_way_at is not None and now - self._made_way_at < LATELY
+        if self.can_cancel and (self._perhaps or not lately):
+            self._made_way_at = now
             self.cancel("somebody drives the robot")
 
     def stop(self) -> None:

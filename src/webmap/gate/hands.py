@@ -138,7 +138,7 @@ class Hands:
         self._end(f"{heir.name or heir.id} gets it", now)
         if self._robots.drivable:
             self._motion.zero(now)
-        self._robots.make_way()  # what follows a goal does not come to stand
+        self._robots.make_way(now)  # what follows a goal does not come to stand
         self.handover.begin(heir, now)
         self._changed(now)
 

@@ -84,10 +84,10 @@ class Robots:
         del self.specs[robot], self.goals[robot], self.hooks[robot]
         self._emit(Detach(self._key, robot))
 
-    def make_way(self) -> None:
+    def make_way(self, now: float) -> None:
         """Cancel a goal that may be running: somebody is going to drive."""
         for goals in self.goals.values():
-            goals.make_way()
+            goals.make_way(now)
 
     def refuse(self, connection: str, what: str, why: str) -> None:
         """Tell somebody what does not happen, under each of the names."""
