@@ -34,7 +34,18 @@ class Figure:
     """How many trials the whole run was asked for."""
 
 
-def note(figure: Figure) -> None:
+@dataclass(frozen=True)
+class Soak:
+    """What half an hour of everything at once has shown; see the unit."""
+
+    soak: str
+    unit: str
+    promised: float | None
+    measured: float
+    version: str = field(default_factory=version)
+
+
+def note(figure: Figure | Soak) -> None:
     """Keep a figure, if this run is one that keeps them."""
     print(figure)
     if path := os.environ.get("WEBMAP_SAFETY_FIGURES"):
@@ -51,8 +62,8 @@ def machine() -> dict[str, Any]:
     }
 
 
-def table(figures: list[Figure], measured_on: dict[str, Any]) -> str:
-    """Return the figures as a table in Markdown, and a line on the machine."""
+def table(figures: list[Figure], soaks: list[Soak], measured_on: dict[str, Any]) -> str:
+    """Return the figures as tables in Markdown, and a line on the machine."""
     lines = [
         "---",
         "orphan: true",
@@ -69,6 +80,18 @@ def table(figures: list[Figure], measured_on: dict[str, Any]) -> str:
         f"| {f.version} |"
         for f in figures
     ]
+    if soaks:
+        lines += [
+            "",
+            "| half an hour of everything at once | promised | measured | version |",
+            "|---|---|---|---|",
+        ]
+    for soak in soaks:
+        promised = "" if soak.promised is None else f"{soak.promised:.0f} {soak.unit}"
+        lines.append(
+            f"| {soak.soak} | {promised} | {soak.measured:.1f} {soak.unit} "
+            f"| {soak.version} |"
+        )
     lines += [
         "",
         f"Measured on {measured_on['processors']} processors, "
@@ -77,13 +100,22 @@ def table(figures: list[Figure], measured_on: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def newest(type: Any, key: str, noted: list[dict[str, Any]]) -> list[Any]:
+    """Return the last figure of each name, of one of the types."""
+    return list({f[key]: type(**f) for f in noted if key in f}.values())
+
+
 def main() -> None:
     """Write the table and the figures where the documentation includes them."""
-    lines = Path(sys.argv[1]).read_text().splitlines()
-    newest = {figure["name"]: Figure(**figure) for figure in map(json.loads, lines)}
-    figures = list(newest.values())
-    content = {"machine": machine(), "figures": [asdict(f) for f in figures]}
-    (DOCS / "safety-figures.md").write_text(table(figures, content["machine"]))
+    noted = [json.loads(line) for line in Path(sys.argv[1]).read_text().splitlines()]
+    figures = newest(Figure, "name", noted)
+    soaks = newest(Soak, "soak", noted)
+    content = {
+        "machine": machine(),
+        "figures": [asdict(f) for f in figures],
+        "soak": [asdict(s) for s in soaks],
+    }
+    (DOCS / "safety-figures.md").write_text(table(figures, soaks, content["machine"]))
     (DOCS / "safety-figures.json").write_text(json.dumps(content, indent=2) + "\n")
 
 

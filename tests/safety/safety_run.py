@@ -92,4 +92,5 @@ def is_measured(name: str) -> bool:
     return any(
         (f["name"], f["asked"], f["version"]) == wanted and f["worst"] <= f["promised"]
         for f in lines
+        if "name" in f
     )

@@ -2,7 +2,7 @@
 
 import json
 
-from safety_figures import DOCS, Figure, note, table
+from safety_figures import DOCS, Figure, Soak, note, table
 from safety_run import TRIALS, is_measured
 
 MACHINE = {"processors": 2, "kernel": "Linux 6.1", "python": "3.11.2"}
@@ -10,7 +10,7 @@ MACHINE = {"processors": 2, "kernel": "Linux 6.1", "python": "3.11.2"}
 
 def test_a_figure_is_a_line_in_milliseconds():
     figure = Figure("the page is frozen", "zero", 0.3, 0.0124, 0.0081, 50, "1.0 (a1b)")
-    lines = table([figure], MACHINE).splitlines()
+    lines = table([figure], [], MACHINE).splitlines()
     assert lines[-3] == (
         "| the page is frozen | a zero | 300 ms | 12 ms | 8 ms | 50 | 1.0 (a1b) |"
     )
@@ -19,15 +19,25 @@ def test_a_figure_is_a_line_in_milliseconds():
 
 def test_what_nobody_can_stop_is_told_from_what_gets_a_zero():
     figure = Figure("the gate is killed", "itself", 0.55, 0.51, 0.0, 1)
-    assert "| its own timeout | 550 ms |" in table([figure], MACHINE)
+    assert "| its own timeout | 550 ms |" in table([figure], [], MACHINE)
 
 
 def test_the_table_in_the_documentation_is_that_of_the_figures_beside_it():
     content = json.loads((DOCS / "safety-figures.json").read_text())
     figures = [Figure(**figure) for figure in content["figures"]]
+    soaks = [Soak(**soak) for soak in content["soak"]]
     assert (DOCS / "safety-figures.md").read_text() == table(
-        figures, content["machine"]
+        figures, soaks, content["machine"]
     )
+
+
+def test_what_half_an_hour_has_shown_stands_in_a_table_of_its_own():
+    soaks = [Soak("memory", "%", 10, 1.26, "1.0"), Soak("late", "ms", None, 3.0, "1.0")]
+    lines = table([], soaks, MACHINE).splitlines()
+    assert lines[-4:-2] == [
+        "| memory | 10 % | 1.3 % | 1.0 |",
+        "| late |  | 3.0 ms | 1.0 |",
+    ]
 
 
 def test_a_run_that_was_cut_goes_on_with_what_is_missing(tmp_path, monkeypatch):

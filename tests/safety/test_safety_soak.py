@@ -1,0 +1,107 @@
+"""Half an hour of everything at once: nothing grows, and the gate is never late.
+
+Only in a full run, or as long as WEBMAP_SAFETY_SOAK says, in minutes.
+"""
+
+import itertools
+import os
+import time
+
+import psutil
+import pytest
+from safety_bench import pass_time, wait_for
+from safety_figures import Soak, note
+from safety_load import UNDER_LOAD, maps_coming, under_load
+from safety_run import FULL, SHOW
+
+from webmap.gate.burst import HELD_PERIOD
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+MINUTES = float(os.environ.get("WEBMAP_SAFETY_SOAK", "30" if FULL else "0"))
+
+WARM = 2.0
+"""Minutes until everybody has everything that they keep."""
+
+STEP = 0.01
+"""Seconds between two looks of the gate at its clock: a zero may be due in between."""
+
+STOP_AGAIN = 240.0
+"""Seconds after which STOP is said again: the zeros of one end after ten minutes."""
+
+GROWTH = 0.1
+
+
+def processes(bench):
+    """Return the display and all that it has started, by what they are."""
+    display = psutil.Process(bench.display.popen.pid)
+    found = {"display": display}
+    for child in display.children(recursive=True):
+        what = child.cmdline()
+        if "webmap.gate" in what:
+            found["gate"] = child
+        elif "webmap.ros.worker" in what:
+            found["worker"] = child
+    return found
+
+
+def memory(bench):
+    """Return the resident bytes of each of them, the least of some seconds.
+
+    A map of 16 million cells comes and goes: what is left between two is what is kept.
+    """
+    seen = {}
+    for _ in range(40):
+        for name, process in processes(bench).items():
+            seen.setdefault(name, []).append(process.memory_info().rss)
+        pass_time(0.25)
+    return {name: min(sizes) for name, sizes in seen.items()}
+
+
+def say_stop(bench):
+    bench.space("keyDown")
+    bench.space("keyUp")
+
+
+@pytest.mark.skipif(not MINUTES, reason="takes half an hour: WEBMAP_SAFETY_TRIALS=50")
+@pytest.mark.timeout(5400)
+def test_half_an_hour_of_everything_grows_nothing_and_delays_no_zero(bench):
+    with under_load(bench), maps_coming(bench):
+        say_stop(bench)
+        pids = {name: process.pid for name, process in processes(bench).items()}
+        pass_time(60 * min(WARM, MINUTES / 3))
+        before = memory(bench)
+        begun = time.monotonic()
+        end, again = begun + 60 * MINUTES, begun
+        while time.monotonic() < end:
+            if time.monotonic() > again:
+                say_stop(bench)
+                again = time.monotonic() + STOP_AGAIN
+                SHOW[-1](f"soak: {(end - again) / 60:.0f} min, {memory(bench)}")
+            pass_time(1.0)
+        wait_for(lambda: bench.robot.log.told[-1].at > end, "a zero")
+        told = [told for told in bench.robot.log.told if told.at >= begun]
+        kept = memory(bench)
+        alive = {name: process.pid for name, process in processes(bench).items()}
+    assert all(one.is_zero for one in told), "STOP stands"
+    gaps = [after.at - one.at for one, after in itertools.pairwise(told)]
+    late = sorted(max(0.0, gap - HELD_PERIOD - STEP) for gap in gaps)
+    most, usual = late[-1], late[int(len(late) * 0.999)]
+    jitter = bench.sentinel.worst(begun, end)
+    for name, size in kept.items():
+        note(
+            Soak(
+                f"memory of the {name} after {MINUTES:g} min",
+                "%",
+                100 * GROWTH,
+                100 * (size / before[name] - 1),
+            )
+        )
+    note(Soak("a zero of STOP was late by, at most", "ms", 50, 1000 * most))
+    note(Soak("a zero of STOP was late by, 99.9 % of them", "ms", 20, 1000 * usual))
+    note(Soak("the machine was late by, at most", "ms", None, 1000 * jitter))
+    assert alive == pids, "none has died"
+    for name, size in kept.items():
+        assert size <= before[name] * (1 + GROWTH), (name, before, kept, UNDER_LOAD)
+    assert most <= 0.05 + (0 if FULL else jitter)
+    assert usual <= 0.02 + (0 if FULL else jitter)
