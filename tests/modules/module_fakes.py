@@ -41,6 +41,10 @@ class Link:
 
         return keep(Removal(undo))
 
+    def on_open(self, fn):
+        """It is open already, and nobody waits for what comes soon."""
+        return keep(Removal(lambda: None))
+
     def say(self, topic: str, message: dict | str, *, cbor: bool = False) -> None:
         """Let a frame come in as a rosbridge writes it."""
         if cbor:

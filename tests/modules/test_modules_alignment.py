@@ -4,6 +4,8 @@ import math
 
 import pytest
 from module_fakes import Link, pose, to_root
+from test_modules_frames import tell, transform
+from test_modules_grid import CORNERS, grid
 
 from webmap import Robot
 from webmap.core.alignment import align_bridge, toml_line
@@ -115,6 +117,50 @@ def test_the_trail_of_a_robot_lies_behind_it(link, bob):
         go(link, step / 10, 0.0, seconds=100.0 + step)
     ((*_, last),) = trail.points
     assert to_root(trail.svg).apply(*last) == pytest.approx((10.0, 0.3))
+
+
+@pytest.mark.parametrize("map_frame", [None, "map"])
+def test_a_robots_own_grids_and_markers_lie_as_it_is_aligned(map, link, bob, map_frame):
+    map.add_robot(bob)
+    told = {"map_frame": map_frame}
+    bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", **told)
+    bob.add_module("OnMaps", "Markers", link, "/bob/markers", **told)
+    map.add_module("OccupancyGrid", link, "/map")
+    costmap, markers, common = (
+        next(m.layer for m in map.modules if getattr(m, "layer", link).topic == topic)
+        for topic in ("/bob/costmap", "/bob/markers", "/map")
+    )
+    align_bridge(link, 1.0, 0.0, 0.0)
+    for layer in (costmap, markers, common):
+        assert to_root(layer.svg).apply(2.0, 0.0) == pytest.approx((3.0, 0.0))
+    bob.set_alignment(10.0, 0.0, 90.0)
+    for layer in (costmap, markers):
+        assert to_root(layer.svg).apply(2.0, 0.0) == pytest.approx((10.0, 2.0))
+        assert layer.svg.get("data-layer-of") == bob.id
+        assert layer.svg.get("data-bridge") is None, "the page moves it with the robot"
+    assert to_root(common.svg).apply(2.0, 0.0) == pytest.approx((3.0, 0.0))
+    bob.unset_alignment()
+    for layer in (costmap, markers):
+        assert to_root(layer.svg).apply(2.0, 0.0) == pytest.approx((3.0, 0.0))
+
+
+def test_a_robots_costmap_in_the_frame_of_its_odometry_lies_as_it_is_aligned_too(
+    map, link, bob
+):
+    map.add_robot(bob)
+    bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", map_frame="map")
+    bob.set_alignment(10.0, 0.0, 90.0)
+    (layer,) = (m.layer for m in map.modules if hasattr(m, "layer"))
+    link.say("/bob/costmap", {**grid(CORNERS, 1.0), "header": header(frame="odom")})
+    tell(link, transform("map", "odom", 3.0, 0.0, 0.0))
+    assert to_root(layer.svg).apply(1.0, 0.0) == pytest.approx((10.0, 4.0))
+
+
+def test_layers_let_a_robot_go_that_is_gone(map, link, bob):
+    map.add_robot(bob)
+    bob.add_module("OnMaps", "Markers", link, "/bob/markers")
+    map.remove_robot(bob)
+    assert bob.whereabouts._listeners == {}
 
 
 def test_the_gate_is_told_where_a_robots_own_map_lies(link, bob):

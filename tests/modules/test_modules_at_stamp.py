@@ -75,6 +75,7 @@ def near(points):
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
     monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 
 @pytest.fixture

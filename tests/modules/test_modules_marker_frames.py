@@ -16,6 +16,7 @@ from webmap.geometry import Affine
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
     monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 
 @pytest.fixture

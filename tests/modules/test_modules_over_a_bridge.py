@@ -43,6 +43,44 @@ def test_the_simulators_floor_is_drawn_cell_by_cell(
     asyncio.run(scenario())
 
 
+def test_frames_that_are_missing_are_said_a_while_after_the_link_is_up(
+    monkeypatch, map: Map, page: Page, robot
+):
+    """Nothing ever comes of them, so nothing but the time makes anybody look."""
+    monkeypatch.setattr("webmap.core.frames.GRACE", 0.6)
+    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.1)
+
+    async def scenario():
+        urls, stop = [], asyncio.Event()
+        simulator = asyncio.create_task(
+            run_simulator(robots=1, on_ready=urls.append, stop=stop)
+        )
+        await until(lambda: urls)
+        bridge = Bridge(urls[0])
+        robot.set_tf(bridge, namespace="/ghost")
+        grid = map.add_module(
+            "OccupancyGrid", bridge, "/map", map_frame="other", namespace="/ghost"
+        ).layer
+        opened = []
+        bridge.on_open(lambda: opened.append(time.monotonic()))
+        bridge.start(asyncio.get_running_loop())
+        try:
+            await until(lambda: grid.problems or robot.problems)
+            assert time.monotonic() - opened[0] > 0.55
+            await until(lambda: grid.problems and robot.problems)
+            (of_grid,), (of_robot,) = grid.problems.values(), robot.problems.values()
+            assert "there is no frame 'ghost/other'" in of_grid
+            assert "there is no frame 'map'; there are: none" in of_robot
+        finally:
+            page.close()
+            robot.unset_tf()
+            await bridge.stop()
+            stop.set()
+            await simulator
+
+    asyncio.run(scenario())
+
+
 def check(image) -> None:
     """Compare 200 places of the picture with the floor plan of the simulator."""
     plan = load_map(FLOOR)

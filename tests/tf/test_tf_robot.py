@@ -23,6 +23,9 @@ class Link:
     def __init__(self):
         self.subscribed = []
 
+    def on_open(self, fn):
+        return Removal(lambda: None)
+
     def subscribe(self, topic, callback, type=None, *, decode=None, **more):
         entry = (topic, callback, decode)
         self.subscribed.append(entry)
@@ -64,6 +67,7 @@ def odometry(x, y=0.0, yaw=0.0, *, stamp=10.0, frame="odom"):
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
     monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 
 @pytest.fixture

@@ -67,17 +67,20 @@ def ready(link, bob, clock):
 def test_a_missing_map_is_said_once_it_lasts_and_taken_back(link, bob, clock):
     link.say("/odom", odometry(1.0))
     assert bob.problems == {}, "frames come one after another"
-    clock.now += 1.5
-    link.say("/odom", odometry(1.0, stamp=11.5))
+    clock.now += 2.5
+    link.say("/odom", odometry(1.0, stamp=12.5))
+    assert bob.problems == {}, "and some only a while after the link is up"
+    clock.now += 1.0
+    link.say("/odom", odometry(1.0, stamp=13.5))
     assert "there is no frame 'map'; there are: none" in bob.problems["tf"]
-    link.say("/tf", {"transforms": [transform("map", "odom", 1.0, stamp=11.5)]})
-    link.say("/odom", odometry(1.0, stamp=11.6))
+    link.say("/tf", {"transforms": [transform("map", "odom", 1.0, stamp=13.5)]})
+    link.say("/odom", odometry(1.0, stamp=13.6))
     assert bob.problems == {}
 
 
 def test_two_trees_are_said_by_their_roots(link, bob, clock):
     chain = [transform("map", "other", 1.0), transform("odom", "base_link", 1.0)]
-    for _ in range(2):
+    for _ in range(3):
         link.say("/tf", {"transforms": chain})
         link.say("/odom", odometry(1.0))
         clock.now += 1.5

@@ -1,5 +1,6 @@
 """The frames of a ROS system, heard once for all robots that need them."""
 
+import asyncio
 import logging
 import time
 from collections.abc import Callable
@@ -18,6 +19,10 @@ TYPE = "tf2_msgs/TFMessage"
 
 QUEUE = 100
 """Messages that a bridge may hold back: many nodes share the topic, and each counts."""
+
+GRACE = 3.0
+"""Seconds since the link opened within which nobody misses a frame: who tells of it is
+still being found, and static ones come late."""
 
 _heard: dict[tuple[Bridge, str], "Frames"] = {}
 
@@ -38,7 +43,11 @@ class Frames:
         self.faults = FrameFaults(self.buffer)
         """What was wrong with transforms of late."""
         self._listeners: dict[int, Callable[[], object]] = {}
+        self._since = time.monotonic()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._timer: asyncio.TimerHandle | None = None
         with no_scope():
+            self._hears_open = bridge.on_open(self._opened)
             self._subscriptions = [
                 bridge.subscribe(
                     f"{namespace}/{topic}",
@@ -58,11 +67,52 @@ class Frames:
         def leave() -> None:
             del self._listeners[key]
             if not self._listeners:
-                _heard.pop((self.bridge, self.namespace), None)
-                for subscription in self._subscriptions:
-                    subscription.remove()
+                self._end()
 
         return Removal(leave)
+
+    @property
+    def complete_from(self) -> float:
+        """From when on a frame that is not there is missing, on the monotonic clock."""
+        return self._since + GRACE
+
+    def wake(self, after: float) -> None:
+        """Call all listeners once more, also if nothing is heard until then.
+
+        Args:
+            after: Seconds from now; who wakes them sooner does it for all.
+
+        """
+        if self._loop is None:
+            return
+        when = self._loop.time() + after
+        if self._timer is not None:
+            if self._timer.when() <= when:
+                return
+            self._timer.cancel()
+        self._timer = self._loop.call_at(when, self._wake)
+
+    def _opened(self) -> None:
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+            self._since = time.monotonic()
+            self.wake(GRACE)
+
+    def _wake(self) -> None:
+        self._timer = None
+        self._tell()
+
+    def _tell(self) -> None:
+        for listener in list(self._listeners.values()):
+            listener()
+
+    def _end(self) -> None:
+        _heard.pop((self.bridge, self.namespace), None)
+        self._hears_open.remove()
+        for subscription in self._subscriptions:
+            subscription.remove()
+        if self._timer is not None:
+            self._timer.cancel()
 
     def _hear(self, static: bool, message: TFMessage) -> None:
         now = time.monotonic()
@@ -86,8 +136,7 @@ class Frames:
             if note and self.faults.note(parent, child, note, now):
                 log.warning("%s: %s", self.bridge.name, note)
         if not static or self.faults.any:
-            for listener in list(self._listeners.values()):
-                listener()
+            self._tell()
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:

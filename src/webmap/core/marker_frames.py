@@ -3,21 +3,21 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from webmap.core.alignment import alignments
-from webmap.core.frames import Frames, frames_of
 from webmap.core.layer import Layer
-from webmap.core.pose_troubles import Lasting
-from webmap.core.sighting import newest_or_at
-from webmap.geometry import Affine
+from webmap.core.layer_frames import LayerFrames, not_known
+from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
-from webmap.scope import keep
-from webmap.tf import TransformError
+from webmap.tf import Transform, TransformError
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
 
 PERIOD = 0.05
 """Least seconds between two moves of markers that move with their frames."""
 
-Put = Callable[[Affine], object]
+Put = Callable[[Transform], object]
 """Puts a marker where its frame is now."""
 
 
@@ -29,40 +29,35 @@ class _Moving:
     put: Put
 
 
-class MarkerFrames:
+class MarkerFrames(LayerFrames):
     """Tells where the frames of markers are on the map, and which of them move.
 
-    Frames are only heard once a marker names one that is not the map's.
-
     Args:
-        layer: The markers; it lies on the common map as the bridge is aligned.
-        bridge: The link to the ROS system.
-        map_frame: The map's own frame; None if markers are drawn as they come.
-        namespace: ``/robot_0`` where the topics are ``/robot_0/tf`` and
-            ``/robot_0/tf_static``.
+        layer: The markers.
+        bridge: As :class:`~webmap.core.layer_frames.LayerFrames` has it.
+        map_frame: Likewise.
+        namespace: Likewise.
+        robot: Likewise.
 
     """
 
     def __init__(
-        self, layer: Layer, bridge: Bridge, map_frame: str | None, namespace: str
+        self,
+        layer: Layer,
+        bridge: Bridge,
+        map_frame: str | None,
+        namespace: str,
+        robot: "Robot | None" = None,
     ) -> None:
-        self._layer = layer
-        self._bridge = bridge
-        self._map_frame = map_frame
-        self._namespace = namespace
-        self._frames: Frames | None = None
+        super().__init__(layer, bridge, map_frame, namespace, robot)
         self._moving: dict[object, _Moving] = {}
         self._lost: dict[str, str] = {}
-        self._lasting = Lasting()
         self._moved_at = -1.0
-        layer.svg.set("data-bridge", alignments.mark(bridge))
-        with layer.scope.active():
-            keep(alignments.on_change(bridge, self._align))
-        self._align()
+        self._look_at_alignment()
 
     def place(
         self, key: object, frame_id: str, stamp: float, locked: bool, put: Put
-    ) -> Affine:
+    ) -> Transform:
         """Return what takes coordinates of a marker's frame to those of the map.
 
         Args:
@@ -74,17 +69,11 @@ class MarkerFrames:
 
         """
         self._moving.pop(key, None)
-        if self._map_frame is None or not frame_id:
-            return Affine()
-        if self._frames is None:
-            if frame_id.strip("/") == self._map_frame:
-                return Affine()
-            self._frames = frames_of(self._bridge, self._namespace)
-            with self._layer.scope.active():
-                keep(self._frames.join(self._news))
-        source = self._frames.buffer.name(frame_id, self._namespace)
+        source = self._source(frame_id)
+        if source is None:
+            return Transform()
         stamp = 0.0 if locked else stamp
-        found, settled = self._look(source, stamp)
+        found, settled = self._find(source, stamp)
         if locked or not settled:
             self._moving[key] = _Moving(source, stamp, locked, put)
         return found
@@ -97,44 +86,38 @@ class MarkerFrames:
         """Say which frames nobody tells of, or take that back."""
         needed = {moving.frame for moving in self._moving.values()}
         self._lost = {f: words for f, words in self._lost.items() if f in needed}
-        if self._lasting.look("lost" if self._lost else ""):
-            frame, words = next(iter(self._lost.items()))
-            text = f"it is not known where {frame!r} is on the map: {words}"
+        words = ""
+        if self._lost:
+            frame, why = next(iter(self._lost.items()))
             more = len(self._lost) - 1
-            self._layer.set_problem(self, text + (f" (and {more} more)" * bool(more)))
-        else:
-            self._layer.clear_problem(self)
+            words = not_known(frame, why) + f" (and {more} more)" * bool(more)
+        self._say(words)
 
     def _news(self) -> None:
         now = time.monotonic()
         if not self._moving or now < self._moved_at + PERIOD:
             return
         self._moved_at = now
-        places: dict[tuple[str, float], tuple[Affine, bool]] = {}
+        places: dict[tuple[str, float], tuple[Transform, bool]] = {}
         for key, each in tuple(self._moving.items()):
             asked = (each.frame, each.stamp)
             if asked not in places:
-                places[asked] = self._look(*asked)
+                places[asked] = self._find(*asked)
             found, settled = places[asked]
             each.put(found)
             if settled and not each.locked:
                 del self._moving[key]
         self.say()
 
-    def _look(self, source: str, stamp: float) -> tuple[Affine, bool]:
-        """Return a frame's place, and whether news would not change it."""
-        if self._frames is None or self._map_frame is None:
-            return Affine(), True
-        buffer = self._frames.buffer
-        target = buffer.name(self._map_frame, self._namespace)
+    def _find(self, source: str, stamp: float) -> tuple[Transform, bool]:
+        """Return where a frame is, and whether news would not change that."""
         try:
-            found, settled = newest_or_at(buffer, target, source, stamp)
+            found = self._look(source, stamp)
         except TransformError as error:
             self._lost.setdefault(source, str(error))
-            return Affine(), False
+            return Transform(), False
         self._lost.pop(source, None)
-        return found.from_above, settled
+        return found
 
-    def _align(self) -> None:
-        place = alignments.of(self._bridge)
-        self._layer.svg.set_pose(place.x, place.y, place.yaw)
+    def _align(self, aligned: Pose) -> None:
+        self._layer.svg.set_pose(aligned.x, aligned.y, aligned.yaw)

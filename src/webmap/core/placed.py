@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from webmap.core.frames import frames_of
 from webmap.core.pose_troubles import Lasting
 from webmap.core.sighting import Sighting, Sightings
 from webmap.core.whereabouts import affine
@@ -182,7 +183,9 @@ class Placed:
 
     def _say(self, found: Sighting) -> None:
         """Say what is wrong with the place, once; take it back when that is mended."""
-        trouble = self._lasting.look(found.trouble)
+        tf = self.robot.tf if found.trouble else None
+        frames = tf and frames_of(tf["bridge"], tf["namespace"])
+        trouble = self._lasting.look(found.trouble, frames or None)
         if trouble == self._trouble:
             return
         self._trouble = trouble

@@ -20,11 +20,13 @@ class Lasting:
     def __init__(self) -> None:
         self._since: float | None = None
 
-    def look(self, trouble: str) -> str:
+    def look(self, trouble: str, frames: "Frames | None" = None) -> str:
         """Return the trouble if it is worth saying, and nothing while it is not.
 
         Args:
             trouble: Which kind there is now; empty if there is none.
+            frames: Those it is about, if it is about frames. Nothing is said while they
+                may still be coming, and they wake who looks when that is over.
 
         """
         if not trouble:
@@ -33,7 +35,14 @@ class Lasting:
         now = time.monotonic()
         if self._since is None:
             self._since = now
-        return trouble if now >= self._since + PATIENCE else ""
+        due = self._since + PATIENCE
+        if frames is not None:
+            due = max(due, frames.complete_from)
+        if now >= due:
+            return trouble
+        if frames is not None:
+            frames.wake(due - now)
+        return ""
 
 
 class PoseTroubles:
@@ -66,7 +75,7 @@ class PoseTroubles:
             quiet: Whether poses that do not get to the map are no trouble.
 
         """
-        self._look_at_placing(None if quiet else placing)
+        self._look_at_placing(None if quiet else placing, frames)
         fault = None
         if placing is not None and frames is not None:
             fault = frames.faults.of(placing.base_frame, time.monotonic())
@@ -82,8 +91,10 @@ class PoseTroubles:
         for about in ("tf", "frames", "jumps"):
             self._owner.clear_problem(about)
 
-    def _look_at_placing(self, placing: "Placing | None") -> None:
-        kind = self._lasting.look("" if placing is None else placing.kind)
+    def _look_at_placing(
+        self, placing: "Placing | None", frames: "Frames | None"
+    ) -> None:
+        kind = self._lasting.look("" if placing is None else placing.kind, frames)
         if kind == self._kind:
             return
         self._kind = kind

@@ -21,9 +21,11 @@ from webmap.ros.messages_marker import (
 from webmap.ros.names import split_type
 from webmap.scene.element import Element
 from webmap.scope import Removal, keep
+from webmap.tf import Transform
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
+    from webmap.core.robot import Robot
 
 MAX_MARKERS = 5000
 """The most markers that one topic may show."""
@@ -61,7 +63,8 @@ class Markers:
 
     Each is drawn where its own frame was at its stamp, and one that is ``frame_locked``
     goes on moving with the frame. One whose frame nobody tells of is drawn as it comes,
-    and that is said until somebody does.
+    and that is said until somebody does. What is tilted, or lies on its side, is drawn
+    as its outline looks from above.
 
     Style it by CSS: ``.markers > .marker``, with the type as a further class
     (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in
@@ -77,6 +80,8 @@ class Markers:
         map_frame: The map's own frame, to which ``/tf`` of the bridge leads; None to
             draw all markers with the numbers that they come with.
         namespace: ``/robot_0`` where frames are told on ``/robot_0/tf``.
+        robot: Whose markers they are: they lie as it is aligned, and as their bridge is
+            if they are nobody's own.
         order: What lies over what: greater is nearer; robots have 100.
 
     Raises:
@@ -94,6 +99,7 @@ class Markers:
         age_limit: float | None = None,
         map_frame: str | None = "map",
         namespace: str = "",
+        robot: "Robot | None" = None,
         order: float = 50.0,
     ) -> None:
         known = str(split_type(type))
@@ -101,7 +107,7 @@ class Markers:
             raise ConfigError(f"type is one of {', '.join(VIEWS)}, got {type!r}")
         self.map = map
         self.layer = MarkerLayer.shared(
-            bridge, topic, known, age_limit, map_frame, namespace
+            bridge, topic, known, age_limit, map_frame, namespace, robot
         )
         self.layer.show_on(map, order=order)
 
@@ -117,9 +123,10 @@ class MarkerLayer(Layer):
         age_limit: float | None,
         map_frame: str | None,
         namespace: str,
+        robot: "Robot | None" = None,
     ) -> None:
         super().__init__()
-        self.frames = MarkerFrames(self, bridge, map_frame, namespace)
+        self.frames = MarkerFrames(self, bridge, map_frame, namespace, robot)
         self.bridge = bridge
         self.topic = topic
         self.type = type
@@ -182,29 +189,32 @@ class MarkerLayer(Layer):
             )
 
     def _put(self, key: Key, marker: FramedMarkerMsg) -> None:
-        before, look = self.shapes.get(key), look_of(marker)
-        same = before is not None and self._looks[key] == look
-        if before is None and len(self.shapes) >= MAX_MARKERS:
+        if key not in self.shapes and len(self.shapes) >= MAX_MARKERS:
             raise ProtocolError(f"{MAX_MARKERS} markers are the limit")
         frame = self.frames.place(
             key,
             marker.frame_id,
             marker.stamp,
             marker.frame_locked,
-            lambda frame: place(self.shapes[key], marker, frame),
+            lambda frame: self._show(key, marker, frame),
         )
         try:
-            if before is not None and same:
-                place(before, marker, frame)
-            else:
-                self._draw(key, before, shape_of(marker, frame), marker)
-                self._looks[key] = look
+            self._show(key, marker, frame)
         except WebMapError:
             self.frames.forget(key)
             raise
         self._ends.pop(key, None)
         if marker.lifetime.seconds > 0:
             self._ends[key] = time.monotonic() + marker.lifetime.seconds
+
+    def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
+        """Put a marker where it is, drawn anew if it looks otherwise from above."""
+        before, look = self.shapes.get(key), look_of(marker, frame)
+        if before is not None and self._looks[key] == look:
+            place(before, marker, frame)
+        else:
+            self._draw(key, before, shape_of(marker, frame), marker)
+            self._looks[key] = look
 
     def _draw(
         self, key: Key, before: Element | None, shape: Element, marker: MarkerMsg

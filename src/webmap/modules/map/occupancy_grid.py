@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from webmap.core.map import Map
+    from webmap.core.robot import Robot
 
 SMALL = 1 << 18
 """Cells up to which a grid is drawn at once; a larger one in a thread of its own."""
@@ -52,6 +53,8 @@ class OccupancyGrid:
             the frames of the bridge's ``/tf``. If not given, data is drawn as it
             comes.
         namespace: ``/robot_0`` where the frames are on ``/robot_0/tf``.
+        robot: Whose grid it is: it lies as that one is aligned, and as its bridge is if
+            it is nobody's own.
         order: What lies over what: greater is nearer; robots have 100.
 
     Raises:
@@ -70,12 +73,13 @@ class OccupancyGrid:
         age_limit: float | None = None,
         map_frame: str | None = None,
         namespace: str = "",
+        robot: "Robot | None" = None,
         order: float | None = None,
     ) -> None:
         check_palette(palette)
         self.map = map
         self.layer = Grid.shared(
-            bridge, topic, palette, throttle, age_limit, map_frame, namespace
+            bridge, topic, palette, throttle, age_limit, map_frame, namespace, robot
         )
         if order is None:
             order = 20.0 if palette == "costmap" else 10.0
@@ -94,9 +98,10 @@ class Grid(Layer):
         age_limit: float | None,
         map_frame: str | None,
         namespace: str,
+        robot: "Robot | None" = None,
     ) -> None:
         super().__init__()
-        self.anchor = Anchored(self, bridge, map_frame, namespace)
+        self.anchor = Anchored(self, bridge, map_frame, namespace, robot)
         self.bridge = bridge
         self.topic = topic
         self.palette = palette

@@ -1,5 +1,6 @@
 """What a robot brings along to every map that shows it."""
 
+import inspect
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.registry import map_modules
@@ -14,7 +15,9 @@ class OnMaps:
     """Gives every map that shows the robot a module, as long as it shows it.
 
     So a robot has its costmap and its markers with it, which are drawn by modules of
-    maps: ``robot.add_module("OnMaps", "Markers", bridge, "/bob/markers")``.
+    maps: ``robot.add_module("OnMaps", "Markers", bridge, "/bob/markers")``. They lie
+    on the common map as the robot is aligned: a module that takes a ``robot`` gets this
+    one, unless another is told.
 
     Args:
         robot: The robot.
@@ -28,7 +31,8 @@ class OnMaps:
     """
 
     def __init__(self, robot: "Robot", module: str, *args: Any, **options: Any) -> None:
-        _ = map_modules[module]
+        if "robot" in inspect.signature(map_modules[module]).parameters:
+            options.setdefault("robot", robot)
         self.robot = robot
         self.module = module
         self._arguments = (args, options)

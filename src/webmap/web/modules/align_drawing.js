@@ -48,11 +48,13 @@ export class AlignDrawing {
 
   /**
    * @param {string[]} robots Who is aligned.
-   * @param {string | null} mark What the layers that go along have as `data-bridge`.
+   * @param {string | null} mark What the layers that go along have as `data-bridge`;
+   *   those that are a robot's own go along with that.
    */
   show(robots, mark) {
     this._unname();
-    const robot = (/** @type {string} */ id) => `.robot[data-robot="${CSS.escape(id)}"]`;
+    const robot = (/** @type {string} */ id) =>
+      `.robot[data-robot="${CSS.escape(id)}"], [data-layer-of="${CSS.escape(id)}"]`;
     const wanted = [
       ...(mark === null ? [] : [`[data-bridge="${CSS.escape(mark)}"]`]),
       ...robots.map(robot),

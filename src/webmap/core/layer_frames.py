@@ -1,0 +1,115 @@
+"""Where a layer lies, and where the frames are that its data is in."""
+
+from typing import TYPE_CHECKING
+
+from webmap.core.alignment import alignments
+from webmap.core.frames import Frames, frames_of
+from webmap.core.layer import Layer
+from webmap.core.pose_troubles import Lasting
+from webmap.core.sighting import newest_or_at
+from webmap.geometry import Pose
+from webmap.ros.bridge import Bridge
+from webmap.scope import keep
+from webmap.tf import Transform
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+
+class LayerFrames:
+    """Lays a layer onto the common map, and knows the frames of its data.
+
+    It lies there as its robot is aligned, or as its bridge is if it is nobody's own.
+    Frames are only heard once data names one that is not the map's. All of it ends with
+    the layer.
+
+    Args:
+        layer: What is drawn.
+        bridge: The link to the ROS system that has the data and the frames.
+        map_frame: The map's own frame; None if data is drawn as it comes.
+        namespace: ``/robot_0`` where the topics are ``/robot_0/tf`` and
+            ``/robot_0/tf_static``.
+        robot: Whose layer it is.
+
+    """
+
+    def __init__(
+        self,
+        layer: Layer,
+        bridge: Bridge,
+        map_frame: str | None,
+        namespace: str,
+        robot: "Robot | None" = None,
+    ) -> None:
+        self._layer = layer
+        self._bridge = bridge
+        self._map_frame = map_frame
+        self._namespace = namespace
+        self._robot = robot
+        self._frames: Frames | None = None
+        self._lasting = Lasting()
+        self._aligned: Pose | None = None
+        with layer.scope.active():
+            keep(alignments.on_change(bridge, self._look_at_alignment))
+            if robot is None:
+                layer.svg.set("data-bridge", alignments.mark(bridge))
+            else:
+                layer.svg.set("data-layer-of", robot.id)
+                keep(robot.whereabouts.join(self._look_at_alignment))
+
+    @property
+    def alignment(self) -> Pose:
+        """Where the map of the data lies on the common one."""
+        own = None if self._robot is None else self._robot.whereabouts.own_alignment
+        return alignments.of(self._bridge) if own is None else own
+
+    def _source(self, frame_id: str) -> str | None:
+        """Return the whole name of a frame; None if data of it is drawn as it comes."""
+        if self._map_frame is None or not frame_id:
+            return None
+        if self._frames is None:
+            if frame_id.strip("/") == self._map_frame:
+                return None
+            self._frames = frames_of(self._bridge, self._namespace)
+            with self._layer.scope.active():
+                keep(self._frames.join(self._news))
+        return self._frames.buffer.name(frame_id, self._namespace)
+
+    def _look(self, source: str, stamp: float) -> tuple[Transform, bool]:
+        """Return what takes a frame to the map, and whether news would not change it.
+
+        Raises:
+            TransformError: If that is not known.
+
+        """
+        if self._frames is None or self._map_frame is None:
+            return Transform(), True
+        buffer = self._frames.buffer
+        target = buffer.name(self._map_frame, self._namespace)
+        return newest_or_at(buffer, target, source, stamp)
+
+    def _say(self, words: str) -> None:
+        """Say what is wrong with the frames, once it has lasted; or take it back."""
+        if self._lasting.look("lost" if words else "", self._frames):
+            self._layer.set_problem(self, words)
+        elif not words:
+            self._layer.clear_problem(self)
+
+    def _look_at_alignment(self) -> None:
+        aligned = self.alignment
+        if aligned != self._aligned:
+            self._aligned = aligned
+            self._align(aligned)
+
+    def _align(self, aligned: Pose) -> None:
+        """Lay the layer where its map is now."""
+        raise NotImplementedError
+
+    def _news(self) -> None:
+        """Look again where frames are."""
+        raise NotImplementedError
+
+
+def not_known(frame: str, why: object) -> str:
+    """Return a sentence on a frame that is somewhere and nobody tells where."""
+    return f"it is not known where {frame!r} is on the map: {why}"
