@@ -8,8 +8,9 @@ import pytest
 
 import webmap
 from webmap.core.extendable import Extendable
-from webmap.core.map import Map, World
+from webmap.core.map import Map
 from webmap.core.robot import Robot
+from webmap.core.world_view import World
 
 TABLE = Path(__file__).parents[2] / "docs" / "reference" / "seed.md"
 OWNERS = {"map": Map, "robot": Robot, "extendable": Extendable}

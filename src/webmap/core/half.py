@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from webmap.core.map import Map
+    from webmap.core.world_view import WorldView
 
 _numbers = itertools.count(1)
 
@@ -15,7 +15,7 @@ class BrowserHalf:
 
     def __init__(
         self,
-        map: "Map",
+        map: "WorldView",
         module: Any,
         script: str | Path,
         options: dict[str, Any],
@@ -23,7 +23,7 @@ class BrowserHalf:
     ) -> None:
         self.instance = next(_numbers)
         self.module = module
-        self._map: Map | None = map
+        self._map: WorldView | None = map
         page = map.page
         page.channel.attach(
             map.root.id,

@@ -1,0 +1,288 @@
+"""A view of the world on a page: what a map is before there is a robot on it."""
+
+import logging
+from pathlib import Path
+from typing import Any
+
+from webmap.core.extendable import Extendable
+from webmap.core.half import BrowserHalf
+from webmap.core.page import Page, page_of
+from webmap.core.registry import Namespace
+from webmap.core.view import Rect, apply_operation, initial_view
+from webmap.errors import ConfigError
+from webmap.geometry import Affine
+from webmap.scene import svg
+from webmap.scene.element import Element
+from webmap.scene.events import Handler
+from webmap.scene.fragment import Fragment
+from webmap.scope import Removal, keep
+
+log = logging.getLogger("webmap.map")
+
+
+class World(Element):
+    """The group whose children are in metres, x east and y north (REP 103)."""
+
+    def __init__(self) -> None:
+        super().__init__("g", class_="world")
+        self.tf = Affine()
+        """What carries world coordinates to pixels from the canvas's top left."""
+
+
+class WorldView(Extendable):
+    """An extendable that shows one viewer the world from above: what every map is.
+
+    It has the canvas, the view, images, mounted fragments, listeners and the browser
+    halves of modules, and it knows no robot.
+
+    Args:
+        container: The page's element to draw in.
+        canvas_width: The width in pixels; the container's if not given.
+        canvas_height: The height in pixels; the container's if not given.
+        namespace: Where its modules are looked up.
+
+    """
+
+    def __init__(
+        self,
+        container: Element,
+        canvas_width: float | None,
+        canvas_height: float | None,
+        namespace: Namespace,
+    ) -> None:
+        super().__init__(namespace)
+        self.page: Page = page_of(container)
+        self.container = container
+        width, height = self.page.size_of(container)
+        self._rect = Rect(0.0, 0.0, canvas_width or width, canvas_height or height)
+        self.images = svg.g(class_="images")
+        self.world = World()
+        self.world.append(self.images)
+        self.world.tf = initial_view(self._rect.width, self._rect.height)
+        self.root: Element = svg.svg(self.world, class_="webmap", tabindex=0)
+        self.root.set("role", "application")
+        self.root.set("aria-label", "Map")
+        self.root.set_map(self.world, canvas_width or 0.0, canvas_height or 0.0)
+        self.fragment = Fragment(self.root)
+        self._halves: dict[int, BrowserHalf] = {}
+        self._mount = self.page.channel.mount(
+            self.fragment, under=container.id, within=self.page.mount
+        )
+        self._mounts = {self.fragment.id: self._mount}
+
+    @property
+    def canvas_width(self) -> float:
+        """The width of the canvas, in pixels."""
+        return self._rect.width
+
+    @property
+    def canvas_height(self) -> float:
+        """The height of the canvas, in pixels."""
+        return self._rect.height
+
+    def get_bounding_rect(self) -> Rect:
+        """Return where the canvas is in the browser's viewport, in pixels."""
+        return self._rect
+
+    # What it shows.
+
+    def add_image(
+        self, iri: str, x: float, y: float, width: float, height: float
+    ) -> Element:
+        """Place an image in the world, under everything else.
+
+        Args:
+            iri: A file of the page's folder, or an absolute path of a file.
+            x: The left edge, in metres.
+            y: The lower edge, in metres.
+            width: In metres.
+            height: In metres.
+
+        Returns:
+            The image, to keep for :meth:`remove_image`.
+
+        A file that does not exist is said on the page, and the rest goes on.
+
+        """
+        try:
+            href = self.page.image(str(iri))
+        except ConfigError as error:
+            self.report_error(f"image {Path(str(iri)).name!r} is not shown: {error}")
+            href = None
+        image = svg.image(
+            x=x, y=y, width=width, height=height, preserveAspectRatio="none"
+        )
+        if href is not None:
+            image.set("href", href)
+        image.set_matrix(Affine(1, 0, 0, -1, 0, 2 * y + height))
+        self.images.append(image)
+        return image
+
+    def remove_image(self, img: Element) -> None:
+        """Remove an image that :meth:`add_image` returned."""
+        img.remove()
+
+    def mount(self, fragment: Fragment, *, order: float) -> int:
+        """Show a fragment in the world."""
+        mount = self.page.channel.mount(
+            fragment, under=self.world.id, order=order, within=self._mount
+        )
+        self._mounts[fragment.id] = mount
+        return mount
+
+    def unmount(self, fragment: Fragment) -> None:
+        """Show a fragment no more."""
+        mount = self._mounts.pop(fragment.id, None)
+        if mount is not None:
+            self.page.forget_mount(mount)
+            self.page.channel.unmount(mount)
+
+    def shows(self, mount: int) -> bool:
+        """Tell whether a mount is one of this map's."""
+        return mount in self._mounts.values()
+
+    # What the viewer does.
+
+    def on(
+        self,
+        element: Element,
+        event: str,
+        handler: Handler,
+        *,
+        prevent: bool = False,
+        stop: bool = False,
+    ) -> Removal:
+        """Call ``handler`` when this viewer does something to an element.
+
+        Args:
+            element: An element that this map shows.
+            event: The DOM's name: ``"click"``, ``"pointerdown"``, ``"keydown"``.
+            handler: Called with the event, in the model's thread.
+            prevent: Whether the browser's own reaction is prevented.
+            stop: Whether elements further out do not hear of it.
+
+        Raises:
+            ValueError: If this map does not show the element.
+
+        """
+        fragment = element.fragment
+        mount = None if fragment is None else self._mounts.get(fragment.id)
+        if mount is None:
+            raise ValueError(f"this map does not show {element!r}")
+        return self.page.listen(
+            mount, element, event, handler, prevent=prevent, stop=stop
+        )
+
+    def add_browser_half(
+        self,
+        module: Any,
+        script: str | Path,
+        options: dict[str, Any] | None = None,
+        style: str | Path | None = None,
+    ) -> BrowserHalf:
+        """Give a module a half that lives in the browser.
+
+        Args:
+            module: The module. Its ``on_message(message)`` gets what the half sends;
+                its ``on_ready()`` is called whenever the half was loaded.
+            script: An ES module: the name of a built-in one, or a file's path. Its
+                default export is called with the map, the options and a function
+                that sends a message, and returns an object with ``destroy()`` and,
+                if it wants messages, ``receive(message)``.
+            options: Plain data for the half.
+            style: A style sheet to load with it, likewise.
+
+        Returns:
+            The half, to send messages to; it ends with the module.
+
+        """
+        half = BrowserHalf(self, module, script, options or {}, style)
+        self._halves[half.instance] = half
+        return keep(half)
+
+    # How it is seen.
+
+    def translate(self, x: float, y: float) -> None:
+        """Move the view by an amount of pixels, right and down."""
+        self._operate("translate", x, y)
+
+    def scale(
+        self, factor: float, x: float | None = None, y: float | None = None
+    ) -> None:
+        """Make everything larger by a factor, about a point that stays where it is.
+
+        Args:
+            factor: Above 1 zooms in.
+            x: Pixels from the canvas's left edge; its middle if not given.
+            y: Pixels from the canvas's top edge; its middle if not given.
+
+        """
+        self._operate("scale", factor, *self._point(x, y))
+
+    def rotate(
+        self, angle: float, x: float | None = None, y: float | None = None
+    ) -> None:
+        """Turn the world about a point that stays where it is.
+
+        Args:
+            angle: Degrees, counter-clockwise as it is seen.
+            x: Pixels from the canvas's left edge; its middle if not given.
+            y: Pixels from the canvas's top edge; its middle if not given.
+
+        """
+        self._operate("rotate", angle, *self._point(x, y))
+
+    def fit(self, x: float, y: float, width: float, height: float) -> None:
+        """Show a rectangle of the world, in metres, as large as it can be."""
+        self._operate("fit", x, y, x + width, y + height)
+
+    def on_view_report(self, tf: Affine, rect: Rect) -> None:
+        """Take what the browser says of its view and its size."""
+        changed = (rect.width, rect.height) != (self._rect.width, self._rect.height)
+        self.world.tf, self._rect = tf, rect
+        if changed:
+            self.notify_modules("on_resize")
+        self.notify_modules("on_view")
+
+    def on_module_message(self, instance: int, message: Any) -> bool:
+        """Hand a message of a browser half to its module; tell whether it is ours."""
+        half = self._halves.get(instance)
+        if half is None:
+            return False
+        self._call(half.module, "on_message", (message,))
+        return True
+
+    def on_module_ready(self, instance: int) -> None:
+        """Tell a module that its browser half is there, maybe after a reload."""
+        half = self._halves.get(instance)
+        if half is not None:
+            self._call(half.module, "on_ready", ())
+
+    def forget_half(self, half: BrowserHalf) -> None:
+        """Note that a browser half has ended."""
+        self._halves.pop(half.instance, None)
+
+    def report_error(self, text: str) -> None:
+        """Log a failure and show it on this map's page."""
+        log.warning("%s", text)
+        self.show_error(text)
+
+    def show_error(self, text: str) -> None:
+        """Show on this map's page what the log has already."""
+        if not self.page.closed:
+            self.page.notice(text)
+
+    def leave_page(self) -> None:
+        """Be on the page no more, with all that is mounted in the world."""
+        self.page.forget_mount(self._mount)
+        self.page.channel.unmount(self._mount)
+
+    def _operate(self, operation: str, *args: float) -> None:
+        self.world.tf = apply_operation(self.world.tf, self._rect, operation, args)
+        self.page.channel.view(self.root.id, operation, *args)
+
+    def _point(self, x: float | None, y: float | None) -> tuple[float, float]:
+        return (
+            self._rect.width / 2 if x is None else x,
+            self._rect.height / 2 if y is None else y,
+        )
