@@ -124,7 +124,7 @@ class Child:
         except subprocess.TimeoutExpired:
             self.kill(f"it has not ended within {timeout:g} s")
             self._process.wait()
-        if self._reader.is_alive() and self._reader is not threading.current_thread():
+        if self._reader is not threading.current_thread():
             self._reader.join(1.0)
 
     def _listen(self) -> None:

@@ -4,35 +4,29 @@ Some bridges do nothing else for a socket until the action goal that came throug
 has ended. So a goal of an action uses up a socket: it is kept for the result, and the
 lane opens another for what comes next. For the same reason, and because the handle of
 an action goal belongs to the socket that sent it, the cancel service is called on a
-socket of its own.
+socket of its own (``calls``).
 
 move_base is an action of topics, which block nothing: its words come on the lane
 itself, its status only while a goal of ours is followed.
 """
 
 import asyncio
-import logging
 from collections.abc import Callable, Iterable
 
-from webmap.errors import BridgeClosed
 from webmap.gate import navigation, words
 from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.calls import Calls
 from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
 from webmap.gate.goals import is_move_base
 from webmap.gate.lanes import Lane
 from webmap.gate.messages import RobotSpec
 from webmap.gate.own_map import in_own_map
-from webmap.gate.sockets import Ears, Socket, open_socket
+from webmap.gate.sockets import Ears, Socket
 from webmap.identifiers import generate_id
 from webmap.ros import ops
 
-log = logging.getLogger("webmap.gate")
-
 MAX_SPENT = 8
 """How many sockets of action goals are kept for their results at most."""
-
-CALL_TIMEOUT = 2.0
-"""How long a service is given to answer, in seconds."""
 
 FEEDBACK_PERIOD = 0.2
 """The least time between two words on how a goal goes, in seconds."""
@@ -64,7 +58,7 @@ class TasksLane:
         self._tell = tell
         self._spent: dict[Socket, SendGoal] = {}
         """The sockets of action goals that are under way, the oldest first."""
-        self._calling: set[asyncio.Task[None]] = set()
+        self._calls = Calls(url)
         self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
         """The goals of move_base that are under way, by robot."""
         self._spending = False
@@ -117,7 +111,7 @@ class TasksLane:
                 self.lane.write(words.cancel_by_topic(topic), only_if_clear=False)
         elif spec.action is not None:
             id, what = generate_id(), f"cancelling the goals of {spec.action}"
-            self._call(words.cancel_by_service(spec.action, id), id, what)
+            self._calls.call(words.cancel_by_service(spec.action, id), id, what)
 
     def run_hook(self, hook: dict[str, str], stopped: bool) -> None:
         """Publish the Bool of a stop hook, or call its service."""
@@ -125,26 +119,16 @@ class TasksLane:
             self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False)
         else:
             id, service = generate_id(), hook["service"]
-            self._call(words.trigger(service, hook["type"], id), id, service)
-
-    def _call(self, request: bytes, id: str, what: str) -> None:
-        """Call a service without waiting for its answer."""
-        task = asyncio.get_running_loop().create_task(
-            self._call_and_wait(request, id, what)
-        )
-        self._calling.add(task)
-        task.add_done_callback(self._calling.discard)
+            self._calls.call(words.trigger(service, hook["type"], id), id, service)
 
     async def settle(self) -> None:
         """Wait until what was to be cancelled is, or cannot be."""
-        if self._calling:
-            await asyncio.wait(self._calling)
+        await self._calls.settle()
 
     def close(self) -> None:
         """End for good."""
         self.lane.close()
-        for task in self._calling:
-            task.cancel()
+        self._calls.close()
         for link in self._spent:
             link.close()
         self._spent.clear()
@@ -210,29 +194,6 @@ class TasksLane:
         for _, goal in list(self._followed.values()):
             why = f"no link to {self._url}"
             self._tell(GoalLost(goal.robot, goal.id, why))
-
-    async def _call_and_wait(self, request: bytes, id: str, what: str) -> None:
-        """Call a service on a socket of its own."""
-        answered = asyncio.Event()
-
-        def hear(data: bytes) -> None:
-            heard = words.hear(data)
-            if heard is not None and heard.id == id:
-                answered.set()
-
-        ears = Ears(text=hear, pong=lambda _: None, lost=lambda why: answered.set())
-        try:
-            async with asyncio.timeout(CALL_TIMEOUT):
-                link = await open_socket(self._url, ears)
-                try:
-                    link.send(request)
-                    await answered.wait()
-                finally:
-                    link.close()
-        except BridgeClosed as error:
-            log.error("%s failed: %s", what, error)
-        except TimeoutError:
-            log.warning("%s: no answer", what)
 
 
 class Pace:

@@ -1,0 +1,101 @@
+"""Calls of services: each on a socket of its own, and none waits for another."""
+
+import json
+
+from link_bench import in_loop, noting_bridge, raw_bridge, until
+
+from webmap.gate import calls
+from webmap.gate.calls import Calls
+
+
+def request(id, service="/e_stop"):
+    return json.dumps({"op": "call_service", "id": id, "service": service}).encode()
+
+
+@in_loop
+async def test_a_call_is_answered_on_a_socket_that_ends_with_it(caplog):
+    async with noting_bridge() as bridge:
+        made = Calls(bridge.url)
+        made.call(request("a"), "a", "/e_stop")
+        made.call(request("b"), "b", "/e_stop")
+        await made.settle()
+        assert {t.message["id"] for t in bridge.of("call_service")} == {"a", "b"}
+        assert len({t.link for t in bridge.told}) == 2
+        await until(lambda: not bridge.links, "the end of both sockets")
+        await made.settle()  # there is nothing to wait for
+    assert caplog.records == []
+
+
+@in_loop
+async def test_a_call_that_hangs_holds_no_other_up_and_is_given_up(monkeypatch, caplog):
+    monkeypatch.setattr(calls, "CALL_TIMEOUT", 1.0)
+    async with noting_bridge() as bridge:
+        bridge.answers_services = False
+        made = Calls(bridge.url)
+        made.call(request("hangs"), "hangs", "cancelling")
+        await until(lambda: bridge.of("call_service"), "the first call")
+        bridge.answers_services = True
+        made.call(request("second"), "second", "/e_stop")
+        await until(lambda: len(made._calling) == 1, "the end of the second")
+        assert caplog.records == []
+        await made.settle()
+        assert [r.getMessage() for r in caplog.records] == ["cancelling: no answer"]
+        bridge.unblock()
+        await until(lambda: not bridge.links, "the end of its socket")
+
+
+@in_loop
+async def test_only_the_answer_to_the_call_ends_it():
+    async with noting_bridge() as bridge:
+        bridge.answers_services = False
+        made = Calls(bridge.url)
+        made.call(request("a"), "a", "/e_stop")
+        await until(lambda: bridge.of("call_service"), "the call")
+        await bridge.send(1, "rubbish")
+        await bridge.send(1, '{"op": "service_response", "id": "another"}')
+        await bridge.send(1, '{"op": "status", "id": null}')
+        assert made._calling
+        await bridge.send(1, '{"op": "service_response", "id": "a"}')
+        await made.settle()
+        bridge.unblock()
+
+
+@in_loop
+async def test_a_call_that_finds_no_bridge_is_said_to_have_failed(caplog):
+    async def talk(link):
+        await link.request()
+        link.say(b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n")
+
+    async with raw_bridge(talk) as url:
+        made = Calls(url)
+        made.call(request("a"), "a", "/e_stop")
+        await made.settle()
+        assert caplog.text.count("/e_stop failed") == 1
+        assert "503" in caplog.text
+
+
+@in_loop
+async def test_a_call_whose_link_is_lost_is_waited_for_no_longer(caplog):
+    async with noting_bridge() as bridge:
+        bridge.answers_services = False
+        made = Calls(bridge.url)
+        made.call(request("a"), "a", "/e_stop")
+        await until(lambda: bridge.of("call_service"), "the call")
+        bridge.transport_of(1).abort()
+        await made.settle()
+        assert "/e_stop: no answer, for the link is lost" in caplog.text
+        bridge.unblock()
+
+
+@in_loop
+async def test_calls_that_are_given_up_take_their_sockets_with_them(caplog):
+    async with noting_bridge() as bridge:
+        bridge.answers_services = False
+        made = Calls(bridge.url)
+        made.call(request("a"), "a", "/e_stop")
+        await until(lambda: bridge.of("call_service"), "the call")
+        made.close()
+        await made.settle()
+        bridge.unblock()
+        await until(lambda: not bridge.links, "the end of its socket")
+    assert caplog.records == []

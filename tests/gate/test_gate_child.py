@@ -1,0 +1,171 @@
+"""One process as the display sees it: written to without waiting, read, and ended.
+
+The processes here are not gates but programs that do what a gate may do at its worst.
+"""
+
+import sys
+import threading
+
+import pytest
+from gate_robot import eventually
+
+from webmap.gate import child, framing
+from webmap.gate.child import Child
+from webmap.gate.messages import Ready, RefusedCount, Tick
+
+
+class Watched:
+    """A process, and what it said."""
+
+    def __init__(self, *command):
+        self.heard = []
+        self.ends = []
+        self.may_go_on = threading.Event()
+        self.may_go_on.set()
+        self.child = Child(self._hear, self._ended, command)
+        self.child.start()
+
+    def _hear(self, child, message):
+        self.may_go_on.wait(60)
+        self.heard.append(message)
+
+    def _ended(self, child):
+        self.ends.append(child)
+
+
+@pytest.fixture
+def run():
+    """Start a program as a gate; it is ended with the test."""
+    started = []
+
+    def start(*command):
+        started.append(Watched(*command))
+        return started[-1]
+
+    yield start
+    for each in started:
+        each.may_go_on.set()
+        each.child.stop(0.0)
+
+
+def shell(script):
+    return ("/bin/sh", "-c", script)
+
+
+ENDLESS = ("/bin/sleep", "600")
+
+
+def test_messages_go_both_ways_whole_and_in_order(run):
+    mirror = run("/bin/cat")
+    mirror.child.send(Ready(1), Ready(2))
+    mirror.child.send(Tick(3, {}))
+    eventually(lambda: len(mirror.heard) == 3, "all of them")
+    assert mirror.heard == [Ready(1), Ready(2), Tick(3, {})]
+    assert mirror.child.pid > 0
+
+
+def test_one_that_is_told_to_end_ends_and_is_told_nothing_more(run):
+    mirror = run("/bin/cat")
+    mirror.child.stop(30.0)
+    assert mirror.ends == [mirror.child]
+    assert mirror.child.epitaph == "exit code 0, without a word"
+    mirror.child.send(Ready(1))
+    assert mirror.heard == []
+
+
+def test_its_last_words_are_kept_and_all_of_them_passed_on(run, capfd):
+    gate = run(*shell("echo first >&2; echo 'no such module' >&2; echo >&2; exit 3"))
+    eventually(lambda: gate.ends, "its end")
+    gate.child.stop(30.0)
+    assert gate.child.epitaph == "no such module"
+    assert capfd.readouterr().err == "first\nno such module\n\n"
+
+
+def test_one_that_was_killed_is_said_to_have_been(run):
+    gate = run(*shell("kill -9 $$"))
+    eventually(lambda: gate.ends, "its end")
+    gate.child.stop(30.0)
+    assert gate.child.epitaph == "it was ended by SIGKILL"
+
+
+def test_one_that_does_not_end_is_killed(run, caplog):
+    gate = run(*ENDLESS)
+    gate.child.stop(0.05)
+    assert gate.child.epitaph == "it was ended by SIGKILL"
+    assert "it has not ended within 0.05 s" in caplog.text
+
+
+def test_one_that_does_not_read_holds_nothing_up_and_is_killed_in_the_end(
+    run, caplog, monkeypatch
+):
+    gate = run(*ENDLESS)
+    text = "x" * (1 << 16)
+    for _ in range(4):
+        gate.child.send(RefusedCount("a", 1, text))
+    assert gate.ends == [], "as yet it may only be slow"
+    monkeypatch.setattr(child, "MAX_UNSENT", 1 << 16)
+    gate.child.send(RefusedCount("a", 1, text))
+    eventually(lambda: gate.ends, "its end")
+    assert "it does not read" in caplog.text
+
+
+def test_what_it_did_not_read_in_time_comes_later_and_in_order(run):
+    mirror = run("/bin/cat")
+    mirror.may_go_on.clear()
+    text = "x" * (1 << 14)
+    sent = [RefusedCount("a", number, text) for number in range(30)]
+    for message in sent:
+        mirror.child.send(message)
+    assert mirror.child._unsent, "the pipes are full"
+    mirror.may_go_on.set()
+
+    def through():
+        mirror.child.send()  # as the next heartbeat does
+        return len(mirror.heard) == len(sent)
+
+    eventually(through, "all of it")
+    assert mirror.heard == sent
+
+
+def test_one_that_is_gone_can_be_written_to(run):
+    gate = run("/bin/true")
+    eventually(lambda: gate.ends, "its end")
+    gate.child.send(Ready(1))
+    assert not gate.child._unsent
+
+
+def test_one_that_talks_nonsense_is_killed(run, caplog):
+    gate = run(*shell(r"printf '\377\377\377\377'; exec sleep 600"))
+    eventually(lambda: gate.ends, "its end")
+    gate.child.stop(30.0)
+    assert gate.child.epitaph == "it was ended by SIGKILL"
+    assert "a message of 4294967295 bytes" in caplog.text
+
+
+def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
+    data = framing.pack(Ready(5)).hex()
+    words = f"import os, time; os.write(1, bytes.fromhex('{data}')); time.sleep(600)"
+
+    def hear(child, message):
+        raise LookupError(message)
+
+    ended = threading.Event()
+    gate = Child(hear, lambda _: ended.set(), (sys.executable, "-c", words))
+    gate.start()
+    assert ended.wait(30)
+    gate.stop(30.0)
+    assert gate.epitaph == "it was ended by SIGKILL"
+    assert "its words could not be dealt with" in caplog.text
+    assert "LookupError: Ready(pid=5)" in caplog.text
+
+
+def test_who_hears_of_its_end_may_stop_it_there_and_then():
+    epitaphs = []
+
+    def ended(gate):
+        gate.stop(30.0)
+        epitaphs.append(gate.epitaph)
+
+    gate = Child(lambda *_: None, ended, shell("echo 'full disk' >&2; exit 1"))
+    gate.start()
+    eventually(lambda: epitaphs == ["full disk"], "its last words")

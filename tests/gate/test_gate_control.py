@@ -1,0 +1,135 @@
+"""The control lane: velocities out, what comes back, and nothing else."""
+
+import json
+
+from link_bench import in_loop, noting_bridge, raw_bridge, until
+
+from webmap.gate import control
+from webmap.gate.control import BUSY_PING, IDLE_PING, ControlLane
+from webmap.gate.events import Alive, Echoed, Key, LinkDown, LinkUp
+from webmap.gate.unproven import MOST
+from webmap.geometry import Twist
+
+ZERO, SLOW = Twist(), Twist(0.1)
+
+
+class Noting:
+    """A control lane with one machine, and what it tells."""
+
+    def __init__(self, url):
+        self.events = []
+        self.control = ControlLane(url, self.events.append)
+        self.control.attach("/cmd_vel", "geometry_msgs/Twist")
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *_):
+        self.control.lane.close()
+
+    def of(self, type):
+        return [event for event in self.events if isinstance(event, type)]
+
+    async def up(self):
+        await until(lambda: self.of(LinkUp), "the link")
+        return self.control
+
+
+def velocities(bridge):
+    return [t.message["msg"]["linear"]["x"] for t in bridge.of("publish", "/cmd_vel")]
+
+
+@in_loop
+async def test_an_echo_says_what_the_robot_was_told_and_that_the_link_lives():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        assert noting.of(LinkUp) == [LinkUp(bridge.url, "control")]
+        lane.listen("/cmd_vel")
+        assert lane.write("/cmd_vel", SLOW)
+        echo = Echoed(Key(bridge.url, "/cmd_vel"), SLOW)
+        await until(lambda: echo in noting.events, "the echo")
+        assert noting.events[noting.events.index(echo) - 1] == Alive(bridge.url)
+
+
+@in_loop
+async def test_what_another_says_on_the_topic_is_told_and_proves_nothing(monkeypatch):
+    monkeypatch.setattr(control, "IDLE_PING", 60.0)
+    monkeypatch.setattr(control, "BUSY_PING", 60.0)
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        lane.listen("/cmd_vel")
+        await until(lambda: bridge.of("subscribe"), "that it listens")
+        await until(lambda: noting.of(Alive), "the answer to the only ping")
+        noting.events.clear()
+        foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
+        await bridge.publish("/cmd_vel", foreign)
+        told = [Echoed(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
+        await until(lambda: noting.events == told, "what was said, and only that")
+
+
+@in_loop
+async def test_what_is_no_velocity_of_its_own_machines_is_passed_over():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        lane.listen("/cmd_vel")
+        await until(lambda: bridge.of("subscribe"), "that it listens")
+        zero = {"linear": {"x": 0.0, "y": 0.0}, "angular": {"z": 0.0}}
+        for words in (
+            "rubbish",
+            json.dumps({"op": "publish", "topic": "/other", "msg": zero}),
+            json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": {"data": 1}}),
+            json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": zero}),
+        ):
+            await bridge.send(1, words)
+        await until(lambda: noting.of(Echoed), "the last of them")
+        assert noting.of(Echoed) == [Echoed(Key(bridge.url, "/cmd_vel"), ZERO)]
+
+
+@in_loop
+async def test_pings_are_more_frequent_while_somebody_listens():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        assert lane.lane.ping_period == IDLE_PING
+        lane.attach("/other", "geometry_msgs/Twist")
+        lane.listen("/cmd_vel")
+        lane.listen("/other")
+        assert lane.lane.ping_period == BUSY_PING
+        lane.ignore("/other")
+        assert lane.lane.ping_period == BUSY_PING
+        lane.ignore("/cmd_vel")
+        assert lane.lane.ping_period == IDLE_PING
+        lane.detach("/other", "geometry_msgs/Twist")
+        assert lane.lane.wanted
+        lane.detach("/cmd_vel", "geometry_msgs/Twist")
+        assert not lane.lane.wanted
+        await until(lambda: len(bridge.of("unadvertise")) == 2, "the goodbyes")
+        assert {t.topic for t in bridge.of("unsubscribe")} == {"/cmd_vel", "/other"}
+
+
+@in_loop
+async def test_few_velocities_may_lie_on_the_way_and_zero_always_goes():
+    async def talk(link):
+        await link.accept()
+        link.writer.transport.pause_reading()
+
+    async with raw_bridge(talk) as url, Noting(url) as noting:
+        lane = await noting.up()
+        went = [lane.write("/cmd_vel", SLOW) for _ in range(MOST + 3)]
+        assert went == [True] * MOST + [False] * 3
+        assert lane.write("/cmd_vel", ZERO)
+
+
+@in_loop
+async def test_an_answer_to_a_ping_makes_room_and_a_new_link_begins_anew():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        while lane.write("/cmd_vel", SLOW):
+            pass
+        lane.lane.hurry(0.01)
+        await until(lambda: lane.write("/cmd_vel", SLOW), "room for one more")
+        lane.lane.cut("it carries nothing")
+        assert noting.events[-1] == LinkDown(bridge.url, "control")
+        assert not lane.write("/cmd_vel", SLOW), "there is no link"
+        await until(lambda: len(noting.of(LinkUp)) == 2, "another link")
+        assert [lane.write("/cmd_vel", SLOW) for _ in range(MOST)] == [True] * MOST
+        await until(lambda: len(velocities(bridge)) >= MOST + 1, "the velocities")

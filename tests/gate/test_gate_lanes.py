@@ -1,0 +1,252 @@
+"""A lane to a bridge: kept open, proved alive, cut, handed over, and tried again."""
+
+import asyncio
+
+from link_bench import (
+    CLOSE,
+    PONG,
+    TEXT,
+    frame,
+    in_loop,
+    noting_bridge,
+    noting_lane,
+    raw_bridge,
+    until,
+)
+
+from webmap.gate import lanes
+from webmap.gate.sockets import Ears
+
+
+def advertise(topic):
+    return f'{{"op": "advertise", "topic": "{topic}"}}'.encode()
+
+
+def unadvertise(topic):
+    return f'{{"op": "unadvertise", "topic": "{topic}"}}'.encode()
+
+
+async def forever(link):
+    while await link.reader.read(1 << 16):
+        pass
+
+
+@in_loop
+async def test_what_is_held_is_said_whenever_the_lane_opens_and_taken_back_once():
+    happened = []
+    async with noting_bridge() as bridge:
+        with noting_lane(bridge.url, happened) as lane:
+            lane.hold("a", advertise("/a"), unadvertise("/a"))
+            lane.hold("a", advertise("/a"), unadvertise("/a"))
+            lane.hold("silent")
+            await until(lambda: happened == ["up"], "the link")
+            lane.hold("b", advertise("/b"))
+            await until(lambda: len(bridge.told) == 2, "both hellos")
+            bridge.transport_of(1).abort()
+            await until(lambda: happened == ["up", "down", "up"], "another link")
+            await until(lambda: len(bridge.told) == 4, "both hellos again")
+            assert [t.topic for t in bridge.told] == ["/a", "/b", "/a", "/b"]
+            lane.let_go("a")
+            lane.let_go("b")
+            lane.let_go("silent")
+            assert lane.wanted, "it was held twice"
+            lane.let_go("a")
+            assert not lane.wanted
+            await until(lambda: bridge.of("unadvertise", "/a"), "the goodbye")
+            assert len(bridge.told) == 5
+
+
+@in_loop
+async def test_what_must_not_wait_is_dropped_when_something_waits_before_it():
+    happened = []
+
+    async def talk(link):
+        await link.accept()
+        link.writer.transport.pause_reading()
+
+    async with raw_bridge(talk) as url:
+        with noting_lane(url, happened) as lane:
+            assert not lane.write(b"early", only_if_clear=False), "there is no link"
+            await until(lambda: happened == ["up"], "the link")
+            assert lane.write(b"first", only_if_clear=True)
+            while not lane._socket.unsent:
+                lane.write(b"x" * (1 << 20), only_if_clear=False)
+            assert not lane.write(b"a velocity", only_if_clear=True)
+            assert lane.write(b"zero", only_if_clear=False)
+
+
+@in_loop
+async def test_a_link_whose_pings_are_not_answered_is_cut_and_made_anew(
+    monkeypatch, caplog
+):
+    monkeypatch.setattr(lanes, "DEAD", 0.1)
+    happened = []
+
+    async def talk(link):
+        await link.accept()
+        await forever(link)
+
+    async with raw_bridge(talk) as url:
+        with noting_lane(url, happened) as lane:
+            lane.hurry(0.02)
+            await until(lambda: happened[:3] == ["up", "down", "up"], "another link")
+    assert "no answer for 0.1 s" in caplog.text
+
+
+@in_loop
+async def test_only_an_answer_to_a_ping_of_ours_proves_that_the_link_lives():
+    pings, pongs, go_on = [], [], asyncio.Event()
+    unasked = [(0).to_bytes(8, "big"), (99).to_bytes(8, "big"), b"", b"nonsense, long"]
+
+    async def talk(link):
+        await link.accept()
+        await until(lambda: pings, "a ping")
+        for data in unasked:
+            link.say(frame(PONG, data))
+        link.say(frame(TEXT, b"said"))
+        await go_on.wait()
+        link.say(frame(PONG, (1).to_bytes(8, "big")) * 2)
+        await forever(link)
+
+    happened = []
+    async with raw_bridge(talk) as url:
+        notes = {"pinged": pings.append, "pong": pongs.append}
+        with noting_lane(url, happened, **notes) as lane:
+            lane.hurry(60.0)
+            await until(lambda: happened == ["up", b"said"], "all that nobody asked")
+            assert (pings, pongs) == ([1], [])
+            go_on.set()
+            await until(lambda: pongs, "the answer")
+            assert pongs == [1], "the second says nothing new"
+
+
+@in_loop
+async def test_a_lane_in_a_hurry_pings_at_once_and_then_more_often():
+    pings = []
+    async with noting_bridge() as bridge:
+        with noting_lane(bridge.url, [], pinged=pings.append) as lane:
+            lane.hurry(60.0)
+            await until(lambda: pings == [1], "the first ping")
+            lane.hurry(0.01)
+            await until(lambda: len(pings) >= 5, "more of them")
+            await until(lambda: not lane._changed.is_set(), "a ping under way")
+            lane.hurry(30.0)
+            assert not lane._changed.is_set(), "slower: no reason to ping now"
+
+
+@in_loop
+async def test_a_lane_that_is_cut_while_there_is_no_link_goes_on_trying(
+    monkeypatch, caplog
+):
+    monkeypatch.setattr(lanes, "FIRST_WAIT", 0.01)
+    happened = []
+    async with noting_bridge() as bridge:
+        await bridge.stop()
+        with noting_lane(bridge.url, happened) as lane:
+            await until(lambda: "no link" in caplog.text, "an attempt")
+            lane.cut("it carries nothing")
+            assert happened == []
+            await bridge.start()
+            await until(lambda: happened == ["up"], "the link")
+            lane.cut("it carries nothing")
+            assert happened == ["up", "down"]
+            await until(lambda: happened == ["up", "down", "up"], "another")
+
+
+@in_loop
+async def test_that_there_is_no_link_is_said_once_for_each_reason(monkeypatch, caplog):
+    monkeypatch.setattr(lanes, "FIRST_WAIT", 0.01)
+    monkeypatch.setattr(lanes, "LONGEST_WAIT", 0.01)
+    attempts = []
+
+    async def talk(link):
+        attempts.append(link)
+        await link.request()
+        status = b"403 Forbidden" if len(attempts) < 4 else b"404 Not Found"
+        link.say(b"HTTP/1.1 " + status + b"\r\nContent-Length: 0\r\n\r\n")
+
+    async with raw_bridge(talk) as url:
+        with noting_lane(url, []):
+            await until(lambda: len(attempts) > 6, "seven attempts")
+    complaints = [r.getMessage() for r in caplog.records if "no link" in r.getMessage()]
+    assert ["403" in text for text in complaints] == [True, False]
+
+
+@in_loop
+async def test_a_bridge_that_takes_links_and_closes_them_at_once_is_not_run_at():
+    times, happened = [], []
+
+    async def talk(link):
+        times.append(asyncio.get_running_loop().time())
+        await link.accept(frame(CLOSE, b"\x03\xe9"))
+        await forever(link)
+
+    async with raw_bridge(talk) as url:
+        with noting_lane(url, happened):
+            await until(lambda: len(times) == 3, "three attempts")
+    assert "up" not in happened
+    assert times[2] - times[0] >= lanes.FIRST_WAIT
+
+
+@in_loop
+async def test_a_socket_that_closes_behind_a_stall_is_cut_before_the_next_one():
+    """What waits in it would arrive beside what is said on the next."""
+    links, happened = [], []
+
+    async def talk(link):
+        links.append(link)
+        await link.accept()
+        if len(links) > 1:
+            await forever(link)
+        link.writer.transport.pause_reading()
+        await until(lambda: b"full" in happened, "a full link")
+        link.say(frame(CLOSE, b"\x03\xe9"))
+
+    async with raw_bridge(talk) as url:
+        with noting_lane(url, happened) as lane:
+            await until(lambda: happened == ["up"], "the link")
+            first = lane._socket
+            while not first.unsent:
+                lane.write(b"x" * (1 << 20), only_if_clear=False)
+            happened.append(b"full")
+            lane.hurry(0.01)
+            await until(lambda: len(links) == 2, "another link")
+            assert first.unsent == 0, "it was thrown away"
+            await until(lambda: happened[-1] == "up", "the word of it")
+            assert happened == ["up", b"full", "down", "up"]
+
+
+@in_loop
+async def test_a_socket_that_is_handed_over_goes_on_and_the_lane_has_another():
+    happened, texts = [], []
+    async with noting_bridge() as bridge:
+        with noting_lane(bridge.url, happened) as lane:
+            await until(lambda: happened == ["up"], "the link")
+            lane.write(b'{"op": "subscribe", "topic": "/t"}', only_if_clear=True)
+            link = lane.spend(Ears(texts.append, lambda _: None, lambda _: None))
+            assert happened == ["up", "down"]
+            await until(lambda: happened == ["up", "down", "up"], "another")
+            await until(lambda: bridge.told, "the subscription")
+            await bridge.publish("/t", {"data": 1})
+            await until(lambda: texts, "what the first one is told")
+            assert link.is_open
+            assert len(bridge.links) == 2
+            link.close()
+            await until(lambda: len(bridge.links) == 1, "its end")
+
+
+@in_loop
+async def test_a_lane_is_closed_for_good_with_or_without_a_link():
+    happened = []
+    async with noting_bridge() as bridge:
+        with noting_lane(bridge.url, happened) as lane:
+            lane.close()  # before it was ever open
+            await until(lane._task.done, "its end")
+            assert (happened, bridge.links) == ([], set())
+        with noting_lane(bridge.url, happened) as lane:
+            await until(lambda: happened == ["up"], "the link")
+            lane.close()
+            await until(lambda: not bridge.links, "its end")
+            assert not lane.write(b"{}", only_if_clear=False)
+            await until(lane._task.done, "the end of all attempts")
+        assert (happened, bridge.links) == (["up"], set())

@@ -1,0 +1,305 @@
+"""The tasks lane: goals and their cancelling, hooks, and what is heard of them."""
+
+import json
+
+from gate_harness import spec
+from link_bench import in_loop, noting_bridge, until
+
+from webmap.gate import tasks
+from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.events import (
+    GoalEnded,
+    GoalLost,
+    GoalProgress,
+    Key,
+    LinkDown,
+    LinkUp,
+)
+from webmap.gate.tasks import TasksLane, goal_topics, hook_topics
+
+MOVE_BASE = spec(
+    action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None
+)
+NAVIGATES = spec(action="/go", cancel_topic=None, goal_topic=None)
+
+
+def goal(id="g1", way="topic", robot="r1"):
+    return SendGoal(Key("ws://x", "/cmd_vel"), robot, id, 1.0, 2.0, 0.0, "a", way)
+
+
+class Noting:
+    """A tasks lane and what it tells."""
+
+    def __init__(self, url):
+        self.events = []
+        self.tasks = TasksLane(url, self.events.append)
+        self.tasks.lane.hold("robots")
+
+    async def __aenter__(self):
+        await self.up()
+        return self
+
+    async def __aexit__(self, *_):
+        self.tasks.close()
+        await self.tasks.settle()
+
+    def of(self, type):
+        return [event for event in self.events if isinstance(event, type)]
+
+    async def up(self, times=1):
+        await until(lambda: len(self.of(LinkUp)) == times, "the link")
+
+    async def send(self, robot, id):
+        """Have an action goal sent, as soon as there is a link for it."""
+        count = len(self.of(LinkUp))
+        assert self.tasks.send(robot, goal(id, "navigate_to_pose", robot.id))
+        await self.up(count + 1)
+
+
+def action_word(op, id, **more):
+    return json.dumps({"op": op, "id": id, **more})
+
+
+class TestTopics:
+    def test_a_robot_needs_the_topics_of_its_ways_and_no_others(self):
+        assert goal_topics(spec(goal_topic=None, cancel_topic=None)) == []
+        pose = spec(pose_topic="/initialpose")
+        assert [name for name, _ in goal_topics(pose)] == [
+            "/goal",
+            "/cancel",
+            "/initialpose",
+        ]
+        assert goal_topics(NAVIGATES) == []
+        assert [name for name, _ in goal_topics(MOVE_BASE)] == [
+            "/goal",
+            "/move_base/goal",
+            "/move_base/cancel",
+        ]
+
+    def test_a_topic_that_is_needed_twice_is_announced_once(self):
+        robot = spec(
+            goal_topic=None,
+            cancel_topic="/move_base/cancel",
+            action="/move_base",
+            action_type="move_base_msgs/MoveBaseAction",
+        )
+        names = [name for name, _ in goal_topics(robot)]
+        assert sorted(names) == ["/move_base/cancel", "/move_base/goal"]
+
+    def test_of_hooks_only_flags_need_a_topic(self):
+        robot = spec(
+            stop_hooks=(
+                {"service": "/e_stop", "type": "std_srvs/Trigger"},
+                {"topic": "/lock", "type": "std_msgs/Bool"},
+            )
+        )
+        assert hook_topics(robot) == [("/lock", "std_msgs/Bool")]
+
+
+class TestTopicGoals:
+    @in_loop
+    async def test_topics_are_announced_and_taken_back(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            noting.tasks.attach(goal_topics(spec()))
+            await until(lambda: len(bridge.of("advertise")) == 2, "both topics")
+            noting.tasks.detach(goal_topics(spec()))
+            await until(lambda: len(bridge.of("unadvertise")) == 2, "the end of both")
+
+    @in_loop
+    async def test_a_goal_is_written_now_or_never(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            assert noting.tasks.send(spec(), goal("g1"))
+            await until(lambda: bridge.of("publish", "/goal"), "the goal")
+            noting.tasks.lane.cut("it carries nothing")
+            assert noting.events[-1] == LinkDown(bridge.url, "tasks")
+            assert not noting.tasks.send(spec(), goal("g2"))
+            await noting.up(2)
+            located = spec(pose_topic="/initialpose")
+            at = TellPose(Key("ws://x", "/cmd_vel"), "r1", 1.0, 2.0, 0.0, "a")
+            assert noting.tasks.tell_pose(located, at)
+            await until(lambda: bridge.of("publish", "/initialpose"), "the pose")
+            assert len(bridge.of("publish", "/goal")) == 1
+
+    @in_loop
+    async def test_goals_are_cancelled_by_every_way_that_a_robot_has(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            noting.tasks.cancel(spec(cancel_topic=None))  # it has none
+            noting.tasks.cancel(spec(cancel_topic="/stop_it", action="/go"))
+            await noting.tasks.settle()
+            noting.tasks.cancel(
+                spec(
+                    cancel_topic="/move_base/cancel",
+                    action="/move_base",
+                    action_type="move_base_msgs/MoveBaseAction",
+                )
+            )
+            noting.tasks.cancel(MOVE_BASE)
+            await until(lambda: len(bridge.of("publish")) == 3, "all words")
+            assert [t.topic for t in bridge.of("publish")] == [
+                "/stop_it",
+                "/move_base/cancel",
+                "/move_base/cancel",
+            ]
+            (call,) = bridge.of("call_service")
+            assert call.message["service"] == "/go/_action/cancel_goal"
+            assert call.link != bridge.of("publish")[0].link
+
+    @in_loop
+    async def test_hooks_are_flags_and_calls(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            flag = {"topic": "/lock", "type": "std_msgs/Bool"}
+            noting.tasks.run_hook(flag, True)
+            noting.tasks.run_hook(flag, False)
+            trigger = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+            noting.tasks.run_hook(trigger, True)
+            await noting.tasks.settle()
+            await until(lambda: len(bridge.of("publish", "/lock")) == 2, "both flags")
+            flags = [t.message["msg"]["data"] for t in bridge.of("publish", "/lock")]
+            assert flags == [True, False]
+            assert bridge.of("call_service")[0].message["service"] == "/e_stop"
+
+
+class TestActionGoals:
+    @in_loop
+    async def test_a_goal_that_blocks_its_socket_holds_up_neither_goals_nor_cancel(
+        self,
+    ):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            bridge.goals_block = True
+            await noting.send(NAVIGATES, "g1")
+            await noting.send(NAVIGATES, "g2")
+            noting.tasks.cancel(NAVIGATES)
+            await noting.tasks.settle()
+            await until(lambda: bridge.of("call_service"), "the cancel")
+            await until(lambda: len(bridge.of("send_action_goal")) == 2, "both")
+            assert len({t.link for t in bridge.told}) == 3
+            assert noting.of(GoalLost) == [], "a socket that was spent is not lost"
+            bridge.unblock()
+
+    @in_loop
+    async def test_its_words_are_told_until_the_result_which_ends_its_socket(
+        self, monkeypatch
+    ):
+        monkeypatch.setattr(tasks, "FEEDBACK_PERIOD", 60.0)
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            await noting.send(NAVIGATES, "g1")
+            (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
+            for distance in (2.0, 1.9, 1.8):
+                values = {"distance_remaining": distance}
+                word = action_word("action_feedback", "g1", values=values)
+                await bridge.send(sent.link, word)
+            await bridge.send(sent.link, "rubbish")
+            await bridge.send(sent.link, action_word("action_result", "g0"))
+            result = action_word("action_result", "g1", status=4, values={})
+            await bridge.send(sent.link, result)
+            await until(lambda: noting.of(GoalEnded), "its end")
+            assert noting.of(GoalEnded) == [GoalEnded("r1", "g1", "reached")]
+            told = [word.left for word in noting.of(GoalProgress)]
+            assert told == [2.0], "thinned out"
+            await until(lambda: sent.link not in bridge.links, "the end of its socket")
+            assert noting.of(GoalLost) == []
+
+    @in_loop
+    async def test_a_robot_may_say_more_after_a_while(self, monkeypatch):
+        monkeypatch.setattr(tasks, "FEEDBACK_PERIOD", 0.0)
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            await noting.send(NAVIGATES, "g1")
+            (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
+            for distance in (2.0, 1.0):
+                values = {"distance_remaining": distance}
+                word = action_word("action_feedback", "g1", values=values)
+                await bridge.send(sent.link, word)
+            await until(lambda: len(noting.of(GoalProgress)) == 2, "both words")
+
+    @in_loop
+    async def test_a_goal_whose_socket_is_lost_is_said_to_be_out_of_sight(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            await noting.send(NAVIGATES, "g1")
+            (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
+            bridge.transport_of(sent.link).abort()
+            (lost,) = await until(lambda: noting.of(GoalLost), "the word of it")
+            assert (lost.robot, lost.id) == ("r1", "g1")
+            assert lost.why.startswith("the link is lost: ")
+
+    @in_loop
+    async def test_of_too_many_goals_the_oldest_is_followed_no_longer(
+        self, monkeypatch
+    ):
+        monkeypatch.setattr(tasks, "MAX_SPENT", 2)
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            for number in range(3):
+                robot = spec(id=f"r{number}", action="/go")
+                await noting.send(robot, f"g{number}")
+            (lost,) = noting.of(GoalLost)
+            assert (lost.robot, lost.id) == ("r0", "g0")
+            assert lost.why == f"more than 2 goals are under way at {bridge.url}"
+            await until(lambda: len(bridge.of("send_action_goal")) == 3, "all goals")
+            first = bridge.of("send_action_goal")[0].link
+            await until(lambda: first not in bridge.links, "the end of its socket")
+
+    @in_loop
+    async def test_the_end_of_the_lane_ends_its_goals_sockets_and_its_calls(self):
+        async with noting_bridge() as bridge:
+            bridge.answers_services = False
+            async with Noting(bridge.url) as noting:
+                await noting.send(NAVIGATES, "g1")
+                noting.tasks.cancel(NAVIGATES)
+                await until(lambda: bridge.of("call_service"), "the cancel")
+                await until(lambda: len(bridge.links) == 3, "three sockets")
+            bridge.unblock()
+            await until(lambda: not bridge.links, "the end of all of them")
+            assert noting.of(GoalLost) == []
+
+
+class TestMoveBase:
+    def word(self, part, id="g1", status=1):
+        state = {"goal_id": {"id": id}, "status": status, "text": "aborted"}
+        said = {"status_list": [state]} if part == "status" else {"status": state}
+        message = {"op": "publish", "topic": f"/move_base/{part}", "msg": said}
+        return json.dumps(message)
+
+    @in_loop
+    async def test_its_topics_are_listened_to_before_it_is_sent_and_until_it_ends(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            assert noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
+            await until(lambda: bridge.of("publish", "/move_base/goal"), "the goal")
+            assert [t.op for t in bridge.told] == ["subscribe"] * 3 + ["publish"]
+            await bridge.send(1, "rubbish")
+            await bridge.send(1, self.word("status"))
+            await until(lambda: noting.of(GoalProgress), "that it is under way")
+            await bridge.send(1, self.word("result", status=4))
+            await until(lambda: noting.of(GoalEnded), "its end")
+            assert noting.of(GoalEnded) == [GoalEnded("r1", "g1", "failed", "aborted")]
+            await until(lambda: len(bridge.of("unsubscribe")) == 3, "that it is over")
+            noting.tasks.forget("r1")  # there is nothing to forget
+
+    @in_loop
+    async def test_without_a_link_nothing_is_sent_and_nothing_followed(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            noting.tasks.lane.cut("it carries nothing")
+            assert not noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
+            await noting.up(2)
+            assert bridge.told == []
+            assert noting.of(GoalLost) == []
+
+    @in_loop
+    async def test_a_link_that_is_lost_loses_sight_of_its_goal_and_it_comes_back(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
+            await until(lambda: bridge.of("publish"), "the goal")
+            bridge.transport_of(1).abort()
+            why = f"no link to {bridge.url}"
+            await until(lambda: noting.of(GoalLost), "the word of it")
+            assert noting.of(GoalLost) == [GoalLost("r1", "g1", why)]
+            await until(lambda: len(bridge.of("subscribe")) == 6, "that it listens")
+            await bridge.send(2, self.word("status"))
+            await until(lambda: noting.of(GoalProgress), "that it is under way")
+
+    @in_loop
+    async def test_a_goal_for_another_robot_s_action_leaves_it_followed(self):
+        async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+            noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
+            noting.tasks.send(NAVIGATES, goal("g2", "navigate_to_pose", "r2"))
+            await noting.up(2)
+            assert noting.of(GoalLost) == [], "the socket only went to another use"
+            await until(lambda: len(bridge.of("subscribe")) == 6, "that it listens on")

@@ -1,0 +1,108 @@
+"""The witness lane: odometry and scans, for whoever watches."""
+
+import cbor2
+from link_bench import in_loop, noting_bridge, until
+
+from webmap.gate.events import Key, LinkDown, LinkUp, Measured, Scanned
+from webmap.gate.witness import WitnessLane
+from webmap.geometry import Twist
+
+ANN, BEN = Key("ws://a", "/cmd_vel"), Key("ws://b", "/cmd_vel")
+MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}
+SCAN = {
+    "header": {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "laser"},
+    "angle_min": -0.1,
+    "angle_max": 0.1,
+    "angle_increment": 0.1,
+    "range_min": 0.05,
+    "range_max": 10.0,
+    "ranges": [1.0, 2.0, 3.0],
+}
+
+
+class Noting:
+    def __init__(self, url):
+        self.events = []
+        self.witness = WitnessLane(url, self.events.append)
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *_):
+        self.witness.lane.close()
+
+    def of(self, type):
+        return [event for event in self.events if isinstance(event, type)]
+
+
+def scan_of(topic, message=SCAN):
+    return cbor2.dumps({"op": "publish", "topic": topic, "msg": message})
+
+
+@in_loop
+async def test_odometry_is_told_of_every_machine_that_it_is_of():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        noting.witness.watch("/odom", "nav_msgs/Odometry", ANN)
+        noting.witness.watch("/odom", "nav_msgs/Odometry", BEN)
+        await until(lambda: bridge.of("subscribe", "/odom"), "that it listens")
+        assert noting.events == [LinkUp(bridge.url, "witness")]
+        assert bridge.of("subscribe")[0].message["throttle_rate"] == 50
+        await bridge.publish("/odom", MOVING)
+        await until(lambda: noting.of(Measured), "odometry")
+        assert noting.of(Measured) == [
+            Measured(ANN, Twist(0.5)),
+            Measured(BEN, Twist(0.5)),
+        ]
+        noting.witness.unwatch("/odom", ANN)
+        assert not bridge.of("unsubscribe"), "the other watches on"
+        noting.witness.unwatch("/odom", BEN)
+        await until(lambda: bridge.of("unsubscribe", "/odom"), "the end of it")
+        assert not noting.witness.lane.wanted
+        bridge.transport_of(1).abort()
+        await until(lambda: noting.of(LinkDown), "the loss of the link")
+
+
+@in_loop
+async def test_words_that_are_no_odometry_are_passed_over():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        noting.witness.watch("/odom", None, ANN)
+        await until(lambda: bridge.of("subscribe"), "that it listens")
+        for words in (
+            "rubbish",
+            '{"op": "status", "topic": "/odom"}',
+            '{"op": "publish"}',
+            '{"op": "publish", "topic": "/other", "msg": {}}',
+            '{"op": "publish", "topic": "/odom", "msg": {"data": 1}}',
+        ):
+            await bridge.send(1, words)
+        await until(lambda: noting.of(Measured), "the last of them")
+        assert noting.of(Measured) == [Measured(ANN, None)], (
+            "a robot that tells nothing"
+        )
+
+
+@in_loop
+async def test_a_scan_is_told_of_the_machines_that_are_assisted_by_it():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        noting.witness.watch("/odom", None, ANN)
+        noting.witness.watch_scan("/scan", ANN)
+        noting.witness.watch_scan("/scan", BEN)
+        await until(lambda: bridge.of("subscribe", "/scan"), "that it listens")
+        assert bridge.of("subscribe", "/scan")[0].message["compression"] == "cbor"
+        for words in (
+            scan_of("/elsewhere"),
+            scan_of("/scan", {"ranges": "none"}),
+            scan_of("/scan"),
+        ):
+            await bridge.send(1, words)
+        await until(lambda: len(noting.of(Scanned)) == 2, "the scan")
+        assert [(s.key, s.topic) for s in noting.of(Scanned)] == [
+            (ANN, "/scan"),
+            (BEN, "/scan"),
+        ]
+        await bridge.publish("/odom", MOVING)
+        await until(lambda: noting.of(Measured), "odometry beside it")
+        noting.witness.unwatch_scan("/scan", ANN)
+        assert not bridge.of("unsubscribe")
+        noting.witness.unwatch_scan("/scan", BEN)
+        await until(lambda: bridge.of("unsubscribe", "/scan"), "the end of it")
