@@ -16,9 +16,9 @@ from webmap.ros.calls import Calls
 from webmap.ros.connection import CLOSED_HERE, Lane, State
 from webmap.ros.doubts import Doubts
 from webmap.ros.events import CallService, Event, Malformed, Publish, Status
+from webmap.ros.fan_out import FanOut
 from webmap.ros.graph import Graph
 from webmap.ros.names import normalise_topic, normalise_url, split_type
-from webmap.ros.offload import Offload
 from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
 from webmap.ros.publications import Publications
@@ -71,7 +71,7 @@ class Bridge:
         self._publications = Publications()
         self._calls = Calls(self.url)
         self._graph = Graph(self.call_service)
-        self._offload = Offload()
+        self._fan_out = FanOut()
         self._doubts = Doubts(self.name, self._graph, self._report)
         self._renewals = Renewals(self._graph.published, self._topics.values)
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
@@ -161,8 +161,8 @@ class Bridge:
         book.add(listener)
         if is_first and self.state == "open":
             self._doubts.watch(book)
-        elif late is not None and self._loop is not None:
-            self._loop.call_soon(self._give, late, [listener])
+        elif late is not None:
+            self._fan_out.give_soon(late, listener)
         return listener
 
     def publish(
@@ -259,6 +259,7 @@ class Bridge:
         if self._lane is not None and self._lane.state != "closed":
             return
         self._loop = loop
+        self._fan_out.begin(loop)
         self._lane = Lane(
             self.url,
             opened=self._opened,
@@ -273,7 +274,7 @@ class Bridge:
         if self._lane is not None:
             await self._lane.stop()
         await self._calls.stop()
-        await self._offload.stop()
+        await self._fan_out.stop()
         await self._doubts.stop()
         await self._renewals.stop()
 
@@ -345,46 +346,9 @@ class Bridge:
             topic = self._topics.get(event.topic)
             if topic is not None:
                 topic.received(event)
-                self._fan_out(topic, event)
+                self._fan_out.offer(event, topic.listeners)
         elif event is not None:
             self._other(event)
-
-    def _fan_out(self, topic: Topic, message: Publish) -> None:
-        now = time.monotonic()
-        due = []
-        for listener in topic.listeners:
-            if listener.throttle.offer(message, now) is not None:
-                due.append(listener)
-            else:
-                self._hold(listener)
-        if due:
-            self._give(message, due)
-
-    def _hold(self, listener: Subscription) -> None:
-        if self._loop is not None:
-            listener.hold(self._loop, lambda: self._release(listener))
-
-    def _release(self, listener: Subscription) -> None:
-        """Hand over the newest message that a listener's throttle held back."""
-        listener.forget_timer()
-        message = listener.throttle.take(time.monotonic())
-        if message is not None:
-            self._give(message, [listener])
-        else:
-            self._hold(listener)
-
-    def _give(self, message: Publish, listeners: list[Subscription]) -> None:
-        if self._offload.wants(message):
-            types = frozenset(listener.decode for listener in listeners)
-            self._offload.decode(
-                message, types, lambda: self._deliver(message, listeners)
-            )
-        else:
-            self._deliver(message, listeners)
-
-    def _deliver(self, message: Publish, listeners: list[Subscription]) -> None:
-        for listener in listeners:
-            listener.deliver(message)
 
     def _other(self, event: Event) -> None:
         if isinstance(event, Malformed):
