@@ -61,6 +61,8 @@ class LaserScanner:
         angle: Where it looks, in degrees from the robot's x, counter-clockwise.
         max_dots: How many dots are drawn at the most; None for one per ray.
         throttle: The least time between two scans, in milliseconds.
+        name: A further class, by which one of several is told:
+            ``.laserscan.rear > .dot``.
 
     Raises:
         ValueError: If ``max_dots`` is less than 1.
@@ -77,6 +79,8 @@ class LaserScanner:
         angle: float = 0.0,
         max_dots: int | None = 50,
         throttle: int = 300,
+        *,
+        name: str = "",
     ) -> None:
         if max_dots is not None and max_dots < 1:
             raise ValueError(f"max_dots must be at least 1 or None, got {max_dots}")
@@ -85,7 +89,13 @@ class LaserScanner:
         self.topic = topic
         self._dots = svg.path(class_="dot")
         self._placed = Placed(
-            robot, self._dots, class_="laserscan", frame="robot", x=x, y=y, angle=angle
+            robot,
+            self._dots,
+            class_=f"laserscan {name}".strip(),
+            frame="robot",
+            x=x,
+            y=y,
+            angle=angle,
         )
         self.svg = self._placed.svg
         bridge.subscribe(

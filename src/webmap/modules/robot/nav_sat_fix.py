@@ -59,6 +59,7 @@ class NavSatFix:
         self._east = east
         self._plane = LocalPlane(*(datum or (0.0, 0.0)), east)
         self.robot = robot
+        self.topic = topic
         self.datum = datum
         self.age_limit = age_limit
         self.position: tuple[float, float] | None = None

@@ -56,6 +56,7 @@ class Path:
         if max_points < 2:
             raise ConfigError(f"max_points must be at least 2, got {max_points}")
         self.robot = robot
+        self.topic = topic
         self.max_points = max_points
         self.age_limit = age_limit
         self.points: list[tuple[float, float]] = []

@@ -108,6 +108,7 @@ class PointCloud:
         if max_points < 1:
             raise ConfigError(f"max_points must be at least 1, got {max_points}")
         self.robot = robot
+        self.topic = topic
         self.window = (z_min, z_max)
         self.cell = cell
         self.max_points = max_points

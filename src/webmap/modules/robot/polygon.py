@@ -52,6 +52,7 @@ class Polygon:
         if age_limit < 0:
             raise ConfigError(f"age_limit must be at least 0 s, got {age_limit}")
         self.robot = robot
+        self.topic = topic
         self.age_limit = age_limit
         self.points: list[tuple[float, float]] = []
         """The newest polygon, in metres."""

@@ -64,6 +64,7 @@ class PoseArray:
         if not (math.isfinite(length) and length > 0):
             raise ConfigError(f"length must be metres above 0, got {length}")
         self.robot = robot
+        self.topic = topic
         self.length = length
         self.max_poses = max_poses
         self.age_limit = age_limit

@@ -55,6 +55,7 @@ class PoseWithCovariance:
         if not (math.isfinite(deviations) and deviations > 0):
             raise ConfigError(f"deviations must be above 0, got {deviations}")
         self.robot = robot
+        self.topic = topic
         self.deviations = deviations
         self.age_limit = age_limit
         self.ellipse = svg.ellipse(

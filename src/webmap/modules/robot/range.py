@@ -56,6 +56,7 @@ class Range:
         age_limit: float = 1.0,
     ) -> None:
         self.robot = robot
+        self.topic = topic
         self.age_limit = age_limit
         self.distance: float | None = None
         """In metres; infinite if nothing is in reach, None if that is not known."""
