@@ -74,7 +74,8 @@ test-web: $(NODE)
 test-gate: $(DEV)
 	$(BIN)/pytest -q -n $(JOBS) tests/gate --ignore tests/gate/test_gate_client.py \
 	  --ignore tests/gate/test_gate_assist_road.py \
-	  --ignore tests/gate/test_gate_machine.py --cov=webmap.gate \
+	  --ignore tests/gate/test_gate_machine.py \
+	  --ignore tests/gate/test_gate_recorded.py --cov=webmap.gate \
 	  --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
 ## test-python: pytest; what measures time runs alone at the end
