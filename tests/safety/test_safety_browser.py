@@ -131,6 +131,26 @@ def test_a_busy_page_stops_the_robot(bench):
     )
 
 
+JUMP = """(() => {
+    const [now, date] = [performance.now.bind(performance), Date.now];
+    performance.now = () => now() + SHIFT;
+    Date.now = () => date() + SHIFT;
+})()"""
+
+
+@pytest.mark.parametrize(("hours", "way"), [(1, "ahead"), (-1, "back")])
+def test_clocks_of_the_browser_that_jump_stop_the_robot_and_nothing_else(
+    bench, hours, way
+):
+    # The jump stays, so that all but the first trial drive by clocks that are wrong.
+    bench.prove(
+        f"the browser's clocks jump an hour {way}",
+        lambda: bench.tab.evaluate(JUMP.replace("SHIFT", str(hours * 3_600_000))),
+        within=PROMISED,
+    )
+    bench.close_page()
+
+
 def test_stop_on_the_keyboard_stops_the_robot_and_the_reset_moves_nothing(bench):
     def back():
         bench.space("keyUp")

@@ -4,6 +4,7 @@ import time
 
 import pytest
 from safety_bench import ROBOT_TIMEOUT, SLOW, wait_for
+from safety_run import FULL
 
 from webmap.testing import Shape
 
@@ -11,6 +12,8 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""
+
+LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 LATE = 6
 """Velocities that a stalled link may have taken (S11)."""
@@ -29,6 +32,22 @@ def test_a_stall_between_browser_and_display_stops_the_robot(bench, way):
     bench.prove(
         f"the browser's link stalls for 2 s, {names[way]}",
         lambda: bench.web_hop.hold(way),
+        within=PROMISED,
+        back=back,
+    )
+
+
+@pytest.mark.parametrize("seconds", [0.5, pytest.param(10.0, marks=LONG)])
+def test_a_stall_of_any_length_between_browser_and_display_stops_the_robot(
+    bench, seconds
+):
+    def back():
+        bench.linger(seconds)
+        bench.web_hop.release()
+
+    bench.prove(
+        f"the browser's link stalls for {seconds:g} s, both ways",
+        lambda: bench.web_hop.hold("both"),
         within=PROMISED,
         back=back,
     )
