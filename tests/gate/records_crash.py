@@ -1,0 +1,68 @@
+"""Kills itself after each line that keeps a STOP on disk, and says what is left of it.
+
+Started as ``records_crash.py FOLDER``; a line of JSON for each death: after how many
+lines, whether the STOP had been acknowledged, and who says STOP to whoever asks then.
+"""
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+from webmap.gate import records
+from webmap.gate.events import Key
+from webmap.gate.records import Records
+
+KEY = Key("ws://127.0.0.1:9090", "/cmd_vel")
+
+
+def die_after(lines: int) -> None:
+    """Have this process killed once it ran so many lines of the module."""
+    left = lines
+
+    def trace(frame, event, _):
+        nonlocal left
+        if frame.f_code.co_filename != records.__file__:
+            return None
+        if event == "line":
+            left -= 1
+            if left < 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+        return trace
+
+    sys.settrace(trace)
+
+
+def keep(folder: Path, by: str | None, lines: int) -> tuple[bool, bool]:
+    """Keep or end a STOP in a child; returns whether it was acknowledged, and lived."""
+    heard, said = os.pipe()
+    child = os.fork()
+    if not child:
+        die_after(lines)
+        problem = Records(folder).keep_latch(KEY, by)
+        sys.settrace(None)
+        os.write(said, b"ack" if problem is None else b"no")
+        os._exit(0)
+    os.close(said)
+    _, status = os.waitpid(child, 0)
+    acknowledged = os.read(heard, 8) == b"ack"
+    os.close(heard)
+    return acknowledged, os.WIFEXITED(status)
+
+
+def main() -> None:
+    """Die at every line of both, until one lives."""
+    folder = Path(sys.argv[1])
+    for by, before in (("Ann", None), (None, "Ann")):
+        lines, lived = 0, False
+        while not lived:
+            assert Records(folder).keep_latch(KEY, before) is None
+            acknowledged, lived = keep(folder, by, lines)
+            stands = Records(folder).latch_of(KEY)
+            print(json.dumps([by, lines, acknowledged, lived, stands]))
+            lines += 1
+
+
+if __name__ == "__main__":
+    main()
