@@ -7,8 +7,10 @@ import weakref
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
+from webmap.core.hand_speeds import HandSpeeds
+from webmap.core.page_ports import PageChannel, Publisher, Viewer
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
 from webmap.scene.bound import BoundElement, Document
@@ -23,85 +25,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.page")
 
 PageFunction = Callable[["Page"], Any]
-
-
-class PageChannel(Protocol):
-    """What core asks of the socket to one page; :mod:`webmap.wire` provides it."""
-
-    def mount(
-        self,
-        fragment: Fragment,
-        *,
-        under: int,
-        order: float = 0,
-        within: int | None = None,
-    ) -> int:
-        """Show a fragment under an element; return the mount's number."""
-
-    def unmount(self, mount: int) -> None:
-        """Take a mounted fragment away."""
-
-    def set_class(self, mount: int, name: str, on: bool) -> None:
-        """Set a class on the fragment's root in this page only."""
-
-    def listen(
-        self, mount: int, element: int, event: str, *, prevent: bool, stop: bool
-    ) -> None:
-        """Hear of an event on an element, in this page only."""
-
-    def unlisten(self, mount: int, element: int, event: str) -> None:
-        """Hear of it no more."""
-
-    def view(self, map_element: int, operation: str, *args: float) -> None:
-        """Apply an operation to a map's view."""
-
-    def attach(
-        self,
-        map_element: int,
-        instance: int,
-        module_url: str,
-        options: dict[str, Any],
-        css_url: str | None = None,
-    ) -> None:
-        """Load the browser half of a module."""
-
-    def detach(self, instance: int) -> None:
-        """Take the browser half of a module away."""
-
-    def send(self, instance: int, message: dict[str, Any]) -> None:
-        """Send a message to the browser half of a module."""
-
-    def error(self, text: str) -> None:
-        """Show a notice."""
-
-
-class Publisher(Protocol):
-    """Where files get URLs by which a page can load them."""
-
-    def publish_file(self, path: Path) -> str:
-        """Let pages load an ES module or a style sheet; return its URL."""
-
-    def publish_image(self, image: Path) -> str:
-        """Let pages load an image; return the URL of this version of it."""
-
-    def withdraw_image(self, url: str) -> None:
-        """Undo one :meth:`publish_image`."""
-
-
-class Viewer(Protocol):
-    """One person's browser, signed in."""
-
-    @property
-    def id(self) -> str:
-        """Opaque, the same for as long as the browser stays signed in."""
-
-    @property
-    def name(self) -> str:
-        """What other people read when this viewer drives."""
-
-    @property
-    def role(self) -> str:
-        """``"viewer"``, ``"operator"`` or ``"admin"``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,8 +116,7 @@ class Page:
         self._mount = channel.mount(self.fragment, under=0)
         _pages[self.fragment.id] = self
         self.on_speeds: Callable[[float, float], None] | None = None
-        self._speeds: dict[int, tuple[float, float]] = {}
-        self._driving: int | None = None
+        self._speeds = HandSpeeds()
         self._listening: dict[tuple[int, int, str], list[Listener]] = {}
 
     def element(self, id: str) -> Element:
@@ -254,30 +176,21 @@ class Page:
         Those of the module that the hands are at; the least of all while they are at
         none; zero if there is no module that drives.
         """
-        if not self._speeds:
-            return (0.0, 0.0)
-        if self._driving in self._speeds:
-            return self._speeds[self._driving]
-        linear, angular = zip(*self._speeds.values(), strict=True)
-        return (min(linear), min(angular))
+        return self._speeds.in_force
 
     def set_speeds(self, module: object, speed: float, rotation_speed: float) -> None:
         """Note that a module of this page drives, and how fast at the most."""
-        self._speeds[id(module)] = (speed, rotation_speed)
+        self._speeds.set(module, speed, rotation_speed)
         self._tell_speeds()
 
     def set_driving(self, module: object, on: bool) -> None:
         """Note that the page's hands are at a module that drives, or left it."""
-        if on:
-            self._driving = id(module)
-        elif self._driving == id(module):
-            self._driving = None
+        self._speeds.drive(module, on)
         self._tell_speeds()
 
     def clear_speeds(self, module: object) -> None:
         """Note that a module drives no more."""
-        self._speeds.pop(id(module), None)
-        self.set_driving(module, False)
+        self._speeds.clear(module)
         self._tell_speeds()
 
     def _tell_speeds(self) -> None:
