@@ -14,7 +14,7 @@ from webmap.core.page import PageEntry
 from webmap.core.runtime import Runtime
 from webmap.core.tasks import spawn
 from webmap.scope import Removal, keep
-from webmap.server import model as model_module
+from webmap.server import page_host as host_module
 from webmap.server.model import Model
 from webmap.server.published import Published
 from webmap.server.viewer import Viewer
@@ -199,7 +199,7 @@ def test_another_viewer_does_not_get_the_page_of_the_first(loop):
 
 
 def test_a_viewer_who_stays_away_loses_the_map(loop, monkeypatch):
-    monkeypatch.setattr(model_module, "KEPT_FOR", 0.01)
+    monkeypatch.setattr(host_module, "KEPT_FOR", 0.01)
     ended = []
 
     def build(page):
@@ -244,7 +244,7 @@ class Grid(Layer):
 
 
 def test_a_thousand_pages_opened_and_closed_leave_nothing_behind(loop, monkeypatch):
-    monkeypatch.setattr(model_module, "KEPT_FOR", 0.0)
+    monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
     link = Link()
     bob = webmap.Robot("Bob")
     built = []
