@@ -1,39 +1,15 @@
-import { Asking } from "./motion/asking.js";
 import { attentive, watchAttention } from "./motion/attention.js";
-import { Hands } from "./motion/hands.js";
+import { Errands } from "./motion/errands.js";
 import { Line } from "./motion/line.js";
-import { Loop } from "./motion/loop.js";
-import { Onset } from "./motion/onset.js";
-import { Pilot } from "./motion/pilot.js";
-import { TAKE_PATIENCE } from "./motion/reach.js";
-import { Stopping } from "./motion/stopping.js";
+import { Listeners } from "./motion/news.js";
+import { Session } from "./motion/session.js";
 
 /** @typedef {import('./motion/axes.js').Axes} Axes */
-/** @typedef {import('./motion/stream.js').Command} Command */
+/** @typedef {import('./motion/news.js').Item} Item */
+/** @typedef {import('./motion/news.js').News} News */
 /** @typedef {import('./motion/report.js').RobotReport} RobotReport */
-/** @typedef {import('./motion/stopping.js').Verdict} Verdict */
-/** @typedef {'connecting' | 'open' | 'late' | 'lost'} LinkState */
-
-/**
- * The kinds of news, and what each tells.
- *
- * `robot`: the gate's newest word on a robot. `gone`: the gate knows a robot no more.
- * `state`: the link's state changed. `refused`: the gate refused something. `stop`:
- * STOP was sent for a robot or "*". `goal`: a goal was sent for a robot. `read`: inputs that must be asked for their state
- * (gamepads) are asked now. `drop`: inputs must forget what is held. `step`: a 20 Hz
- * step is over.
- *
- * @typedef {object} News
- * @property {RobotReport} robot
- * @property {string} gone
- * @property {LinkState} state
- * @property {{robot: string | null, what: string, why: string}} refused
- * @property {string} stop
- * @property {string} goal
- * @property {null} read
- * @property {null} drop
- * @property {null} step
- */
+/** @typedef {import('./motion/stream.js').Command} Command */
+/** @typedef {{x: number, y: number, yaw: number}} Pose Metres and radians. */
 
 /** Commands carry the state of the hands this often, in ms. */
 const PERIOD = 50;
@@ -45,6 +21,9 @@ const PERIOD = 50;
  * 20 Hz while it holds a lease, from a timer of the page itself: a worker's timer would
  * go on when the page is hidden or hangs. No method moves a robot by itself but
  * {@link Drive#goal}; see `motion/pilot.js` for when the hands do.
+ *
+ * What is decided is decided in `motion/`; here are the clock, the timer, the socket and
+ * the page's events.
  */
 export class Drive {
   /**
@@ -55,31 +34,20 @@ export class Drive {
    */
   constructor(baseUrl, options = {}) {
     const now = performance.now();
-    this._hands = new Hands(now);
-    this._loop = new Loop();
-    this._pilot = new Pilot(this._hands, this._loop, now, options);
-    this._stopping = new Stopping();
-    this._asking = new Asking();
-    this._onset = new Onset();
+    this._session = new Session(now, options);
+    this._pilot = this._session.pilot;
+    this._listeners = new Listeners();
+    this._errands = new Errands(
+      this._pilot,
+      this._session.loop,
+      (commands) => this._send(commands),
+      () => performance.now(),
+    );
     this._line = new Line(socketUrl(baseUrl, options.id), {
-      open: () => this._loop.open(performance.now()),
+      open: () => this._session.loop.open(performance.now()),
       receive: (message) => this._receive(message),
-      lost: () => this._lost(),
+      lost: () => this._tellAll(this._session.lost(performance.now())),
     });
-    /**
-     * This connection's name at the gate; null while there is none.
-     * @type {string | null}
-     */
-    this.connection = null;
-    /** @type {LinkState} */
-    this._state = "connecting";
-    /** @type {Map<keyof News, Set<Function>>} */
-    this._listeners = new Map();
-    /**
-     * STOPs that were asked for without a connection.
-     * @type {Set<string>}
-     */
-    this._unsent = new Set();
     this._unwatch = watchAttention(
       (left) => this._doubt(left),
       () => this._renew(),
@@ -90,7 +58,12 @@ export class Drive {
 
   /** The state of the link: may commands arrive, and do they? */
   get state() {
-    return this._state;
+    return this._session.state;
+  }
+
+  /** This connection's name at the gate; null while there is none. */
+  get connection() {
+    return this._session.connection;
   }
 
   /**
@@ -103,11 +76,32 @@ export class Drive {
 
   /** What the operator should know of the chosen robot and of the hands. */
   get status() {
-    return {
-      link: this._state,
-      connection: this.connection,
-      ...this._pilot.status,
-    };
+    return { link: this.state, connection: this.connection, ...this._pilot.status };
+  }
+
+  /** Who asks for robots. */
+  get requests() {
+    return this._session.asking.requests(performance.now());
+  }
+
+  /** What became of the STOPs of this page. */
+  get verdicts() {
+    return this._session.verdicts(performance.now());
+  }
+
+  /** Show no more what became of the STOPs until now. */
+  dismissVerdicts() {
+    this._session.stopping.dismiss();
+  }
+
+  /**
+   * How long it took a robot the last time from the first command to motion, in ms; null
+   * before that.
+   *
+   * @param {string} robot
+   */
+  motionDelay(robot) {
+    return this._session.onset.delay(robot);
   }
 
   /**
@@ -119,12 +113,10 @@ export class Drive {
    * @returns {() => void} Stops listening.
    */
   on(kind, fn) {
-    const listeners = this._listeners.get(kind) ?? new Set();
-    this._listeners.set(kind, listeners.add(fn));
-    return () => {
-      listeners.delete(fn);
-    };
+    return this._listeners.on(kind, fn);
   }
+
+  // Hands ----------------------------------------------------------------------
 
   /**
    * Say what an input asks for. One input owns the motion at a time.
@@ -133,10 +125,11 @@ export class Drive {
    * @param {Partial<Axes> | null} axes Null when the input is gone.
    */
   setInput(source, axes) {
-    const was = this._hands.pressed;
-    this._hands.set(source, axes, performance.now());
+    const { hands } = this._session;
+    const was = hands.pressed;
+    hands.set(source, axes, performance.now());
     // A release must not wait for the next step, nor should a press.
-    if (was !== this._hands.pressed) this._step();
+    if (was !== hands.pressed) this._step();
   }
 
   /**
@@ -156,6 +149,8 @@ export class Drive {
     this._doubt(false);
   }
 
+  // Leases ---------------------------------------------------------------------
+
   /**
    * Choose the robot that a press drives. The one driven before is let go of.
    *
@@ -165,20 +160,12 @@ export class Drive {
     this._send(this._pilot.choose(robot, performance.now()));
   }
 
-  /**
-   * Ask for the lease of a robot. Whatever is pressed now does not move it.
-   *
-   * @param {string} robot
-   */
+  /** @param {string} robot Ask for its lease. Whatever is pressed now does not move it. */
   take(robot) {
     this._send(this._pilot.take(robot, performance.now()));
   }
 
-  /**
-   * Give the lease of a robot back, neutral first.
-   *
-   * @param {string} robot
-   */
+  /** @param {string} robot Give its lease back, neutral first. */
   release(robot) {
     this._send(this._pilot.release(robot, performance.now()));
   }
@@ -192,113 +179,62 @@ export class Drive {
     this._send(this._pilot.ask(robot));
   }
 
-  /**
-   * Hand a robot to the one who asks for it, neutral first.
-   *
-   * @param {string} robot
-   */
+  /** @param {string} robot Hand it to the one who asks for it, neutral first. */
   grant(robot) {
     this._send(this._pilot.grant(robot, performance.now()));
   }
 
-  /**
-   * Keep a robot that somebody asks for.
-   *
-   * @param {string} robot
-   */
+  /** @param {string} robot Keep it, although somebody asks for it. */
   deny(robot) {
     this._send([{ op: "deny", robot }]);
   }
 
   /**
-   * Who asks for robots.
-   *
-   * @returns {import('./motion/asking.js').Request[]}
+   * @param {string} robot
+   * @returns {boolean} Whether this page may send it somewhere without asking anybody.
    */
-  get requests() {
-    return this._asking.requests(performance.now());
+  holds(robot) {
+    return this._pilot.epoch(robot) !== null;
   }
+
+  /** @param {string} robot Whose lease goes on being needed, if this page has it. */
+  keep(robot) {
+    this._pilot.keep(robot, performance.now());
+  }
+
+  // Goals ----------------------------------------------------------------------
 
   /**
    * Send a robot to a place, and take its lease for that when it is free.
    *
    * @param {string} robot
-   * @param {{x: number, y: number, yaw: number}} pose Metres and radians in the
-   *     robot's goal frame.
+   * @param {Pose} pose In the robot's goal frame.
    * @returns {Promise<void>} Done when the gate has accepted the goal.
    * @throws {Error} When the gate refuses it or does not answer.
    */
   async goal(robot, pose) {
-    await this._place("goal", robot, pose);
+    await this._errands.place("goal", robot, pose);
   }
 
   /**
    * Tell a robot where it is, and take its lease for that moment when it is free.
    *
    * @param {string} robot
-   * @param {{x: number, y: number, yaw: number}} pose Metres and radians in the
-   *     robot's goal frame.
+   * @param {Pose} pose In the robot's goal frame.
    * @returns {Promise<void>} Done when the gate has accepted it.
    * @throws {Error} When the gate refuses it or does not answer.
    */
   async locate(robot, pose) {
-    const taken = await this._place("locate", robot, pose);
+    const taken = await this._errands.place("locate", robot, pose);
     if (taken) this.release(robot);
   }
 
-  /**
-   * Whether this page may send a robot somewhere without asking anybody.
-   *
-   * @param {string} robot
-   */
-  holds(robot) {
-    return this._pilot.epoch(robot) !== null;
-  }
-
-  /**
-   * Keep the lease of a robot that this page has, as it goes on being needed.
-   *
-   * @param {string} robot
-   */
-  keep(robot) {
-    this._pilot.keep(robot, performance.now());
-  }
-
-  /**
-   * @param {'goal' | 'locate'} op
-   * @param {string} robot
-   * @param {{x: number, y: number, yaw: number}} pose
-   * @returns {Promise<boolean>} Whether the lease was taken for it.
-   */
-  async _place(op, robot, { x, y, yaw }) {
-    if (![x, y, yaw].every(Number.isFinite)) {
-      throw new Error(`A ${op} needs finite numbers, got ${x}, ${y}, ${yaw}.`);
-    }
-    const taken = this._pilot.epoch(robot) === null;
-    if (taken) {
-      this._send([{ op: "take", robot }]);
-      await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
-    }
-    const command = this._pilot.place(op, robot, { x, y, yaw }, performance.now());
-    this._send([command]);
-    if (op === "goal") this._tell("goal", robot);
-    try {
-      await this._until(robot, op, () => this._loop.acknowledged(command.seq));
-    } catch (error) {
-      if (taken) this.release(robot);
-      throw error;
-    }
-    return taken;
-  }
-
-  /**
-   * Take back the goal of a robot.
-   *
-   * @param {string} robot
-   */
+  /** @param {string} robot Take its goal back. */
   cancel(robot) {
     this._send([{ op: "cancel", robot }]);
   }
+
+  // STOP -----------------------------------------------------------------------
 
   /**
    * Stop a robot, or all: "*". Needs no lease, and is heard whoever drives.
@@ -310,13 +246,11 @@ export class Drive {
    * @returns {boolean} Whether it has left this page.
    */
   stop(robot) {
+    // Nothing may come before this: whatever else a STOP means here follows it.
     const left = this._line.open;
     if (left) this._line.send({ op: "stop", robot });
-    else this._unsent.add(robot);
-    const now = performance.now();
-    this._pilot.stopped(robot, now);
-    this._stopping.start(robot, this.robots, now);
-    this._tell("stop", robot);
+    this._session.stopped(robot, left, performance.now());
+    this._listeners.tell("stop", robot);
     return left;
   }
 
@@ -340,31 +274,6 @@ export class Drive {
     this._send([{ op: "stop-test", robot }]);
   }
 
-  /**
-   * How long it took a robot the last time from the first command to motion, in ms; null
-   * before that.
-   *
-   * @param {string} robot
-   */
-  motionDelay(robot) {
-    return this._onset.delay(robot);
-  }
-
-  /**
-   * What became of the STOPs of this page.
-   *
-   * @returns {Verdict[]}
-   */
-  get verdicts() {
-    const connected = this._state === "open" || this._state === "late";
-    return this._stopping.verdicts(this.robots, connected, performance.now());
-  }
-
-  /** Show no more what became of the STOPs until now. */
-  dismissVerdicts() {
-    this._stopping.dismiss();
-  }
-
   /** End for good: neutral, leases back, connection closed. */
   close() {
     this._doubt(true);
@@ -373,153 +282,68 @@ export class Drive {
     this._line.abandon();
   }
 
+  // The page's events, its timer and its socket --------------------------------
+
   /** @param {boolean} left Whether the page is hidden or going away. */
   _doubt(left) {
     const now = performance.now();
     this._pilot.doubt(now, { drop: true });
     this._step();
     if (left) this._send(this._pilot.letGo(now));
-    this._tell("drop", null);
-  }
-
-  _tick() {
-    this._tell("read", null);
-    this._step();
-    const now = performance.now();
-    if (this._line.open) this._judge(this._loop.state(now));
-    this._line.mind(now);
-    this._tell("step", null);
-  }
-
-  _step() {
-    const held = this._hands.pressed;
-    this._send(this._pilot.step(performance.now(), attentive()));
-    if (held && !this._hands.pressed) this._tell("drop", null);
-  }
-
-  /** @param {'open' | 'late' | 'lost'} state */
-  _judge(state) {
-    if (state === "lost") this._line.lose();
-    else if (this.connection !== null) this._setState(state);
+    this._listeners.tell("drop", null);
   }
 
   /** The page was frozen or stored away; its connection may be dead or not ours. */
   _renew() {
     this._pilot.doubt(performance.now(), { drop: true });
-    this._tell("drop", null);
+    this._listeners.tell("drop", null);
     this._line.renew();
   }
 
-  _lost() {
-    this.connection = null;
-    this._forget(performance.now());
-    this._setState("lost");
-    for (const report of this.robots.values()) this._tell("robot", report);
+  _tick() {
+    this._listeners.tell("read", null);
+    this._step();
+    const now = performance.now();
+    if (this._line.open) {
+      const news = this._session.judge(now);
+      if (news === null) this._line.lose();
+      else this._tellAll(news);
+    }
+    this._line.mind(now);
+    this._errands.step(now);
+    this._listeners.tell("step", null);
   }
 
-  /**
-   * Forget leases, numbers and ticks: they belong to one connection to one gate.
-   *
-   * @param {number} now
-   */
-  _forget(now) {
-    this._pilot.doubt(now);
-    this._pilot.disconnect();
-    this._asking.forget();
-    this._loop.open(now);
+  _step() {
+    const { hands } = this._session;
+    const held = hands.pressed;
+    this._send(this._pilot.step(performance.now(), attentive()));
+    if (held && !hands.pressed) this._listeners.tell("drop", null);
   }
 
   /** @param {any} message */
   _receive(message) {
-    const now = performance.now();
-    if (message.op === "tick") {
-      this._loop.receive(message.tick, message.ack, now);
-    } else if (message.op === "hello") {
-      // A second one on a connection: the gate was started anew.
-      if (this.connection !== null) this._forget(now);
-      this.connection = message.connection;
-      this._line.trust();
-      for (const robot of this._unsent) this._line.send({ op: "stop", robot });
-      this._unsent.clear();
-      this._setState("open");
-    } else if (message.op === "robot") {
-      this._pilot.report(message, now);
-      this._stopping.report(message, now);
-      this._asking.report(message, now);
-      this._onset.report(message, now);
-      this._tell("robot", message);
-    } else if (message.op === "gone") {
-      this._pilot.gone(message.robot, now);
-      this._stopping.gone(message.robot);
-      this._asking.gone(message.robot);
-      this._onset.gone(message.robot);
-      this._tell("gone", message.robot);
-    } else if (message.op === "refused") {
-      this._pilot.refuse(message.robot, message.what, message.why, now);
-      this._tell("refused", message);
+    if (message.op === "hello") this._line.trust();
+    const { say, news } = this._session.receive(message, performance.now());
+    this._send(say);
+    if (message.op === "refused") {
+      this._errands.refused(message.robot, message.what, message.why);
+    }
+    this._tellAll(news);
+  }
+
+  /** @param {Command[]} commands */
+  _send(commands) {
+    for (const command of commands) {
+      this._line.send(command);
+      this._session.sent(command, performance.now());
+      if (command.op === "goal") this._listeners.tell("goal", command.robot);
     }
   }
 
-  /** @param {Command[]} messages */
-  _send(messages) {
-    for (const message of messages) {
-      this._line.send(message);
-      if (message.op !== "drive") continue;
-      const moving = ["x", "y", "turn"].some((axis) => message[axis] !== 0);
-      this._onset.sent(message.robot, moving, performance.now());
-    }
-  }
-
-  /**
-   * @param {string} robot
-   * @param {string} what
-   * @param {() => boolean} reached
-   * @returns {Promise<void>}
-   */
-  _until(robot, what, reached) {
-    return new Promise((resolve, reject) => {
-      const since = performance.now();
-      /** @param {string | null} problem */
-      const end = (problem) => {
-        for (const off of offs) off();
-        if (problem === null) resolve();
-        else reject(new Error(problem));
-      };
-      const offs = [
-        this.on("refused", (refusal) => {
-          if (refusal.robot === robot && refusal.what === what) end(refusal.why);
-        }),
-        this.on("step", () => {
-          if (reached()) end(null);
-          else if (performance.now() - since > TAKE_PATIENCE) {
-            end("The gate is silent.");
-          }
-        }),
-      ];
-    });
-  }
-
-  /** @param {LinkState} state */
-  _setState(state) {
-    if (state === this._state) return;
-    this._state = state;
-    this._tell("state", state);
-  }
-
-  /**
-   * @template {keyof News} K
-   * @param {K} kind
-   * @param {News[K]} news
-   */
-  _tell(kind, news) {
-    for (const fn of this._listeners.get(kind) ?? []) {
-      try {
-        fn(news);
-      } catch (error) {
-        // A broken display must never keep a neutral or a STOP from leaving.
-        reportError(error);
-      }
-    }
+  /** @param {Item[]} news */
+  _tellAll(news) {
+    for (const [kind, what] of news) this._listeners.tell(kind, what);
   }
 }
 

@@ -1,0 +1,111 @@
+import { TAKE_PATIENCE } from "./reach.js";
+
+/** @typedef {import('./loop.js').Loop} Loop */
+/** @typedef {import('./pilot.js').Pilot} Pilot */
+/** @typedef {import('./stream.js').Command} Command */
+
+/**
+ * Something that was asked of the gate.
+ *
+ * @typedef {object} Question
+ * @property {string} robot
+ * @property {string} what
+ * @property {number} since
+ * @property {() => boolean} reached Whether it was done.
+ * @property {(problem: string | null) => void} end
+ */
+
+/**
+ * Sends robots to places, and tells them where they are: takes the lease of each for that
+ * when it is free, and waits for what the gate says to it.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class Errands {
+  /**
+   * @param {Pilot} pilot
+   * @param {Loop} loop
+   * @param {(commands: Command[]) => void} send
+   * @param {() => number} clock
+   */
+  constructor(pilot, loop, send, clock) {
+    this._pilot = pilot;
+    this._loop = loop;
+    this._send = send;
+    this._clock = clock;
+    /** @type {Set<Question>} */
+    this._questions = new Set();
+  }
+
+  /**
+   * @param {'goal' | 'locate'} op
+   * @param {string} robot
+   * @param {{x: number, y: number, yaw: number}} pose Metres and radians.
+   * @returns {Promise<boolean>} Whether the lease was taken for it.
+   * @throws {Error} When the gate refuses it or does not answer.
+   */
+  async place(op, robot, { x, y, yaw }) {
+    if (![x, y, yaw].every(Number.isFinite)) {
+      throw new Error(`A ${op} needs finite numbers, got ${x}, ${y}, ${yaw}.`);
+    }
+    const taken = this._pilot.epoch(robot) === null;
+    if (taken) {
+      this._send([{ op: "take", robot }]);
+      await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
+    }
+    const command = this._pilot.place(op, robot, { x, y, yaw }, this._clock());
+    this._send([command]);
+    try {
+      await this._until(robot, op, () => this._loop.acknowledged(command.seq));
+    } catch (error) {
+      if (taken) this._send(this._pilot.release(robot, this._clock()));
+      throw error;
+    }
+    return taken;
+  }
+
+  /**
+   * The gate refused something.
+   *
+   * @param {string | null} robot
+   * @param {string} what
+   * @param {string} why
+   */
+  refused(robot, what, why) {
+    for (const question of this._questions) {
+      if (question.robot === robot && question.what === what) question.end(why);
+    }
+  }
+
+  /** @param {number} now */
+  step(now) {
+    for (const question of this._questions) {
+      if (question.reached()) question.end(null);
+      else if (now - question.since > TAKE_PATIENCE) question.end("The gate is silent.");
+    }
+  }
+
+  /**
+   * @param {string} robot
+   * @param {string} what
+   * @param {() => boolean} reached
+   * @returns {Promise<void>}
+   */
+  _until(robot, what, reached) {
+    return new Promise((resolve, reject) => {
+      /** @type {Question} */
+      const question = {
+        robot,
+        what,
+        since: this._clock(),
+        reached,
+        end: (problem) => {
+          this._questions.delete(question);
+          if (problem === null) resolve();
+          else reject(new Error(problem));
+        },
+      };
+      this._questions.add(question);
+    });
+  }
+}

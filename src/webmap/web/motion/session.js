@@ -1,0 +1,184 @@
+import { Asking } from "./asking.js";
+import { Hands } from "./hands.js";
+import { Loop } from "./loop.js";
+import { Onset } from "./onset.js";
+import { Pilot } from "./pilot.js";
+import { Stopping } from "./stopping.js";
+
+/** @typedef {import('./news.js').Item} Item */
+/** @typedef {import('./news.js').LinkState} LinkState */
+/** @typedef {import('./stream.js').Command} Command */
+
+/**
+ * What this page and the gate know of each other, over one connection after another.
+ *
+ * Leases, numbers and ticks belong to one connection to one gate; what is held in the
+ * hand, and a STOP that could not leave, outlive it. It hears what the gate says and
+ * returns what is to be sent and told. Times are in milliseconds of one clock.
+ */
+export class Session {
+  /**
+   * @param {number} now
+   * @param {{releaseAfter?: number}} options See {@link Pilot}.
+   */
+  constructor(now, options) {
+    this.hands = new Hands(now);
+    this.loop = new Loop();
+    this.pilot = new Pilot(this.hands, this.loop, now, options);
+    this.stopping = new Stopping();
+    this.asking = new Asking();
+    this.onset = new Onset();
+    /**
+     * This connection's name at the gate; null while there is none.
+     * @type {string | null}
+     */
+    this.connection = null;
+    /** @type {LinkState} */
+    this.state = "connecting";
+    /**
+     * STOPs that were asked for without a connection.
+     * @type {Set<string>}
+     */
+    this._unsent = new Set();
+  }
+
+  /**
+   * What became of the STOPs of this page.
+   *
+   * @param {number} now
+   */
+  verdicts(now) {
+    const connected = this.state === "open" || this.state === "late";
+    return this.stopping.verdicts(this.pilot.robots, connected, now);
+  }
+
+  /**
+   * STOP was said.
+   *
+   * @param {string} robot Or "*".
+   * @param {boolean} left Whether it has left this page; if not, it will be the first
+   *     thing said on the next connection, as a stop that comes late is still a stop.
+   * @param {number} now
+   */
+  stopped(robot, left, now) {
+    if (!left) this._unsent.add(robot);
+    this.pilot.stopped(robot, now);
+    this.stopping.start(robot, this.pilot.robots, now);
+  }
+
+  /**
+   * A command was sent.
+   *
+   * @param {Command} command
+   * @param {number} now
+   */
+  sent(command, now) {
+    if (command.op !== "drive") return;
+    const moving = ["x", "y", "turn"].some((axis) => command[axis] !== 0);
+    this.onset.sent(command.robot, moving, now);
+  }
+
+  /**
+   * Take what the gate says.
+   *
+   * @param {any} message
+   * @param {number} now
+   * @returns {{say: Command[], news: Item[]}} What to send, and then to tell.
+   */
+  receive(message, now) {
+    if (message.op === "hello") return this._greeted(message.connection, now);
+    return { say: [], news: this._heard(message, now) };
+  }
+
+  /**
+   * Judge the link by how the loop is.
+   *
+   * @param {number} now
+   * @returns {Item[] | null} What to tell; null if the connection is to be given up.
+   */
+  judge(now) {
+    const state = this.loop.state(now);
+    if (state === "lost") return null;
+    // Before its first word a gate may be anybody.
+    return this.connection === null ? [] : this._change(state);
+  }
+
+  /**
+   * The connection is lost.
+   *
+   * @param {number} now
+   * @returns {Item[]} What to tell.
+   */
+  lost(now) {
+    this.connection = null;
+    this._forget(now);
+    const news = this._change("lost");
+    for (const report of this.pilot.robots.values()) news.push(["robot", report]);
+    return news;
+  }
+
+  /**
+   * @param {string} connection
+   * @param {number} now
+   * @returns {{say: Command[], news: Item[]}}
+   */
+  _greeted(connection, now) {
+    // A second greeting on a connection: the gate was started anew.
+    if (this.connection !== null) this._forget(now);
+    this.connection = connection;
+    const say = [...this._unsent].map((robot) => ({ op: "stop", robot }));
+    this._unsent.clear();
+    return { say, news: this._change("open") };
+  }
+
+  /**
+   * @param {any} message
+   * @param {number} now
+   * @returns {Item[]}
+   */
+  _heard(message, now) {
+    switch (message.op) {
+      case "tick":
+        this.loop.receive(message.tick, message.ack, now);
+        return [];
+      case "robot":
+        for (const one of this._watching) one.report(message, now);
+        return [["robot", message]];
+      case "gone":
+        for (const one of this._watching) one.gone(message.robot, now);
+        return [["gone", message.robot]];
+      case "refused":
+        this.pilot.refuse(message.robot, message.what, message.why, now);
+        return [["refused", message]];
+      default:
+        return [];
+    }
+  }
+
+  /** Those who follow what the gate says of each robot. */
+  get _watching() {
+    return [this.pilot, this.stopping, this.asking, this.onset];
+  }
+
+  /**
+   * Forget leases, numbers and ticks: they belong to one connection to one gate.
+   *
+   * @param {number} now
+   */
+  _forget(now) {
+    this.pilot.doubt(now);
+    this.pilot.disconnect();
+    this.asking.forget();
+    this.loop.open(now);
+  }
+
+  /**
+   * @param {LinkState} state
+   * @returns {Item[]}
+   */
+  _change(state) {
+    if (state === this.state) return [];
+    this.state = state;
+    return [["state", state]];
+  }
+}

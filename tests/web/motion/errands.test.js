@@ -1,0 +1,94 @@
+import assert from "node:assert/strict";
+import { beforeEach, test } from "node:test";
+
+import { Errands } from "../../../src/webmap/web/motion/errands.js";
+import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/reach.js";
+import { Session } from "../../../src/webmap/web/motion/session.js";
+
+const POSE = { x: 1, y: 2, yaw: 0 };
+
+/** @type {{now: number, sent: any[], session: Session, errands: Errands}} */
+let it;
+beforeEach(() => {
+  const session = new Session(0, {});
+  const send = (/** @type {any[]} */ commands) => it.sent.push(...commands);
+  const errands = new Errands(session.pilot, session.loop, send, () => it.now);
+  it = { now: 0, sent: [], session, errands };
+  session.receive({ op: "hello", connection: "c1" }, 0);
+  say(false);
+});
+
+/** @param {boolean} mine */
+function say(mine) {
+  const holder = mine ? { connection: "c1", name: "me" } : null;
+  const report = { op: "robot", robot: "r1", mine, holder, epoch: mine ? 7 : null };
+  it.session.receive(report, it.now);
+}
+
+/** A turn of the loop, in which promises go on. */
+async function step(ms = 50) {
+  it.now += ms;
+  it.errands.step(it.now);
+  await new Promise(setImmediate);
+}
+
+/** @param {number} ack */
+const acknowledge = (ack) =>
+  it.session.receive({ op: "tick", tick: 100, ack }, it.now);
+
+const said = () => it.sent.map(({ op }) => op);
+
+test("a robot that is free is taken first, and sent when it came", async () => {
+  const placed = it.errands.place("goal", "r1", POSE);
+  await step();
+  assert.deepEqual(said(), ["take"]);
+  say(true);
+  await step();
+  assert.deepEqual(said(), ["take", "goal"]);
+  const { epoch, seq, ...rest } = it.sent[1];
+  assert.deepEqual([epoch, rest.x, rest.y, rest.yaw], [7, 1, 2, 0]);
+  acknowledge(seq);
+  await step();
+  assert.equal(await placed, true, "the lease was taken for it");
+});
+
+test("a robot that this page has is sent at once", async () => {
+  say(true);
+  const placed = it.errands.place("locate", "r1", POSE);
+  assert.deepEqual(said(), ["locate"]);
+  acknowledge(it.sent[0].seq);
+  await step();
+  assert.equal(await placed, false);
+});
+
+test("a lease that was taken for nothing is given back", async () => {
+  const placed = it.errands.place("goal", "r1", POSE);
+  const failed = assert.rejects(placed, /no such place/);
+  say(true);
+  await step();
+  it.errands.refused("r1", "take", "a refusal of something else");
+  it.errands.refused("r2", "goal", "a refusal of another's");
+  it.errands.refused("r1", "goal", "no such place");
+  await failed;
+  assert.deepEqual(said(), ["take", "goal", "release"]);
+});
+
+test("a lease that is refused is the end of it", async () => {
+  const placed = it.errands.place("goal", "r1", POSE);
+  it.errands.refused("r1", "take", "Ann drives it");
+  await assert.rejects(placed, /Ann drives it/);
+  assert.deepEqual(said(), ["take"]);
+});
+
+test("a gate that does not answer is not waited for", async () => {
+  const failed = assert.rejects(it.errands.place("goal", "r1", POSE), /silent/);
+  await step(TAKE_PATIENCE);
+  await step(1);
+  await failed;
+});
+
+test("a place needs finite numbers", async () => {
+  const nowhere = { ...POSE, yaw: NaN };
+  await assert.rejects(it.errands.place("goal", "r1", nowhere), /finite.+1, 2, NaN/);
+  assert.deepEqual(it.sent, []);
+});

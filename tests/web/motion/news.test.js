@@ -1,0 +1,32 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Listeners } from "../../../src/webmap/web/motion/news.js";
+
+test("who listens is told, until that is ended", () => {
+  const listeners = new Listeners();
+  /** @type {string[]} */
+  const heard = [];
+  const end = listeners.on("stop", (robot) => heard.push(robot));
+  listeners.tell("stop", "r1");
+  listeners.tell("gone", "r2");
+  end();
+  listeners.tell("stop", "r3");
+  assert.deepEqual(heard, ["r1"]);
+});
+
+test("a listener that fails is reported, and keeps nobody from hearing", () => {
+  /** @type {unknown[]} */
+  const reported = [];
+  globalThis.reportError = (error) => reported.push(error);
+  const listeners = new Listeners();
+  const failure = new Error("broken display");
+  const heard = [];
+  listeners.on("drop", () => {
+    throw failure;
+  });
+  listeners.on("drop", () => heard.push("drop"));
+  listeners.tell("drop", null);
+  assert.deepEqual(heard, ["drop"]);
+  assert.deepEqual(reported, [failure]);
+});

@@ -1,0 +1,148 @@
+import assert from "node:assert/strict";
+import { beforeEach, describe, test } from "node:test";
+
+import { Session } from "../../../src/webmap/web/motion/session.js";
+
+const HELLO = { op: "hello", connection: "c1" };
+const REPORT = {
+  op: "robot",
+  robot: "r1",
+  name: "Bob",
+  state: "held",
+  holder: { connection: "c1", name: "me" },
+  mine: true,
+  epoch: 7,
+  armed: true,
+  armable: true,
+  sent: [0, 0, 0],
+  measured: [0, 0, 0],
+};
+
+/** @type {Session} */
+let session;
+beforeEach(() => {
+  session = new Session(0, {});
+  session.loop.open(0);
+});
+
+/**
+ * Drive r1 until it is given motion, with a gate that answers.
+ *
+ * @returns {any} The last command.
+ */
+function drive() {
+  session.receive(HELLO, 0);
+  session.receive({ op: "tick", tick: 100, ack: -1 }, 0);
+  session.receive(REPORT, 0);
+  session.pilot.choose("r1", 0);
+  session.hands.set("keys", { x: 1 }, 250);
+  let last;
+  for (let now = 250; now < 800; now += 50) {
+    [last] = session.pilot.step(now, true);
+    session.sent(last, now);
+    session.receive({ op: "tick", tick: 100 + now, ack: Number(last.seq) }, now);
+  }
+  assert.equal(last?.x, 1, "it drives");
+  return last;
+}
+
+describe("a connection", () => {
+  test("is open with the gate's first word, and not before", () => {
+    assert.deepEqual(session.judge(100), []);
+    assert.equal(session.state, "connecting");
+    const { say, news } = session.receive(HELLO, 100);
+    assert.deepEqual([say, news], [[], [["state", "open"]]]);
+    assert.equal(session.connection, "c1");
+    assert.deepEqual(session.judge(110), [], "what is no news is not told");
+  });
+
+  test("is late without a tick for a while, and then to be given up", () => {
+    session.receive(HELLO, 0);
+    assert.deepEqual(session.judge(301), [["state", "late"]]);
+    session.receive({ op: "tick", tick: 1, ack: -1 }, 310);
+    assert.deepEqual(session.judge(320), [["state", "open"]]);
+    assert.equal(session.judge(811), null);
+  });
+
+  test("that is lost takes leases and ticks with it, and says so of each robot", () => {
+    drive();
+    const [[kind, state], [also, report]] = session.lost(800);
+    assert.deepEqual([kind, state], ["state", "lost"]);
+    assert.deepEqual([also, report.robot, report.mine], ["robot", "r1", false]);
+    assert.equal(session.connection, null);
+    assert.equal(session.pilot.driven, null);
+    assert.equal(session.loop.tick, null);
+    assert.equal(session.hands.dead, true);
+  });
+
+  test("to a gate that was started anew begins with nothing", () => {
+    drive();
+    const { news } = session.receive({ op: "hello", connection: "c2" }, 800);
+    assert.deepEqual(news, [], "the link was open all the time");
+    assert.equal(session.connection, "c2");
+    assert.equal(session.pilot.driven, null);
+    assert.equal(session.hands.dead, true);
+  });
+});
+
+describe("a STOP", () => {
+  test("that could not leave is the first thing said, once", () => {
+    session.stopped("*", false, 0);
+    session.stopped("*", false, 10);
+    assert.deepEqual(session.receive(HELLO, 100).say, [{ op: "stop", robot: "*" }]);
+    session.lost(200);
+    assert.deepEqual(session.receive(HELLO, 300).say, []);
+  });
+
+  test("that left is not said again", () => {
+    session.stopped("r1", true, 0);
+    assert.deepEqual(session.receive(HELLO, 100).say, []);
+  });
+
+  test("ends the lease, kills the hands, and is followed up", () => {
+    drive();
+    session.stopped("r1", true, 800);
+    assert.equal(session.pilot.driven, null);
+    assert.equal(session.hands.dead, true);
+    const [verdict] = session.verdicts(810);
+    assert.deepEqual([verdict.robot, verdict.state], ["r1", "stopping"]);
+  });
+});
+
+describe("what the gate says", () => {
+  test("of a robot is known, followed and told", () => {
+    const asker = { connection: "c9", name: "Ann", left: 8 };
+    const { news } = session.receive({ ...REPORT, asker }, 0);
+    assert.equal(news[0][0], "robot");
+    assert.equal(session.pilot.robots.get("r1")?.name, "Bob");
+    assert.equal(session.asking.requests(0)[0].who, "Ann");
+  });
+
+  test("tells how long a robot took to move", () => {
+    drive();
+    session.receive({ ...REPORT, measured: [0.5, 0, 0] }, 900);
+    assert.ok(Number(session.onset.delay("r1")) > 0);
+  });
+
+  test("of a robot that is gone is forgotten by all", () => {
+    session.receive({ ...REPORT, asker: { connection: "c9", name: "", left: 8 } }, 0);
+    session.stopped("r1", true, 0);
+    assert.deepEqual(session.receive({ op: "gone", robot: "r1" }, 0).news, [
+      ["gone", "r1"],
+    ]);
+    assert.equal(session.pilot.robots.size, 0);
+    assert.deepEqual(session.asking.requests(0), []);
+    assert.deepEqual(session.verdicts(0), []);
+  });
+
+  test("in refusal is told, and a doubt if it was a command", () => {
+    drive();
+    const no = { op: "refused", robot: "r1", what: "drive", why: "too old" };
+    assert.deepEqual(session.receive(no, 800).news, [["refused", no]]);
+    assert.equal(session.hands.dead, true);
+  });
+
+  test("in words of another version is nothing", () => {
+    assert.deepEqual(session.receive({ op: "sing" }, 0), { say: [], news: [] });
+  });
+});
