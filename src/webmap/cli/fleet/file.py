@@ -4,9 +4,10 @@ import tomllib
 from pathlib import Path
 
 from webmap.cli.fleet.checks import Mistakes
+from webmap.cli.fleet.fleet_table import read_table
 from webmap.cli.fleet.lines import Lines
 from webmap.cli.fleet.lines import Path as Way
-from webmap.cli.fleet.schema import Fleet, read_table
+from webmap.cli.fleet.schema import Fleet
 from webmap.errors import ConfigError
 
 LARGEST = 1 << 20

@@ -1,0 +1,104 @@
+"""Reading a fleet file's table: its bridges, its map, and its robots one by one."""
+
+from typing import Any
+
+from webmap.cli.fleet import checks
+from webmap.cli.fleet.alignments import Alignment, bridge_table
+from webmap.cli.fleet.checks import Check, Mistakes
+from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.places import read_places, read_tiles
+from webmap.cli.fleet.robot_table import known_bridge, read_robot
+from webmap.cli.fleet.schema import TOP, Fleet, RobotLine
+from webmap.discovery.naming import same_name
+from webmap.errors import ConfigError
+from webmap.ros.names import normalise_url
+
+
+def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
+    """Return what a file's table means; what is wrong is noted.
+
+    Args:
+        data: The table as the TOML reader gives it.
+        mistakes: Where every mistake goes. If there is one, the result is of no use.
+
+    """
+    for key in data:
+        if key not in TOP:
+            checks.unknown(key, TOP, (key,), mistakes)
+    fleet = Fleet()
+    for key in ("title", "floor"):
+        if key in data:
+            setattr(fleet, key, checks.one(checks.text, data[key], (key,), mistakes))
+    fleet.bridges, fleet.alignments = _bridges(data.get("bridges"), mistakes)
+    if "map" in data:
+        fleet.map = _map(data["map"], fleet.bridges, mistakes)
+    if "tiles" in data:
+        fleet.tiles = read_tiles(data["tiles"], ("tiles",), mistakes)
+    if "labels" in data:
+        fleet.labels = read_places(data["labels"], ("labels",), mistakes)
+    robots = data.get("robots")
+    if not isinstance(robots, list) or not robots:
+        got = "nothing" if robots is None else checks.show(robots)
+        mistakes.add(("robots",), f"got {got}, expected a table [[robots]] for each")
+        return fleet
+    for index, value in enumerate(robots):
+        fleet.robots.append(
+            read_robot(value, ("robots", index), fleet.bridges, mistakes)
+        )
+    _no_name_twice(fleet.robots, mistakes)
+    return fleet
+
+
+def _bridges(
+    value: Any, mistakes: Mistakes
+) -> tuple[dict[str, str], dict[str, Alignment]]:
+    if not isinstance(value, dict) or not value:
+        got = "nothing" if value is None else checks.show(value)
+        example = 'a table [bridges] with lines such as hall = "ws://robot:9090"'
+        mistakes.add(("bridges",), f"got {got}, expected {example}")
+        return {}, {}
+    urls, alignments = {}, {}
+    for name, bridge in value.items():
+        path: Path = ("bridges", name)
+        if isinstance(bridge, dict):
+            urls[name], stated = bridge_table(bridge, _address, path, mistakes)
+            if stated is not None:
+                alignments[name] = stated
+        else:
+            urls[name] = checks.one(_address, bridge, path, mistakes) or ""
+    return urls, alignments
+
+
+def _map(
+    value: Any, bridges: dict[str, str], mistakes: Mistakes
+) -> tuple[str, str] | None:
+    path: Path = ("map",)
+    known: dict[str, Check] = {
+        "bridge": lambda name: known_bridge(name, bridges),
+        "topic": checks.topic,
+    }
+    if isinstance(value, dict) and "bridge" not in value and len(bridges) == 1:
+        value = {"bridge": next(iter(bridges)), **value}
+    meant = checks.table(value, known, path, mistakes, needed=("bridge", "topic"))
+    return (str(meant.get("bridge")), str(meant.get("topic")))
+
+
+def _address(value: Any) -> str:
+    try:
+        return normalise_url(value)
+    except ConfigError:
+        raise ConfigError(
+            'the address of a rosbridge, such as "ws://robot:9090"'
+        ) from None
+
+
+def _no_name_twice(robots: list[RobotLine], mistakes: Mistakes) -> None:
+    first: dict[str, RobotLine] = {}
+    for robot in robots:
+        other = first.setdefault(same_name(robot.name), robot)
+        if other is not robot and robot.name:
+            mistakes.add(
+                (*robot.path, "name"),
+                f'got the text "{robot.name}", expected a name that differs from '
+                f'"{other.name}" by more than case and Unicode form',
+            )
