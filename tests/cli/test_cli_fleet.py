@@ -189,7 +189,7 @@ def changed(old, new):
         ),
         (
             changed("{ x = 1 }", "{ colour = 1 }"),
-            "FILE:38: robots[1].modules[0]: Laser",
+            "FILE:38: robots[1].modules[0].options.colour: LaserScanner: there is no",
         ),
         (
             changed('{ bridge = "north" }', '{ bridge = "east" }'),

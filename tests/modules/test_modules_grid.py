@@ -202,7 +202,7 @@ def test_raw_cells_may_have_any_value(map, link, channel):
 
 
 def test_a_palette_that_does_not_exist_is_named(map, link):
-    with pytest.raises(ValueError, match="map, costmap, raw, got 'heat'"):
+    with pytest.raises(ValueError, match='"map" or "costmap" or "raw", got'):
         map.add_module("OccupancyGrid", link, "/map", palette="heat")
     assert Layer._shared == {}
 

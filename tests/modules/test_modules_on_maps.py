@@ -5,7 +5,7 @@ from module_fakes import header, pose
 
 from webmap import Map
 from webmap.core.layer import Layer
-from webmap.errors import ModuleNotFound
+from webmap.errors import ConfigError, ModuleNotFound
 
 
 def grids(map: Map) -> list:
@@ -59,8 +59,23 @@ def test_a_module_that_there_is_not_is_named(robot):
         robot.add_module("OnMaps", "OccupancyGird")
 
 
-def test_arguments_that_make_no_sense_are_said_on_the_map(map, robot, link, channel):
-    robot.add_module("OnMaps", "OccupancyGrid", link, "/c", palette="grey")
+@pytest.mark.parametrize(
+    ("module", "options", "said"),
+    [
+        ("OccupancyGrid", {"palette": "grey"}, 'palette: expected "map" or "costmap"'),
+        ("OccupancyGrid", {"pallette": "map"}, 'did you mean "palette"'),
+        ("Markers", {"type": "std_msgs/String"}, "type: expected"),
+    ],
+)
+def test_arguments_of_the_wrong_kind_are_refused_before_any_map(
+    robot, link, module, options, said
+):
+    with pytest.raises(ConfigError, match=said):
+        robot.add_module("OnMaps", module, link, "/c", **options)
+
+
+def test_arguments_that_make_no_sense_are_said_on_the_map(map, robot, channel):
+    robot.add_module("OnMaps", "TileLayer", "/none", (50.0, 14.0), most=0)
     map.add_robot(robot)
     (error,) = channel.errors
-    assert "Bob: OccupancyGrid: a palette is one of" in error
+    assert "Bob: TileLayer: most is a number of tiles" in error

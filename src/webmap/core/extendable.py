@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
+from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import Namespace
 from webmap.scope import Scope, no_scope
 
@@ -39,9 +40,12 @@ class Extendable:
 
         Raises:
             ModuleNotFound: If there is no module of that name.
+            ConfigError: If an argument is not of the kind that the module's
+                annotations name; it is a ``TypeError``, too.
 
         """
         factory = self.namespace[name] if isinstance(name, str) else name
+        check_arguments(factory, args, kwargs)
         scope = Scope(f"{factory}")
         scope.report = lambda text, lasting: self._failed(scope, text, lasting)
         try:

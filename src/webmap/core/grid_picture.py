@@ -2,7 +2,7 @@
 
 import io
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from webmap.errors import ConfigError
 from webmap.geometry import Affine, Pose
@@ -10,6 +10,9 @@ from webmap.geometry import Affine, Pose
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+Palette: TypeAlias = Literal["map", "costmap", "raw"]
+"""The names of :data:`PALETTES`."""
 
 
 def check_palette(palette: str) -> None:

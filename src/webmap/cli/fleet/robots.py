@@ -1,16 +1,17 @@
 """From a fleet file to robots."""
 
-import inspect
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import webmap
+from webmap.cli.fleet import checks
 from webmap.cli.fleet.alignments import align_bridges
 from webmap.cli.fleet.cameras import add_cameras
 from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.schema import Fleet, ModuleLine, RobotLine
 from webmap.console import RobotDescription
 from webmap.console.fleet import make_robot
+from webmap.core.module_arguments import WrongArgument, WrongArguments
 from webmap.core.registry import robot_modules
 from webmap.errors import WebMapError
 
@@ -89,20 +90,33 @@ def _add_module(
     args = [_meant(value, bridges) for value in module.args]
     options = {key: _meant(value, bridges) for key, value in module.options.items()}
     try:
-        factory = robot_modules[module.name]
+        robot_modules[module.name]
     except WebMapError as error:
         mistakes.add((*module.path, "name"), str(error))
         return
     try:
-        inspect.signature(factory).bind(robot, *args, **options)
-    except TypeError as error:
-        takes = ", ".join(list(inspect.signature(factory).parameters)[1:])
-        mistakes.add(module.path, f"{module.name} takes ({takes}): {error}")
-        return
-    try:
         robot.add_module(module.name, *args, **options)
+    except WrongArguments as error:
+        for wrong in error.wrong:
+            mistakes.add((*module.path, *wrong.way), _in_words(module, wrong))
+    except WebMapError as error:
+        # What a module says of a value begins with the name of the argument.
+        key = str(error).partition(" ")[0].rstrip(":")
+        way = ("options", key) if key in options else ()
+        mistakes.add((*module.path, *way), f"{module.name}: {error}")
     except Exception as error:  # a module of somebody else's may raise anything
-        mistakes.add(module.path, f"{module.name} refused its arguments: {error}")
+        said = f"{type(error).__name__}: {error}"
+        mistakes.add(module.path, f"{module.name} refused its arguments: {said}")
+
+
+def _in_words(module: ModuleLine, wrong: WrongArgument) -> str:
+    if not wrong.got:
+        return f"{module.name}: {wrong.words}"
+    expected = wrong.words
+    if expected == "a Bridge":
+        expected = 'a bridge, such as { bridge = "hall" }'
+    of = f", for {wrong.name} of {module.name}"
+    return f"got {checks.show(wrong.got[0])}, expected {expected}{of}"
 
 
 def _meant(value: Any, bridges: Mapping[str, "Bridge"]) -> Any:

@@ -4,7 +4,7 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from webmap.core.grid_picture import check_palette, grid_png, place_grid
+from webmap.core.grid_picture import Palette, check_palette, grid_png, place_grid
 from webmap.core.layer import Layer
 from webmap.core.map_file import MapImage, read_map
 from webmap.core.pictures import Picture
@@ -39,7 +39,7 @@ class MapFile:
         map: "Map",
         file: str | Path,
         *,
-        palette: str = "map",
+        palette: Palette = "map",
         order: float = 5.0,
     ) -> None:
         check_palette(palette)

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import msgspec
 
@@ -45,6 +45,14 @@ class FramedMarkerArrayMsg(msgspec.Struct, frozen=True):
 
     markers: list[FramedMarkerMsg]
 
+
+MarkerType: TypeAlias = Literal[
+    "visualization_msgs/MarkerArray",
+    "visualization_msgs/Marker",
+    "visualization_msgs/msg/MarkerArray",
+    "visualization_msgs/msg/Marker",
+]
+"""The types that have markers, in either dialect."""
 
 VIEWS: dict[str, type[FramedMarkerMsg] | type[FramedMarkerArrayMsg]] = {
     "visualization_msgs/MarkerArray": FramedMarkerArrayMsg,
@@ -95,7 +103,7 @@ class Markers:
         bridge: Bridge,
         topic: str,
         *,
-        type: str = "visualization_msgs/MarkerArray",
+        type: MarkerType = "visualization_msgs/MarkerArray",
         age_limit: float | None = None,
         map_frame: str | None = "map",
         namespace: str = "",

@@ -5,7 +5,7 @@ import math
 from typing import TYPE_CHECKING
 
 from webmap.core.anchored import Anchored
-from webmap.core.grid_picture import check_palette, grid_png, place_grid
+from webmap.core.grid_picture import Palette, check_palette, grid_png, place_grid
 from webmap.core.layer import Layer
 from webmap.core.pictures import Picture
 from webmap.core.refusals import refusing
@@ -68,7 +68,7 @@ class OccupancyGrid:
         bridge: Bridge,
         topic: str = "/map",
         *,
-        palette: str = "map",
+        palette: Palette = "map",
         throttle: int = 0,
         age_limit: float | None = None,
         map_frame: str | None = None,

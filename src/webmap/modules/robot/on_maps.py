@@ -3,6 +3,7 @@
 import inspect
 from typing import TYPE_CHECKING, Any
 
+from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules
 from webmap.errors import ModuleNotFound, WebMapError
 
@@ -27,11 +28,14 @@ class OnMaps:
 
     Raises:
         ModuleNotFound: If there is no map module of that name.
+        ConfigError: If it takes no such arguments.
 
     """
 
     def __init__(self, robot: "Robot", module: str, *args: Any, **options: Any) -> None:
-        if "robot" in inspect.signature(map_modules[module]).parameters:
+        factory = map_modules[module]
+        check_arguments(factory, args, options, first=1)
+        if "robot" in inspect.signature(factory).parameters:
             options.setdefault("robot", robot)
         self.robot = robot
         self.module = module
