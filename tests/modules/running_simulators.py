@@ -22,7 +22,7 @@ from webmap.sim.world import World, WorldOptions
 class Running:
     """One simulator, its world and what it said last."""
 
-    def __init__(self, dialect: str) -> None:
+    def __init__(self, dialect: str, *, tilted: bool = False) -> None:
         quirks = parse_quirks("real", dialect)
         # Without any drift, odometry would be taken from the map at every step.
         base = BaseOptions(drift=1e-9)
@@ -31,7 +31,7 @@ class Running:
         schema = Schema(Dialect(dialect))
         graph = Graph(schema)
         Rosapi(graph, quirks).start()
-        self.node = RobotsNode(self.world, graph, "Twist", quirks)
+        self.node = RobotsNode(self.world, graph, "Twist", quirks, tilted=tilted)
         self.said: dict[str, dict[str, Any]] = {}
         publish = self.node.publish
 
@@ -55,9 +55,9 @@ class Running:
 
 
 @contextlib.contextmanager
-def simulators(*dialects: str) -> Iterator[dict[str, Running]]:
+def simulators(*dialects: str, tilted: bool = False) -> Iterator[dict[str, Running]]:
     """Run a simulator of each dialect in a thread of their own."""
-    found = {dialect: Running(dialect) for dialect in dialects}
+    found = {dialect: Running(dialect, tilted=tilted) for dialect in dialects}
     ready, stop = threading.Event(), threading.Event()
 
     async def run() -> None:

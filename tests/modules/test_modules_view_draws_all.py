@@ -5,9 +5,11 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Page
 from running_simulators import simulators
+from test_modules_drawn_from_simulator import HELPERS, until
 
 from real_browser import watched_tab
 
@@ -35,9 +37,12 @@ ON_THE_MAP = {
 }
 
 
-@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_all_that_robots_say_is_drawn(chromium: Browser, dialect):
-    with simulators(dialect) as found:
+@pytest.mark.parametrize(
+    ("dialect", "tilted"), [("ros1", False), ("ros2", True)], ids=["ros1", "ros2"]
+)
+def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
+    """Also where lasers hang upside down and a cloud is in its optical frame."""
+    with simulators(dialect, tilted=tilted) as found:
         world = found[dialect].world
         process = subprocess.Popen(
             [*VIEW, found[dialect].url, "--port", "0", "--no-browser"],
@@ -48,6 +53,7 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect):
             url = re.search(r"http\S+", process.stdout.readline())
             with watched_tab(chromium, 1000, 700) as tab:
                 tab.set_default_timeout(20_000)
+                tab.add_init_script(HELPERS)
                 tab.goto(url.group(0))
                 for selector in OF_A_ROBOT:
                     for name in ("robot_0", "robot_1"):
@@ -61,11 +67,53 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect):
                 )
                 pose = world.robots[1].pose
                 assert math.dist((x, y), (pose.x, pose.y)) < 0.05
+                dots_are_where_walls_are(tab, world, clouds=2 if tilted else 1)
                 assert tab.locator(".webmap-notice").count() == 0
         finally:
             process.terminate()
             process.wait(10)
             process.stdout.close()
+
+
+def dots_are_where_walls_are(tab: Page, world, clouds: int) -> None:
+    """Look where the dots of a robot's laser and of its clouds lie on the map."""
+    robot = '.robot[data-name="robot_1"]'
+    pose, ranges = world.robots[1].pose, world.sweep([1])[0]
+    turns = pose.yaw - math.pi + np.arange(len(ranges)) * math.tau / len(ranges)
+    hit = np.isfinite(ranges)
+    rays = np.column_stack((np.cos(turns[hit]), np.sin(turns[hit])))
+    walls = (pose.x, pose.y) + ranges[hit, np.newaxis] * rays
+
+    def apart(selector: str) -> np.ndarray:
+        drawn = np.array(tab.evaluate(f"dots('{robot} {selector}')")).reshape(-1, 2)
+        return np.hypot(*(drawn[:, np.newaxis] - walls).transpose(2, 0, 1))
+
+    scan = apart(".laserscan > .dot")
+    assert len(scan) == len(walls)
+    assert scan.min(axis=0).max() < 0.01, "each ray has a dot where it ends"
+    until(lambda: tab.locator(f"{robot} .pointcloud").count(), clouds.__eq__, "clouds")
+    everything = apart(".pointcloud > .dot")
+    assert (everything.min(axis=0) < 0.1).mean() > 0.95, "walls are in the clouds"
+    if clouds == 1:
+        return
+    (optical,) = (
+        number
+        for number in range(clouds)
+        if len(apart(f".pointcloud:nth-child({number + 1} of .pointcloud) > .dot"))
+        and _sees_only_ahead(tab, robot, number, pose)
+    )
+    mine = apart(f".pointcloud:nth-child({optical + 1} of .pointcloud) > .dot")
+    ahead = abs((turns[hit] - pose.yaw + math.pi) % math.tau - math.pi)
+    seen = (ahead < math.radians(20)) & (ranges[hit] < 5.5)
+    assert seen.sum() > 10
+    assert (mine[:, seen].min(axis=0) < 0.15).mean() > 0.9, "what is ahead is seen"
+
+
+def _sees_only_ahead(tab: Page, robot: str, number: int, pose) -> bool:
+    nth = f".pointcloud:nth-child({number + 1} of .pointcloud) > .dot"
+    x, y = (np.array(tab.evaluate(f"dots('{robot} {nth}')")) - (pose.x, pose.y)).T
+    aside = np.arctan2(y, x) - pose.yaw
+    return bool(abs((aside + math.pi) % math.tau - math.pi).max() < math.radians(32))
 
 
 PLACE = """(selector) => {

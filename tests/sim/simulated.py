@@ -76,6 +76,7 @@ class Bench:
         nan=False,
         drift=0.0,
         robot_timeout=0.25,
+        tilted=False,
     ):
         behaviour = parse_quirks(quirks, dialect)
         self.world = World(
@@ -91,7 +92,7 @@ class Bench:
         self.graph = Graph(schema, clock=lambda: self.time)
         self.rosapi = Rosapi(self.graph, behaviour)
         self.rosapi.start()
-        self.node = RobotsNode(self.world, self.graph, twist, behaviour)
+        self.node = RobotsNode(self.world, self.graph, twist, behaviour, tilted=tilted)
         self.node.start()
         self.encoder = Encoder(schema, behaviour)
 

@@ -77,6 +77,11 @@ from webmap.cli.options import PORT, verbose_option
     help="Costmaps, clouds, sonars, markers, health and the like, for who subscribes.",
 )
 @click.option(
+    "--tilted",
+    is_flag=True,
+    help="Lasers that hang upside down, and a depth camera in its optical frame.",
+)
+@click.option(
     "--polite",
     is_flag=True,
     help="A rosbridge that says what is wrong; real ones are silent.",
@@ -96,6 +101,7 @@ def sim(
     wander: bool,
     flat: bool,
     extras: bool,
+    tilted: bool,
     polite: bool,
     with_parent: bool,
 ) -> None:
@@ -123,6 +129,7 @@ def sim(
             wander=wander,
             flat=flat,
             extras=extras,
+            tilted=tilted,
             quirks="polite" if polite else "real",
             on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),
         )

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from webmap.geometry import Pose, Quaternion
 from webmap.sim.maps import FloorPlan
+from webmap.sim.mounts import LASER_HEIGHT, mount
 from webmap.sim.planner import Point
 from webmap.sim.robot import Robot
 from webmap.sim.rosbridge.dialect import Dialect
 from webmap.sim.scanner import ScannerOptions
+from webmap.tf import Transform
 
 Message = dict[str, Any]
 
@@ -33,8 +35,8 @@ class Messages:
 
     def __init__(self, dialect: Dialect, *, nan: bool = False) -> None:
         self.dialect = dialect
-        self.mounted: dict[str, tuple[Pose, float]] = {}
-        """Frames of further sensors: where on the base, and how high, in metres."""
+        self.mounted = {"base_laser": mount(0.0, LASER_HEIGHT)}
+        """Frames of sensors, and where they are on the base."""
         self._covariance = _COVARIANCE.copy()
         if nan:
             self._covariance[1] = math.nan
@@ -138,15 +140,18 @@ class Messages:
         for robot, at in zip(robots, believed, strict=True):
             odom, base = f"{robot.frames}odom", f"{robot.frames}base_link"
             map_from_odom = at @ robot.odometry.inverse
-            found.append(self._transform(topic, stamp, "map", odom, map_from_odom))
-            found.append(self._transform(topic, stamp, odom, base, robot.odometry))
+            for parent, child, place in (
+                ("map", odom, map_from_odom),
+                (odom, base, robot.odometry),
+            ):
+                whole = Transform.from_pose(place)
+                found.append(self._transform(topic, stamp, parent, child, whole))
         return {"transforms": found}
 
     def static_transforms(
         self, topic: str, stamp: float, robots: list[Robot]
     ) -> Message:
         """Return where the sensors sit on the base."""
-        mounted = {"base_laser": (Pose(), 0.2), **self.mounted}
         return {
             "transforms": [
                 self._transform(
@@ -155,10 +160,9 @@ class Messages:
                     f"{robot.frames}base_link",
                     f"{robot.frames}{name}",
                     at,
-                    z=height,
                 )
                 for robot in robots
-                for name, (at, height) in mounted.items()
+                for name, at in self.mounted.items()
             ]
         }
 
@@ -201,21 +205,15 @@ class Messages:
         }
 
     def _transform(
-        self,
-        topic: str,
-        stamp: float,
-        parent: str,
-        child: str,
-        at: Pose,
-        z: float = 0.0,
+        self, topic: str, stamp: float, parent: str, child: str, at: Transform
     ) -> Message:
-        header = self.dialect.header(f"{topic}:{child}", stamp, parent)
+        by, turn = at.translation, at.rotation
         return {
-            "header": header,
+            "header": self.dialect.header(f"{topic}:{child}", stamp, parent),
             "child_frame_id": child,
             "transform": {
-                "translation": vector(at.x, at.y, z),
-                "rotation": quaternion(at.yaw),
+                "translation": vector(by.x, by.y, by.z),
+                "rotation": {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w},
             },
         }
 

@@ -7,8 +7,9 @@ from typing import Any
 
 from webmap.geometry import Pose, Twist
 from webmap.sim.actionlib import ActionlibServer
-from webmap.sim.feeds import Feeds, sonar
+from webmap.sim.feeds import Feeds, depth, sonar
 from webmap.sim.messages import Messages, read_pose
+from webmap.sim.mounts import OVER, mount, overhead
 from webmap.sim.nav2 import NavigateToPose
 from webmap.sim.navigator import Goal
 from webmap.sim.rosbridge.encode import Publication
@@ -41,6 +42,8 @@ class RobotsNode:
         quirks: Of the server, for the services that may hang.
         extras: Whether robots have more than odometry, a scan, a battery, a camera
             and plans.
+        tilted: Whether their lasers hang upside down, and they have a depth camera
+            whose cloud is in its optical frame.
 
     """
 
@@ -52,8 +55,10 @@ class RobotsNode:
         quirks: Quirks,
         *,
         extras: bool = True,
+        tilted: bool = False,
     ) -> None:
         self.world = world
+        self.tilted = tilted
         self.graph = graph
         self.messages = Messages(graph.schema.dialect, nan=world.options.scanner.nan)
         self._twist = twist
@@ -64,7 +69,10 @@ class RobotsNode:
         self._paths_seen = [0 for _ in world.robots]
         self._feeds = Feeds(self, STEP) if extras else None
         if self._feeds is not None:
-            self.messages.mounted[sonar.FRAME] = (sonar.MOUNTED, 0.15)
+            self.messages.mounted[sonar.FRAME] = mount(sonar.MOUNTED.x, 0.15)
+        if tilted:
+            self.messages.mounted["base_laser"] @= OVER
+            self.messages.mounted[depth.FRAME] = depth.MOUNTED
 
     def start(self) -> None:
         """Advertise, subscribe and serve everything."""
@@ -200,6 +208,8 @@ class RobotsNode:
         now = self.graph.clock()
         options = self.world.options.scanner
         for i, ranges in zip(wanted, self.world.sweep(wanted), strict=True):
+            if self.tilted:
+                ranges = overhead(ranges)
             topic = f"{robots[i].topics}/base_scan"
             self.publish(
                 topic, self.messages.scan(topic, now, robots[i], options, ranges)

@@ -35,6 +35,7 @@ async def run_simulator(
     wander: bool = False,
     flat: bool = False,
     extras: bool = True,
+    tilted: bool = False,
     host: str = "127.0.0.1",
     refuse_nan: bool = True,
     on_ready: Callable[[str], None] | None = None,
@@ -60,6 +61,8 @@ async def run_simulator(
         extras: Whether robots have costmaps, clouds, footprints, particles, sonars,
             fixes, markers, diagnostics and logs too. They cost nothing while nobody
             subscribes.
+        tilted: Whether their lasers hang upside down and, with ``extras``, they have a
+            depth camera whose cloud is in its optical frame.
         host: The address to listen on.
         refuse_nan: Whether the bases ignore a twist with NaN or infinity.
         on_ready: Called with the URL once clients can connect.
@@ -100,7 +103,7 @@ async def run_simulator(
     schema = Schema(Dialect(dialect))
     graph = Graph(schema)
     Rosapi(graph, behaviour).start()
-    node = RobotsNode(world, graph, twist, behaviour, extras=extras)
+    node = RobotsNode(world, graph, twist, behaviour, extras=extras, tilted=tilted)
     node.start()
     server = RosbridgeServer(graph, Encoder(schema, behaviour))
     stop = stop or asyncio.Event()

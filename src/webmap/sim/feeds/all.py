@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from webmap.sim.feeds.cloud import Clouds
 from webmap.sim.feeds.costmap_topics import CostmapTopics
+from webmap.sim.feeds.depth import DepthClouds
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.feeds.footprint import Footprints
 from webmap.sim.feeds.health import Health
@@ -40,6 +41,7 @@ class Feeds:
             Sonars(node).feed,
             Satellites(node).feed,
             Marks(node).feed,
+            *([DepthClouds(node).feed] if node.tilted else ()),
         )
 
     def start(self) -> None:

@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.messages import Message
+from webmap.sim.mounts import LASER_HEIGHT
 
 if TYPE_CHECKING:
     from webmap.sim.node import RobotsNode
 
 RINGS = np.radians([-6.0, 0.0, 6.0, 12.0])
 """How far each ring looks up from level."""
-
-MOUNTED = 0.2
-"""The lidar's height above the floor, in metres."""
 
 ROBOT_TOP = 0.3
 """How far robots reach above the lidar, in metres; walls are taller than it sees."""
@@ -46,27 +44,43 @@ class Clouds:
         whole = world.sweep([index])[0]
         walls = world.scanner.sweep([robot.pose])[0]
         points = cloud_points(whole, walls)
-        return {
-            "header": self._node.messages.dialect.header(
-                topic, stamp, f"{robot.frames}base_laser"
-            ),
-            "height": 1,
-            "width": len(points),
-            "fields": [
-                {
-                    "name": name,
-                    "offset": POINT.fields[name][1] if POINT.fields else 0,
-                    "datatype": _DATATYPES[POINT[name].str],
-                    "count": 1,
-                }
-                for name in POINT.names or ()
-            ],
-            "is_bigendian": False,
-            "point_step": POINT.itemsize,
-            "row_step": POINT.itemsize * len(points),
-            "data": points.tobytes(),
-            "is_dense": True,
-        }
+        if self._node.tilted:
+            points["y"] *= -1
+            points["z"] *= -1
+        dialect = self._node.messages.dialect
+        return cloud_message(
+            dialect.header(topic, stamp, f"{robot.frames}base_laser"), points
+        )
+
+
+def cloud_message(header: Message, points: NDArray[np.void]) -> Message:
+    """Return ``sensor_msgs/PointCloud2`` of points with named fields.
+
+    Args:
+        header: Its header.
+        points: Of shape (N,).
+
+    """
+    layout = points.dtype
+    return {
+        "header": header,
+        "height": 1,
+        "width": len(points),
+        "fields": [
+            {
+                "name": name,
+                "offset": layout.fields[name][1] if layout.fields else 0,
+                "datatype": _DATATYPES[layout[name].str],
+                "count": 1,
+            }
+            for name in layout.names or ()
+        ],
+        "is_bigendian": False,
+        "point_step": layout.itemsize,
+        "row_step": layout.itemsize * len(points),
+        "data": points.tobytes(),
+        "is_dense": True,
+    }
 
 
 def cloud_points(
@@ -85,7 +99,7 @@ def cloud_points(
         over = whole > (ROBOT_TOP / rise if rise > 0 else np.inf)
         reach = np.where(over, walls, whole).astype(np.float64)
         if rise < 0:
-            reach = np.minimum(reach, MOUNTED / -rise)
+            reach = np.minimum(reach, LASER_HEIGHT / -rise)
         hit = np.isfinite(reach) & (reach > 0)
         ring = np.zeros(int(hit.sum()), POINT)
         ring["x"] = reach[hit] * np.cos(bearings[hit])

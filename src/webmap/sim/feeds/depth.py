@@ -1,0 +1,90 @@
+"""A depth camera that looks down a little, and whose cloud is in its optical frame."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from webmap.geometry import Pose
+from webmap.sim.feeds.cloud import cloud_message
+from webmap.sim.feeds.feed import Feed
+from webmap.sim.messages import Message
+from webmap.sim.mounts import OPTICAL, mount, seen_from
+from webmap.sim.scanner import cast_rays, shade
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+FRAME = "camera_optical"
+AHEAD, HEIGHT = 0.2, 0.4
+"""Where the lens is on the base, in metres."""
+
+MOUNTED = mount(AHEAD, HEIGHT, down=0.3) @ OPTICAL
+"""Where its optical frame is on the base."""
+
+FIELD = math.radians(60)
+"""How far it sees to the sides, in all."""
+
+RISES = np.tan(np.radians(np.linspace(-40.0, 20.0, 25)))
+"""Of the rows of the picture, over what is level."""
+
+NEAREST, FARTHEST = 0.3, 6.0
+"""How far it measures along the floor, in metres."""
+
+ROBOT_TOP, WALL_TOP = 0.5, 2.5
+"""How high robots and walls are, in metres."""
+
+_COLUMNS = 61
+POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+
+
+class DepthClouds:
+    """Makes ``sensor_msgs/PointCloud2`` as a camera's driver does."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+        self.feed = Feed("camera/points", "sensor_msgs/PointCloud2", 0.2, self._make)
+
+    def _make(self, index: int, topic: str, stamp: float) -> Message:
+        robot = self._node.world.robots[index]
+        seen = seen_from(MOUNTED, self.points(index))
+        points = np.zeros(len(seen), POINT)
+        for number, axis in enumerate("xyz"):
+            points[axis] = seen[:, number]
+        dialect = self._node.messages.dialect
+        return cloud_message(
+            dialect.header(topic, stamp, f"{robot.frames}{FRAME}"), points
+        )
+
+    def points(self, index: int) -> NDArray[np.float64]:
+        """Return what a robot's camera sees, in the frame of its base: (N, 3)."""
+        world = self._node.world
+        at = world.robots[index].pose @ Pose(AHEAD)
+        bearings = np.linspace(-FIELD / 2, FIELD / 2, _COLUMNS)
+        along_x, along_y = np.cos(at.yaw + bearings), np.sin(at.yaw + bearings)
+        ones = np.ones(_COLUMNS)
+        walls = cast_rays(
+            world.obstacles, at.x * ones, at.y * ones, along_x, along_y, FARTHEST
+        )
+        walls = np.minimum(walls, 2 * FARTHEST)  # nothing there is not at a height
+        nearest = walls.copy()
+        for disc in world.others(index):
+            shade(nearest, along_x, along_y, at, *disc)
+        found = []
+        for rise in RISES:
+            over = HEIGHT + nearest * rise > ROBOT_TOP
+            reach = np.where(over, walls, nearest)
+            if rise < 0:
+                reach = np.minimum(reach, HEIGHT / -rise)
+            height = HEIGHT + reach * rise
+            hit = (reach >= NEAREST) & (reach <= FARTHEST) & (height < WALL_TOP)
+            row = np.column_stack(
+                (
+                    AHEAD + reach * np.cos(bearings),
+                    reach * np.sin(bearings),
+                    height,
+                )
+            )
+            found.append(row[hit])
+        return np.concatenate(found)

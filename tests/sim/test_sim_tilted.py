@@ -1,0 +1,92 @@
+"""Sensors that are not level, against where walls truly are."""
+
+import math
+
+import numpy as np
+import pytest
+from simulated import Bench
+from test_sim_feeds import heard
+
+from webmap.geometry import Quaternion, Vector3
+from webmap.sim.feeds.cloud import POINT
+from webmap.sim.feeds.depth import POINT as DEPTH
+from webmap.tf import Transform
+
+DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+
+
+def mounted(bench, name) -> Transform:
+    """Where a sensor is on its robot, as ``/tf_static`` tells it."""
+    (message,) = heard(bench, "/tf_static", 0.1)
+    for each in message["transforms"]:
+        if each["child_frame_id"] == f"robot_0/{name}":
+            assert each["header"]["frame_id"] == "robot_0/base_link"
+            found = each["transform"]
+            return Transform(
+                Vector3(**found["translation"]), Quaternion(**found["rotation"])
+            )
+    raise AssertionError(name)
+
+
+def on_map(bench, name, points) -> np.ndarray:
+    """Points of a sensor where they are on the map, of shape (N, 3)."""
+    place = Transform.from_pose(bench.world.robots[0].pose) @ mounted(bench, name)
+    found = (place.apply(Vector3(*map(float, point))) for point in points)
+    return np.array([(p.x, p.y, p.z) for p in found])
+
+
+def to_wall(points) -> np.ndarray:
+    """How far points are from the faces of the room's walls, in metres."""
+    x, y = points[:, 0], points[:, 1]
+    edge = np.minimum(np.minimum(x, 10 - x), np.minimum(y, 6 - y))
+    return abs(edge - 0.05)
+
+
+@DIALECTS
+def test_a_scan_upside_down_has_its_rays_the_other_way_about(dialect):
+    bench = Bench(dialect, robots=1, tilted=True)
+    scan = heard(bench, "/robot_0/base_scan")[-1]
+    assert mounted(bench, "base_laser").rotation == Quaternion(1.0, 0.0, 0.0, 0.0)
+    turns = scan["angle_min"] + scan["angle_increment"] * np.arange(360)
+    rays = [
+        (r * math.cos(a), r * math.sin(a), 0.0)
+        for r, a in zip(scan["ranges"], turns, strict=True)
+        if r is not None
+    ]
+    assert len(rays) > 100
+    there = on_map(bench, "base_laser", rays)
+    assert to_wall(there).max() < 0.01
+    assert there[:, 2] == pytest.approx(0.2)
+
+
+def test_the_cloud_of_a_lidar_upside_down_has_the_floor_below():
+    bench = Bench(robots=1, tilted=True)
+    cloud = heard(bench, "/robot_0/points", compression="cbor")[-1]
+    points = np.frombuffer(cloud["data"], POINT)
+    there = on_map(bench, "base_laser", zip(*(points[a] for a in "xyz"), strict=True))
+    assert there[:, 2].min() == pytest.approx(0.0, abs=1e-3)
+    assert to_wall(there[there[:, 2] > 0.01]).max() < 0.01
+
+
+def test_the_cloud_of_a_depth_camera_is_in_its_optical_frame():
+    bench = Bench(robots=1, tilted=True)
+    cloud = heard(bench, "/robot_0/camera/points", compression="cbor")[-1]
+    assert cloud["header"]["frame_id"] == "robot_0/camera_optical"
+    points = np.frombuffer(cloud["data"], DEPTH)
+    assert points["z"].min() > 0.2, "z is forward"
+    there = on_map(
+        bench, "camera_optical", zip(*(points[a] for a in "xyz"), strict=True)
+    )
+    heights = there[:, 2]
+    assert heights.min() == pytest.approx(0.0, abs=1e-3)
+    assert heights.max() > 0.5
+    assert to_wall(there[heights > 0.01]).max() < 0.01
+    at = bench.world.robots[0].pose
+    aside = np.arctan2(there[:, 1] - at.y, there[:, 0] - at.x) - at.yaw
+    aside = (aside + math.pi) % math.tau - math.pi
+    assert abs(aside).max() < math.radians(31), "only what is ahead is seen"
+
+
+def test_level_robots_have_no_depth_camera():
+    bench = Bench(robots=1)
+    assert "/robot_0/camera/points" not in bench.graph.topics
