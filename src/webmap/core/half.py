@@ -1,11 +1,11 @@
 """Browser halves: the part of a module that reacts faster than a round trip."""
 
 import itertools
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from webmap.core.world_view import WorldView
+from webmap.core.page import Page
 
 _numbers = itertools.count(1)
 
@@ -15,18 +15,20 @@ class BrowserHalf:
 
     def __init__(
         self,
-        map: "WorldView",
+        page: Page,
+        map_element: int,
         module: Any,
         script: str | Path,
         options: dict[str, Any],
         style: str | Path | None,
+        ended: Callable[[int], object],
     ) -> None:
         self.instance = next(_numbers)
         self.module = module
-        self._map: WorldView | None = map
-        page = map.page
-        page.channel.attach(
-            map.root.id,
+        self._channel = page.channel
+        self._ended: Callable[[int], object] | None = ended
+        self._channel.attach(
+            map_element,
             self.instance,
             page.asset(script),
             options,
@@ -35,12 +37,12 @@ class BrowserHalf:
 
     def send(self, message: dict[str, Any]) -> None:
         """Send a message to the half; nothing happens once it has ended."""
-        if self._map is not None:
-            self._map.page.channel.send(self.instance, message)
+        if self._ended is not None:
+            self._channel.send(self.instance, message)
 
     def remove(self) -> None:
         """End the half; the second call does nothing."""
-        map, self._map = self._map, None
-        if map is not None:
-            map.forget_half(self)
-            map.page.channel.detach(self.instance)
+        ended, self._ended = self._ended, None
+        if ended is not None:
+            ended(self.instance)
+            self._channel.detach(self.instance)

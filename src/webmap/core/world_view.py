@@ -196,7 +196,15 @@ class WorldView(Extendable):
             The half, to send messages to; it ends with the module.
 
         """
-        half = BrowserHalf(self, module, script, options or {}, style)
+        half = BrowserHalf(
+            self.page,
+            self.root.id,
+            module,
+            script,
+            options or {},
+            style,
+            self._halves.pop,
+        )
         self._halves[half.instance] = half
         return keep(half)
 
@@ -257,10 +265,6 @@ class WorldView(Extendable):
         half = self._halves.get(instance)
         if half is not None:
             self._call(half.module, "on_ready", ())
-
-    def forget_half(self, half: BrowserHalf) -> None:
-        """Note that a browser half has ended."""
-        self._halves.pop(half.instance, None)
 
     def report_error(self, text: str) -> None:
         """Log a failure and show it on this map's page."""
