@@ -1,0 +1,216 @@
+"""Which robot needs which lane to which bridge, and what is done through them."""
+
+from gate_harness import spec
+from link_bench import in_loop, noting_bridge, until
+
+from webmap.gate import actions
+from webmap.gate.assist import AssistSpec
+from webmap.gate.events import Echoed, Key, LinkDown, LinkUp, Measured, Wrote
+from webmap.gate.links import Links
+from webmap.geometry import Twist
+
+SLOW, ZERO = Twist(0.1), Twist()
+MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}
+
+
+class Noting:
+    """All links of a gate, and what they tell."""
+
+    def __init__(self):
+        self.events = []
+        self.links = Links(self.events.append)
+
+    async def __aenter__(self):
+        return self
+
+    async def __aexit__(self, *_):
+        self.links.close()
+        await self.links.settle()
+
+    def of(self, type):
+        return [event for event in self.events if isinstance(event, type)]
+
+    def do(self, action):
+        return self.links.perform(action)
+
+    def attach(self, robot):
+        key = Key(robot.bridge_url, robot.twist_topic or "")
+        assert self.do(actions.Attach(key, robot)) is None
+        return key
+
+    async def up(self, *lanes):
+        def up():
+            return sorted(event.lane for event in self.of(LinkUp)) == sorted(lanes)
+
+        await until(up, f"the links {lanes}")
+
+
+@in_loop
+async def test_a_robot_has_the_links_that_it_needs_and_only_as_long_as_it_needs_them():
+    async with noting_bridge() as bridge, Noting() as noting:
+        robot = spec(bridge_url=bridge.url, odometry_topic="/odom")
+        key = noting.attach(robot)
+        await noting.up("control", "witness", "tasks")
+        await until(lambda: len(bridge.links) == 3, "three sockets")
+        blind = spec(bridge_url=bridge.url, id="r1")
+        noting.attach(blind)
+        await until(lambda: len(bridge.links) == 2, "the end of the witness")
+        noting.attach(spec(bridge_url=bridge.url, twist_topic=None, id="r2"))
+        noting.do(actions.Detach(key, "r1"))
+        await until(lambda: len(bridge.links) == 1, "the end of the control lane")
+        noting.links.zero_all()  # nobody is driven
+        noting.do(actions.Detach(Key(bridge.url, ""), "r2"))
+        await until(lambda: not bridge.links, "the end of the last one")
+
+
+@in_loop
+async def test_a_velocity_goes_out_now_or_is_said_to_be_dropped():
+    async with noting_bridge() as bridge, Noting() as noting:
+        key = Key(bridge.url, "/cmd_vel")
+        write = actions.WriteTwist(key, SLOW, 7, "a")
+        assert noting.do(write) == Wrote(key, SLOW, 7, "a", False), "no such robot"
+        noting.attach(spec(bridge_url=bridge.url))
+        assert noting.do(write) == Wrote(key, SLOW, 7, "a", False), "no link yet"
+        await noting.up("control", "tasks")
+        assert noting.do(write) == Wrote(key, SLOW, 7, "a", True)
+        await until(lambda: bridge.of("publish", "/cmd_vel"), "the velocity")
+
+
+@in_loop
+async def test_bridges_of_odometry_and_goals_may_be_others_than_that_of_velocity():
+    async with (
+        noting_bridge() as a,
+        noting_bridge() as b,
+        noting_bridge() as c,
+        Noting() as noting,
+    ):
+        robot = spec(
+            bridge_url=a.url,
+            odometry_topic="/odom",
+            odometry_url=b.url,
+            goal_url=c.url,
+            stop_hooks=({"topic": "/lock", "type": "std_msgs/Bool"},),
+            assist=AssistSpec(topic="/scan", footprint=((0.1, 0.1), (-0.1, 0.0))),
+        )
+        key = noting.attach(robot)
+        await noting.up("control", "witness", "witness", "tasks", "tasks")
+        noting.do(actions.Watch(key, True))
+        await until(lambda: len(a.of("subscribe")) == 2, "echo and scan")
+        assert {t.topic for t in a.of("subscribe")} == {"/cmd_vel", "/scan"}
+        await until(lambda: b.of("subscribe", "/odom"), "odometry")
+        await until(lambda: len(c.of("advertise")) == 2, "goals")
+        assert [t.topic for t in a.of("advertise", "/lock")] == ["/lock"]
+        noting.do(actions.RunHook(key, "r1", robot.stop_hooks[0], True))
+        await until(lambda: a.of("publish", "/lock"), "the hook")
+        noting.do(actions.Watch(key, False))
+        await until(lambda: a.of("unsubscribe", "/scan"), "no scans any more")
+        await until(lambda: b.of("unsubscribe", "/odom"), "nor odometry")
+        noting.do(actions.Detach(key, "r1"))
+        await until(lambda: not (a.links | b.links | c.links), "the end of all")
+
+
+@in_loop
+async def test_of_two_robots_on_one_machine_the_other_stays_watched():
+    async with noting_bridge() as bridge, Noting() as noting:
+        first = spec(bridge_url=bridge.url, odometry_topic="/odom")
+        second = spec(bridge_url=bridge.url, odometry_topic="/odom2", id="r2")
+        key = noting.attach(first)
+        noting.attach(second)
+        noting.do(actions.Watch(key, True))
+        noting.do(actions.Watch(key, True))  # which is no other than once
+        await until(lambda: len(bridge.of("subscribe")) >= 3, "all of it")
+        noting.do(actions.Detach(key, "r1"))
+        await until(lambda: bridge.of("unsubscribe", "/odom"), "the first one's end")
+        noting.events.clear()
+        await bridge.publish("/odom", MOVING)
+        await bridge.publish("/odom2", MOVING)
+        await bridge.publish("/cmd_vel", MOVING["twist"]["twist"])
+        await until(lambda: noting.of(Echoed), "what is said to the machine")
+        await until(lambda: noting.of(Measured), "how it moves")
+        assert noting.of(Measured) == [Measured(key, Twist(0.5))], "of the second only"
+        noting.do(actions.Detach(key, "r2"))
+        await until(lambda: not bridge.links, "the end of it")
+
+
+@in_loop
+async def test_a_robot_that_is_declared_anew_is_watched_on_and_its_goal_followed():
+    async with noting_bridge() as bridge, Noting() as noting:
+        robot = spec(
+            bridge_url=bridge.url,
+            action="/move_base",
+            action_type="move_base_msgs/MoveBaseAction",
+        )
+        key = noting.attach(robot)
+        await noting.up("control", "tasks")
+        noting.do(actions.Watch(key, True))
+        sent = actions.SendGoal(key, "r1", "g1", 1.0, 2.0, 0.0, "a", "move_base")
+        assert noting.do(sent).done
+        await until(lambda: bridge.of("publish", "/move_base/goal"), "the goal")
+        noting.attach(spec(**{**_fields(robot), "v_max": 0.2}))
+        noting.attach(spec(**{**_fields(robot), "action": "/other"}))
+        await until(lambda: bridge.of("unsubscribe", "/move_base/status"), "its end")
+        assert len(bridge.of("unsubscribe", "/move_base/status")) == 1
+        listening = len(bridge.of("subscribe", "/cmd_vel"))
+        ended = len(bridge.of("unsubscribe", "/cmd_vel"))
+        assert listening == ended + 1, "its echo is listened to"
+
+
+def _fields(robot):
+    return {name: getattr(robot, name) for name in robot.__struct_fields__}
+
+
+@in_loop
+async def test_goals_poses_and_cancels_go_where_the_robot_takes_them():
+    async with noting_bridge() as bridge, Noting() as noting:
+        robot = spec(bridge_url=bridge.url, pose_topic="/initialpose")
+        key = noting.attach(robot)
+        await noting.up("control", "tasks")
+        sent = actions.SendGoal(key, "r1", "g1", 1.0, 2.0, 0.0, "a", "topic")
+        assert noting.do(sent).done
+        assert noting.do(actions.TellPose(key, "r1", 1.0, 2.0, 0.5, "a")).done
+        noting.do(actions.CancelGoals(key, "r1"))
+        await until(lambda: bridge.of("publish", "/cancel"), "the cancel")
+        assert [t.topic for t in bridge.of("publish")] == [
+            "/goal",
+            "/initialpose",
+            "/cancel",
+        ]
+
+
+@in_loop
+async def test_a_link_that_carries_nothing_is_cut_and_one_that_is_not_there_is_not():
+    async with noting_bridge() as bridge, Noting() as noting:
+        noting.do(actions.CutLink(bridge.url))
+        assert noting.events == []
+        noting.attach(spec(bridge_url=bridge.url))
+        await noting.up("control", "tasks")
+        noting.do(actions.CutLink(bridge.url))
+        assert noting.events[-1] == LinkDown(bridge.url, "control")
+        await noting.up("control", "control", "tasks")
+
+
+@in_loop
+async def test_in_the_end_zero_goes_to_all_that_may_be_driven_and_to_nothing_else():
+    async with noting_bridge() as bridge, Noting() as noting:
+        watched = noting.attach(spec(bridge_url=bridge.url))
+        noting.attach(spec(bridge_url=bridge.url, twist_topic="/idle", id="r2"))
+        async with noting_bridge() as other:
+            still = noting.attach(
+                spec(bridge_url=other.url, twist_topic=None, odometry_topic="/odom")
+            )
+            await noting.up("control", "tasks", "tasks", "witness")
+            noting.do(actions.Watch(watched, True))
+            noting.do(actions.Watch(still, True))
+            noting.links.zero_all()
+            await until(lambda: bridge.of("publish"), "the zero")
+            told = [(t.topic, t.message["msg"]["linear"]) for t in bridge.of("publish")]
+            assert told == [("/cmd_vel", {"x": 0.0, "y": 0.0, "z": 0.0})]
+            assert other.of("publish") == []
+            noting.do(actions.Detach(still, "r1"))
+
+
+@in_loop
+async def test_what_is_not_for_the_links_is_left_to_others():
+    async with Noting() as noting:
+        assert noting.do(actions.Unlock(Key("ws://x", "/cmd_vel"))) is None
+        assert noting.events == []

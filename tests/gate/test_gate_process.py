@@ -1,0 +1,101 @@
+"""The gate's process itself, at both ends of its pipes; it tells what it has run."""
+
+import asyncio
+import gc
+import importlib
+import os
+import signal
+import subprocess
+import threading
+
+import pytest
+from gate_robot import eventually
+
+from webmap.gate import framing, process
+from webmap.gate.child import Child
+from webmap.gate.gate import Gate
+from webmap.gate.messages import FromGate, Heartbeat, Ready
+from webmap.gate.outbox import Outbox
+
+
+@pytest.fixture
+def not_measured():
+    """Have what these processes run counted: each comes to an end of its own."""
+
+
+@pytest.fixture
+def gate():
+    """A gate's process."""
+    started = subprocess.Popen(
+        Child.COMMAND,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    with started:
+        try:
+            yield started
+        finally:
+            started.kill()
+
+
+def said_until_ready(gate):
+    unpacker, said = framing.Unpacker(FromGate), []
+
+    def ready():
+        said.extend(unpacker.feed(os.read(gate.stdout.fileno(), 1 << 16)))
+        return said
+
+    eventually(ready, "its first word", 60.0)
+    return said
+
+
+def test_it_says_who_it_is_and_ends_with_the_pipe(gate):
+    assert said_until_ready(gate)[0] == Ready(gate.pid)
+    _, err = gate.communicate(framing.pack(Heartbeat()), timeout=60)
+    assert (gate.returncode, err) == (0, b"")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_in_good_order(gate, number):
+    said_until_ready(gate)
+    gate.send_signal(number)
+    assert gate.wait(60) == 0, "and not by the signal itself"
+
+
+def test_a_pipe_that_brings_nonsense_ends_it(gate):
+    said_until_ready(gate)
+    gate.stdin.write(b"\xff" * 8)
+    gate.stdin.flush()
+    assert gate.wait(60) == 0, "although the pipe is still open"
+
+
+def test_an_error_of_its_own_ends_it_with_a_code(monkeypatch, caplog):
+    def fail(*_):
+        raise ArithmeticError("a slip")
+
+    monkeypatch.setattr(Gate, "step", fail)
+    kept = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGINT)}
+    (pipe_in, theirs), (out, pipe_out) = os.pipe(), os.pipe()
+    box = Outbox(pipe_out)
+    try:
+        assert asyncio.run(process._serve(pipe_in, box)) == 1
+        assert "the gate has failed" in caplog.text
+        box.close(30.0)
+        said = framing.Unpacker(FromGate).feed(os.read(out, 1 << 16))
+        assert said == [Ready(os.getpid())]
+    finally:
+        gc.unfreeze()
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+        (reader,) = (t for t in threading.enumerate() if t.name == "gate-inbox")
+        os.close(theirs)
+        reader.join(30)
+        for end in (pipe_in, pipe_out, out):
+            os.close(end)
+    assert not reader.is_alive(), "a loop that has ended is told nothing more"
+
+
+def test_what_only_looks_at_the_module_starts_no_gate(monkeypatch):
+    monkeypatch.setattr(os, "_exit", lambda code: pytest.fail("it ended the process"))
+    assert importlib.import_module("webmap.gate.__main__").main is not None

@@ -1,0 +1,278 @@
+"""The gate whole, in the test's own process: decisions, links, disk and locks."""
+
+import asyncio
+import contextlib
+import json
+
+import pytest
+from gate_harness import spec
+from link_bench import in_loop, noting_bridge, until
+
+from webmap.gate import events, messages, shell
+from webmap.gate.disk import Disk
+from webmap.gate.events import Key
+from webmap.gate.locks import Locks
+from webmap.gate.records import UNKNOWN, Records, path_of
+from webmap.gate.shell import Shell
+
+
+class Running:
+    """A gate that runs, the display that it talks to, and a page with a hand."""
+
+    def __init__(self, folder):
+        self.said = []
+        self.locks = Locks(folder)
+        self.shell = Shell(self, self.locks, Disk(Records(folder)))
+        self.x = None
+        """What the hand asks for; ``None`` sends nothing."""
+        self._seq = 0
+
+    def put(self, message):
+        """Take what the display is told."""
+        self.said.append(message)
+
+    async def __aenter__(self):
+        self.work = asyncio.create_task(self.shell.run())
+        self._hand = asyncio.create_task(self._stream())
+        self.shell.tell(messages.Connect("a", "Ann", "operator"))
+        return self
+
+    async def __aexit__(self, *_):
+        self._hand.cancel()
+        await self.end()
+
+    async def end(self):
+        """End it as the end of the pipe does."""
+        if not self.work.done():
+            self.shell.tell(events.Shutdown("the display process has ended"))
+        await self.work
+
+    async def _stream(self):
+        while True:
+            await asyncio.sleep(0.05)
+            self.shell.tell(messages.Heartbeat())
+            report, tick = self.report(), self.tick
+            if self.x is not None and report is not None and tick is not None:
+                self._seq += 1
+                self.say(
+                    op="drive",
+                    robot="r1",
+                    epoch=report.epoch or 0,
+                    seq=self._seq,
+                    tick=tick,
+                    x=self.x if report.armed else 0.0,
+                    y=0.0,
+                    turn=0.0,
+                )
+
+    def say(self, **command):
+        text = json.dumps(command).encode()
+        self.shell.tell(messages.FromBrowser("a", text))
+
+    @property
+    def tick(self):
+        ticks = (m.tick for m in reversed(self.said) if isinstance(m, messages.Tick))
+        return next(ticks, None)
+
+    def report(self):
+        for message in reversed(self.said):
+            if isinstance(message, messages.RobotReport):
+                return message
+        return None
+
+    async def reported(self, check, what):
+        await until(lambda: (r := self.report()) is not None and check(r), what)
+
+    async def drive_off(self, bridge):
+        await self.reported(lambda r: r.armable, "a robot to be had")
+        self.say(op="take", robot="r1")
+        self.x = 1.0
+        await until(lambda: any(speeds(bridge)), "motion")
+
+
+def speeds(bridge):
+    return [t.message["msg"]["linear"]["x"] for t in bridge.of("publish", "/cmd_vel")]
+
+
+def robot(bridge, **more):
+    return spec(bridge_url=bridge.url, stops_within=0.25, v_max=0.25, **more)
+
+
+@contextlib.asynccontextmanager
+async def driving(folder, **more):
+    async with noting_bridge() as bridge, Running(folder) as gate:
+        gate.shell.tell(robot(bridge, **more))
+        await gate.drive_off(bridge)
+        yield bridge, gate
+
+
+@in_loop
+async def test_a_gate_whose_display_has_ended_stops_its_robots_and_ends(tmp_path):
+    async with driving(tmp_path) as (bridge, gate):
+        before = asyncio.get_running_loop().time()
+        await gate.end()
+        assert asyncio.get_running_loop().time() - before < shell.DRAIN + 5.0
+        assert not gate.shell.failed
+        await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
+        await until(lambda: not bridge.links, "the end of the links")
+
+
+@in_loop
+async def test_goals_that_are_to_be_cancelled_are_before_the_gate_ends(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(shell, "DRAIN", 30.0)
+    async with noting_bridge() as bridge, Running(tmp_path) as gate:
+        gate.shell.tell(
+            robot(bridge, action="/go", cancel_topic=None, on_operator_loss="cancel")
+        )
+        await gate.reported(lambda r: r.armable, "a robot to be had")
+        await until(lambda: bridge.of("advertise", "/goal"), "the link of goals")
+        gate.say(op="take", robot="r1")
+        await gate.reported(lambda r: r.holder is not None, "the lease")
+        epoch, tick = gate.report().epoch, gate.tick
+        goal = {"op": "goal", "robot": "r1", "epoch": epoch, "seq": 1, "tick": tick}
+        gate.say(**goal, x=1.0, y=2.0, yaw=0.0)
+        await until(lambda: bridge.of("send_action_goal"), "the goal")
+        await until(lambda: len(bridge.of("advertise", "/goal")) == 2, "the next link")
+        await gate.end()
+        assert [t.message["service"] for t in bridge.of("call_service")] == [
+            "/go/_action/cancel_goal"
+        ]
+
+
+@in_loop
+async def test_a_hook_that_hangs_does_not_keep_the_gate_alive(tmp_path):
+    hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+    async with noting_bridge() as bridge, Running(tmp_path) as gate:
+        bridge.answers_services = False
+        gate.shell.tell(robot(bridge, stop_hooks=(hook,)))
+        await gate.reported(lambda r: r.armable, "a link")
+        gate.say(op="stop", robot="r1")
+        await until(lambda: bridge.of("call_service"), "the call")
+        before = asyncio.get_running_loop().time()
+        await gate.end()
+        assert asyncio.get_running_loop().time() - before < shell.DRAIN + 5.0
+        bridge.unblock()
+
+
+@pytest.mark.parametrize("where", ["handle", "step"])
+@in_loop
+async def test_a_gate_that_fails_sends_zero_and_ends(
+    tmp_path, monkeypatch, caplog, where
+):
+    async with driving(tmp_path) as (bridge, gate):
+
+        def fail(*_):
+            raise ArithmeticError("a slip")
+
+        gate.x = None
+        moves = len(speeds(bridge))
+        monkeypatch.setattr(gate.shell._gate, where, fail)
+        gate.shell.tell(messages.Heartbeat())
+        await gate.work
+        assert gate.shell.failed
+        assert "every driven robot is stopped" in caplog.text
+        assert "ArithmeticError: a slip" in caplog.text
+        await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
+        await until(lambda: not bridge.links, "the end of the links")
+        assert 0.0 in speeds(bridge)[moves:]
+        gate._hand.cancel()
+
+
+@in_loop
+async def test_a_link_that_stalls_is_cut_and_on_the_next_zero_goes_first(tmp_path):
+    async with driving(tmp_path) as (bridge, gate):
+        links = set(bridge.links)
+        for link in links:
+            bridge.transport_of(link).pause_reading()
+        await gate.reported(lambda r: r.link == "down", "a link that is cut")
+        for link in links & bridge.links:
+            bridge.transport_of(link).resume_reading()
+
+        def on_the_next():
+            told = bridge.of("publish", "/cmd_vel")
+            return [
+                t.message["msg"]["linear"]["x"] for t in told if t.link not in links
+            ]
+
+        await until(on_the_next, "a velocity on another link")
+        assert on_the_next()[0] == 0.0
+
+
+@in_loop
+async def test_a_robot_that_another_gate_has_is_asked_for_until_it_is_free(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(shell, "LOCK_RETRY", 0.05)
+    other = Locks(tmp_path)
+    async with noting_bridge() as bridge, Running(tmp_path) as gate:
+        key = Key(bridge.url, "/cmd_vel")
+        assert other.acquire(key).held
+        gate.shell.tell(robot(bridge))
+        await gate.reported(
+            lambda r: "another WebMap" in (r.reason or ""), "the reason"
+        )
+        assert not gate.report().armable
+        other.release(key)
+        await gate.reported(lambda r: r.armable, "a robot to be had")
+
+
+@in_loop
+async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(shell, "LOCK_RETRY", 0.05)
+    other = Locks(tmp_path)
+    async with noting_bridge() as bridge, Running(tmp_path) as gate:
+        key = Key(bridge.url, "/cmd_vel")
+        assert other.acquire(key).held
+        gate.shell.tell(robot(bridge))
+        await gate.reported(lambda r: not r.armable, "that it is not to be had")
+        gate.shell.tell(messages.Forget("r1"))
+        gone = messages.RobotGone("r1")
+        await until(lambda: gone in gate.said, "the end of the robot")
+        assert gate.shell._waiting_for_lock == {}
+        other.release(key)
+        assert other.acquire(key).held, "nobody else asks for it"
+
+
+@in_loop
+async def test_a_robot_that_is_forgotten_may_be_had_by_another_gate(tmp_path):
+    async with noting_bridge() as bridge, Running(tmp_path) as gate:
+        key = Key(bridge.url, "/cmd_vel")
+        gate.shell.tell(robot(bridge))
+        await gate.reported(lambda r: r.armable, "a robot to be had")
+        assert not Locks(tmp_path).acquire(key).held
+        gate.shell.tell(messages.Forget("r1"))
+        await until(lambda: Locks(tmp_path).acquire(key).held, "the lock")
+
+
+@in_loop
+async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, caplog):
+    async with noting_bridge() as bridge, Running(tmp_path) as gate:
+        path = path_of(tmp_path, Key(bridge.url, "/cmd_vel"), "stop")
+        path.write_bytes(b"\xff{")
+        gate.shell.tell(robot(bridge))
+        await gate.reported(lambda r: r.latched, "the STOP")
+        assert gate.report().stop.by == UNKNOWN
+        assert "cannot be read" in caplog.text
+        gate.shell.tell(messages.Reset("r1"))
+        await gate.reported(lambda r: r.armable, "a robot to be had")
+        assert not path.exists()
+        assert not any(speeds(bridge))
+
+
+@in_loop
+async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_path):
+    async with driving(tmp_path) as (bridge, gate):
+        key = Key(bridge.url, "/cmd_vel")
+        Records(tmp_path).keep_latch(key, "Ben")
+        await gate.reported(lambda r: r.latched and r.stop.by == "Ben", "the STOP")
+        await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
+        gate.x = None
+        gate.shell.tell(messages.Reset("r1"))
+        await gate.reported(lambda r: not r.latched, "the reset")
+        assert Records(tmp_path).latch_of(key) is None
+        gate.say(op="stop", robot="r1")
+        await until(lambda: Records(tmp_path).latch_of(key) == "Ann", "the file")
