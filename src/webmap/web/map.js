@@ -1,16 +1,17 @@
+import { DragEnd } from "./drag_end.js";
+import { Following } from "./following.js";
+import { Operations, operated } from "./operations.js";
 import {
   apply,
-  fit,
   initialView,
   isSame,
   isShifted,
   isView,
   resize,
-  rotate,
-  scale,
   translate,
   unapply,
 } from "./view.js";
+import { ViewReports } from "./view_reports.js";
 
 /** @typedef {import('./view.js').Matrix} Matrix */
 /** @typedef {import('./view.js').Point} Point */
@@ -27,10 +28,6 @@ import {
  */
 
 const SVG = "http://www.w3.org/2000/svg";
-/** Milliseconds between two reports of the view, at least. */
-const REPORT_PERIOD = 100;
-/** Milliseconds for which the click that ends a drag may keep us waiting. */
-const CLICK_PATIENCE = 500;
 
 /**
  * A map on the page: an `<svg>` whose world group shows metres, x right and y up.
@@ -61,18 +58,11 @@ export class MapCanvas {
     this._onSelect = new Set();
     /** @type {string | null} */
     this._selected = null;
-    /** @type {Array<() => void>} Operations that wait until the map has a size. */
-    this._waiting = [];
-    this._follow = 0;
-    /** @type {Point | null} Where on the screen the followed element stays. */
-    this._place = null;
-    this._applied = 0;
+    this._operations = new Operations();
+    this._following = new Following();
+    this._reports = new ViewReports(() => this._report());
+    this._dragEnd = new DragEnd();
     this._session = 0;
-    this._reported = -Infinity;
-    /** @type {ReturnType<typeof setTimeout> | undefined} */
-    this._timer = undefined;
-    this._changed = false;
-    this._suppressed = -Infinity;
     this._matrix = svg.createSVGMatrix();
 
     this._setSize(size);
@@ -100,7 +90,7 @@ export class MapCanvas {
     const { signal } = this._ends;
     const options = { capture: true, signal };
     this.svg.addEventListener("click", (event) => this._filterClick(event), options);
-    this.svg.addEventListener("pointerdown", () => (this._suppressed = -Infinity), options);
+    this.svg.addEventListener("pointerdown", () => this._dragEnd.forget(), options);
     addEventListener("scroll", () => this.reportSoon(), { ...options, passive: true });
     this._observer = new ResizeObserver(() => this._resized());
     this._observer.observe(this.svg);
@@ -146,7 +136,7 @@ export class MapCanvas {
    */
   setView(view) {
     if (!isView(view) || isSame(view, this._view)) return;
-    if (isShifted(view, this._view)) this._stopFollowing();
+    if (isShifted(view, this._view)) this._following.start(0);
     this._program(view);
     this.reportSoon();
   }
@@ -204,28 +194,25 @@ export class MapCanvas {
 
   /** Swallow the click with which the browser ends a drag; call it when one ends. */
   suppressNextClick() {
-    this._suppressed = performance.now();
+    this._dragEnd.note(performance.now());
   }
 
   /** @param {MouseEvent} event */
   _filterClick(event) {
-    const waited = performance.now() - this._suppressed;
-    this._suppressed = -Infinity;
-    // A click without a pointer comes from a key and ends no drag.
-    if (event.detail === 0 || waited > CLICK_PATIENCE) return;
+    if (!this._dragEnd.swallows(event.detail, performance.now())) return;
     event.stopImmediatePropagation();
     event.preventDefault();
   }
 
   /** The element that the view follows, or 0. */
   get following() {
-    return this._follow;
+    return this._following.id;
   }
 
   /** @param {number} id The element to follow, or 0. */
   follow(id) {
-    this._follow = id;
-    this._place = this._followedPlace();
+    this._following.start(id);
+    this._following.settle(this._followedPlace());
     this.reportSoon();
   }
 
@@ -241,9 +228,9 @@ export class MapCanvas {
     this._session = state.session;
     const { applied, matrix, follow } =
       kept && kept.applied >= state.applied ? kept : state;
-    this._applied = Math.max(this._applied, applied);
+    this._operations.reach(applied);
     if (!matrix) return;
-    this._whenSized(() => {
+    this._operations.whenSized(this._sized, () => {
       if (isView(matrix)) this._change(matrix);
       this.follow(follow);
     });
@@ -251,8 +238,8 @@ export class MapCanvas {
 
   /** @returns {ViewState} */
   get state() {
-    const { _session: session, _applied: applied, _follow: follow } = this;
-    return { session, applied, matrix: this._view, follow };
+    const { applied } = this._operations;
+    return { session: this._session, applied, matrix: this._view, follow: this.following };
   }
 
   /**
@@ -261,10 +248,9 @@ export class MapCanvas {
    * @param {number[]} args
    */
   operate(number, operation, args) {
-    if (number <= this._applied) return;
-    this._applied = number;
-    this._changed = true;
-    this._whenSized(() => this._operate(operation, args));
+    if (!this._operations.reach(number)) return;
+    this._reports.note();
+    this._operations.whenSized(this._sized, () => this._operate(operation, args));
   }
 
   /**
@@ -272,33 +258,16 @@ export class MapCanvas {
    * @param {number[]} args
    */
   _operate(operation, args) {
-    const { _view: view, width, height } = this;
-    const [first, x = width / 2, y = height / 2] = args;
-    if (operation === "follow") this.follow(first);
-    else if (operation === "translate") this._program(translate(view, first, args[1]));
-    else if (operation === "scale") this._program(scale(view, first, x, y));
-    else if (operation === "rotate") this._program(rotate(view, first, x, y));
-    else if (operation === "fit") this._fit(args);
-    else if (operation === "set") this._set(args);
-  }
-
-  /** @param {number[]} bounds */
-  _fit([x0, y0, x1, y1]) {
-    this._stopFollowing();
-    this._program(fit(this._view, [x0, y0, x1, y1], this.width, this.height));
-  }
-
-  /** @param {number[]} numbers */
-  _set([a, b, c, d, e, f]) {
-    this._stopFollowing();
-    this._program({ a, b, c, d, e, f });
+    const { view, follow } = operated(this._view, this, operation, args);
+    if (follow !== undefined) this.follow(follow);
+    if (view !== undefined) this._program(view);
   }
 
   /** @param {Matrix} view */
   _program(view) {
     if (!isView(view)) return;
     this._change(view);
-    this._place = this._followedPlace();
+    this._following.settle(this._followedPlace());
   }
 
   /**
@@ -307,16 +276,17 @@ export class MapCanvas {
    * @param {boolean} reselected Whether another robot may be selected.
    */
   settle(reselected) {
-    this._keepUp();
+    const shift = this._following.shift(this._followedPlace());
+    if (shift) this._change(translate(this._view, shift.x, shift.y));
     if (reselected) this._checkSelection();
-    if (this._changed) this._report();
+    this._reports.settle();
   }
 
   /** Leave the elements alone from now on. */
   destroy() {
     this._ends?.abort();
     this._observer?.disconnect();
-    clearTimeout(this._timer);
+    this._reports.end();
     this._overlay?.remove();
     this._onView.clear();
     this._onSelect.clear();
@@ -328,7 +298,7 @@ export class MapCanvas {
   _change(view) {
     this._view = view;
     this._show();
-    this._changed = true;
+    this._reports.note();
     for (const fn of [...this._onView]) fn(view);
   }
 
@@ -348,10 +318,8 @@ export class MapCanvas {
     if (before.width === after.width && before.height === after.height) return;
     Object.assign(this, after);
     this._change(resize(this._view, before, after));
-    if (this._sized) {
-      for (const operate of this._waiting.splice(0)) operate();
-    }
-    this._place = this._followedPlace();
+    if (this._sized) this._operations.goOn();
+    this._following.settle(this._followedPlace());
     this.reportSoon();
   }
 
@@ -359,33 +327,13 @@ export class MapCanvas {
     return this.width > 0 && this.height > 0;
   }
 
-  /** @param {() => void} operate */
-  _whenSized(operate) {
-    if (this._sized) operate();
-    else this._waiting.push(operate);
-  }
-
-  _stopFollowing() {
-    this._follow = 0;
-    this._place = null;
-  }
-
   /** @returns {Point | null} Where the followed element is, in the map's pixels. */
   _followedPlace() {
-    if (!this._follow) return null;
-    const element = this._surroundings.find(this._follow);
+    if (!this.following) return null;
+    const element = this._surroundings.find(this.following);
     if (!(element instanceof SVGGraphicsElement)) return null;
     const matrix = element.getCTM();
     return matrix && { x: matrix.e, y: matrix.f };
-  }
-
-  _keepUp() {
-    const now = this._followedPlace();
-    if (!now) return;
-    this._place ??= now;
-    const [x, y] = [this._place.x - now.x, this._place.y - now.y];
-    if (Math.hypot(x, y) < 0.01) return;
-    this._change(translate(this._view, x, y));
   }
 
   _checkSelection() {
@@ -398,16 +346,10 @@ export class MapCanvas {
 
   /** Tell the server of the view, soon and not too often. */
   reportSoon() {
-    this._changed = true;
-    const wait = this._reported + REPORT_PERIOD - performance.now();
-    this._timer ??= setTimeout(() => this._report(), Math.max(0, wait));
+    this._reports.soon();
   }
 
   _report() {
-    clearTimeout(this._timer);
-    this._timer = undefined;
-    this._changed = false;
-    this._reported = performance.now();
     const place = this.svg.getScreenCTM();
     this._surroundings.send({
       op: "view",
@@ -417,8 +359,8 @@ export class MapCanvas {
       height: this.height,
       left: place?.e ?? 0,
       top: place?.f ?? 0,
-      follow: this._follow,
-      applied: this._applied,
+      follow: this.following,
+      applied: this._operations.applied,
     });
   }
 }

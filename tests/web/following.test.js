@@ -1,0 +1,52 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+
+import { Following } from "../../src/webmap/web/following.js";
+
+const at = (x, y) => ({ x, y });
+
+test("who follows nothing shifts nothing", () => {
+  const following = new Following();
+  following.settle(at(1, 2));
+  assert.equal(following.shift(at(5, 5)), null);
+});
+
+test("the view is shifted by as much as the element has moved on the screen", () => {
+  const following = new Following();
+  following.start(7);
+  following.settle(at(100, 50));
+  assert.deepEqual(following.shift(at(103, 48)), at(-3, 2));
+  assert.deepEqual(following.shift(at(101, 50)), at(-1, 0), "its place is the same");
+});
+
+test("what nobody would see is let be", () => {
+  const following = new Following();
+  following.start(7);
+  following.settle(at(100, 50));
+  assert.equal(following.shift(at(100.005, 50)), null);
+});
+
+test("an element that comes later stays where it is first seen", () => {
+  const following = new Following();
+  following.start(7);
+  following.settle(null);
+  assert.equal(following.shift(null), null);
+  assert.equal(following.shift(at(10, 10)), null);
+  assert.deepEqual(following.shift(at(12, 10)), at(-2, 0));
+});
+
+test("a view that was changed otherwise makes a new place", () => {
+  const following = new Following();
+  following.start(7);
+  following.settle(at(100, 50));
+  following.settle(at(200, 50));
+  assert.deepEqual(following.shift(at(201, 50)), at(-1, 0));
+});
+
+test("nothing is followed any more when it has ended", () => {
+  const following = new Following();
+  following.start(7);
+  following.settle(at(100, 50));
+  following.start(0);
+  assert.equal(following.shift(at(150, 50)), null);
+});

@@ -1,0 +1,64 @@
+import assert from "node:assert/strict";
+import test from "node:test";
+
+import { REPORT_PERIOD, ViewReports } from "../../src/webmap/web/view_reports.js";
+
+/**
+ * @param {number} count
+ * @returns {{reports: ViewReports, times: number[], all: Promise<void>}} What reports,
+ *     when it did, and the promise that it did so often.
+ */
+function reporting(count) {
+  const times = [];
+  let end = () => {};
+  const all = new Promise((resolve) => {
+    end = () => resolve(undefined);
+  });
+  const reports = new ViewReports(() => {
+    times.push(performance.now());
+    if (times.length === count) end();
+  });
+  return { reports, times, all };
+}
+
+test("a change is reported soon, and the next one not too soon after it", async () => {
+  const first = reporting(1);
+  first.reports.soon();
+  first.reports.soon();
+  assert.equal(first.times.length, 0);
+  await first.all;
+
+  const second = reporting(2);
+  second.reports.soon();
+  second.reports.settle();
+  second.reports.soon();
+  await second.all;
+  // Timers may be a millisecond early by this clock.
+  assert.ok(second.times[1] - second.times[0] >= REPORT_PERIOD - 2);
+});
+
+test("a frame reports what changed, once", () => {
+  const { reports, times } = reporting(1);
+  reports.settle();
+  assert.equal(times.length, 0, "nothing changed");
+  reports.note();
+  reports.settle();
+  reports.settle();
+  assert.equal(times.length, 1);
+});
+
+test("what a frame reported is not reported again by the timer", async () => {
+  const { reports, times } = reporting(2);
+  reports.soon();
+  reports.settle();
+  await new Promise((resolve) => setTimeout(resolve, 5));
+  assert.equal(times.length, 1);
+});
+
+test("a map that is gone reports nothing", async () => {
+  const { reports, times } = reporting(1);
+  reports.soon();
+  reports.end();
+  await new Promise((resolve) => setTimeout(resolve, 5));
+  assert.equal(times.length, 0);
+});
