@@ -67,7 +67,21 @@ class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
         return Quaternion(self.x, self.y, self.z, self.w)
 
 
-class PoseMsg(msgspec.Struct, frozen=True):
+class Unstamped(msgspec.Struct, frozen=True):
+    """A type without a header, which is asked the same as one that has it."""
+
+    @property
+    def frame_id(self) -> str:
+        """Empty: this type does not say in which frame it is."""
+        return ""
+
+    @property
+    def stamp(self) -> float:
+        """0: this type does not say when it was measured."""
+        return 0.0
+
+
+class PoseMsg(Unstamped, frozen=True):
     """``geometry_msgs/Pose``."""
 
     position: PointMsg
@@ -100,16 +114,6 @@ class PoseMsg(msgspec.Struct, frozen=True):
     def place(self) -> "PoseMsg":
         """The pose itself; every view of a pose has one of this name."""
         return self
-
-    @property
-    def frame_id(self) -> str:
-        """Empty: this type does not say in which frame it is."""
-        return ""
-
-    @property
-    def stamp(self) -> float:
-        """0: this type does not say when it was measured."""
-        return 0.0
 
 
 class Stamped(msgspec.Struct, frozen=True, kw_only=True):
@@ -156,7 +160,7 @@ class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
         return self.pose.pose
 
 
-class Pose2DMsg(msgspec.Struct, frozen=True, gc=False):
+class Pose2DMsg(Unstamped, frozen=True, gc=False):
     """``geometry_msgs/Pose2D``."""
 
     x: float
@@ -172,16 +176,6 @@ class Pose2DMsg(msgspec.Struct, frozen=True, gc=False):
             PointMsg(self.x, self.y),
             QuaternionMsg(turned.x, turned.y, turned.z, turned.w),
         )
-
-    @property
-    def frame_id(self) -> str:
-        """Empty: this type does not say in which frame it is."""
-        return ""
-
-    @property
-    def stamp(self) -> float:
-        """0: this type does not say when it was measured."""
-        return 0.0
 
 
 class TwistMsg(msgspec.Struct, frozen=True):
@@ -209,17 +203,11 @@ class TwistWithCovarianceMsg(msgspec.Struct, frozen=True):
     twist: TwistMsg
 
 
-class OdometryMsg(Stamped, frozen=True, kw_only=True):
-    """``nav_msgs/Odometry``."""
+class OdometryMsg(PoseWithCovarianceStampedMsg, frozen=True, kw_only=True):
+    """``nav_msgs/Odometry``: the same pose, and a velocity."""
 
-    pose: PoseWithCovarianceMsg
     twist: TwistWithCovarianceMsg
     child_frame_id: str = ""
-
-    @property
-    def place(self) -> PoseMsg:
-        """Place and orientation in :attr:`frame_id`."""
-        return self.pose.pose
 
     @property
     def velocity(self) -> Twist:
