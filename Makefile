@@ -69,7 +69,7 @@ test-fast: $(DEV)
 test-web: $(NODE)
 	node --test $$(find tests/web -name '*.test.js' | sort)
 
-## test-gate: every branch of what the gate decides is taken by a test
+## test-gate: every branch of the gate, its sockets and process too, is taken by a test
 .PHONY: test-gate
 test-gate: $(DEV)
 	$(BIN)/pytest -q -n $(JOBS) tests/gate --ignore tests/gate/test_gate_client.py \
