@@ -40,7 +40,7 @@ class FoundFleet:
             grid: Whether the robots' own map is shown under them.
 
         """
-        from webmap.cli.latecomers import LateRobots, Looking, greet
+        from webmap.cli.latecomers import LateRobots, LookingForRobots, greet
 
         late = LateRobots(console)
         for robot, about in self.robots:
@@ -51,7 +51,7 @@ class FoundFleet:
         names += [robot.name for robot, _ in self.robots]
         came = greet(late, names, self.stops_within, grid=grid)
         for bridge, robots in self.known:
-            _services.append(Looking(bridge, robots, came))
+            _services.append(LookingForRobots(bridge, robots, came))
 
 
 _services: list[object] = []

@@ -1,15 +1,15 @@
 """What else is drawn of robots that were found: all that their topics offer."""
 
-import asyncio
 import logging
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from webmap.cli.looking import Looking
 from webmap.discovery import FoundRobot, discover
+from webmap.discovery.late_frames import late_frames
 from webmap.discovery.layers import FoundLayer, Kind, find_layers
 from webmap.discovery.robots import host_name
-from webmap.errors import BridgeError, WebMapError
-from webmap.lifecycle import lifecycle
+from webmap.errors import WebMapError
 from webmap.scope import no_scope
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ def draw_layers(bridges: Sequence["Bridge"], robots: Sequence["Robot"]) -> None:
     _services.extend(DrawnLayers(bridge, robots) for bridge in bridges)
 
 
-class DrawnLayers:
-    """Looks what can be drawn behind a bridge; a service of the process.
+class DrawnLayers(Looking):
+    """Looks again and again what can be drawn behind a bridge, and draws it.
 
     Args:
         bridge: The bridge.
@@ -45,34 +45,19 @@ class DrawnLayers:
     """
 
     def __init__(self, bridge: "Bridge", robots: Sequence["Robot"]) -> None:
-        self.bridge = bridge
+        super().__init__(bridge)
         self._robots = robots
         self._drawn: set[tuple[int, str]] = set()
-        self._task: asyncio.Task[None] | None = None
-        lifecycle.add(self)
 
-    def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to look."""
-        self._task = loop.create_task(self._look_on())
+    @property
+    def period(self) -> float:
+        """Seconds between two looks from now on."""
+        return LATER if self._drawn else SOON
 
-    async def stop(self) -> None:
-        """Look no more."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
-
-    async def _look_on(self) -> None:
-        while True:
-            try:
-                if self.bridge.state == "open":
-                    self.take(await self.bridge.topics())
-            except BridgeError as error:
-                log.debug("%s: %s", self.bridge.url, error)
-            await asyncio.sleep(LATER if self._drawn else SOON)
-
-    def take(self, topics: dict[str, str]) -> None:
+    async def take(self, topics: dict[str, str]) -> None:
         """Draw what is new among the topics behind the bridge."""
-        found = discover(topics, host_name(self.bridge.url)).robots
+        trees = late_frames(self.bridge).trees
+        found = discover(topics, host_name(self.bridge.url), trees).robots
         layers = find_layers(topics, [robot.namespace for robot in found])
         for one in found:
             robot = self._shown(one)
@@ -93,11 +78,23 @@ class DrawnLayers:
         topic = found.topic("odometry") or found.topic("pose")
         for robot in self._robots:
             feed = robot.feed
+            if feed is None and self._has_base(robot, found):
+                return robot
             if feed is None and robot.name == found.name:
                 return robot
             if feed is not None and feed.bridge is self.bridge and feed.topic == topic:
                 return robot
         return None
+
+    def _has_base(self, robot: "Robot", found: FoundRobot) -> bool:
+        """Return whether a robot is drawn by the base frame of one that was found."""
+        frames = robot.tf
+        if frames is None or frames["bridge"] is not self.bridge:
+            return False
+        space = found.tf_namespace or ""
+        names = (found.base_frame, f"{space}/{found.base_frame}".strip("/"))
+        mine = frames["namespace"] == space and frames["base_frame"] in names
+        return found.base_frame != "" and mine
 
     def _draw(self, robot: "Robot", layer: FoundLayer, namespace: str) -> None:
         bridge, topic = self.bridge, layer.topic

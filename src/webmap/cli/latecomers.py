@@ -1,22 +1,21 @@
 """Robots that appear while the console runs."""
 
-import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
+from webmap.cli.looking import Looking
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
 from webmap.core.alignment_store import store
 from webmap.discovery import FoundRobot, discover
+from webmap.discovery.late_frames import late_frames
 from webmap.discovery.naming import same_name
 from webmap.discovery.newcomers import Newcomers, News
 from webmap.discovery.robots import host_name
 from webmap.discovery.words import in_one_line
-from webmap.errors import BridgeError
-from webmap.lifecycle import lifecycle
 from webmap.scope import no_scope
 
 if TYPE_CHECKING:
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
 
 PERIOD = 5.0
 """Seconds between two looks."""
-
-LONGEST = 60.0
-"""Seconds between two looks at a rosapi that does not answer: each costs a call."""
 
 
 class LateRobots:
@@ -74,8 +70,10 @@ class LateRobots:
             self._console.add_grid(bridge, topic)
 
 
-class Looking:
-    """Looks again and again what is behind a bridge; a service of the process.
+class LookingForRobots(Looking):
+    """Looks again and again which robots are behind a bridge.
+
+    Their topics tell, and the frames that are heard for a moment at each look.
 
     Args:
         bridge: The bridge.
@@ -84,44 +82,24 @@ class Looking:
 
     """
 
+    period = PERIOD
+
     def __init__(
         self,
         bridge: "Bridge",
         known: Iterable[FoundRobot],
         came: Callable[[News, "Bridge"], object],
     ) -> None:
-        self.bridge = bridge
+        super().__init__(bridge)
         self._newcomers = Newcomers(known)
         self._came = came
-        self._task: asyncio.Task[None] | None = None
-        lifecycle.add(self)
 
-    def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to look."""
-        self._task = loop.create_task(self._look_on())
-
-    async def stop(self) -> None:
-        """Look no more."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
-
-    async def _look_on(self) -> None:
-        pause = PERIOD
-        while True:
-            await asyncio.sleep(pause)
-            if self.bridge.state != "open":
-                pause = PERIOD
-                continue
-            try:
-                topics = await self.bridge.topics()
-            except BridgeError:
-                pause = min(2 * pause, LONGEST)
-                continue
-            pause = PERIOD
-            found = discover(topics, host_name(self.bridge.url))
-            for news in self._newcomers.look(found):
-                self._came(news, self.bridge)
+    async def take(self, topics: dict[str, str]) -> None:
+        """Tell what is new among the robots."""
+        trees = await late_frames(self.bridge).listen(topics)
+        found = discover(topics, host_name(self.bridge.url), trees)
+        for news in self._newcomers.look(found):
+            self._came(news, self.bridge)
 
 
 def greet(

@@ -1,0 +1,115 @@
+"""Robots of nothing but a shared ``/tf`` are found while others are shown already."""
+
+import asyncio
+import time
+
+import pytest
+from frames_only import TF, telling
+
+from webmap import Bridge
+from webmap.cli.found_layers import DrawnLayers, _services, draw_layers
+from webmap.cli.latecomers import LateRobots, LookingForRobots, greet
+from webmap.console import Console
+from webmap.discovery import discover
+from webmap.discovery.late_frames import LateFrames, late_frames
+from webmap.discovery.tf_robots import Trees
+from webmap.geometry import Pose
+
+CLOUD = "sensor_msgs/PointCloud2"
+
+
+def chain(name: str, x: float, y: float) -> list:
+    """The frames of a robot, whose names begin with its own."""
+    odom, base = f"{name}/odom", f"{name}/base_footprint"
+    return [("map", odom, Pose(x, 0.0, 0.0)), (odom, base, Pose(0.0, y, 0.5))]
+
+
+async def until(condition, seconds: float = 30.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Looks that follow one another quickly."""
+    monkeypatch.setattr(LookingForRobots, "period", 0.05)
+    monkeypatch.setattr(DrawnLayers, "period", 0.05)
+    monkeypatch.setitem(LateFrames.listen.__kwdefaults__, "seconds", 0.3)
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
+    quick, dialect, capsys
+):
+    told = {"/tf": chain("ann", 1.0, 2.0)}
+    extra = {"/ann/points": CLOUD, "/bob/points": CLOUD}
+    with telling(told, dialect, extra) as url:
+
+        async def scenario() -> None:
+            loop = asyncio.get_running_loop()
+            bridge = Bridge(url)
+            console = Console()
+            late = LateRobots(console)
+            topics = {"/tf": TF, **extra}
+            trees = Trees()
+            for parent, child, _ in told["/tf"]:
+                trees.take("", parent, child)
+            (ann,) = discover(topics, "host", trees).robots
+            looking = LookingForRobots(bridge, [ann], greet(late, ["ann"], None))
+            draw_layers([bridge], console.robots)
+            drawing = _services[-1]
+            bridge.start(loop)
+            for service in (looking, drawing):
+                service.start(loop)
+            try:
+                await until(lambda: late_frames(bridge).trees.parents)
+                told["/tf"] += chain("bob", 5.0, 3.0)
+                await until(lambda: late.robots)
+                (bob,) = late.robots
+                assert (bob.name, console.robots) == ("bob", [bob])
+                assert bob.tf["base_frame"] == "bob/base_footprint"
+                await until(lambda: bob.valid)
+                assert (bob.position.x, bob.position.y) == pytest.approx((5.0, 3.0))
+                assert bob.yaw == pytest.approx(0.5)
+                # What its name is in front of is drawn as its own.
+                await until(lambda: "/bob/points" in bridge._topics)
+                assert "/ann/points" not in bridge._topics
+                bob.destroy()
+                await looking.stop()
+                assert "/tf" not in bridge._topics, "it is heard for a moment only"
+            finally:
+                for service in (looking, drawing, bridge):
+                    await service.stop()
+
+        asyncio.run(scenario())
+    assert capsys.readouterr().err.count("A robot appeared") == 1
+
+
+def test_a_bridge_without_frames_is_not_listened_to():
+    async def scenario() -> None:
+        late = late_frames(Bridge("ws://127.0.0.1:9"))
+        began = time.monotonic()
+        assert (await late.listen({"/odom": "nav_msgs/Odometry"})).parents == {}
+        assert time.monotonic() - began < 0.5
+
+    asyncio.run(scenario())
+
+
+def test_what_was_heard_once_is_kept_for_the_next_look():
+    with telling({"/tf": chain("ann", 1.0, 2.0)}) as url:
+
+        async def scenario() -> None:
+            bridge = Bridge(url)
+            bridge.start(asyncio.get_running_loop())
+            try:
+                await until(lambda: bridge.state == "open")
+                late = late_frames(bridge)
+                heard = await late.listen({"/tf": TF}, seconds=0.5)
+                assert [base.space for base in heard.bases()] == ["/ann"]
+                assert late_frames(bridge).trees.bases() == heard.bases()
+            finally:
+                await bridge.stop()
+
+        asyncio.run(scenario())
