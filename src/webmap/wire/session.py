@@ -27,6 +27,7 @@ from webmap.wire.messages import (
 )
 from webmap.wire.mounts import Mount, flags
 from webmap.wire.opcodes import RESET, VERSION, Op
+from webmap.wire.unsaid import Unsaid
 
 _HEADER = struct.Struct("<HBId").pack
 
@@ -42,9 +43,6 @@ class SceneSession:
 
     WINDOW = 2
     HEARTBEAT = 1.0
-    MESSAGES_KEPT = 1000
-    BYTES_KEPT = 256 * 1024
-    NOTICES_KEPT = 5
 
     def __init__(self) -> None:
         self._key = secrets.randbits(31)
@@ -56,16 +54,8 @@ class SceneSession:
         self._numbers = itertools.count(1)
         self._frame = 0
         self._seen = 0
-        self._tell_all = False
         self._spoke = math.inf
-        # What is next in the coming frame, by kind; all but messages can be made
-        # again from the state above.
-        self._gone = bytearray()
-        self._new: list[int] = []
-        self._records = bytearray()
-        self._messages: list[bytes] = []
-        # The newest notices, which a page that was loaded again is told again.
-        self._notices: dict[bytes, None] = {}
+        self._unsaid = Unsaid()
 
     # Fragments ------------------------------------------------------------------
 
@@ -99,7 +89,7 @@ class SceneSession:
         number = next(self._numbers)
         self._mounts[number] = Mount(number, fragment, within or 0, under, order)
         self._fragments.setdefault(fragment, None)
-        self._new.append(number)
+        self._unsaid.new.append(number)
         return number
 
     def unmount(self, mount: int) -> None:
@@ -116,10 +106,10 @@ class SceneSession:
             self._forget(canvas)
         if all(m.fragment is not gone.fragment for m in self._mounts.values()):
             del self._fragments[gone.fragment]
-        if mount in self._new:
-            self._new.remove(mount)
+        if mount in self._unsaid.new:
+            self._unsaid.new.remove(mount)
         else:
-            self._gone += bytes((Op.UNMOUNT, *varint(mount)))
+            self._unsaid.gone += bytes((Op.UNMOUNT, *varint(mount)))
 
     def _forget(self, canvas: Canvas) -> None:
         del self._canvases[canvas.svg]
@@ -142,7 +132,7 @@ class SceneSession:
                     place.classes[word] = None
                 else:
                     del place.classes[word]
-                self._record(place.class_record(word, on))
+                self._unsaid.record(place.class_record(word, on))
 
     def listen(
         self,
@@ -162,13 +152,13 @@ class SceneSession:
         check_event(event)
         place = self._mount(mount)
         place.listening[element, event] = flags(prevent=prevent, stop=stop)
-        self._record(place.listen_record(element, event))
+        self._unsaid.record(place.listen_record(element, event))
 
     def unlisten(self, mount: int, element: int, event: str) -> None:
         """Undo :meth:`listen`; it does nothing if there is nothing to undo."""
         place = self._mounts.get(mount)
         if place and place.listening.pop((element, event), None) is not None:
-            self._record(place.listen_record(element, event))
+            self._unsaid.record(place.listen_record(element, event))
 
     def fragment(self, mount: int) -> Fragment | None:
         """Return the fragment of a mount, or None if it is not on the page."""
@@ -188,7 +178,7 @@ class SceneSession:
         if canvas is None:
             canvas = self._find_canvas(map_element)
             self._canvases[map_element] = canvas
-            self._record(canvas.state(self._key))
+            self._unsaid.record(canvas.state(self._key))
         return canvas
 
     def _find_canvas(self, map_element: int) -> Canvas:
@@ -215,7 +205,7 @@ class SceneSession:
 
         """
         canvas = self._canvas(map_element)
-        self._record(canvas.operate(operation, args))
+        self._unsaid.record(canvas.operate(operation, args))
 
     def attach(
         self,
@@ -240,46 +230,28 @@ class SceneSession:
         record += string(module_url) + string(css_url or "")
         record += string(msgspec.json.encode(options).decode())
         self._attached[instance] = (map_element, bytes(record))
-        self._record(record)
+        self._unsaid.record(record)
 
     def detach(self, instance: int) -> None:
         """Take the browser's half of a module away."""
         if self._attached.pop(instance, None) is not None:
-            self._record(bytes((Op.DETACH, *varint(instance))))
+            self._unsaid.record(bytes((Op.DETACH, *varint(instance))))
 
     def send(self, instance: int, message: dict[str, Any]) -> None:
         """Send a message to the browser's half of a module."""
         if instance in self._attached:
             text = msgspec.json.encode(message).decode()
-            self._say(bytes((Op.MESSAGE, *varint(instance))) + string(text))
+            self._unsaid.message(bytes((Op.MESSAGE, *varint(instance))) + string(text))
 
     def error(self, text: str) -> None:
         """Show a notice on the page, and again after it was loaded again."""
-        record = bytes((Op.ERROR,)) + string(text)
-        self._notices.pop(record, None)
-        self._notices[record] = None
-        if len(self._notices) > self.NOTICES_KEPT:
-            del self._notices[next(iter(self._notices))]
-        self._say(record)
-
-    def _say(self, record: bytes) -> None:
-        if len(self._messages) >= self.MESSAGES_KEPT:
-            # A page that looks away this long wants the newest.
-            del self._messages[0]
-        self._messages.append(record)
-
-    def _record(self, record: bytes | bytearray) -> None:
-        self._records += record
-        if len(self._records) > self.BYTES_KEPT:
-            # All of it can be made again from what is kept, and that is less.
-            self._records.clear()
-            self._tell_all = True
+        self._unsaid.notice(text)
 
     # The socket -----------------------------------------------------------------
 
     def restart(self) -> None:
         """Tell everything again, because the page has a new socket or lost track."""
-        self._tell_all = True
+        self._unsaid.tell_all = True
         self._seen = self._frame
 
     def receive(self, text: str | bytes) -> list[PageEvent]:
@@ -330,34 +302,32 @@ class SceneSession:
         """
         if self._frame - self._seen >= self.WINDOW:
             return None
-        body = None if self._tell_all else self._changes()
+        body = None if self._unsaid.tell_all else self._changes()
         if body == b"" and now - self._spoke < self.HEARTBEAT:
             return None
         if body is None:
             body = self._everything()
-        head = _HEADER(VERSION, RESET * self._tell_all, self._frame + 1, now)
+        head = _HEADER(VERSION, RESET * self._unsaid.tell_all, self._frame + 1, now)
         self._frame += 1
         self._spoke = now
-        self._tell_all = False
-        self._gone, self._records = bytearray(), bytearray()
-        self._new, self._messages = [], []
+        self._unsaid.said()
         return head + body
 
     def _changes(self) -> bytes | None:
         """Return what is new since the last frame; None if it was forgotten."""
-        parts: list[bytes | bytearray] = [self._gone]
+        parts: list[bytes | bytearray] = [self._unsaid.gone]
         fragments = self._fragments
         for fragment, known in fragments.items():
             revision = fragment.revision
             if known != revision and known is not None:
                 changes = encode_changes(fragment, known)
                 if changes is None:
-                    self._tell_all = True
+                    self._unsaid.tell_all = True
                     return None
                 parts.append(changes)
                 fragments[fragment] = revision
-        parts += [self._place(self._mounts[number]) for number in self._new]
-        return b"".join((*parts, self._records, *self._messages))
+        parts += [self._place(self._mounts[number]) for number in self._unsaid.new]
+        return b"".join((*parts, self._unsaid.records, *self._unsaid.messages))
 
     def _place(self, mount: Mount) -> bytes:
         self._fragments[mount.fragment] = mount.fragment.revision
@@ -369,5 +339,5 @@ class SceneSession:
         for canvas in self._canvases.values():
             parts += (canvas.state(self._key), canvas.unreported)
         parts += [record for _, record in self._attached.values()]
-        parts += [record for record in self._notices if record not in self._messages]
-        return b"".join((*parts, *self._messages))
+        parts += self._unsaid.notices_again()
+        return b"".join((*parts, *self._unsaid.messages))
