@@ -191,6 +191,28 @@ def test_space_and_escape_stop_the_robot(bench: Bench, key: str) -> None:
     bench.still(tolerance=0.05)
 
 
+@pytest.mark.parametrize("key", ["Space", "Escape"])
+def test_with_no_robot_selected_they_stop_all(bench: Bench, key: str) -> None:
+    bench.page.keyboard.press(key)
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
+
+
+def test_escape_in_a_dialog_that_is_not_modal_is_stop(bench: Bench) -> None:
+    bench.drive()
+    bench.page.evaluate(
+        """() => {
+            const dialog = document.createElement('dialog');
+            dialog.append(document.createElement('button'));
+            dialog.dataset.handsOff = '';
+            document.body.append(dialog);
+            bench.mark(() => dialog.show());
+        }"""
+    )
+    bench.still(tolerance=0.15)
+    bench.page.keyboard.press("Escape")
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "r1"}])
+
+
 def test_shift_and_escape_stop_all(bench: Bench) -> None:
     bench.page.keyboard.press("Shift+Escape")
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])

@@ -153,6 +153,29 @@ def test_a_pointer_that_is_captured_elsewhere_is_neutral(touched: Bench) -> None
     touched.still()
 
 
+def test_a_capture_that_is_told_to_be_lost_is_neutral_at_once(touched: Bench) -> None:
+    drive_by_finger(touched)
+    held = touched.page.evaluate(
+        """() => {
+            const pad = document.querySelector('.webmap-stick');
+            const ids = Array.from({length: 100}, (_, id) => id);
+            const pointerId = ids.find((id) => pad.hasPointerCapture(id));
+            const pressed = () => [bench.drive.status.pressed,
+                                   pad.classList.contains('held')];
+            const before = pressed();
+            // Of another pointer it is no news.
+            const lost = (id) => pad.dispatchEvent(
+                new PointerEvent('lostpointercapture', {pointerId: id}));
+            lost(pointerId + 1);
+            const other = pressed();
+            lost(pointerId);
+            return [before, other, pressed()];
+        }"""
+    )
+    assert held == [[True, True], [True, True], [False, False]]
+    touched.still(tolerance=0.05)
+
+
 @pytest.mark.parametrize("doubt", ["blur", "hidden", "lost focus"])
 def test_a_finger_that_rests_through_a_doubt_moves_nothing(
     touched: Bench, doubt: str

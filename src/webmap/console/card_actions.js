@@ -1,5 +1,6 @@
 import { byId } from "./dom.js";
 import { closeSheet } from "./sheet.js";
+import { StopTestButton } from "./stop_test.js";
 
 /** @typedef {import('./console.js').MapCanvas} MapCanvas */
 
@@ -12,7 +13,9 @@ import { closeSheet } from "./sheet.js";
  * @param {AbortSignal} signal
  */
 export function listenToActions(map, send, signal) {
+  const test = new StopTestButton(map.drive);
   const show = () => {
+    test.show(map.selected, performance.now());
     const button = document.querySelector("[data-act=follow]");
     const pressed = `${map.following !== 0}`;
     if (button?.getAttribute("aria-pressed") === pressed) return;
@@ -25,8 +28,8 @@ export function listenToActions(map, send, signal) {
     if (["follow", "send", "locate"].includes(button.dataset.act ?? "")) closeSheet();
     if (button.dataset.act === "cancel") map.drive.cancel(map.selected);
     if (button.dataset.act === "release") map.drive.release(map.selected);
-    if (button.dataset.act === "stop-test") map.drive.stopTest(map.selected);
-    if (button.dataset.act !== "follow") return;
+    if (button.dataset.act === "stop-test") test.press(map.selected, performance.now());
+    if (button.dataset.act !== "follow") return show();
     if (map.following) map.follow(0);
     else send({ op: "follow" });
     show();
@@ -35,6 +38,7 @@ export function listenToActions(map, send, signal) {
   const timer = setInterval(show, 250);
   const offs = [
     map.onView(show),
+    map.drive.on("robot", show),
     map.onSelect(() => {
       if (map.following) map.follow(0);
       show();

@@ -16,6 +16,7 @@ import { keepSizes, listenToTools } from "./view_tools.js";
  * @typedef {object} Report
  * @property {string} robot
  * @property {boolean} mine
+ * @property {{state: string, text: string} | null} [test] The newest stop test.
  *
  * @typedef {object} Drive
  * @property {string} state
@@ -25,6 +26,7 @@ import { keepSizes, listenToTools } from "./view_tools.js";
  * @property {(robot: string) => void} cancel
  * @property {(robot: string) => void} release
  * @property {(robot: string) => void} stopTest
+ * @property {() => void} doubt
  *
  * @typedef {object} MapCanvas
  * @property {SVGSVGElement} svg
@@ -62,7 +64,7 @@ export default function attach(map, options, send) {
   listenToTools(map, options, signal);
   listenToSearch(signal);
   listenToSheet(signal);
-  listenToHelp(signal);
+  listenToHelp(map.drive, signal);
   return {
     destroy() {
       ending.abort();

@@ -22,6 +22,7 @@ PARTS = (
     "names.js",
     "search.js",
     "sheet.js",
+    "stop_test.js",
     "view_tools.js",
 )
 """What console.js imports; a browser can load what was published."""

@@ -1,19 +1,36 @@
 import { byId, typing } from "./dom.js";
 
-/** @param {AbortSignal} signal */
-export function listenToHelp(signal) {
+/**
+ * Help lies beside STOP and is no modal dialog: that would take STOP's clicks, and Esc,
+ * which is STOP here too. While it is open no input moves a robot (`data-hands-off`), as
+ * it covers what the operator would have to see.
+ *
+ * @param {import('./console.js').Drive} drive
+ * @param {AbortSignal} signal
+ */
+export function listenToHelp(drive, signal) {
   const help = /** @type {HTMLDialogElement} */ (byId("help"));
-  byId("help-open").addEventListener("click", () => help.showModal(), { signal });
-  byId("help-close").addEventListener("click", () => help.close(), { signal });
-  const outside = (/** @type {MouseEvent} */ event) => {
-    if (event.target === help) help.close();
+  const turn = () => {
+    if (help.open) {
+      help.close();
+      byId("help-open").focus();
+    } else {
+      drive.doubt();
+      help.show();
+    }
+    byId("help-open").setAttribute("aria-expanded", `${help.open}`);
   };
-  help.addEventListener("click", outside, { signal });
+  byId("help-open").addEventListener("click", turn, { signal });
+  byId("help-close").addEventListener("click", turn, { signal });
+  const outside = (/** @type {PointerEvent} */ { target }) => {
+    const map = target instanceof Element && target.closest("svg.webmap");
+    if (help.open && map) turn();
+  };
+  document.addEventListener("pointerdown", outside, { signal });
   const key = (/** @type {KeyboardEvent} */ event) => {
     if (event.key !== "?" || typing(event)) return;
     event.preventDefault();
-    if (help.open) help.close();
-    else help.showModal();
+    turn();
   };
   document.addEventListener("keydown", key, { signal });
 }

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap import html, svg
 from webmap.console.cameras import CameraViews
+from webmap.console.own_stop import OwnStop
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.speeds import SpeedTable
 from webmap.console.tasks import GoalLine
@@ -24,6 +25,14 @@ ACTIONS = (
 
 console.js follows, cancels and hands back, since that must work over a bad link too.
 """
+
+TEST_WORDS = (
+    ("take", "Take it to test its stop"),
+    ("ready", "Test its stop"),
+    ("asking", "It will creep: press again"),
+    ("running", "Testing its stop"),
+)
+"""What the button of the stop test says; console.js says which, in ``data-test``."""
 
 
 class Goals(Protocol):
@@ -83,6 +92,7 @@ class RobotCard:
         self._goal = GoalLine()
         self._cameras = CameraViews()
         self._speeds = SpeedTable(most)
+        self._own_stop = OwnStop(most[0])
         element.append(*self._parts())
         self.on_select()
 
@@ -144,6 +154,7 @@ class RobotCard:
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
         self.element.set("data-tone", words.tone or None)
         self._speeds.show(robot)
+        self._own_stop.show(robot)
 
     def show_battery(self, battery: Any) -> None:
         """Show charge and voltage, as far as they are known."""
@@ -186,7 +197,7 @@ class RobotCard:
         buttons["send"].on("click", lambda event: self._goals.aim())
         buttons["locate"].on("click", lambda event: self._poses.aim())
         buttons["cancel"].on("click", lambda event: self._forget_goal())
-        actions = html.div(*buttons.values(), class_="actions")
+        actions = html.div(*buttons.values(), stop_test(), class_="actions")
         return [
             head,
             state,
@@ -197,6 +208,7 @@ class RobotCard:
             self._cameras.element,
             facts,
             *self._speeds.elements,
+            *self._own_stop.elements,
         ]
 
     def _forget_goal(self) -> None:
@@ -240,3 +252,13 @@ def action(act: str, symbol: str, words: str) -> "Element":
     """Return a button on which console.js acts."""
     element = html.button(icon(symbol), words, type="button", class_="button")
     return element.set("data-act", act)
+
+
+def stop_test() -> "Element":
+    """Return the button that lets a robot creep to see whether it stops by itself."""
+    words = [html.span(text=text, class_=name) for name, text in TEST_WORDS]
+    element = html.button(
+        icon("icon-test"), *words, type="button", class_="button", disabled=True
+    )
+    element.set("title", "Creeps, sends nothing any more, and sees when it stands")
+    return element.set("data-act", "stop-test").set("data-test", "take")

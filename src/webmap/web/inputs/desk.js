@@ -152,9 +152,8 @@ export class Desk {
     if (driven === null && event.code === "Escape") {
       for (const leave of this._escapes) if (leave()) return true;
     }
-    const robot = driven ?? choice;
-    if (robot === null) return false;
-    this._drive.stop(robot);
+    // With none to mean they mean all: a STOP too many is harmless.
+    this._drive.stop(driven ?? choice ?? "*");
     return true;
   }
 }
@@ -168,7 +167,7 @@ function keepsKey(event) {
   const target = event.target;
   if (!(target instanceof Element)) return false;
   if (event.code === "Escape") {
-    return target.closest("dialog, [popover], input, textarea") !== null;
+    return target.closest("dialog:modal, [popover], input, textarea") !== null;
   }
   return target.matches("input[type=checkbox], input[type=radio], select, summary");
 }

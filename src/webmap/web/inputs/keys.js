@@ -115,7 +115,7 @@ export class Keys {
     if (!escape && takesKeys(event.target)) return false;
     if (event.repeat) {
       // Held on, Space would scroll the page.
-      if (!escape && this._owner.wanted()) event.preventDefault();
+      if (!escape) event.preventDefault();
       return true;
     }
     if (!this._owner.stop(escape && event.shiftKey, event)) return false;

@@ -14,8 +14,8 @@ import { TwiceButton } from "./twice_button.js";
  * A button that stops all robots, always in sight, and what became of every STOP.
  *
  * Also covers the page with an alarm when a robot moves on although it was given zero.
- * Space and Escape stop the robot that is driven or selected, Shift and Escape all,
- * whether or not the map has a `Teleop`.
+ * Space and Escape stop the robot that is driven or selected, all while there is none,
+ * and Shift and Escape all, whether or not the map has a `Teleop`.
  *
  * @param {MapCanvas} map
  * @returns {Half}

@@ -123,6 +123,8 @@ export class Panel {
     }
     this._reset.show(report !== null && isLatched(report));
     this._tester.show(report !== null && mayTest(report));
+    const known = report?.stop_time != null;
+    this._tester.element.classList.toggle("known", known);
     this._stick.hidden = stick === null;
     set(this._stick, "aria-pressed", String(stick === true));
     set(this._stop, "aria-label", name ? `Stop ${name}` : "Stop the selected robot");
@@ -148,11 +150,11 @@ function actOf(report, asking) {
 
 /**
  * @param {RobotReport} report
- * @returns {boolean} Whether this page may find out that the robot stops by itself, which
- *     nobody knows yet.
+ * @returns {boolean} Whether this page may find out that the robot stops by itself: also
+ *     of one of which that is stated, or that was tested before.
  */
 function mayTest(report) {
-  return report.mine && report.stop_time === null && !isTested(report);
+  return report.mine && !isTested(report);
 }
 
 /** @param {number | null} delay */

@@ -27,13 +27,16 @@ export function takesKeys(target) {
   );
 }
 
+/** What covers the page, or says (`data-hands-off`) that nobody drives while it is open. */
+const COVERS = ":modal, dialog[open][data-hands-off]";
+
 /** @returns {boolean} Whether an input held now may move a robot. */
 export function attentive() {
   return (
     document.visibilityState === "visible" &&
     document.hasFocus() &&
     !takesKeys(document.activeElement) &&
-    document.querySelector(":modal") === null
+    document.querySelector(COVERS) === null
   );
 }
 

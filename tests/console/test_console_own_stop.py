@@ -1,0 +1,63 @@
+"""What the card says of a robot that nothing tells to stop any more."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from webmap.console.own_stop import NOBODY_KNOWS, OwnStop, bound
+
+
+def report(**changes):
+    known = {
+        "stop_time": 0.25,
+        "stop_source": "stated",
+        "stop_date": None,
+        "v": 2.0,
+        "brake": 0.5,
+        "test": None,
+    }
+    return SimpleNamespace(report=SimpleNamespace(**(known | changes)))
+
+
+def words(robot) -> str:
+    shown = OwnStop(1.0)
+    shown.show(robot)
+    return f"{shown._bound.text}|{shown._how.text}|{shown._test.text}"
+
+
+def test_the_bound_is_the_robot_s_timeout_and_its_braking_from_the_speed_in_force():
+    assert bound(0.25, "stated", 0.2, 0.5) == (
+        "stands within 0.65 s",
+        " 0.25 s (stated) + 0.40 s of braking from 0.20 m/s",
+    )
+
+
+def test_it_is_that_of_the_page_s_own_limit_where_the_robot_allows_more():
+    assert words(report()).startswith("stands within 2.25 s|")
+
+
+def test_the_result_of_a_stop_test_is_shown_with_its_date():
+    said = words(report(stop_time=0.31, stop_source="tested", stop_date="2026-11-21"))
+    assert "0.31 s (tested 2026-11-21)" in said
+
+
+@pytest.mark.parametrize(
+    ("source", "text"),
+    [(None, NOBODY_KNOWS), ("tested", "It does not stop by itself.")],
+)
+def test_a_robot_without_a_bound_is_said_to_have_none(source, text):
+    said = words(report(stop_time=None, stop_source=source, stop_date="2026-11-21"))
+    assert said.startswith(f"{text}|")
+
+
+def test_a_test_that_failed_says_why():
+    failed = SimpleNamespace(state="failed", text="it did not move within 1.5 s")
+    assert words(report(test=failed)).endswith(
+        "|Stop test: It did not move within 1.5 s."
+    )
+
+
+def test_a_robot_that_is_only_watched_has_no_such_line():
+    shown = OwnStop(1.0)
+    shown.show(SimpleNamespace(report=None))
+    assert shown.elements[0].get("hidden") is not None
