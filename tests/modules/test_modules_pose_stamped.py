@@ -79,3 +79,15 @@ def test_scans_are_told_apart_by_name(link, robot):
     plain = robot.add_module("LaserScanner", link, "/scan")
     assert list(front.svg.classes) == ["laserscan", "front"]
     assert list(plain.svg.classes) == ["laserscan"]
+
+
+def test_what_is_drawn_says_of_what_without_the_robots_own_namespace(link, robot):
+    names = {
+        "/bob/front/scan": "front/scan",  # the robot is called Bob
+        "/scan": "/scan",
+        "/bob": "/bob",
+        "/ann/scan": "/ann/scan",
+    }
+    for topic, name in names.items():
+        module = robot.add_module("LaserScanner", link, topic)
+        assert module.svg.get("data-layer") == name

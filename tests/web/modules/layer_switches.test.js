@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { hiding } from "../../../src/webmap/web/modules/layer_switches.js";
+import { hiding, several } from "../../../src/webmap/web/modules/layer_switches.js";
 
 const LAYERS = [
   ["Scans", ".laserscan"],
@@ -15,4 +15,23 @@ test("only what is switched off is hidden, and only on this map", () => {
     hiding(LAYERS, { Maps: false }, "[a]"),
     "[a] :is(.floor, .map-file) { display: none; }",
   );
+});
+
+test("one of several drawings of a layer is hidden by itself", () => {
+  const shown = { "Scans\nrear/scan": false, "Scans\nfront/scan": true };
+  assert.equal(
+    hiding(LAYERS, shown, "[a]"),
+    '[a] :is(.laserscan)[data-layer="rear/scan"] { display: none; }',
+  );
+});
+
+test("a layer is divided when it draws different things, and not for each robot", () => {
+  const drawn = (...names) => names.map((layer) => ({ dataset: layer ? { layer } : {} }));
+  assert.deepEqual(several(drawn("rear/scan", "front/scan", "rear/scan")), [
+    "front/scan",
+    "rear/scan",
+  ]);
+  assert.deepEqual(several(drawn("scan", "scan", "")), []);
+  const many = Array.from({ length: 99 }, (_, number) => `/map_${number}`);
+  assert.equal(several(drawn(...many)).length, 16);
 });

@@ -16,7 +16,7 @@ LAYERS = {
     "Clouds": ".pointcloud",
     "Plans": ".path",
     "Trails": ".trail",
-    "Poses": ".posearray",
+    "Poses": ".posearray, .posestamped",
     "Uncertainty": ".covariance",
     "Footprints": ".polygon",
     "Ranges": ".range",
@@ -31,7 +31,8 @@ LAYERS = {
 class LayerSwitches:
     """A list of what the map shows, each to be switched on and off.
 
-    Only what is there at the time is listed. The choice is the viewer's own and is kept
+    Only what is there at the time is listed. A layer that draws different things, such
+    as two scans or two maps, has a switch for each of them besides. The choice is the viewer's own and is kept
     in that browser; what is switched off still comes from the robot.
 
     Args:

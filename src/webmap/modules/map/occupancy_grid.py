@@ -117,6 +117,8 @@ class Grid(Layer):
         self.svg.set(pointer_events="none")
         if palette == "costmap":
             self.svg.set(opacity=0.7)
+        else:  # each of several maps is switched by itself
+            self.svg.set("data-layer", topic)
 
     def start(self) -> None:
         """Subscribe to the grid and to its updates."""

@@ -8,6 +8,7 @@ from webmap.core.from_above import levelled
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ProtocolError
+from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg
@@ -98,6 +99,7 @@ class LaserScanner:
             angle=angle,
         )
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_scan),

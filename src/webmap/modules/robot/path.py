@@ -9,6 +9,7 @@ from webmap.core.from_above import flat, in_space
 from webmap.core.placed import Placed, check_finite, rounded, thinned
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
+from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import PathMsg
 from webmap.scene import svg
@@ -70,6 +71,7 @@ class Path:
         )
         self._placed = Placed(robot, self.line, class_=f"path {name}".strip())
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_path),

@@ -8,6 +8,7 @@ from webmap.core.from_above import levelled
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
+from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_cloud import PointCloud2Msg
 from webmap.scene import svg
@@ -131,6 +132,7 @@ class PointCloud:
             angle=angle,
         )
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_cloud),

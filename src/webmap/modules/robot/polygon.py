@@ -7,6 +7,7 @@ from webmap.core.from_above import flat, in_space
 from webmap.core.placed import Placed, check_finite, rounded
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError
+from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import PolygonStampedMsg
 from webmap.scene import svg
@@ -67,6 +68,7 @@ class Polygon:
             robot, self.outline, class_=f"polygon {name}".strip(), frame=frame
         )
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_polygon),

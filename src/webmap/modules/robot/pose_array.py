@@ -7,6 +7,7 @@ from webmap.core.placed import Placed, thinned
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
+from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import ParticleCloudMsg, PoseArrayMsg
 from webmap.ros.names import split_type
@@ -73,6 +74,7 @@ class PoseArray:
         self.arrows = svg.path(class_="arrow", fill="#d03a7c", fill_opacity=0.7)
         self._placed = Placed(robot, self.arrows, class_="posearray", frame=frame)
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_poses),

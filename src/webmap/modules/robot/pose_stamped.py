@@ -7,6 +7,7 @@ from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
+from webmap.modules.robot.labelled import label
 from webmap.modules.robot.pose_array import arrow
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import PoseStampedMsg
@@ -74,6 +75,7 @@ class PoseStamped:
             robot, self.arrow, class_=f"posestamped {name}".strip(), frame=frame
         )
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         self.svg.set(visibility="hidden")
         bridge.subscribe(
             topic,

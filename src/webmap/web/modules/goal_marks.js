@@ -2,6 +2,7 @@ import { onScreen } from "./aim.js";
 import { button, html, say, svg } from "./elements.js";
 import { look } from "./goal_words.js";
 import { lay } from "./overlay.js";
+import { SentElsewhere } from "./sent_elsewhere.js";
 
 /** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -46,7 +47,9 @@ export class GoalMarks {
     this._marks = new Map();
     this._drawing = svg("svg", { class: "webmap-aim-drawing", "aria-hidden": "true" });
     this._labels = html("div", "webmap-goal-labels");
+    this._elsewhere = new SentElsewhere(map.svg);
     this._offs = [
+      () => this._elsewhere.destroy(),
       lay(map, this._drawing),
       lay(map, this._labels),
       map.onView(() => this._place()),
@@ -70,6 +73,7 @@ export class GoalMarks {
       this._marks.delete(robot);
     }
     for (const [robot, told] of goals) this._update(robot, told);
+    this._elsewhere.hideFor(new Set(goals.keys()));
     this._place();
   }
 

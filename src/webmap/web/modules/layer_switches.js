@@ -7,6 +7,12 @@ import { lay } from "./overlay.js";
 /** Where the choice is kept in this browser. */
 const KEPT = "webmap.layers";
 
+/** What parts a layer's name from that of one of its drawings, in what is kept. */
+const OF = "\n";
+
+/** How many drawings of a layer are listed; more of them are switched together only. */
+const MOST = 16;
+
 /** How often an open list looks what there is, in milliseconds. */
 const PERIOD = 1000;
 
@@ -34,10 +40,27 @@ export default function attach(map, options) {
  * @returns {string} The style sheet that hides what is not shown.
  */
 export function hiding(layers, shown, scope) {
-  return layers
-    .filter(([name]) => shown[name] === false)
-    .map(([, selector]) => `${scope} :is(${selector}) { display: none; }`)
-    .join("\n");
+  const rules = [];
+  for (const [name, selector] of layers) {
+    if (shown[name] === false) rules.push(`${scope} :is(${selector}) { display: none; }`);
+    for (const key of Object.keys(shown)) {
+      if (!key.startsWith(name + OF) || shown[key] !== false) continue;
+      const one = JSON.stringify(key.slice(name.length + OF.length));
+      rules.push(`${scope} :is(${selector})[data-layer=${one}] { display: none; }`);
+    }
+  }
+  return rules.join("\n");
+}
+
+/**
+ * @param {Iterable<{dataset: DOMStringMap}>} drawings What a layer draws at the moment.
+ * @returns {string[]} What of it can be switched by itself; nothing if it is one thing.
+ */
+export function several(drawings) {
+  const found = new Set();
+  for (const { dataset } of drawings) if (dataset.layer) found.add(dataset.layer);
+  const names = [...found].sort();
+  return names.length > 1 ? names.slice(0, MOST) : [];
 }
 
 class LayerSwitches {
@@ -83,30 +106,39 @@ class LayerSwitches {
   /** List what is on the map at the moment. */
   _look() {
     if (!this._details.open) return;
+    const there = new Set();
     for (const [name, selector] of this._layers) {
-      const there = this._map.world.querySelector(selector) !== null;
-      const row = this._rows.get(name);
-      if (row) row.hidden = !there;
-      else if (there) this._add(name);
+      /** @type {NodeListOf<SVGElement>} */
+      const drawings = this._map.world.querySelectorAll(selector);
+      if (drawings.length === 0) continue;
+      there.add(name);
+      for (const one of several(drawings)) there.add(name + OF + one);
     }
-    const any = [...this._rows.values()].some((row) => !row.hidden);
-    say(this._none, any ? "" : "There is nothing to switch.");
+    for (const key of there) if (!this._rows.has(key)) this._add(key);
+    for (const [key, row] of this._rows) row.hidden = !there.has(key);
+    say(this._none, there.size > 0 ? "" : "There is nothing to switch.");
   }
 
-  /** @param {string} name */
-  _add(name) {
+  /** @param {string} key A layer, or one of its drawings. */
+  _add(key) {
+    const [name, one = ""] = key.split(OF);
     const box = html("input", "", { type: "checkbox" });
-    box.checked = this._shown[name] !== false;
+    box.checked = this._shown[key] !== false;
     box.addEventListener("change", () => {
-      this._shown[name] = box.checked;
+      this._shown[key] = box.checked;
       keep(this._shown);
       this._apply();
     });
-    const row = html("label", "webmap-layers-row", {}, box, name);
-    this._rows.set(name, row);
-    // In the order of the layers, whichever came first.
+    const kind = one ? "webmap-layers-row one" : "webmap-layers-row";
+    const row = html("label", kind, {}, box, html("span", "", {}, one || name));
+    if (one) row.title = `${name}: ${one}`;
+    this._rows.set(key, row);
+    // In the order of the layers, whichever came first; what is of one follows it.
     const order = this._layers.map(([known]) => known);
-    const rows = [...this._rows].sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
+    const place = (/** @type {string} */ of) => order.indexOf(of.split(OF)[0]);
+    const rows = [...this._rows].sort(
+      ([a], [b]) => place(a) - place(b) || (a < b ? -1 : 1),
+    );
     this._list.replaceChildren(...rows.map(([, element]) => element));
   }
 
