@@ -12,6 +12,7 @@ from running_simulators import simulators
 from test_modules_drawn_from_simulator import HELPERS, until
 
 from real_browser import watched_tab
+from webmap.geometry import Pose
 
 pytestmark = pytest.mark.browser
 
@@ -44,6 +45,7 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
     """Also where lasers hang upside down and a cloud is in its optical frame."""
     with simulators(dialect, tilted=tilted) as found:
         world = found[dialect].world
+        found[dialect].do(lambda: face_a_wall(world, 1))
         process = subprocess.Popen(
             [*VIEW, found[dialect].url, "--port", "0", "--no-browser"],
             stdout=subprocess.PIPE,
@@ -73,6 +75,14 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
             process.terminate()
             process.wait(10)
             process.stdout.close()
+
+
+def face_a_wall(world, index: int) -> None:
+    """Turn a robot to a wall that its camera can see."""
+    robot, (ranges,) = world.robots[index], world.sweep([index])
+    near = np.flatnonzero((ranges > 1.5) & (ranges < 4.0))
+    turn = near[len(near) // 2] * math.tau / len(ranges) - math.pi
+    robot.pose = robot.odometry = robot.pose @ Pose(0.0, 0.0, turn)
 
 
 def dots_are_where_walls_are(tab: Page, world, clouds: int) -> None:
