@@ -1,5 +1,6 @@
 """``webmap check`` and ``webmap run`` with a fleet file."""
 
+import os
 import re
 import signal
 import subprocess
@@ -47,3 +48,10 @@ def test_a_wrong_file_is_refused_with_exit_code_2_by_both(tmp_path):
         assert f'{file}:4: robots[0].nmae: there is no key "nmae" here' in said.stderr
         assert said.stdout == ""
         assert "Traceback" not in said.stderr
+
+
+def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    said = webmap("check", tmp_path / "pipe")
+    assert said.returncode == 2
+    assert f"{tmp_path / 'pipe'}: expected a file, got a pipe" in said.stderr

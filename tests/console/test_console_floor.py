@@ -114,6 +114,27 @@ def test_a_map_that_makes_no_sense_is_refused_in_words(tmp_path, changes, said):
         load_floor(write(tmp_path, **changes), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("line", "wrong"),
+    [
+        (2, "resolution: -1"),
+        (3, "origin: [0, x, 0]"),
+        (1, "image: gone.png"),
+        (4, "negate: maybe"),
+        (4, "resolution: 2"),
+    ],
+)
+def test_what_is_wrong_in_the_yaml_is_named_with_its_own_line(tmp_path, line, wrong):
+    draw(tmp_path)
+    lines = ["image: floor.png", "resolution: 0.5", "origin: [0, 0, 0]", "negate: 0"]
+    lines[line - 1] = wrong
+    file = tmp_path / "floor.yaml"
+    file.write_text("\n".join(lines))
+    with pytest.raises(ConfigError) as error:
+        load_floor(file, tmp_path)
+    assert str(error.value).startswith(f"{file}:{line}: ")
+
+
 @pytest.mark.parametrize("text", ["", "- a\n- b", "{", "\x00", "a: &a [*a]"])
 def test_a_yaml_that_is_none_is_refused(tmp_path, text):
     file = tmp_path / "floor.yaml"

@@ -5,20 +5,20 @@ the night, since a page can show either without asking.
 """
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-import yaml
 
 from webmap import geometry
 from webmap.errors import ConfigError
+from webmap.lined_yaml import LinedYaml
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-MAX_YAML = 1 << 20
 MAX_PIXELS = 1 << 26
 
 UNKNOWN = 205
@@ -79,8 +79,9 @@ def load_floor(file: Path, folder: Path) -> Floor:
     """
     from PIL import ImageOps
 
-    plan = read_yaml(file)
-    grey = read_image(_image_file(file, plan.image))
+    said = LinedYaml(file)
+    plan = read_plan(said)
+    grey = read_image(_image_file(said, plan.image))
     if plan.negate:
         grey = ImageOps.invert(grey)
     images = {}
@@ -93,29 +94,25 @@ def load_floor(file: Path, folder: Path) -> Floor:
     return Floor(images["day"], images["night"], x, y, width, height, yaw, bounds)
 
 
-def read_yaml(file: Path) -> FloorFile:
-    """Read the YAML file of a map.
+def read_plan(said: LinedYaml) -> FloorFile:
+    """Return what the YAML file of a map says.
 
     Raises:
-        ConfigError: If it cannot be read or makes no sense.
+        ConfigError: If it makes no sense; file and line are named.
 
     """
     try:
-        with file.open("rb") as stream:
-            text = stream.read(MAX_YAML + 1)
-        if len(text) > MAX_YAML:
-            raise ConfigError(f"floor {file}: more than 1 MiB is no map's YAML")
-        plan = msgspec.convert(_plain(yaml.safe_load(text)), FloorFile)
-    except (OSError, ValueError, yaml.YAMLError, msgspec.ValidationError) as error:
-        if isinstance(error, ConfigError):
-            raise
-        raise ConfigError(f"floor {file}: {error}") from error
-    numbers = (plan.resolution, *plan.origin)
-    if not (all(map(math.isfinite, numbers)) and plan.resolution > 0):
-        raise ConfigError(
-            f"floor {file}: resolution must be metres above 0 and origin three finite "
-            f"numbers, got {plan.resolution} and {list(plan.origin)}"
-        )
+        plan = msgspec.convert(_plain(said.data), FloorFile)
+    except msgspec.ValidationError as error:
+        # It ends with the way, as in "at `$.origin[1]`".
+        found = re.search(r"`\$\.(\w+)", str(error))
+        raise said.wrong((found[1],) if found else (), f"floor: {error}") from None
+    if not (math.isfinite(plan.resolution) and plan.resolution > 0):
+        words = f"resolution must be metres above 0, got {plan.resolution}"
+        raise said.wrong(("resolution",), f"floor: {words}")
+    if not all(map(math.isfinite, plan.origin)):
+        words = f"origin must be three finite numbers, got {list(plan.origin)}"
+        raise said.wrong(("origin",), f"floor: {words}")
     return plan
 
 
@@ -188,14 +185,15 @@ def _plain(data: Any) -> Any:
     return data
 
 
-def _image_file(file: Path, name: str) -> Path:
-    folder = file.resolve().parent
+def _image_file(said: LinedYaml, name: str) -> Path:
+    if "\0" in name:
+        raise said.wrong(("image",), "floor: image must be the name of a file")
+    folder = said.file.resolve().parent
     image = (folder / name).resolve()
     if Path(name).is_absolute() or not image.is_relative_to(folder):
-        raise ConfigError(
-            f"floor {file}: the image {name!r} is not in the folder of the YAML file; "
-            "put it there and write its bare name"
-        )
+        words = f"the image {name!r} is not in the folder of the YAML file"
+        advice = "put it there and write its bare name"
+        raise said.wrong(("image",), f"floor: {words}; {advice}")
     if not image.is_file():
-        raise ConfigError(f"floor {file}: there is no image {image}")
+        raise said.wrong(("image",), f"floor: there is no image file {image}")
     return image

@@ -9,6 +9,7 @@ import yaml
 
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
+from webmap.plain_files import read_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -104,13 +105,9 @@ def _settings(file: Path) -> _Settings:
 
 def _read_yaml(file: Path) -> dict[str, Any]:
     try:
-        if not file.is_file():
-            raise ConfigError(f"{file}: there is no such file")
-        with file.open("rb") as stream:
-            data = stream.read(MAX_YAML + 1)
-        if len(data) > MAX_YAML:
-            raise ConfigError(f"{file}: more than 1 MiB is no map's YAML")
-        said = yaml.load(data, _Texts)  # noqa: S506
+        said = yaml.load(read_file(file, MAX_YAML), _Texts)  # noqa: S506
+    except FileNotFoundError:
+        raise ConfigError(f"{file}: there is no such file") from None
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         if isinstance(error, ConfigError):
             raise

@@ -137,6 +137,8 @@ class MBTiles:
     def __init__(self, file: Path) -> None:
         self.file = file
         self._lock = threading.Lock()
+        if not file.is_file():
+            raise ConfigError(f"tiles {str(file)!r}: expected a folder or a file")
         with file.open("rb") as stream:
             if stream.read(len(_HEADER)) != _HEADER:
                 raise ConfigError(f"tiles {str(file)!r}: this is no MBTiles file")

@@ -11,6 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from webmap.errors import ConfigError
+from webmap.plain_files import read_file
 
 FLOOR = Path(__file__).parent / "data" / "floor.yaml"
 """The floor plan that comes with the simulator."""
@@ -86,10 +87,7 @@ def load_map(path: Path | str) -> FloorPlan:
 
 def _read_settings(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as stream:
-            data = stream.read(_LARGEST + 1)
-        if len(data) > _LARGEST:
-            raise ConfigError(f"{path}: more than 1 MiB is no map's YAML")
+        data = read_file(path, _LARGEST)
         settings = yaml.load(data, _Loader)  # noqa: S506 - it is a safe one
     except OSError as error:
         raise ConfigError(f"{path}: no map there ({error.strerror})") from error

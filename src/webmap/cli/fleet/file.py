@@ -9,6 +9,7 @@ from webmap.cli.fleet.lines import Lines
 from webmap.cli.fleet.lines import Path as Way
 from webmap.cli.fleet.schema import Fleet
 from webmap.errors import ConfigError
+from webmap.plain_files import read_file
 
 LARGEST = 1 << 20
 """Bytes that a file may have."""
@@ -65,16 +66,14 @@ def read_text(file: Path) -> FleetText:
     """Read a file.
 
     Raises:
-        ConfigError: If it is too large, not UTF-8, or not TOML.
+        ConfigError: If it is no file, too large, not UTF-8, or not TOML.
         OSError: If it cannot be read.
 
     """
-    with file.open("rb") as stream:
-        data = stream.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise ConfigError(
-            f"{file}: the file is larger than {LARGEST >> 20} MiB; {EXPECTED}"
-        )
+    try:
+        data = read_file(file, LARGEST)
+    except ConfigError as error:
+        raise ConfigError(f"{error}; {EXPECTED}") from None
     if data.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
         raise ConfigError(
             f"{file}: the file begins with a byte order mark; save it as UTF-8 without"

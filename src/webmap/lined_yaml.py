@@ -1,0 +1,96 @@
+"""YAML files that people write by hand, and on which line of them something stands."""
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from webmap.errors import ConfigError
+from webmap.plain_files import read_file
+
+LARGEST = 1 << 20
+"""Bytes that a file may have."""
+
+
+class LinedYaml:
+    """What a YAML file says, and where; JSON is YAML, too.
+
+    Aliases are refused: a few of them in one another stand for more than any memory
+    holds. So is a key that is there twice, of which one would be lost.
+
+    Args:
+        file: The file.
+
+    Raises:
+        ConfigError: If it cannot be read or is no such YAML; file and line are named.
+
+    """
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self._lines: dict[tuple[str | int, ...], int] = {}
+        try:
+            loader = _Loader(read_file(file, LARGEST))
+            node = loader.get_single_node()
+            if node is not None:
+                self._note((), node)
+            self.data: Any = None if node is None else loader.construct_document(node)
+            """What it says, as plain values; None if it says nothing."""
+        except ConfigError:
+            raise
+        except OSError as error:
+            raise ConfigError(f"{file}: {error.strerror}") from None
+        except yaml.MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            line = f":{mark.line + 1}" if mark else ""
+            words = " ".join(str(error.problem or error.context).split())[:200]
+            raise ConfigError(f"{file}{line}: this is no YAML: {words}") from None
+        except RecursionError:
+            raise ConfigError(f"{file}: values are nested too deep") from None
+        except (yaml.YAMLError, ValueError) as error:
+            words = " ".join(str(error).split())[:200]
+            raise ConfigError(f"{file}: this is no YAML: {words}") from None
+
+    def wrong(self, way: tuple[str | int, ...], words: str) -> ConfigError:
+        """Return the error that something is wrong, with file and line.
+
+        Args:
+            way: Keys and indices on the way to it; what is not there is taken to be
+                where the part stands that lacks it.
+            words: What was got and what was expected.
+
+        """
+        while way and way not in self._lines:
+            way = way[:-1]
+        line = self._lines.get(way, 1)
+        # What a file holds must not steer the terminal that shows it.
+        said = "".join(char if char.isprintable() else "?" for char in words)
+        return ConfigError(f"{self.file}:{line}: {said}")
+
+    def _note(self, way: tuple[str | int, ...], node: yaml.Node) -> None:
+        self._lines[way] = node.start_mark.line + 1
+        if isinstance(node, yaml.SequenceNode):
+            for index, each in enumerate(node.value):
+                self._note((*way, index), each)
+        elif isinstance(node, yaml.MappingNode):
+            for key, each in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    continue
+                if (*way, key.value) in self._lines:
+                    raise yaml.MarkedYAMLError(
+                        problem=f'the key "{key.value}" is there twice',
+                        problem_mark=key.start_mark,
+                    )
+                self._note((*way, key.value), each)
+                self._lines[(*way, key.value)] = key.start_mark.line + 1
+
+
+class _Loader(yaml.SafeLoader):
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(
+                problem="aliases (*name) have no place in it",
+                problem_mark=event.start_mark,
+            )
+        return super().compose_node(parent, index)

@@ -1,0 +1,77 @@
+"""Files that people name, and what is no file though it has a name."""
+
+import os
+import socket
+
+import pytest
+
+from webmap.errors import ConfigError
+from webmap.lined_yaml import LinedYaml
+from webmap.plain_files import read_file
+
+
+def test_a_file_is_read_and_so_is_one_behind_a_link(tmp_path):
+    (tmp_path / "a").write_bytes(b"abc")
+    (tmp_path / "b").symlink_to("a")
+    assert read_file(tmp_path / "b", 3) == b"abc"
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="pipe: expected a file, got a pipe"):
+        read_file(tmp_path / "pipe", 10)
+
+
+def test_folders_devices_and_sockets_are_refused(tmp_path, monkeypatch):
+    with pytest.raises(ConfigError, match="got a folder"):
+        read_file(tmp_path, 10)
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    with pytest.raises(ConfigError, match="got a device"):
+        read_file(tmp_path / "zero", 10)
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket")
+        with pytest.raises(OSError, match="No such device"):
+            read_file(tmp_path / "socket", 10)
+
+
+def test_a_file_that_is_too_large_is_refused(tmp_path):
+    (tmp_path / "a").write_bytes(b"x" * ((1 << 20) + 1))
+    with pytest.raises(ConfigError, match="larger than 1 MiB"):
+        read_file(tmp_path / "a", 1 << 20)
+
+
+def test_yaml_knows_on_which_line_something_stands(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("# places\nlabels:\n  - name: A\n    x: 1\n  - {x: 2}\n")
+    said = LinedYaml(file)
+    assert said.data == {"labels": [{"name": "A", "x": 1}, {"x": 2}]}
+    ways = [("labels",), ("labels", 0, "x"), ("labels", 1, "name"), ("none",)]
+    lines = [str(said.wrong(way, "?")).split(":")[1] for way in ways]
+    assert lines == ["2", "4", "5", "2"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a: 1\nb: &x [1]\nc: *x\n", ":3: this is no YAML: aliases (*name) have no"),
+        ("a: 1\na: 2\n", ':2: this is no YAML: the key "a" is there twice'),
+        ("a: 1\nb: [\n", ":3: this is no YAML: "),
+        ("a: !!python/object:os.system {}\n", ":1: this is no YAML: could not"),
+        ("a: 2001-99-99\n", ": this is no YAML: month must be in 1..12"),
+        ("\x00", ": this is no YAML: "),
+        ("[" * 5000, ": values are nested too deep"),
+    ],
+)
+def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        LinedYaml(file)
+    assert str(error.value).startswith(f"{file}{said}")
+
+
+def test_what_a_file_holds_does_not_steer_a_terminal(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("a: 1\n")
+    assert str(LinedYaml(file).wrong(("a",), "\x1b[2J")) == f"{file}:1: ?[2J"
