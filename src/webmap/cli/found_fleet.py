@@ -1,7 +1,7 @@
 """The robots behind bridges, found or told, as the console takes them."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -9,9 +9,11 @@ import click
 
 from webmap.cli.described import describe, overrules
 from webmap.cli.finding import find
+from webmap.cli.overruling import Overruling
 from webmap.console import RobotDescription
 from webmap.discovery import FoundRobot
-from webmap.discovery.words import in_one_line
+from webmap.discovery.words import in_one_line, robot_table
+from webmap.errors import BridgeClosed
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -32,6 +34,16 @@ class FoundFleet:
     known: list[tuple["Bridge", tuple[FoundRobot, ...]]] = field(default_factory=list)
     """For each bridge the robots that were found, also those told by hand."""
 
+    overruling: Overruling = field(default_factory=Overruling)
+    """What was said of robots better than it was guessed."""
+
+    def table(self) -> str:
+        """Return what the page would use, and why, for people."""
+        lines = [f"{about.name} (told with --robot)" for about in self.told]
+        for robot, about in self.robots:
+            lines += ["", f"behind {about.bridge.url}:", *robot_table(robot)]
+        return "\n".join(lines).lstrip("\n") or "No robot is known."
+
     def show(self, console: "Console", *, grid: bool) -> None:
         """Show what was found and what comes later.
 
@@ -49,7 +61,9 @@ class FoundFleet:
             late.add(robot, about)
         names = [about.name for about in self.told]
         names += [robot.name for robot, _ in self.robots]
-        came = greet(late, names, self.stops_within, grid=grid)
+        came = greet(
+            late, names, self.stops_within, grid=grid, overruling=self.overruling
+        )
         for bridge, robots in self.known:
             _services.append(LookingForRobots(bridge, robots, came))
 
@@ -64,6 +78,8 @@ def find_fleet(
     *,
     wait: float,
     stops_within: float | None,
+    topics: Mapping[str, str] | None = None,
+    overruling: Overruling | None = None,
 ) -> FoundFleet:
     """Return the robots behind bridges, and say on standard error what was found.
 
@@ -72,16 +88,29 @@ def find_fleet(
         told: Robots that were told by hand; each takes the place of one found.
         wait: How long to wait for a bridge that cannot be reached, in seconds.
         stops_within: Seconds within which every base stops by itself, if known.
+        topics: Types by topic, where the bridge cannot be asked for them.
+        overruling: What was said of robots better than it is guessed.
+
+    Raises:
+        ConfigError: If something was said of a robot that there is not.
 
     """
-    found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
-    fleet = FoundFleet([*told], stops_within)
+    overruling = overruling or Overruling()
+    found = asyncio.run(
+        find([bridge.url for bridge in bridges], wait=wait, topics=topics)
+    )
+    names = [robot.name for one in found for robot in one.findings.robots]
+    missing = any(isinstance(one.trouble, BridgeClosed) for one in found)
+    names += [robot.name for robot in told]
+    for sentence in overruling.check(names, all_known=not missing):
+        click.echo(sentence, err=True)
+    fleet = FoundFleet([*overruling.tell(told)], stops_within, overruling=overruling)
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             click.echo(one.why, err=True)
-        for robot in one.findings.robots:
+        for robot in overruling.findings(bridge.url, one.findings).robots:
             about = describe(robot, bridge, stops_within=stops_within)
-            if any(overrules(other, about) for other in told):
+            if any(overrules(other, about) for other in fleet.told):
                 continue
             click.echo(f"Found {in_one_line(robot)}", err=True)
             fleet.robots.append((robot, about))

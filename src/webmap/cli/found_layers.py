@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from webmap.cli.looking import Looking
+from webmap.cli.overruling import Overruling
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.late_frames import late_frames
 from webmap.discovery.layers import FoundLayer, Kind, find_layers
@@ -24,15 +25,21 @@ _services: list[object] = []
 """What runs as long as the process does; nobody else holds it."""
 
 
-def draw_layers(bridges: Sequence["Bridge"], robots: Sequence["Robot"]) -> None:
+def draw_layers(
+    bridges: Sequence["Bridge"],
+    robots: Sequence["Robot"],
+    overruling: Overruling | None = None,
+) -> None:
     """Draw, as long as the process runs, what the robots of bridges offer.
 
     Args:
         bridges: The bridges.
         robots: The robots that are shown; more may come.
+        overruling: What was said of robots better than it is guessed.
 
     """
-    _services.extend(DrawnLayers(bridge, robots) for bridge in bridges)
+    said = overruling or Overruling()
+    _services.extend(DrawnLayers(bridge, robots, said) for bridge in bridges)
 
 
 class DrawnLayers(Looking):
@@ -41,11 +48,18 @@ class DrawnLayers(Looking):
     Args:
         bridge: The bridge.
         robots: The robots that are shown; more may come.
+        overruling: What was said of robots better than it is guessed.
 
     """
 
-    def __init__(self, bridge: "Bridge", robots: Sequence["Robot"]) -> None:
+    def __init__(
+        self,
+        bridge: "Bridge",
+        robots: Sequence["Robot"],
+        overruling: Overruling,
+    ) -> None:
         super().__init__(bridge)
+        self._overruling = overruling
         self._robots = robots
         self._drawn: set[tuple[int, str]] = set()
 
@@ -57,7 +71,8 @@ class DrawnLayers(Looking):
     async def take(self, topics: dict[str, str]) -> None:
         """Draw what is new among the topics behind the bridge."""
         trees = late_frames(self.bridge).trees
-        found = discover(topics, host_name(self.bridge.url), trees).robots
+        behind = discover(topics, host_name(self.bridge.url), trees)
+        found = self._overruling.findings(self.bridge.url, behind).robots
         layers = find_layers(topics, [robot.namespace for robot in found])
         for one in found:
             robot = self._shown(one)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from webmap.cli.looking import Looking
+from webmap.cli.overruling import Overruling
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
 from webmap.core.alignment_store import store
@@ -108,6 +109,7 @@ def greet(
     stops_within: float | None,
     *,
     grid: bool = True,
+    overruling: Overruling | None = None,
 ) -> Callable[[News, "Bridge"], None]:
     """Return what shows news, and says so on standard error.
 
@@ -118,22 +120,26 @@ def greet(
         taken: Names of the robots that are there.
         stops_within: Seconds within which every base stops by itself, if known.
         grid: Whether the robots' own map is shown under them.
+        overruling: What was said of robots better than it is guessed.
 
     """
     from webmap.cli.described import describe
     from webmap.cli.growing import grow
 
     names = {same_name(name) for name in taken}
+    said_of = overruling or Overruling()
 
     def came(news: News, bridge: "Bridge") -> None:
-        robot = news.robot
+        fixed = said_of.fixed(bridge.url, news.robot)
+        robot = said_of.apply(bridge.url, news.robot)
         if grid:
             late.show_grid(bridge, robot.topic("map"))
         if news.roles:
             shown = late.at(bridge, robot.namespace)
             if shown is None:  # it was told by hand, with all that it has
                 return
-            used = grow(shown, bridge, robot, news.roles, stops_within=stops_within)
+            roles = [role for role in news.roles if role not in fixed]
+            used = grow(shown, bridge, robot, roles, stops_within=stops_within)
             if used:
                 click.echo(f"{shown.name} has more now: {', '.join(used)}", err=True)
             return

@@ -3,6 +3,7 @@
 import click
 
 from webmap.cli.options import web_options
+from webmap.cli.topic_list import one_bridge, topics_option
 
 
 @click.command()
@@ -15,6 +16,20 @@ from webmap.cli.options import web_options
     help="A robot and its topics; what it does not have stays empty. Several times "
     "for several robots. With several URLs, URL's number and @ before the name say "
     "behind which the robot is: 2@bob:/odom:/cmd_vel:",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="ROBOT.ROLE=TOPIC",
+    help="Another topic than the one that is guessed, or none: robot_1.scan=/scan2, "
+    "robot_1.battery= . The roles are those that webmap discover prints, and name. "
+    "Several times for several.",
+)
+@click.option(
+    "--show",
+    is_flag=True,
+    help="Print the robots and the topics that would be used, and why, and end.",
 )
 @click.option(
     "--stops-within",
@@ -41,14 +56,18 @@ from webmap.cli.options import web_options
     help="Seconds to wait for a rosbridge that cannot be reached, before the page "
     "opens without its robots. They are added when they come.",
 )
+@topics_option
 @web_options
 def view(
     url: tuple[str, ...],
     robots: tuple[str, ...],
+    settings: tuple[str, ...],
+    show: bool,
     stops_within: float | None,
     floor: str | None,
     discover: bool,
     wait: float,
+    topics: dict[str, str] | None,
     host: str,
     port: int,
     no_browser: bool,
@@ -57,31 +76,50 @@ def view(
     """See and drive the robots behind one rosbridge or several.
 
     URL is a rosbridge's: ws://robot:9090. The robots behind it are found by their
-    topics, also those that appear later; say with --robot what is found wrongly.
+    topics, also those that appear later; --show says which are used. Say with --set
+    what is guessed wrongly, or with --robot what a robot has.
 
     \b
     webmap view ws://robot:9090
+    webmap view ws://robot:9090 --set robot_1.scan=/robot_1/front/scan
     webmap view ws://robot:9090 --robot Bob:/odom:/cmd_vel:/scan
     """
     from pathlib import Path
 
     import webmap
     from webmap import console
-    from webmap.cli.found_fleet import find_fleet
+    from webmap.cli.found_fleet import FoundFleet, find_fleet
     from webmap.cli.found_layers import draw_layers
+    from webmap.cli.overruling import Overruling, parse_setting
 
+    one_bridge(url, topics)
+    overruling = Overruling([parse_setting(text) for text in settings])
     bridges = [webmap.Bridge(text) for text in url]
     told = [
         console.parse_robot(text, bridges, stops_within=stops_within) for text in robots
     ]
     plan = Path(floor) if floor else None
     fleet = None
-    if discover or not told:
-        fleet = find_fleet(bridges, told, wait=wait, stops_within=stops_within)
+    if discover or topics is not None or not told:
+        fleet = find_fleet(
+            bridges,
+            told,
+            wait=wait,
+            stops_within=stops_within,
+            topics=topics,
+            overruling=overruling,
+        )
+        told = fleet.told
+    else:
+        overruling.check([robot.name for robot in told], all_known=True)
+        told = overruling.tell(told)
+    if show:
+        click.echo((fleet or FoundFleet(told)).table())
+        return
     opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:
         fleet.show(opened, grid=plan is None)
-        draw_layers(bridges, opened.robots)
+        draw_layers(bridges, opened.robots, overruling)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

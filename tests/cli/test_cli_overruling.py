@@ -1,0 +1,135 @@
+"""What is said with ``--set`` comes before what is guessed."""
+
+import subprocess
+import sys
+
+import pytest
+
+from webmap import Bridge
+from webmap.cli.described import describe
+from webmap.cli.overruling import Overruling, parse_setting
+from webmap.console import RobotDescription
+from webmap.discovery import discover
+from webmap.errors import ConfigError
+
+URL = "ws://127.0.0.1:9090/"
+TOPICS = {
+    "/robot_1/odom": "nav_msgs/Odometry",
+    "/robot_1/cmd_vel": "geometry_msgs/Twist",
+    "/robot_1/scan": "sensor_msgs/LaserScan",
+    "/robot_1/rear/scan": "sensor_msgs/LaserScan",
+    "/robot_1/battery": "sensor_msgs/BatteryState",
+}
+
+
+def overruling(*texts):
+    return Overruling([parse_setting(text) for text in texts])
+
+
+@pytest.fixture
+def found():
+    (robot,) = discover(TOPICS).robots
+    assert robot.topic("scan") == "/robot_1/scan"
+    return robot
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("robot_1.scan", "not of the form ROBOT.ROLE=TOPIC"),
+        ("scan=/scan", "not of the form ROBOT.ROLE=TOPIC"),
+        (".scan=/scan", "not of the form ROBOT.ROLE=TOPIC"),
+        ("robot_1.scam=/scan", "did you mean 'scan'?"),
+        ("robot_1.arm=/arm", "no role 'arm'. The roles are odometry, velocity"),
+        ("robot_1.scan=scan", "'scan' is no name of a topic; it begins with a slash"),
+        ("robot_1.scan=/a b", "'/a b' is no name of a topic"),
+        ("robot_1.scan=/a,/b", "one topic of that role, got 2"),
+        ("robot_1.name= ", "at least one character"),
+    ],
+)
+def test_a_setting_that_makes_no_sense_says_what_was_expected(text, words):
+    with pytest.raises(ConfigError, match=r"^--set ") as refused:
+        parse_setting(text)
+    assert words in str(refused.value)
+
+
+def test_one_topic_is_overruled_and_the_others_stay(found):
+    said = overruling("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
+    robot = said.apply(URL, found)
+    about = describe(robot, Bridge(URL))
+    assert about.scan == "/robot_1/rear/scan"
+    assert robot.first("scan").type == "sensor_msgs/LaserScan"
+    assert about.battery == ""
+    assert (about.odometry, about.twist) == ("/robot_1/odom", "/robot_1/cmd_vel")
+    assert said.fixed(URL, found) == {"scan", "battery"}
+
+
+def test_a_robot_gets_another_name_and_is_known_again_by_its_namespace(found):
+    said = overruling("robot_1.name=Bob", "robot_1.base=base_footprint")
+    for _ in range(2):
+        robot = said.apply(URL, found)
+        assert (robot.name, robot.base_frame) == ("Bob", "base_footprint")
+
+
+def test_a_robot_without_odometry_is_not_placed_by_another_pose():
+    topics = TOPICS | {"/robot_1/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
+    (robot,) = discover(topics).robots
+    robot = overruling("robot_1.odometry=").apply(URL, robot)
+    assert describe(robot, Bridge(URL)).odometry == ""
+
+
+@pytest.mark.parametrize(
+    ("odometry", "type"),
+    [
+        ("nav_msgs/Odometry", "move_base_msgs/MoveBaseAction"),
+        ("nav_msgs/msg/Odometry", "nav2_msgs/action/NavigateToPose"),
+    ],
+)
+def test_the_dialect_says_which_action_it_is(odometry, type):
+    (robot,) = discover({"/robot_1/odom": odometry}).robots
+    robot = overruling("robot_1.action=/robot_1/drive_to").apply(URL, robot)
+    assert robot.action == ("/robot_1/drive_to", type)
+
+
+def test_cameras_are_a_list(found):
+    robot = overruling("robot_1.camera=/front/image,/rear/image").apply(URL, found)
+    assert describe(robot, Bridge(URL)).cameras == ("/front/image", "/rear/image")
+
+
+def test_a_robot_that_was_told_gets_what_its_form_has_no_place_for():
+    bob = RobotDescription(name="Bob", bridge=Bridge(URL), odometry="/odom")
+    (told,) = overruling("Bob.battery=/battery", "Bob.odometry=/odom2").tell([bob])
+    assert (told.battery, told.odometry) == ("/battery", "/odom2")
+    with pytest.raises(ConfigError, match="write a fleet file"):
+        overruling("Bob.plan=/plan").tell([bob])
+
+
+def test_a_robot_that_is_not_there_is_refused_unless_it_may_still_come():
+    said = overruling("robot_7.scan=/scan")
+    with pytest.raises(ConfigError, match="did you mean 'robot_1'"):
+        said.check(["robot_1"], all_known=True)
+    (words,) = said.check(["robot_1"], all_known=False)
+    assert words == "--set robot_7.scan=/scan waits for a robot of that name."
+    assert said.check(["robot_7"], all_known=True) == []
+
+
+def view(*arguments):
+    command = [sys.executable, "-m", "webmap", "view", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+
+def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
+    shown = view(
+        *(ros1, "--show", "--set", "robot_1.scan=/robot_0/base_scan"),
+        *("--set", "robot_1.name=Bob"),
+    )
+    assert shown.returncode == 0, shown.stderr
+    bob = shown.stdout.partition("Bob (in /robot_1)")[2]
+    (scan,) = (line for line in bob.splitlines() if line.startswith("  scan "))
+    assert scan.split() == [
+        *("scan", "/robot_0/base_scan", "said", "with", "--set"),
+    ]
+    refused = view(ros1, "--show", "--set", "robot_9.scan=/scan")
+    assert refused.returncode == 2
+    assert "there is no robot 'robot_9'" in refused.stderr
+    assert refused.stdout == ""
