@@ -9,15 +9,16 @@ from typing import Any
 
 import msgspec
 
-from webmap.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.errors import BridgeClosed, BridgeError
 from webmap.lifecycle import lifecycle
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.calls import Calls
-from webmap.ros.connection import CLOSED_HERE, Lane, State
+from webmap.ros.connection import Lane, State
 from webmap.ros.doubts import Doubts
 from webmap.ros.events import CallService, Event, Malformed, Publish, Status
 from webmap.ros.fan_out import FanOut
 from webmap.ros.graph import Graph
+from webmap.ros.link_trouble import LinkTrouble
 from webmap.ros.names import normalise_topic, normalise_url, split_type
 from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
@@ -63,8 +64,6 @@ class Bridge:
         """The one spelling of the address."""
         self.name = name or self.url
         self.stats = BridgeStats()
-        self.trouble: str | None = None
-        """Why the link is not open: how the last attempt failed or the link ended."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._lane: Lane | None = None
         self._topics: dict[str, Topic] = {}
@@ -78,8 +77,7 @@ class Bridge:
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
         self._protocol = Protocol()
-        self._complained = False
-        """Whether this link, or the attempts to open it, were complained of."""
+        self._trouble = LinkTrouble(self.name, self._report)
         lifecycle.add(self)
 
     def __repr__(self) -> str:
@@ -89,6 +87,11 @@ class Bridge:
     def state(self) -> State:
         """``new``, ``connecting``, ``open``, or ``closed`` after :meth:`stop`."""
         return self._lane.state if self._lane is not None else "new"
+
+    @property
+    def trouble(self) -> str | None:
+        """Why the link is not open: how the last attempt failed or the link ended."""
+        return self._trouble.why
 
     @property
     def last_heard(self) -> float | None:
@@ -265,7 +268,7 @@ class Bridge:
             opened=self._opened,
             received=self._received,
             closed=self._link_lost,
-            failed=self._not_opened,
+            failed=self._trouble.not_opened,
         )
         self._lane.start(loop)
 
@@ -305,10 +308,8 @@ class Bridge:
     def _opened(self) -> None:
         self.stats.links += 1
         self._protocol = Protocol()
-        self._complained = False
-        self.trouble = None
+        self._trouble.opened()
         self._graph.forget()
-        log.info("%s: the link is open", self.name)
         for frame in self._publications.again():
             self._send(frame)
         for topic in list(self._topics.values()):
@@ -318,22 +319,12 @@ class Bridge:
         self._on_open.call()
 
     def _link_lost(self, reason: str) -> None:
-        level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
-        log.log(level, "%s: the link ended: %s", self.name, reason)
-        self.trouble = reason
+        self._trouble.lost(reason)
         self._doubts.forget()
         self._renewals.forget()
         for topic in self._topics.values():
             topic.link_lost()
         self._on_close.call(reason)
-
-    def _not_opened(self, error: BridgeClosed) -> None:
-        # One line in the log for a bridge that is away, however long.
-        level = logging.DEBUG if self._complained else logging.WARNING
-        self._complained = True
-        self.trouble = error.why
-        log.log(level, "%s", error)
-        self._on_error.call(error)
 
     def _report(self, error: Exception) -> None:
         self._on_error.call(error)
@@ -353,7 +344,7 @@ class Bridge:
     def _other(self, event: Event) -> None:
         if isinstance(event, Malformed):
             self.stats.malformed += 1
-            self._complain_of_frame(event)
+            self._trouble.malformed(event)
         elif isinstance(event, Status) and event.level == "error":
             error = BridgeError(f"{self.name} says: {event.msg}")
             log.warning("%s", error)
@@ -362,14 +353,3 @@ class Bridge:
             answer = "this client offers no services"
             id = None if event.id is None else str(event.id)
             self._send(service_response(event.service, answer, id=id, result=False))
-
-    def _complain_of_frame(self, event: Malformed) -> None:
-        """Report what is not rosbridge, once for each link; the rest is counted."""
-        if not self._complained:
-            self._complained = True
-            error = ProtocolError(
-                f"{self.name} sent {event.size} bytes that are not rosbridge: "
-                f"{event.reason}"
-            )
-            log.warning("%s", error)
-            self._report(error)
