@@ -1,5 +1,6 @@
 """``webmap view``: robots are found, told, and come later."""
 
+import asyncio
 import re
 import signal
 import socket
@@ -8,14 +9,18 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
 from cli_simulator import simulator
 
 from webmap import Bridge
 from webmap.cli.described import describe, overrules
+from webmap.cli.found_layers import DrawnLayers
 from webmap.cli.latecomers import LateRobots, greet
+from webmap.cli.overruling import Overruling, parse_setting
 from webmap.console import Console, RobotDescription
+from webmap.core.layer import Layer
 from webmap.discovery import discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
@@ -135,8 +140,9 @@ class FakeMap:
     def __init__(self):
         self.robots, self.modules = [], []
 
-    def add_module(self, *arguments):
+    def add_module(self, *arguments, **options):
         self.modules.append(arguments)
+        return SimpleNamespace(layer=Layer())
 
     def add_robot(self, robot):
         self.robots.append(robot.name)
@@ -161,11 +167,15 @@ def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
     late.show_grid(bridge, "")
     late.show_grid(bridge, "/map")
     late.show_grid(bridge, "/other/map")
+    late.show_grid(bridge, "/map")  # the same again
     after = FakePage()
     console.opened(after)
     for page in (early, after):
         assert page.maps[0].robots == ["bob"]
-        assert page.maps[0].modules == [("OccupancyGrid", bridge, "/map")]
+        assert page.maps[0].modules == [
+            ("OccupancyGrid", bridge, "/map"),
+            ("OccupancyGrid", bridge, "/other/map"),
+        ]
     late.robots[0].destroy()
 
 
@@ -225,7 +235,7 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     assert robot.tf is not None
     names = {type(module).__name__ for module in robot.modules}
     assert {"LaserScanner", "Battery", "Path"} <= names
-    assert console.grid == (bridge, "/map")
+    assert list(console.grids) == [(bridge, "/map")]
     assert "bob has more now: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
     robot.destroy()
 
@@ -288,3 +298,69 @@ def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
     assert overrules(RobotDescription(bridge=bridge, **told), found) is is_it
     elsewhere = RobotDescription(bridge=Bridge("ws://al:9090"), **told)
     assert not overrules(elsewhere, found)
+
+
+SCAN, GRID, PATH = "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "nav_msgs/Path"
+RICH = {
+    "/a/odom": "nav_msgs/Odometry",
+    "/a/front/scan": SCAN,
+    "/a/rear/scan": SCAN,
+    "/map": GRID,
+    "/a/map": GRID,
+    "/a/plan": PATH,
+    "/a/trajectory": PATH,
+    "/a/move_base/current_goal": "geometry_msgs/PoseStamped",
+}
+
+
+def drawing_of(bridge, topics, *settings):
+    """Draw what is found of one robot; return it, the console and what is drawn."""
+    console = Console()
+    late = LateRobots(console)
+    said = Overruling([parse_setting(text) for text in settings])
+    (found_,) = said.findings(bridge.url, discover(topics, "bob")).robots
+    late.add(found_, describe(found_, bridge))
+    layers = DrawnLayers(bridge, console.robots, said, console)
+    asyncio.run(layers.take(topics))
+    return late.robots[0], console, layers
+
+
+def topics_of(robot, name):
+    return [m.topic for m in robot.modules if type(m).__name__ == name]
+
+
+def test_all_scans_maps_and_paths_are_drawn_and_each_once(bridge):
+    robot, console, layers = drawing_of(bridge, RICH)
+    assert topics_of(robot, "LaserScanner") == ["/a/front/scan", "/a/rear/scan"]
+    scans = [m for m in robot.modules if type(m).__name__ == "LaserScanner"]
+    classes = [list(scan.svg.classes) for scan in scans]
+    assert classes == [["laserscan"], ["laserscan", "scan-2"]]
+    assert sorted(topics_of(robot, "Path")) == ["/a/plan", "/a/trajectory"]
+    assert topics_of(robot, "PoseStamped") == ["/a/move_base/current_goal"]
+    own = [m for m in robot.modules if type(m).__name__ == "OnMaps"]
+    assert [(m.module, m._arguments[0][1]) for m in own] == [
+        ("OccupancyGrid", "/a/map")
+    ]
+    assert list(console.grids) == [(bridge, "/map")]
+    asyncio.run(layers.take(RICH | {"/a/third": SCAN}))
+    assert topics_of(robot, "LaserScanner")[2:] == ["/a/third"], "one that came later"
+    robot.destroy()
+
+
+def test_what_is_overruled_leaves_all_else_as_it_was_found(bridge):
+    robot, console, _ = drawing_of(bridge, RICH, "a.scan=/a/other", "a.map=")
+    assert topics_of(robot, "LaserScanner") == ["/a/other"]
+    assert sorted(topics_of(robot, "Path")) == ["/a/plan", "/a/trajectory"]
+    assert console.grids == {}
+    robot.destroy()
+
+
+def test_what_is_left_out_is_said_once(bridge, capsys):
+    many = RICH | {f"/a/path_{number}": PATH for number in range(9)}
+    robot, _, layers = drawing_of(bridge, many)
+    asyncio.run(layers.take(many))
+    assert len(topics_of(robot, "Path")) == 6
+    said = [line for line in capsys.readouterr().err.splitlines() if "enough" in line]
+    assert len(said) == 1
+    assert "a: not drawn, since there are enough of their kind: /a/path_5" in said[0]
+    robot.destroy()

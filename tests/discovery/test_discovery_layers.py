@@ -1,8 +1,14 @@
 """Which topics are drawn besides, by rules of names and types."""
 
+import inspect
+
 import pytest
 
-from webmap.discovery.layers import find_layers
+from webmap.core.registry import map_modules, robot_modules
+from webmap.discovery.drawing import drawing
+from webmap.discovery.layers import RULES, FoundLayer, find_layers, left_out
+
+FRAMES = {"map_frame": "map", "namespace": "/a"}
 
 NAV2 = {
     "/tb/local_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
@@ -42,6 +48,8 @@ def test_what_nav2_publishes_is_drawn_once_each():
         "/waypoints": "markers",
         "/gps/fix": "fix",
         "/ir_left": "range",
+        "/plan": "path",
+        "/map": "map",
     }
     assert found[0].topic.endswith("local_costmap/costmap"), "not the global one"
 
@@ -60,6 +68,74 @@ def test_move_base_has_other_names():
         "local plan",
         "particles",
     ]
+
+
+def test_what_has_an_odd_name_is_drawn_by_its_type():
+    topics = {
+        "/a/front": "sensor_msgs/LaserScan",
+        "/a/rear": "sensor_msgs/LaserScan",
+        "/a/map": "nav_msgs/OccupancyGrid",
+        "/a/keepout": "nav_msgs/OccupancyGrid",
+        "/a/trajectory": "nav_msgs/Path",
+        "/a/transformed_global_plan": "nav_msgs/Path",
+        "/a/velodyne": "sensor_msgs/PointCloud2",
+        "/a/trees": "geometry_msgs/PoseArray",
+        "/a/zone": "geometry_msgs/PolygonStamped",
+        "/a/move_base/current_goal": "geometry_msgs/PoseStamped",
+        "/a/move_base_simple/goal": "geometry_msgs/PoseStamped",
+        "/a/dock": "geometry_msgs/PoseStamped",
+        "/a/ekf_pose": "geometry_msgs/PoseWithCovarianceStamped",
+        "/a/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
+    }
+    found = find_layers(topics, ["/a"])["/a"]
+    assert {layer.topic.removeprefix("/a/"): layer.kind for layer in found} == {
+        "front": "scan",
+        "rear": "scan",
+        "map": "map",
+        "keepout": "grid",
+        "trajectory": "path",
+        "transformed_global_plan": "path",
+        "velodyne": "cloud",
+        "trees": "poses",
+        "zone": "polygon",
+        # The same goal a second time is left out; where a pose is told is no layer.
+        "move_base/current_goal": "goal",
+        "dock": "pose",
+        "ekf_pose": "doubt",
+    }
+    (other,) = left_out(topics, ["/a"])["/a"]
+    assert other.topic == "/a/move_base_simple/goal"
+
+
+def test_every_map_is_drawn_a_robots_own_with_it_and_a_shared_one_once():
+    grid = "nav_msgs/OccupancyGrid"
+    topics = {"/map": grid, "/a/map": grid, "/b/map": grid, "/b/static_map": grid}
+    found = find_layers(topics, ["/a", "/b"])
+    drawn = {
+        (layer.topic, drawing(layer, space, FRAMES).shared)
+        for space, layers in found.items()
+        for layer in layers
+    }
+    assert drawn == {
+        ("/map", True),
+        ("/a/map", False),
+        ("/b/map", False),
+        ("/b/static_map", False),
+    }
+    own = drawing(found["/a"][0], "/a", FRAMES)
+    assert (own.module, own.of_maps, own.options) == ("OccupancyGrid", True, FRAMES)
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{rule.kind} {rule.name}")
+def test_every_rule_has_a_module_that_takes_its_arguments(rule):
+    type = rule.types[0]
+    layer = FoundLayer(rule.kind, "/a/topic", type, rule.words)
+    drawn = drawing(layer, "/a", FRAMES, 2)
+    factory = (map_modules if drawn.of_maps or drawn.shared else robot_modules)[
+        drawn.module
+    ]
+    inspect.signature(factory).bind(None, None, "/a/topic", **drawn.options)
+    assert rule.words, "it is shown to people"
 
 
 def test_each_robot_gets_its_own_and_health_is_everybodys():

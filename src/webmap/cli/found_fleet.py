@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from webmap.cli.described import describe, overrules
+from webmap.cli.draw_layer import shared_map
 from webmap.cli.finding import find
 from webmap.cli.overruling import Overruling
 from webmap.console import RobotDescription
@@ -57,7 +58,7 @@ class FoundFleet:
         late = LateRobots(console)
         for robot, about in self.robots:
             if grid:
-                late.show_grid(about.bridge, robot.topic("map"))
+                late.show_grid(about.bridge, shared_map(robot))
             late.add(robot, about)
         names = [about.name for about in self.told]
         names += [robot.name for robot, _ in self.robots]

@@ -1,22 +1,22 @@
 """What else is drawn of robots that were found: all that their topics offer."""
 
-import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import click
+
+from webmap.cli.draw_layer import draw_layer, meant
 from webmap.cli.looking import Looking
 from webmap.cli.overruling import Overruling
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.late_frames import late_frames
-from webmap.discovery.layers import FoundLayer, Kind, find_layers
+from webmap.discovery.layers import FoundLayer
 from webmap.discovery.robots import host_name
-from webmap.errors import WebMapError
 from webmap.scope import no_scope
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
-
-log = logging.getLogger("webmap.cli")
+    from webmap.console import Console
 
 SOON, LATER = 1.0, 15.0
 """Seconds between two looks: until something was found, and from then on."""
@@ -29,6 +29,8 @@ def draw_layers(
     bridges: Sequence["Bridge"],
     robots: Sequence["Robot"],
     overruling: Overruling | None = None,
+    *,
+    console: "Console | None" = None,
 ) -> None:
     """Draw, as long as the process runs, what the robots of bridges offer.
 
@@ -36,10 +38,11 @@ def draw_layers(
         bridges: The bridges.
         robots: The robots that are shown; more may come.
         overruling: What was said of robots better than it is guessed.
+        console: Where maps are shown; none are without it.
 
     """
     said = overruling or Overruling()
-    _services.extend(DrawnLayers(bridge, robots, said) for bridge in bridges)
+    _services.extend(DrawnLayers(bridge, robots, said, console) for bridge in bridges)
 
 
 class DrawnLayers(Looking):
@@ -49,6 +52,7 @@ class DrawnLayers(Looking):
         bridge: The bridge.
         robots: The robots that are shown; more may come.
         overruling: What was said of robots better than it is guessed.
+        console: Where maps are shown; none are without it.
 
     """
 
@@ -57,10 +61,12 @@ class DrawnLayers(Looking):
         bridge: "Bridge",
         robots: Sequence["Robot"],
         overruling: Overruling,
+        console: "Console | None" = None,
     ) -> None:
         super().__init__(bridge)
-        self._overruling = overruling
+        self._console = console
         self._robots = robots
+        self._overruling = overruling
         self._drawn: set[tuple[int, str]] = set()
 
     @property
@@ -72,17 +78,18 @@ class DrawnLayers(Looking):
         """Draw what is new among the topics behind the bridge."""
         trees = late_frames(self.bridge).trees
         behind = discover(topics, host_name(self.bridge.url), trees)
-        found = self._overruling.findings(self.bridge.url, behind).robots
-        layers = find_layers(topics, [robot.namespace for robot in found])
-        for one in found:
+        said = self._overruling
+        for guessed in behind.robots:
+            one = said.apply(self.bridge.url, guessed, behind.dialect)
             robot = self._shown(one)
             if robot is None:
                 continue
-            for layer in layers[one.namespace]:
-                key = (id(robot), layer.topic)
-                if key not in self._drawn:
-                    self._drawn.add(key)
-                    self._draw(robot, layer, one.namespace)
+            fixed = said.fixed(self.bridge.url, guessed)
+            space = guessed.namespace
+            for layer in meant(behind.layers[space], guessed, fixed):
+                if self._is_new(robot, layer):
+                    draw_layer(robot, self.bridge, layer, space, self._console)
+            self._say(robot, behind.left_out[space])
             if (id(robot), "") not in self._drawn:
                 self._drawn.add((id(robot), ""))
                 with no_scope():
@@ -111,49 +118,18 @@ class DrawnLayers(Looking):
         mine = frames["namespace"] == space and frames["base_frame"] in names
         return found.base_frame != "" and mine
 
-    def _draw(self, robot: "Robot", layer: FoundLayer, namespace: str) -> None:
-        bridge, topic = self.bridge, layer.topic
-        frames = robot.tf
-        placed = (
-            {}
-            if frames is None
-            else {"map_frame": frames["map_frame"], "namespace": frames["namespace"]}
-        )
-        add = robot.add_module
-        draw: dict[Kind, Callable[[], object]] = {
-            "costmap": lambda: add(
-                "OnMaps",
-                "OccupancyGrid",
-                bridge,
-                topic,
-                palette="costmap",
-                throttle=500,
-                **placed,
-            ),
-            "cloud": lambda: add(
-                "PointCloud", bridge, topic, throttle=1000, colour_by="z"
-            ),
-            "local plan": lambda: add("Path", bridge, topic, name="local"),
-            "particles": lambda: add("PoseArray", bridge, topic, type=layer.type),
-            "doubt": lambda: add("PoseWithCovariance", bridge, topic),
-            "footprint": lambda: add("Polygon", bridge, topic),
-            "range": lambda: add("Range", bridge, topic),
-            "markers": lambda: add(
-                "OnMaps", "Markers", bridge, topic, type=layer.type, **placed
-            ),
-            "fix": lambda: add("NavSatFix", bridge, topic),
-            "health": lambda: add(
-                "Diagnostics", bridge, topic, prefix=_prefix(topic, namespace)
-            ),
-        }
-        try:
-            with no_scope():
-                draw[layer.kind]()
-        except WebMapError as error:
-            log.warning("%s: %s is not drawn: %s", robot.name, topic, error)
+    def _is_new(self, robot: "Robot", layer: FoundLayer) -> bool:
+        key = (id(robot), layer.topic)
+        new = key not in self._drawn
+        self._drawn.add(key)
+        return new
 
-
-def _prefix(topic: str, namespace: str) -> str:
-    """Return what the names of a robot's parts begin with on a topic of all robots."""
-    shared = namespace and not topic.startswith(namespace + "/")
-    return namespace.strip("/") + "/" if shared else ""
+    def _say(self, robot: "Robot", others: Sequence[FoundLayer]) -> None:
+        """Say once what is left out, since it costs the link more than it tells."""
+        new = [layer.topic for layer in others if self._is_new(robot, layer)]
+        if new:
+            click.echo(
+                f"{robot.name}: not drawn, since there are enough of their kind: "
+                f"{', '.join(new)}",
+                err=True,
+            )

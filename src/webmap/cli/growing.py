@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from webmap.cli.described import MOST_CAMERAS
+from webmap.cli.draw_layer import shows
 from webmap.console.fleet import set_goals
 from webmap.discovery import FoundRobot
 from webmap.discovery.found import Role
@@ -36,6 +37,8 @@ def grow(
     """
 
     def use_scan() -> None:
+        if shows(robot, bridge, found.topic("scan")):  # as one of several
+            return
         scanner = robot.add_module(
             "LaserScanner", bridge, found.topic("scan"), max_dots=None, throttle=100
         )
@@ -45,6 +48,10 @@ def grow(
         set_goals(
             robot, bridge, found.topic("goal"), found.topic("cancel"), found.action
         )
+
+    def use_plan() -> None:
+        if not shows(robot, bridge, found.topic("plan")):
+            robot.add_module("Path", bridge, found.topic("plan"))
 
     def use_cameras() -> list[str]:
         there = [module for module in robot.modules if hasattr(module, "watch")]
@@ -68,7 +75,7 @@ def grow(
         ),
         "scan": use_scan,
         "battery": lambda: robot.add_module("Battery", bridge, found.topic("battery")),
-        "plan": lambda: robot.add_module("Path", bridge, found.topic("plan")),
+        "plan": use_plan,
         "tf": lambda: robot.set_tf(bridge, **found.tf_options),
     }
     used = []

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from webmap.cli.draw_layer import shared_map
 from webmap.cli.looking import Looking
 from webmap.cli.overruling import Overruling
 from webmap.console import Console, RobotDescription
@@ -66,7 +67,7 @@ class LateRobots:
         return self._places.get((bridge, namespace))
 
     def show_grid(self, bridge: "Bridge", topic: str) -> None:
-        """Show a map under the robots, if there is one; the first one stays."""
+        """Show a map under the robots, if there is one, besides those shown before."""
         if topic:
             self._console.add_grid(bridge, topic)
 
@@ -133,7 +134,7 @@ def greet(
         fixed = said_of.fixed(bridge.url, news.robot)
         robot = said_of.apply(bridge.url, news.robot)
         if grid:
-            late.show_grid(bridge, robot.topic("map"))
+            late.show_grid(bridge, shared_map(robot))
         if news.roles:
             shown = late.at(bridge, robot.namespace)
             if shown is None:  # it was told by hand, with all that it has

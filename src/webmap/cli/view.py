@@ -119,7 +119,8 @@ def view(
     opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:
         fleet.show(opened, grid=plan is None)
-        draw_layers(bridges, opened.robots, overruling)
+        maps = opened if plan is None else None
+        draw_layers(bridges, opened.robots, overruling, console=maps)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
 
+TOP = 10.0
+"""How near the first map lies: over those from files, under costmaps and robots."""
+
 
 class Console:
     """What is shown on every page of the console besides what it was opened with."""
@@ -13,9 +16,13 @@ class Console:
     def __init__(self) -> None:
         self.robots: list[Robot] = []
         """The robots that were added, in that order."""
-        self.grid: tuple[Bridge, str] | None = None
-        """The map under the robots, if one was added: a bridge and a topic."""
+        self.grids: dict[tuple[Bridge, str], dict[str, Any]] = {}
+        """The maps under the robots, in the order in which they were added: for a
+        bridge and a topic the options of ``OccupancyGrid``."""
+        self.images: list[tuple[str, float, float, float, float]] = []
+        """Pictures under everything else, as ``Map.add_image`` takes them."""
         self._modules: dict[str, dict[str, Any]] = {}
+        self._more: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
 
     def add(self, robot: "Robot") -> None:
@@ -24,18 +31,57 @@ class Console:
         for page in list(self._pages):
             _show(robot, page)
 
-    def add_grid(self, bridge: "Bridge", topic: str) -> None:
-        """Show a map under the robots, likewise; the first one stays.
+    def add_grid(self, bridge: "Bridge", topic: str, **options: Any) -> bool:
+        """Show a map under the robots, likewise; one that is shown stays as it is.
 
         Args:
             bridge: The bridge that has it.
             topic: Of ``nav_msgs/OccupancyGrid``.
+            **options: The other arguments of ``OccupancyGrid``. Maps lie in the order
+                in which they came, the first on top, unless ``order`` says otherwise.
+
+        Returns:
+            Whether it is new.
 
         """
-        if self.grid is None:
-            self.grid = (bridge, topic)
-            for page in list(self._pages):
-                _show_grid(self.grid, page)
+        if (bridge, topic) in self.grids:
+            return False
+        if "order" not in options and "palette" not in options:
+            options["order"] = TOP - len(self.grids) / 100
+        self.grids[bridge, topic] = options
+        for page in list(self._pages):
+            self._show_grids(page, only=(bridge, topic))
+        return True
+
+    def add_image(
+        self, file: str, x: float, y: float, width: float, height: float
+    ) -> None:
+        """Show a picture under everything else, likewise.
+
+        Args:
+            file: Its path.
+            x: The left edge, in metres.
+            y: The lower edge, in metres.
+            width: In metres.
+            height: In metres.
+
+        """
+        self.images.append((file, x, y, width, height))
+        for page in list(self._pages):
+            _show_image(self.images[-1], page)
+
+    def add_module(self, name: str, /, *args: Any, **options: Any) -> None:
+        """Give the map of every page one module more.
+
+        Args:
+            name: The module's name.
+            *args: What its constructor gets after the map.
+            **options: Its arguments by name.
+
+        """
+        self._more.append((name, args, options))
+        for page in list(self._pages):
+            _add_module(name, args, options, page)
 
     def set_module(self, name: str, /, **options: Any) -> None:
         """Give the map of every page to come a module, or that module more options.
@@ -51,11 +97,27 @@ class Console:
         """Show on a page that has been filled what was added until now."""
         self._pages.add(page)
         for name, options in self._modules.items():
-            _add_module(name, options, page)
-        if self.grid is not None:
-            _show_grid(self.grid, page)
+            _add_module(name, (), options, page)
+        for name, args, options in self._more:
+            _add_module(name, args, options, page)
+        for image in self.images:
+            _show_image(image, page)
+        self._show_grids(page)
         for robot in self.robots:
             _show(robot, page)
+
+    def _show_grids(
+        self, page: "Page", *, only: "tuple[Bridge, str] | None" = None
+    ) -> None:
+        bridges = {bridge for bridge, _ in self.grids}
+        for (bridge, topic), options in self.grids.items():
+            if only not in (None, (bridge, topic)):
+                continue
+            for map in page.maps:
+                grid = map.add_module("OccupancyGrid", bridge, topic, **options)
+                if len(bridges) > 1:  # else the topic says which map it is
+                    name = f"{topic} ({bridge.name})"
+                    grid.layer.svg.set("data-layer", name)
 
 
 def _show(robot: "Robot", page: "Page") -> None:
@@ -63,14 +125,16 @@ def _show(robot: "Robot", page: "Page") -> None:
         map.add_robot(robot)
 
 
-def _show_grid(grid: "tuple[Bridge, str]", page: "Page") -> None:
+def _show_image(image: tuple[str, float, float, float, float], page: "Page") -> None:
     for map in page.maps:
-        map.add_module("OccupancyGrid", *grid)
+        map.add_image(*image)
 
 
-def _add_module(name: str, options: dict[str, Any], page: "Page") -> None:
+def _add_module(
+    name: str, args: tuple[Any, ...], options: dict[str, Any], page: "Page"
+) -> None:
     for map in page.maps:
         try:
-            map.add_module(name, **options)
+            map.add_module(name, *args, **options)
         except ValueError as error:  # a file that was there is not any more
             map.report_error(f"{name} is not shown: {error}")

@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from webmap.discovery.layers import FoundLayer
 
 Role: TypeAlias = Literal[
     "odometry",
@@ -138,3 +141,9 @@ class Findings:
 
     notes: tuple[str, ...] = ()
     """What holds for all of it, in sentences."""
+
+    layers: "Mapping[str, tuple[FoundLayer, ...]]" = field(default_factory=dict)
+    """What is drawn of each robot, by its namespace."""
+
+    left_out: "Mapping[str, tuple[FoundLayer, ...]]" = field(default_factory=dict)
+    """What could be drawn of each robot too, but for its number."""

@@ -9,23 +9,34 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from webmap.discovery.grouping import nearest
+from webmap.discovery.grouping import inside, nearest
 from webmap.errors import ConfigError
 from webmap.ros.names import is_topic, split_type
 
 Kind: TypeAlias = Literal[
+    "map",
+    "grid",
     "costmap",
+    "scan",
     "cloud",
     "local plan",
+    "path",
     "particles",
+    "poses",
     "doubt",
     "footprint",
+    "polygon",
+    "goal",
+    "pose",
     "range",
     "markers",
     "fix",
     "health",
 ]
 """What is drawn of a topic."""
+
+SHARED: tuple[Kind, ...] = ("map", "grid", "health")
+"""What every robot has of a topic that is in nobody's namespace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +53,9 @@ class LayerRule:
     most: int
     """How many topics of this kind a robot gets."""
 
+    words: str
+    """Why such a topic is drawn so, for people."""
+
 
 @dataclass(frozen=True, slots=True)
 class FoundLayer:
@@ -52,41 +66,84 @@ class FoundLayer:
     type: str
     """The type as the bridge spells it."""
 
+    rule: str = ""
+    """The rule, in words."""
 
+
+GRID = ("nav_msgs/OccupancyGrid",)
+SCAN = ("sensor_msgs/LaserScan",)
+CLOUD = ("sensor_msgs/PointCloud2",)
+PATH = ("nav_msgs/Path",)
+ARRAY = ("geometry_msgs/PoseArray",)
+PARTICLES = ("nav2_msgs/ParticleCloud",)
+DOUBT = ("geometry_msgs/PoseWithCovarianceStamped",)
 POLYGON = ("geometry_msgs/PolygonStamped",)
+POSE = ("geometry_msgs/PoseStamped",)
+MARKERS = ("visualization_msgs/MarkerArray",)
+MARKER = ("visualization_msgs/Marker",)
+FIX = ("sensor_msgs/NavSatFix",)
+HEALTH = ("diagnostic_msgs/DiagnosticArray",)
 
 RULES: tuple[LayerRule, ...] = (
-    LayerRule("costmap", ("nav_msgs/OccupancyGrid",), r"local_costmap/costmap\Z", 1),
-    LayerRule("costmap", ("nav_msgs/OccupancyGrid",), r"costmap/costmap\Z", 1),
-    LayerRule("cloud", ("sensor_msgs/PointCloud2",), r"points|cloud", 2),
-    LayerRule("local plan", ("nav_msgs/Path",), r"/local_plan\Z", 1),
+    LayerRule("costmap", GRID, r"local_costmap/costmap\Z", 1, "a local costmap"),
+    LayerRule("costmap", GRID, r"costmap/costmap\Z", 1, "a costmap"),
+    LayerRule("costmap", GRID, r"costmap", 1, "named a costmap"),
+    LayerRule("map", GRID, r"/map\Z", 4, "the usual name"),
+    LayerRule("map", GRID, r"map[^/]*\Z", 4, "named a map"),
+    LayerRule("grid", GRID, r"", 2, "its type alone"),
+    LayerRule("scan", SCAN, r"/(?:base_)?scan\Z", 6, "the usual name"),
+    LayerRule("scan", SCAN, r"", 6, "its type alone"),
+    LayerRule("cloud", CLOUD, r"points|cloud", 2, "named points or a cloud"),
+    LayerRule("cloud", CLOUD, r"", 2, "its type alone"),
+    LayerRule("local plan", PATH, r"/local_plan\Z", 1, "the usual name"),
+    LayerRule("path", PATH, r"/plan\Z", 6, "the usual name"),
+    LayerRule("path", PATH, r"plan|path|trajectory", 6, "named a way to go"),
+    LayerRule("path", PATH, r"", 6, "its type alone"),
+    LayerRule("particles", PARTICLES, r"", 1, "its type alone"),
+    LayerRule("particles", ARRAY, r"particle_?cloud\Z", 1, "the usual name"),
+    LayerRule("poses", ARRAY, r"", 3, "its type alone"),
     LayerRule(
-        "particles",
-        ("geometry_msgs/PoseArray", "nav2_msgs/ParticleCloud"),
-        r"particle_?cloud\Z",
-        1,
+        "doubt",
+        DOUBT,
+        r"/(?:amcl_pose|localization_pose|pose)\Z",
+        2,
+        "a localiser's pose",
     ),
     LayerRule(
         "doubt",
-        ("geometry_msgs/PoseWithCovarianceStamped",),
-        r"/(?:amcl_pose|localization_pose|pose)\Z",
-        1,
+        DOUBT,
+        r"\A(?!.*initial_?pose\Z)",
+        2,
+        "its type alone, unless it is where an initial pose is told",
     ),
-    LayerRule("footprint", POLYGON, r"local_costmap/(?:published_)?footprint\Z", 1),
-    LayerRule("footprint", POLYGON, r"footprint\Z", 1),
-    LayerRule("range", ("sensor_msgs/Range",), r"", 8),
-    LayerRule("markers", ("visualization_msgs/MarkerArray",), r"", 3),
-    LayerRule("markers", ("visualization_msgs/Marker",), r"", 3),
-    LayerRule("fix", ("sensor_msgs/NavSatFix",), r"(?:\A|/)fix\Z", 1),
-    LayerRule("fix", ("sensor_msgs/NavSatFix",), r"", 1),
-    LayerRule("health", ("diagnostic_msgs/DiagnosticArray",), r"/diagnostics\Z", 1),
+    LayerRule(
+        "footprint",
+        POLYGON,
+        r"local_costmap/(?:published_)?footprint\Z",
+        1,
+        "of a local costmap",
+    ),
+    LayerRule("footprint", POLYGON, r"footprint[^/]*\Z", 1, "named a footprint"),
+    LayerRule("polygon", POLYGON, r"", 3, "its type alone"),
+    LayerRule("goal", POSE, r"/current_goal\Z", 1, "where move_base says that it goes"),
+    LayerRule("goal", POSE, r"/goal_pose\Z", 1, "where RViz sends Nav2"),
+    LayerRule(
+        "goal", POSE, r"/move_base_simple/goal\Z", 1, "where RViz sends move_base"
+    ),
+    LayerRule("pose", POSE, r"", 3, "its type alone"),
+    LayerRule("range", ("sensor_msgs/Range",), r"", 8, "its type alone"),
+    LayerRule("markers", MARKERS, r"", 3, "its type alone"),
+    LayerRule("markers", MARKER, r"", 3, "its type alone"),
+    LayerRule("fix", FIX, r"/fix\Z", 1, "the usual name"),
+    LayerRule("fix", FIX, r"", 1, "its type alone"),
+    LayerRule("health", HEALTH, r"/diagnostics\Z", 1, "the usual name"),
 )
 
 
 def find_layers(
     topics: Mapping[str, str], robots: Iterable[str]
 ) -> dict[str, list[FoundLayer]]:
-    """Return what can be drawn of each robot.
+    """Return what is drawn of each robot.
 
     Args:
         topics: Types by topic, in either dialect.
@@ -94,9 +151,32 @@ def find_layers(
             for a robot without one.
 
     """
-    spaces = list(robots)
+    return {space: drawn for space, (drawn, _) in _sorted(topics, robots).items()}
+
+
+def left_out(
+    topics: Mapping[str, str], robots: Iterable[str]
+) -> dict[str, list[FoundLayer]]:
+    """Return what could be drawn of each robot, but for its number.
+
+    Args:
+        topics: Types by topic, in either dialect.
+        robots: The namespaces of the robots behind the bridge.
+
+    """
+    return {space: others for space, (_, others) in _sorted(topics, robots).items()}
+
+
+def is_own(topic: str, namespace: str) -> bool:
+    """Tell whether a map is a robot's own, and not the one that all of them share."""
+    return namespace != "" and inside(topic, namespace)
+
+
+def _sorted(
+    topics: Mapping[str, str], robots: Iterable[str]
+) -> dict[str, tuple[list[FoundLayer], list[FoundLayer]]]:
     matched: dict[str, list[tuple[int, str, FoundLayer]]] = {
-        space: [] for space in spaces
+        space: [] for space in robots
     }
     for topic, type in topics.items():
         found = _match(topic, type)
@@ -117,7 +197,7 @@ def _match(topic: str, type: str) -> tuple[int, FoundLayer] | None:
         return None
     for place, rule in enumerate(RULES):
         if plain in rule.types and re.search(rule.name, topic):
-            return place, FoundLayer(rule.kind, topic, type.strip())
+            return place, FoundLayer(rule.kind, topic, type.strip(), rule.words)
     return None
 
 
@@ -126,14 +206,17 @@ def _owners(topic: str, kind: Kind, spaces: Mapping[str, object]) -> list[str]:
     owner = nearest(topic, spaces)
     if owner is not None:
         return [owner]
-    if kind == "health" or len(spaces) == 1:
+    if kind in SHARED or len(spaces) == 1:
         return list(spaces)
     return []
 
 
-def _best(found: list[tuple[int, str, FoundLayer]]) -> list[FoundLayer]:
+def _best(
+    found: list[tuple[int, str, FoundLayer]],
+) -> tuple[list[FoundLayer], list[FoundLayer]]:
     best: list[FoundLayer] = []
+    others: list[FoundLayer] = []
     for place, _, layer in sorted(found, key=lambda each: each[:2]):
-        if sum(other.kind == layer.kind for other in best) < RULES[place].most:
-            best.append(layer)
-    return best
+        count = sum(other.kind == layer.kind for other in best)
+        (best if count < RULES[place].most else others).append(layer)
+    return best, others

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 
 from webmap.discovery.found import Findings, FoundRobot, Guess, Role
 from webmap.discovery.grouping import inside, nearest, robot_namespaces
+from webmap.discovery.layers import find_layers, left_out
 from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
 from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import is_topic, is_type
@@ -46,7 +47,13 @@ def discover(
         _robot(name, space, mine[space], twists[space], bases.get(space))
         for name, space in zip(_names(spaces, host), spaces, strict=True)
     )
-    return Findings(robots, _dialect(topics.values()), _notes(topics, robots))
+    return Findings(
+        robots,
+        _dialect(topics.values()),
+        _notes(topics, robots),
+        {space: tuple(drawn) for space, drawn in find_layers(topics, spaces).items()},
+        {space: tuple(more) for space, more in left_out(topics, spaces).items()},
+    )
 
 
 def host_name(url: str) -> str:

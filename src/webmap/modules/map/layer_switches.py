@@ -32,8 +32,9 @@ class LayerSwitches:
     """A list of what the map shows, each to be switched on and off.
 
     Only what is there at the time is listed. A layer that draws different things, such
-    as two scans or two maps, has a switch for each of them besides. The choice is the viewer's own and is kept
-    in that browser; what is switched off still comes from the robot.
+    as two scans or two maps, has a switch for each of them besides. The choice is the
+    viewer's own and is kept in that browser; what is switched off still comes from the
+    robot.
 
     Args:
         map: The map.
