@@ -10,17 +10,23 @@ import sys
 import threading
 import time
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
+from playwright.sync_api import expect
+from processes import WEB, reset, running
 from safety_bench import wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from real_browser import watched_tab
 from webmap.gate.client import GateClient
 from webmap.gate.messages import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]
+
+SITE = Path(__file__).with_name("safety_goal_site.py")
 
 FAR = (0.0, 0.0, 0.0)
 """A goal that the simulated robot drives to for half a minute."""
@@ -206,3 +212,50 @@ def test_zero_is_not_held_up_by_a_goal_and_a_call_that_hang(folder):
         (goal,) = robot.log.of("send_action_goal")
         links = {heard.link for heard in robot.log.of("call_service")}
         assert goal.link not in links, "behind the goal a call would wait for its end"
+
+
+@pytest.fixture
+def page_of_goals(folder, monkeypatch, chromium):
+    """A page in a browser, with a robot whose goals block their socket."""
+    with Simulator() as robot:
+        monkeypatch.setenv("SAFETY_BRIDGE", robot.url)
+        display = running("run", SITE, "--port", 0, "--no-browser", pattern=WEB)
+        with display as process, watched_tab(chromium, 1000, 700) as tab:
+            tab.goto(process.url)
+            expect(tab.locator(".robot.selected:not(.unplaced)")).to_be_attached()
+            yield robot, tab
+
+
+def aim(robot, tab):
+    """Send the robot to the middle of the world; again if the goal came too late."""
+    for _ in range(10):
+        go = tab.get_by_role("button", name="Send to a place")
+        go.click()
+        expect(go).to_have_attribute("aria-pressed", "true")
+        tab.mouse.move(500, 350)
+        tab.mouse.down()
+        tab.mouse.move(530, 350)
+        tab.mouse.up()
+        try:
+            wait_for(lambda: robot.moves, "the robot on its way", 3.0)
+        except AssertionError:
+            continue
+        return
+    raise AssertionError(tab.inner_text("body"))
+
+
+@pytest.mark.browser
+def test_a_page_ends_goals_that_block_their_socket_by_cancel_and_by_stop(page_of_goals):
+    robot, tab = page_of_goals
+    aim(robot, tab)
+    tab.get_by_role("button", name="Cancel the goal").first.click()
+    wait_for(lambda: robot.stands, "standing still after the cancel", BRAKING)
+    assert robot.stays(1.0)
+
+    aim(robot, tab)
+    tab.keyboard.press("Space")
+    wait_for(lambda: robot.stands, "standing still after STOP", BRAKING)
+    expect(tab.locator(".webmap-teleop")).to_have_attribute("data-state", "stopped")
+    reset(tab)
+    # Nobody says zero any more: if the goal were not called off, it would go on.
+    assert robot.stays(2.0), "the goal goes on after the reset"
