@@ -69,6 +69,11 @@ def test_a_button_that_makes_no_sense_is_refused_by_its_key(change, key, words):
         ({"topic": "/x", "type": "geometry_msgs/msg/TwistStamped"}, "a velocity"),
         ({"topic": "/bob/cmd_vel", "type": "std_msgs/String"}, "carries a velocity"),
         ({"topic": "bob/cmd_vel/", "type": "std_msgs/String"}, "carries a velocity"),
+        (
+            {"topic": "/wheels/commands", "type": "std_msgs/Float64MultiArray"},
+            "/wheels/commands of type std_msgs/Float64MultiArray carries a velocity",
+        ),
+        ({"topic": "/x", "type": "gazebo_msgs/ModelState"}, "the place or the speed"),
         ({"topic": "/x", "type": "geometry_msgs/PoseStamped"}, "carries a goal"),
         ({"topic": "/goal_pose", "type": "std_msgs/Empty"}, "carries a goal"),
         ({"topic": "/mb/cancel", "type": "std_msgs/Empty"}, "the end of a goal"),

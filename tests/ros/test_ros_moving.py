@@ -2,7 +2,9 @@
 
 import pytest
 
-from webmap.ros.moving import moved_by_name, moved_by_type
+from webmap.ros.moving import moved_by_both, moved_by_name, moved_by_type
+
+SIMULATED = "the place or the speed of a simulated robot"
 
 
 @pytest.mark.parametrize(
@@ -12,6 +14,11 @@ from webmap.ros.moving import moved_by_name, moved_by_type
         ("geometry_msgs/msg/TwistStamped", "a velocity"),
         ("ackermann_msgs/msg/AckermannDriveStamped", "a velocity"),
         ("sensor_msgs/Joy", "a velocity"),
+        ("gazebo_msgs/ModelState", SIMULATED),
+        ("gazebo_msgs/msg/ModelStates", SIMULATED),
+        ("gazebo_msgs/srv/SetModelState", SIMULATED),
+        ("std_msgs/Float64MultiArray", None),
+        ("geometry_msgs/Vector3", None),
         ("geometry_msgs/PoseStamped", "a goal"),
         ("move_base_msgs/MoveBaseActionGoal", "a goal"),
         ("nav2_msgs/action/NavigateToPose_SendGoal", "a goal"),
@@ -38,9 +45,36 @@ def test_a_type_tells_what_it_moves(type, moved):
         ("/navigate_to_pose/_action/send_goal", "a goal"),
         ("/navigate_to_pose/_action/cancel_goal", "the end of a goal"),
         ("/navigate_to_pose/_action/get_result", "a goal"),
+        ("/velocity_controller/commands", "a velocity"),
+        ("/bob/left_wheel_velocity_controller/command", "a velocity"),
+        ("/mecanum_drive_controller/reference", "a velocity"),
+        ("/arm_controller/joint_trajectory", "a velocity"),
+        ("/bob/cmdvel", "a velocity"),
+        ("/bob/target_velocity", "a velocity"),
+        ("/controller_manager/list_controllers", None),
+        ("/velocity_controller/transition_event", None),
+        ("/voice/commands", None),
+        ("/travel/target", None),
         ("/dock", None),
         ("/goal_checker/reset", None),
     ],
 )
 def test_a_name_tells_what_it_moves(name, moved):
     assert moved_by_name(name) == moved
+
+
+@pytest.mark.parametrize(
+    ("name", "type", "moved"),
+    [
+        ("/wheels/commands", "std_msgs/msg/Float64MultiArray", "a velocity"),
+        ("/left_wheel/cmd", "std_msgs/Float64", "a velocity"),
+        ("/bob/velocity", "geometry_msgs/Vector3", "a velocity"),
+        ("/bob/vel", "geometry_msgs/msg/Vector3Stamped", "a velocity"),
+        ("/samples", "std_msgs/Float64MultiArray", None),
+        ("/gravity", "geometry_msgs/Vector3", None),
+        ("/voice/commands", "std_msgs/String", None),
+        ("/wheels/commands", "no type", None),
+    ],
+)
+def test_numbers_move_by_their_name_and_their_type_together(name, type, moved):
+    assert moved_by_both(name, type) == moved

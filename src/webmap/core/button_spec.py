@@ -11,7 +11,7 @@ from webmap.errors import ConfigError
 from webmap.ros import ops
 from webmap.ros.form_fields import UnknownType, fields_of
 from webmap.ros.message_forms import FormError, checked
-from webmap.ros.moving import moved_by_name, moved_by_type
+from webmap.ros.moving import moved_by_both, moved_by_name, moved_by_type
 from webmap.ros.names import normalise_topic, split_type
 
 Kind = Literal["service", "topic", "parameter"]
@@ -156,7 +156,9 @@ def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
     """
     if kind == "parameter":
         return None
-    by_type = None if type is None else moved_by_type(type)
+    by_type = None
+    if type is not None:
+        by_type = moved_by_type(type) or moved_by_both(name, type)
     moved = by_type or moved_by_name(name)
     if moved is None:
         return None

@@ -5,6 +5,8 @@ nobody has declared them: by the names and types that ROS packages give them. A 
 that moves a robot by itself, such as one that docks, cannot be told by its name.
 """
 
+import re
+
 from webmap.errors import ConfigError
 from webmap.ros.names import TypeName, split_type
 
@@ -28,6 +30,23 @@ _TYPES: dict[str, tuple[str, ...]] = {
         "sensor_msgs/Joy",
     ),
     "a goal": ("geometry_msgs/PoseStamped", "geometry_msgs/PoseArray", "nav_msgs/Path"),
+    "the place or the speed of a simulated robot": (
+        "gazebo_msgs/ModelState",
+        "gazebo_msgs/ModelStates",
+        "gazebo_msgs/EntityState",
+        "gazebo_msgs/LinkState",
+        "gazebo_msgs/LinkStates",
+        "gazebo_msgs/SetModelState",
+        "gazebo_msgs/SetEntityState",
+        "gazebo_msgs/SetLinkState",
+        "gazebo_msgs/SetModelConfiguration",
+        "gazebo_msgs/ApplyBodyWrench",
+        "gazebo_msgs/ApplyLinkWrench",
+        "gazebo_msgs/ApplyJointEffort",
+        "ros_gz_interfaces/SetEntityPose",
+        "ros_gz_interfaces/EntityWrench",
+        "simulation_interfaces/SetEntityState",
+    ),
     "the end of a goal": ("actionlib_msgs/GoalID", "action_msgs/CancelGoal"),
 }
 _KIND = {f"{name}": kind for kind, names in _TYPES.items() for name in names}
@@ -41,6 +60,24 @@ _NAMES = {
     "send_goal": "a goal",
     "cancel_goal": "the end of a goal",
 }
+_VELOCITY = re.compile(
+    r"(?:cmd|command|setpoint|target|desired).*vel|vel.*(?:cmd|command|setpoint|target)"
+)
+"""Last parts of names: cmd_vel_nav, stamped_cmd_vel, target_velocity, and the like."""
+
+_CONTROLLER = re.compile(
+    r"/[^/]*controller[^/]*/(?:commands?|reference(?:_unstamped)?|joint_trajectory)\Z"
+)
+"""What the controllers of ros_control and ros2_control listen to."""
+
+_NUMBERS = re.compile(
+    r"std_msgs/(?:Float|U?Int)\d+(?:MultiArray)?|geometry_msgs/Vector3(?:Stamped)?"
+)
+"""Types that say nothing of what their numbers are."""
+
+_NUMBERS_MOVE = re.compile(r"/(?:commands?|cmds?|vel|velocity|velocities)\Z")
+"""Names at which such numbers are commands; at another, a message may be a text."""
+
 _ACTION_TOPICS = ("ActionGoal",)
 _ACTION_TYPES = ("_SendGoal", "_Goal")
 
@@ -58,7 +95,7 @@ def moved_by_name(name: str) -> str | None:
     if "/_action/" in name:
         return "the end of a goal" if name.endswith("/cancel_goal") else "a goal"
     last = name.rpartition("/")[2].lower()
-    if "cmd_vel" in last:  # cmd_vel_nav, stamped_cmd_vel, and the like
+    if _VELOCITY.search(last) or _CONTROLLER.search(name.lower()):
         return "a velocity"
     return _NAMES.get(last)
 
@@ -68,6 +105,9 @@ def moved_by_type(type: str) -> str | None:
 
     Args:
         type: In either dialect; a text that is no type moves nothing.
+
+    Returns:
+        What :func:`moved_by_name` returns, or that it is a simulator's.
 
     """
     try:
@@ -79,3 +119,21 @@ def moved_by_type(type: str) -> str | None:
     if name.endswith("_CancelGoal"):
         return "the end of a goal"
     return _KIND.get(str(TypeName(package, name)))
+
+
+def moved_by_both(name: str, type: str) -> str | None:
+    """Return what numbers of this type carry at this name, if they move robots.
+
+    Neither tells it alone: wheels take a ``std_msgs/Float64MultiArray`` at
+    ``/wheels/commands``, and so does a plot at ``/samples``.
+
+    Args:
+        name: The resolved name.
+        type: In either dialect; a text that is no type moves nothing.
+
+    """
+    try:
+        numbers = _NUMBERS.fullmatch(str(split_type(type)))
+    except ConfigError:
+        return None
+    return "a velocity" if numbers and _NUMBERS_MOVE.search(name.lower()) else None
