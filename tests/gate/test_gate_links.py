@@ -210,6 +210,17 @@ async def test_in_the_end_zero_goes_to_all_that_may_be_driven_and_to_nothing_els
 
 
 @in_loop
+async def test_the_end_of_the_gate_is_the_end_of_every_link():
+    async with noting_bridge() as bridge:
+        async with Noting() as noting:
+            noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
+            await noting.up("control", "witness", "tasks")
+            await until(lambda: len(bridge.links) == 3, "three sockets")
+        await until(lambda: not bridge.links, "the end of all of them")
+        assert noting.of(LinkDown) == []
+
+
+@in_loop
 async def test_what_is_not_for_the_links_is_left_to_others():
     async with Noting() as noting:
         assert noting.do(actions.Unlock(Key("ws://x", "/cmd_vel"))) is None

@@ -12,7 +12,7 @@ import pytest
 from gate_robot import eventually
 
 from webmap.gate import framing, process
-from webmap.gate.child import Child
+from webmap.gate.child import gate_command
 from webmap.gate.gate import Gate
 from webmap.gate.messages import FromGate, Heartbeat, Ready
 from webmap.gate.outbox import Outbox
@@ -27,7 +27,7 @@ def not_measured():
 def gate():
     """A gate's process."""
     started = subprocess.Popen(
-        Child.COMMAND,
+        gate_command(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -259,7 +259,7 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
         assert "cannot be read" in caplog.text
         gate.shell.tell(messages.Reset("r1"))
         await gate.reported(lambda r: r.armable, "a robot to be had")
-        assert not path.exists()
+        await until(lambda: not path.exists(), "no file")
         assert not any(speeds(bridge))
 
 
@@ -273,6 +273,6 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
         gate.x = None
         gate.shell.tell(messages.Reset("r1"))
         await gate.reported(lambda r: not r.latched, "the reset")
-        assert Records(tmp_path).latch_of(key) is None
+        await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
         gate.say(op="stop", robot="r1")
         await until(lambda: Records(tmp_path).latch_of(key) == "Ann", "the file")

@@ -24,24 +24,27 @@ MAX_WORDS = 300
 """The longest line of a gate that is kept as its last words, in characters."""
 
 
+def gate_command() -> list[str]:
+    """Return what starts a gate."""
+    # -P: no file that lies about in the working folder is taken for a module.
+    return [sys.executable, "-P", "-m", "webmap.gate"]
+
+
 class Child:
     """A running gate.
 
     Args:
         hear: Called with each message, in a thread of the child's own.
         ended: Called once, in that thread, when the gate has closed its end.
-        command: What is run.
+        command: What is run; a gate, if nothing is said.
 
     """
-
-    # -P: no file that lies about in the working folder is taken for a module.
-    COMMAND = (sys.executable, "-P", "-m", "webmap.gate")
 
     def __init__(
         self,
         hear: Callable[["Child", FromGate], None],
         ended: Callable[["Child"], None],
-        command: Sequence[str] = COMMAND,
+        command: Sequence[str] | None = None,
     ) -> None:
         self._hear = hear
         self._ended = ended
@@ -50,7 +53,7 @@ class Child:
         # A session of its own: Ctrl-C in the terminal reaches the display, which
         # lets the gate stop the robots in order.
         self._process = subprocess.Popen(
-            command,
+            command or gate_command(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
