@@ -34,8 +34,8 @@ class Layer:
         self.fragment = Fragment(self.svg)
         self.users = 0
         self.scope = Scope(type(self).__name__, self._failed)
-        self._told = Problems(log)
-        self.maps: list[Map] = self._told.maps
+        self._told: Problems[Map] = Problems(log)
+        self.maps = self._told.maps
         """Those that hear what fails: see :meth:`show_on`."""
         self.problems: dict[object, str] = self._told.standing
         """What fails for now, in sentences, by what they are about."""

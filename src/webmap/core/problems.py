@@ -2,13 +2,20 @@
 
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
+from typing import Generic, Protocol, TypeVar
 
 
-class Problems:
+class Told(Protocol):
+    """Who shows people what fails: a map."""
+
+    def show_error(self, text: str) -> None:
+        """Show what the log has already."""
+
+
+T = TypeVar("T", bound=Told)
+
+
+class Problems(Generic[T]):
     """The sentences of one thing that maps share, and the maps that show them.
 
     Args:
@@ -18,7 +25,7 @@ class Problems:
     """
 
     def __init__(self, log: logging.Logger, worded: Callable[[str], str] = str) -> None:
-        self.maps: list[Map] = []
+        self.maps: list[T] = []
         self.standing: dict[object, str] = {}
         """What fails for now, by what it is about."""
         self._log = log
@@ -41,12 +48,12 @@ class Problems:
         """Note that what was said of ``about`` is true no more."""
         self.standing.pop(about, None)
 
-    def join(self, map: "Map") -> None:
+    def join(self, map: T) -> None:
         """Show a map what fails now, and from now on."""
         self.maps.append(map)
         for text in self.standing.values():
             map.show_error(self._worded(text))
 
-    def leave(self, map: "Map") -> None:
+    def leave(self, map: T) -> None:
         """Show a map nothing more."""
         self.maps.remove(map)

@@ -57,8 +57,8 @@ class Robot(Driven):
         super().__init__(name, namespace)
         self.base_link = base_link
         self.model = default_model() if model is None else model
-        self._told = Problems(log, lambda text: f"{self.name}: {text}")
-        self.maps: list[Map] = self._told.maps
+        self._told: Problems[Map] = Problems(log, lambda text: f"{self.name}: {text}")
+        self.maps = self._told.maps
         self.problems: dict[object, str] = self._told.standing
         """What fails for now, in sentences, by what they are about."""
         self.selected = False

@@ -97,7 +97,7 @@ class Model:
     def host(self, key: tuple[str, str, str], viewer: Viewer) -> PageHost:
         """Return the page of that key: the one that was kept, or a new one."""
         if key not in self._hosts:
-            self._hosts[key] = host = PageHost(self, key, viewer)
+            self._hosts[key] = host = PageHost(self, self.pages[key[0]], key, viewer)
             host.drive = self._drives.get(key[1:])
         return self._hosts[key]
 

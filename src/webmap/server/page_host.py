@@ -3,10 +3,12 @@
 import inspect
 import logging
 import time
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 from webmap.core.page import Page, PageEntry
+from webmap.core.page_ports import Publisher
+from webmap.core.runtime import Runtime
 from webmap.core.tasks import spawn
 from webmap.core.view import Rect
 from webmap.errors import WireError
@@ -25,9 +27,6 @@ from webmap.wire.messages import (
     ViewReport,
 )
 from webmap.wire.session import SceneSession
-
-if TYPE_CHECKING:
-    from webmap.server.model import Model
 
 log = logging.getLogger("webmap.page")
 
@@ -59,16 +58,41 @@ class Speeds(Protocol):
         """Set the most that this connection's hands may ask for."""
 
 
+class Keeper(Protocol):
+    """Who keeps the pages, as far as one of them asks."""
+
+    @property
+    def runtime(self) -> Runtime:
+        """What ticks a page that has a socket."""
+
+    @property
+    def publisher(self) -> Publisher:
+        """Where its files get URLs."""
+
+    def count_refused(self, viewer: Viewer, last: str) -> None:
+        """Count a message of a page that was not taken."""
+
+    def forget(self, key: tuple[str, str, str], host: "PageHost") -> None:
+        """Note that a page has ended for good."""
+
+    def later(self, delay: float, fn: Callable[..., object], *args: Any) -> None:
+        """Call ``fn`` in the model's thread after ``delay`` seconds."""
+
+
 class PageHost:
     """One page of one viewer, through losses of its socket and reloads."""
 
     def __init__(
-        self, model: "Model", key: tuple[str, str, str], viewer: Viewer
+        self,
+        keeper: Keeper,
+        entry: PageEntry,
+        key: tuple[str, str, str],
+        viewer: Viewer,
     ) -> None:
         self.viewer = viewer
-        self._model = model
+        self._keeper = keeper
+        self._entry = entry
         self._key = key
-        self._entry: PageEntry = model.pages[key[0]]
         self._session = SceneSession()
         self._page: Page | None = None
         self._outbox: Outbox | None = None
@@ -96,7 +120,7 @@ class PageHost:
             events = self._session.receive(text)
         except WireError as error:
             log.warning("%r: %s", self, error)
-            self._model.count_refused(self.viewer, f"page: {error}")
+            self._keeper.count_refused(self.viewer, f"page: {error}")
             return
         for event in events:
             self._hear(event)
@@ -123,7 +147,7 @@ class PageHost:
         self._outbox = None
         self._stop_watching()
         self._lost += 1
-        self._model.later(KEPT_FOR, self._give_up, self._lost)
+        self._keeper.later(KEPT_FOR, self._give_up, self._lost)
 
     def tick(self, now: float) -> None:
         """Send what changed, if the page keeps up."""
@@ -143,7 +167,7 @@ class PageHost:
         if self._page is None:
             self._open(sizes)
         self._stop_watching()
-        self._watching = self._model.runtime.watch(self)
+        self._watching = self._keeper.runtime.watch(self)
 
     def _view_report(self, report: ViewReport) -> None:
         r = report
@@ -176,7 +200,7 @@ class PageHost:
     def close(self) -> None:
         """End the page for good."""
         self._stop_watching()
-        self._model.forget(self._key, self)
+        self._keeper.forget(self._key, self)
         if self._page is not None:
             self._page.close()
             self._page = None
@@ -191,7 +215,7 @@ class PageHost:
 
     def _open(self, sizes: Mapping[str, tuple[float, float]]) -> None:
         page = self._page = Page(
-            self._entry, self._session, self.viewer, self._model.publisher, sizes
+            self._entry, self._session, self.viewer, self._keeper.publisher, sizes
         )
         page.on_speeds = lambda v, w: self.tell_speeds()
         try:
