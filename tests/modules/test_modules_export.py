@@ -151,6 +151,30 @@ def test_the_svg_needs_nothing_else_and_runs_nothing(tab, tmp_path):
     assert len(images) == 3
     assert "<b>Küche</b>" in [t.text for t in root.iter(f"{SVG}text")]
     assert tab.url.split("/")[2] not in text
+    # Where the page's fonts are not there, one of the same kind takes the same room.
+    families = [e.get("font-family") for e in root.iter() if e.get("font-family")]
+    assert families
+    for family in families:
+        assert re.search(r"\b(sans-serif|serif|monospace)\b", family), family
+    for words in root.iter(f"{SVG}text"):
+        assert words.text is None or float(words.get("textLength", 0)) > 0, words.text
+
+
+def test_a_text_takes_the_same_room_in_another_font(tab, chromium, tmp_path):
+    file = saved(tab, "svg", tmp_path)
+    text = file.read_text("utf-8")
+    other = tmp_path / "other.svg"
+    other.write_text(re.sub(r'font-family="[^"]*"', 'font-family="monospace"', text))
+    assert other.read_text() != text
+    measure = "[...document.querySelectorAll('text')].map(t => t.getBBox().width)"
+    widths = []
+    for each in (file, other):
+        page = chromium.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+        page.goto(each.as_uri())
+        widths.append(page.evaluate(measure))
+        page.close()
+    assert len(widths[0]) > 1
+    assert widths[1] == pytest.approx(widths[0], rel=0.02)
 
 
 def test_the_png_is_the_same_picture(tab, chromium, tmp_path):

@@ -1,4 +1,5 @@
 import { svg } from "./elements.js";
+import { keepLength } from "./export_fonts.js";
 import { writeStyle, writeTransform } from "./export_styles.js";
 
 /** @typedef {import('./export_styles.js').Inherited} Inherited */
@@ -65,6 +66,9 @@ export class Copier {
         const inner = this.copy(child, here, hidden);
         if (inner) copy.append(inner);
       }
+    }
+    if (original instanceof SVGTextElement && !hidden && original.childElementCount === 0) {
+      keepLength(copy, original.getComputedTextLength());
     }
     return copy;
   }

@@ -1,39 +1,18 @@
+import { standingAlone } from "./export_fonts.js";
+
 /**
  * What style sheets say, written onto the elements themselves, so that a drawing looks
  * the same without them.
  */
 
 /** What children take from their parents. */
-const INHERITED = [
-  "clip-rule",
-  "color",
-  "fill",
-  "fill-opacity",
-  "fill-rule",
-  "font-family",
-  "font-size",
-  "font-style",
-  "font-variant",
-  "font-weight",
-  "image-rendering",
-  "letter-spacing",
-  "marker-end",
-  "marker-mid",
-  "marker-start",
-  "paint-order",
-  "shape-rendering",
-  "stroke",
-  "stroke-dasharray",
-  "stroke-dashoffset",
-  "stroke-linecap",
-  "stroke-linejoin",
-  "stroke-miterlimit",
-  "stroke-opacity",
-  "stroke-width",
-  "text-anchor",
-  "text-rendering",
-  "visibility",
-];
+const INHERITED = (
+  "clip-rule color fill fill-opacity fill-rule font-family font-size font-style " +
+  "font-variant font-weight image-rendering letter-spacing marker-end marker-mid " +
+  "marker-start paint-order shape-rendering stroke stroke-dasharray stroke-dashoffset " +
+  "stroke-linecap stroke-linejoin stroke-miterlimit stroke-opacity stroke-width " +
+  "text-anchor text-rendering visibility"
+).split(" ");
 
 /** @type {[string, string][]} What each element has for itself, with its first value. */
 const OWN = [
@@ -71,7 +50,8 @@ export function writeStyle(copy, style, above) {
   /** @type {Inherited} */
   const here = {};
   for (const name of INHERITED) {
-    here[name] = style.getPropertyValue(name);
+    const value = style.getPropertyValue(name);
+    here[name] = name === "font-family" ? standingAlone(value) : value;
     if (here[name] === above[name]) copy.removeAttribute(name);
     else copy.setAttribute(name, here[name]);
   }

@@ -1,4 +1,5 @@
 import { svg } from "./elements.js";
+import { keepLength, standingAlone } from "./export_fonts.js";
 
 /**
  * Draw a panel of HTML with what is in it: its ground, its texts and its drawings.
@@ -47,7 +48,7 @@ export function drawPanel(panel, frame, copy) {
  * @returns {SVGTextElement[]} One for each line in which it was laid out.
  */
 function lines(text, style, frame) {
-  /** @type {{words: string, box: DOMRect}[]} */
+  /** @type {{words: string, box: DOMRect, right: number}[]} */
   const found = [];
   const range = document.createRange();
   for (const { 0: word, index } of text.data.matchAll(/\S+\s*/g)) {
@@ -55,22 +56,25 @@ function lines(text, style, frame) {
     range.setEnd(text, index + word.trimEnd().length);
     const box = range.getBoundingClientRect();
     const last = found.at(-1);
-    if (last && Math.abs(last.box.top - box.top) < 2) last.words += word;
-    else found.push({ words: word, box });
+    if (last && Math.abs(last.box.top - box.top) < 2) {
+      last.words += word;
+      last.right = box.right;
+    } else found.push({ words: word, box, right: box.right });
   }
   const size = Number.parseFloat(style.fontSize);
-  return found.map(({ words, box }) => {
+  return found.map(({ words, box, right }) => {
     const { x, y } = place(box, frame);
     const line = svg("text", {
       x,
       // Where most fonts have their base line, in the box of a line.
       y: `${Number(y) + box.height / 2 + 0.35 * size}`,
       fill: style.color,
-      "font-family": style.fontFamily,
+      "font-family": standingAlone(style.fontFamily),
       "font-size": style.fontSize,
       "font-weight": style.fontWeight,
     });
     line.textContent = words.trimEnd();
+    keepLength(line, right - box.left);
     return line;
   });
 }
