@@ -1,43 +1,18 @@
 """Where a layer lies whose data is in another frame than the map's."""
 
-from typing import TYPE_CHECKING
-
-from webmap.core.layer import Layer
 from webmap.core.layer_frames import LayerFrames, not_known
 from webmap.core.placed import put
 from webmap.core.whereabouts import affine
 from webmap.geometry import Affine, Pose
-from webmap.ros.bridge import Bridge
 from webmap.tf import TransformError
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 
 class Anchored(LayerFrames):
-    """Keeps a whole layer where the frames of a ROS system have its data.
+    """Keeps a whole layer where the frames of a ROS system have its data."""
 
-    Args:
-        layer: What is moved, whole.
-        bridge: As :class:`~webmap.core.layer_frames.LayerFrames` has it.
-        map_frame: Likewise.
-        namespace: Likewise.
-        robot: Likewise.
-
-    """
-
-    def __init__(
-        self,
-        layer: Layer,
-        bridge: Bridge,
-        map_frame: str | None,
-        namespace: str,
-        robot: "Robot | None" = None,
-    ) -> None:
-        super().__init__(layer, bridge, map_frame, namespace, robot)
+    def _begin(self) -> None:
         self._frame: str | None = None
         self._offset = Affine()
-        self._look_at_alignment()
 
     def stand_in(self, frame_id: str, stamp: float) -> None:
         """Take the layer's coordinates to be in a frame, as it was at a time.

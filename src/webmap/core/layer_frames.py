@@ -49,6 +49,7 @@ class LayerFrames:
         self._frames: Frames | None = None
         self._lasting = Lasting()
         self._aligned: Pose | None = None
+        self._begin()
         with layer.scope.active():
             keep(alignments.on_change(bridge, self._look_at_alignment))
             if robot is None:
@@ -56,6 +57,7 @@ class LayerFrames:
             else:
                 layer.svg.set("data-layer-of", robot.id)
                 keep(robot.whereabouts.join(self._look_at_alignment))
+        self._look_at_alignment()
 
     @property
     def alignment(self) -> Pose:
@@ -100,6 +102,9 @@ class LayerFrames:
         if aligned != self._aligned:
             self._aligned = aligned
             self._align(aligned)
+
+    def _begin(self) -> None:
+        """Make ready, before the layer is laid anywhere."""
 
     def _align(self, aligned: Pose) -> None:
         """Lay the layer where its map is now."""

@@ -3,16 +3,10 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from webmap.core.layer import Layer
 from webmap.core.layer_frames import LayerFrames, not_known
 from webmap.geometry import Pose
-from webmap.ros.bridge import Bridge
 from webmap.tf import Transform, TransformError
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 PERIOD = 0.05
 """Least seconds between two moves of markers that move with their frames."""
@@ -30,30 +24,12 @@ class _Moving:
 
 
 class MarkerFrames(LayerFrames):
-    """Tells where the frames of markers are on the map, and which of them move.
+    """Tells where the frames of markers are on the map, and which of them move."""
 
-    Args:
-        layer: The markers.
-        bridge: As :class:`~webmap.core.layer_frames.LayerFrames` has it.
-        map_frame: Likewise.
-        namespace: Likewise.
-        robot: Likewise.
-
-    """
-
-    def __init__(
-        self,
-        layer: Layer,
-        bridge: Bridge,
-        map_frame: str | None,
-        namespace: str,
-        robot: "Robot | None" = None,
-    ) -> None:
-        super().__init__(layer, bridge, map_frame, namespace, robot)
+    def _begin(self) -> None:
         self._moving: dict[object, _Moving] = {}
         self._lost: dict[str, str] = {}
         self._moved_at = -1.0
-        self._look_at_alignment()
 
     def place(
         self, key: object, frame_id: str, stamp: float, locked: bool, put: Put
