@@ -320,3 +320,27 @@ def test_points_of_a_route_are_added_by_touch_after_a_pose_was_set_in_between(
     edit.tap()
     tap_floor(4)
     expect(page.locator(".robot.selected")).to_have_count(0)
+
+
+def test_the_log_unfolds_into_what_robots_say_and_shows_the_level_that_is_chosen(
+    open_console,
+):
+    page = open_console()
+    log = page.locator(".webmap-rosout")
+    log.locator("summary").click()
+    expect(log.locator(".webmap-rosout-count")).to_have_text("Nothing was said yet.")
+    page.locator("#robots .row").first.click()
+    page.get_by_role("button", name="Send to").click()
+    robot = page.locator(".robot.selected .body").bounding_box()
+    page.mouse.click(robot["x"] + 12, robot["y"] + 40)
+    line = log.locator(".webmap-rosout-line").last
+    expect(line).to_have_attribute("data-level", "info")
+    expect(line.locator("strong")).to_have_text("Info")
+    expect(line.locator(".webmap-rosout-text")).to_contain_text("goal")
+    expect(line.locator(".webmap-rosout-age")).to_have_text(re.compile(r"^\d+ s$"))
+    log.get_by_label("Show").select_option("error")
+    expect(line).to_be_hidden()
+    page.reload()
+    expect(log.get_by_label("Show")).to_have_value("error")
+    log.get_by_label("Show").select_option("debug")
+    expect(line).to_be_visible()

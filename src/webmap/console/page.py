@@ -98,6 +98,7 @@ def build(
     map.add_module("MeasureTool")
     map.add_module("AlignTool")
     map.add_module("RouteTool", title)
+    map.add_module("RosoutPanel", bridges)
     map.add_module("ExportTool", place=".map-tools", classes="button square")
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
