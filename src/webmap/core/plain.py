@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 R = TypeVar("R", bound="Robot")
+D = TypeVar("D", bound=msgspec.Struct)
 
 
 class OdometryData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -149,46 +150,21 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
     feed, twist, move = robot.feed, robot.motion.twist_topic, robot.motion.move_topic
     pose = robot.motion.pose_topic
     own = robot.whereabouts.own_alignment
+    hooks = [] if twist is None else [dict(hook) for hook in twist.stop_hooks]
     known = {"robot", "unplaced", "selected", "stale"}
     plain = RobotData(
         name=robot.name,
         base_link=robot.base_link,
         classes=[name for name in robot.svg.classes if name not in known],
         model=element_to_dict(robot.model),
-        odometry=None
-        if feed is None
-        else OdometryData(feed.bridge.url, feed.topic, feed.throttle, feed.type),
+        odometry=_arguments(OdometryData, feed),
         tf=None
         if robot.tf is None
         else TfData(**{**robot.tf, "bridge": robot.tf["bridge"].url}),
         alignment=None if own is None else numbers(own),
-        twist=None
-        if twist is None
-        else TwistData(
-            twist.bridge.url,
-            twist.topic,
-            twist.type,
-            twist.stops_within,
-            twist.v_max,
-            twist.w_max,
-            twist.a_max,
-            twist.holonomic,
-            [dict(hook) for hook in twist.stop_hooks],
-        ),
-        move=None
-        if move is None
-        else MoveData(
-            move.bridge.url,
-            move.topic,
-            move.frame,
-            move.cancel_topic,
-            move.on_operator_loss,
-            move.action,
-            move.action_type,
-        ),
-        initial_pose=None
-        if pose is None
-        else InitialPoseData(pose.bridge.url, pose.topic, pose.covariance),
+        twist=_arguments(TwistData, twist, stop_hooks=hooks),
+        move=_arguments(MoveData, move),
+        initial_pose=_arguments(InitialPoseData, pose),
         scan_assist=assist_data(robot.motion.assist),
         modules=[
             ModuleData(
@@ -201,6 +177,14 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
     )
     result: dict[str, Any] = msgspec.to_builtins(plain)
     return result
+
+
+def _arguments(cls: type[D], kept: Any, **others: Any) -> D | None:
+    """Return what set something as it is kept; None if nothing is."""
+    if kept is None:
+        return None
+    fields = {name: getattr(kept, name) for name in cls.__struct_fields__}
+    return cls(**{**fields, "bridge": kept.bridge.url, **others})
 
 
 def _bridge_in(value: Any, link: Any) -> Any:
