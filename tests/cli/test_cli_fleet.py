@@ -85,7 +85,7 @@ def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
         "ws://north:9090",
         "wss://south/ros",
     ]
-    assert fleet.fleet.map == ("north", "/map")
+    assert fleet.fleet.maps == [{"bridge": "north", "topic": "/map"}]
     bob, ann = fleet.robots
     spec = bob.motion.spec()
     assert (bob.name, spec.twist_topic, spec.stops_within) == (

@@ -53,21 +53,28 @@ def test_the_file_is_toml_with_every_topic_that_is_used():
     assert robot["twist"] == {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}
     assert robot["scan"] == ["/scan", "/rear/scan"]
     assert robot["move"]["cancel_topic"] == "/move_base/cancel"
-    assert robot["modules"] == [{"name": "Path", "args": [{"bridge": "bob"}, "/plan"]}]
+    assert robot["modules"] == [
+        {"name": "Trail", "options": {"length": 10.0}},
+        {"name": "Path", "args": [{"bridge": "bob"}, "/plan"]},
+        {
+            "name": "PoseStamped",
+            "args": [{"bridge": "bob"}, "/move_base_simple/goal"],
+            "options": {"name": "goal"},
+        },
+    ]
     assert "map" not in data
 
 
-def test_the_first_map_and_every_camera_are_in_the_file():
+def test_maps_costmaps_and_every_camera_are_in_the_file():
     more = {"/map": "nav_msgs/OccupancyGrid", "/costmap": "nav_msgs/OccupancyGrid"}
     more |= {"/cam/image_raw/compressed": "sensor_msgs/CompressedImage"}
     found = discover(TOPICS | more, "bob")
     text = fleet_toml([("al", "ws://al", discover({})), ("bob", "ws://bob", found)])
     data = tomllib.loads(text)
-    assert data["map"] == {"bridge": "bob", "topic": "/map"}
-    names = [module["name"] for module in data["robots"][0]["modules"]]
-    assert names == ["Path"]
+    assert data["map"] == [{"bridge": "bob", "topic": "/map"}]
+    (costmap,) = [m for m in data["robots"][0]["modules"] if m["name"] == "OnMaps"]
+    assert costmap["args"] == ["OccupancyGrid", {"bridge": "bob"}, "/costmap"]
     assert data["robots"][0]["cameras"] == ["/cam/image_raw/compressed"]
-    assert "# found too: costmap /costmap" in text
 
 
 def test_an_address_as_a_name_is_a_quoted_key():

@@ -1,10 +1,13 @@
 """What was found, as a fleet file to keep and to correct."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import msgspec
 
-from webmap.discovery.found import Findings, FoundRobot, Role
+from webmap.discovery.drawing import Drawing, drawing
+from webmap.discovery.found import Findings, FoundRobot
+from webmap.discovery.layers import FoundLayer
 
 HEAD = """\
 # A fleet file: webmap check FILE reads it, webmap run FILE shows it.
@@ -17,9 +20,6 @@ UNSURE = """\
 # twist.stops_within = 0.25
 """
 
-ALSO: tuple[Role, ...] = ("pose", "map", "costmap", "cloud")
-"""Roles that stay out of a page; modules show most of them."""
-
 
 def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
     """Return a fleet file.
@@ -31,14 +31,14 @@ def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
     """
     parts = [HEAD, "[bridges]"]
     parts += [f"{_key(name)} = {_text(url)}" for name, url, _ in found]
-    parts += _map(found)
+    parts += _maps(found)
     for bridge, _, findings in found:
         for robot in findings.robots:
-            parts += ["", *_robot(robot, bridge)]
+            parts += ["", *_robot(robot, bridge, findings)]
     return "\n".join(parts) + "\n"
 
 
-def _robot(robot: FoundRobot, bridge: str) -> list[str]:
+def _robot(robot: FoundRobot, bridge: str, findings: Findings) -> list[str]:
     lines = [
         "[[robots]]",
         f"name = {_text(robot.name)}",
@@ -52,11 +52,7 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
         )
     if robot.tf_namespace is not None:
         lines += _frames(robot)
-    scans = robot.guesses.get("scan", ())
-    if scans:
-        listed = ", ".join(_text(guess.topic) for guess in scans)
-        why = "; ".join(guess.rule for guess in scans)
-        lines.append(f"scan = [{listed}] # {why}")
+    lines += _scans(robot, findings)
     battery = robot.first("battery")
     if battery is not None:
         lines.append(f"battery = {_text(battery.topic)} # {battery.rule}")
@@ -65,14 +61,11 @@ def _robot(robot: FoundRobot, bridge: str) -> list[str]:
         rows = [f"  {_text(guess.topic)}, # {guess.rule}" for guess in cameras]
         lines += ["cameras = [", *rows, "]"]
     lines += _motion(robot)
-    lines += _modules(robot, bridge)
-    for role in ALSO:
-        if where in robot.guesses.get(role, ()):
-            continue
-        lines += [
-            f"# found too: {role} {guess.topic} ({guess.rule})"
-            for guess in robot.guesses.get(role, ())
-        ]
+    lines += _modules(robot, bridge, findings)
+    lines += [
+        f"# not drawn, since there are enough of its kind: {layer.topic}"
+        for layer in findings.left_out.get(robot.namespace, ())
+    ]
     return lines + [f"# {note}" for note in robot.notes]
 
 
@@ -89,31 +82,71 @@ def _frames(robot: FoundRobot) -> list[str]:
     ]
 
 
-def _map(found: Sequence[tuple[str, str, Findings]]) -> list[str]:
-    """Return the first map that there is."""
+def _maps(found: Sequence[tuple[str, str, Findings]]) -> list[str]:
+    """Return the maps that robots share, each once for its bridge."""
+    lines: list[str] = []
     for bridge, _, findings in found:
+        named: dict[str, FoundLayer] = {}
         for robot in findings.robots:
-            guess = robot.first("map")
-            if guess is not None:
-                return [
-                    "",
-                    "[map]",
-                    f"bridge = {_text(bridge)}",
-                    f"topic = {_text(guess.topic)} # {guess.rule}",
-                ]
-    return []
+            for layer in findings.layers.get(robot.namespace, ()):
+                if drawing(layer, robot.namespace, None).shared:
+                    named.setdefault(layer.topic, layer)
+        for topic, layer in named.items():
+            lines += [
+                "",
+                "[[map]]",
+                f"bridge = {_text(bridge)}",
+                f"topic = {_text(topic)} # {layer.rule}",
+            ]
+            if layer.kind == "grid":
+                lines.append('palette = "costmap"')
+    return lines
 
 
-def _modules(robot: FoundRobot, bridge: str) -> list[str]:
-    """Return what is shown of a robot besides."""
-    wanted = [("Path", guess) for guess in robot.guesses.get("plan", ())[:1]]
+def _scans(robot: FoundRobot, findings: Findings) -> list[str]:
+    """Return the scans that are drawn: the best, and what else there is."""
+    layers = findings.layers.get(robot.namespace, ())
+    best = robot.first("scan")
+    topics = {} if best is None else {best.topic: best.rule}
+    for layer in layers:
+        if layer.kind == "scan":
+            topics.setdefault(layer.topic, layer.rule)
+    if not topics:
+        return []
+    listed = ", ".join(_text(topic) for topic in topics)
+    return [f"scan = [{listed}] # {'; '.join(topics.values())}"]
+
+
+def _modules(robot: FoundRobot, bridge: str, findings: Findings) -> list[str]:
+    """Return what is shown of a robot besides, as ``webmap view`` does."""
+    frames = None
+    if robot.tf_namespace is not None:
+        frames = {"map_frame": "map", **robot.tf_options}
     link = f"{{ bridge = {_text(bridge)} }}"
-    lines = [
-        f'  {{ name = "{module}", args = [{link}, {_text(guess.topic)}] }}, '
-        f"# {guess.rule}"
-        for module, guess in wanted
-    ]
-    return ["modules = [", *lines, "]"] if lines else []
+    where = robot.topic("odometry") or robot.topic("pose")
+    plan = robot.first("plan")
+    lines = ['  { name = "Trail", options = { length = 10.0 } },']
+    if plan is not None:
+        path = FoundLayer("path", plan.topic, plan.type, plan.rule)
+        lines.append(_module(drawing(path, "", None), path, link))
+    for layer in findings.layers.get(robot.namespace, ()):
+        drawn = drawing(layer, robot.namespace, frames)
+        if drawn.shared or layer.kind == "scan":
+            continue
+        if layer.topic not in (where, robot.topic("plan")):
+            lines.append(_module(drawn, layer, link))
+    return ["modules = [", *lines, "]"]
+
+
+def _module(drawn: Drawing, layer: FoundLayer, link: str) -> str:
+    name = "OnMaps" if drawn.of_maps else drawn.module
+    of = f"{_text(drawn.module)}, " if drawn.of_maps else ""
+    # What is empty is so unless it is said.
+    said = {key: value for key, value in drawn.options.items() if value != ""}
+    options = ", ".join(f"{key} = {_value(value)}" for key, value in said.items())
+    behind = f", options = {{ {options} }}" if options else ""
+    args = f"[{of}{link}, {_text(layer.topic)}]"
+    return f'  {{ name = "{name}", args = {args}{behind} }}, # {layer.rule}'
 
 
 def _motion(robot: FoundRobot) -> list[str]:
@@ -138,6 +171,10 @@ def _motion(robot: FoundRobot) -> list[str]:
     if pose is not None:
         lines.append(f"initial_pose = {_text(pose.topic)} # {pose.rule}")
     return lines
+
+
+def _value(value: Any) -> str:
+    return _text(value) if isinstance(value, str) else str(value).lower()
 
 
 def _text(value: str) -> str:

@@ -1,13 +1,15 @@
 """Reading a fleet file's table: its bridges, its map, and its robots one by one."""
 
+from functools import partial
 from typing import Any
 
 from webmap.cli.fleet import checks
 from webmap.cli.fleet.alignments import Alignment, bridge_table
-from webmap.cli.fleet.checks import Check, Mistakes
+from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.lines import Path
 from webmap.cli.fleet.places import read_places, read_tiles
-from webmap.cli.fleet.robot_table import known_bridge, read_robot
+from webmap.cli.fleet.robot_table import known_bridge, read_modules, read_robot
+from webmap.cli.fleet.scenery import read_images, read_maps
 from webmap.cli.fleet.schema import TOP, Fleet, RobotLine
 from webmap.discovery.naming import same_name
 from webmap.errors import ConfigError
@@ -31,7 +33,14 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
             setattr(fleet, key, checks.one(checks.text, data[key], (key,), mistakes))
     fleet.bridges, fleet.alignments = _bridges(data.get("bridges"), mistakes)
     if "map" in data:
-        fleet.map = _map(data["map"], fleet.bridges, mistakes)
+        only = next(iter(fleet.bridges)) if len(fleet.bridges) == 1 else None
+        known = partial(known_bridge, bridges=fleet.bridges)
+        fleet.maps = read_maps(data["map"], known, only, mistakes)
+    if "image" in data:
+        fleet.images = read_images(data["image"], mistakes)
+    if "modules" in data:
+        where = ("modules",)
+        fleet.modules = read_modules(data["modules"], where, fleet.bridges, mistakes)
     if "tiles" in data:
         fleet.tiles = read_tiles(data["tiles"], ("tiles",), mistakes)
     if "labels" in data:
@@ -67,20 +76,6 @@ def _bridges(
         else:
             urls[name] = checks.one(_address, bridge, path, mistakes) or ""
     return urls, alignments
-
-
-def _map(
-    value: Any, bridges: dict[str, str], mistakes: Mistakes
-) -> tuple[str, str] | None:
-    path: Path = ("map",)
-    known: dict[str, Check] = {
-        "bridge": lambda name: known_bridge(name, bridges),
-        "topic": checks.topic,
-    }
-    if isinstance(value, dict) and "bridge" not in value and len(bridges) == 1:
-        value = {"bridge": next(iter(bridges)), **value}
-    meant = checks.table(value, known, path, mistakes, needed=("bridge", "topic"))
-    return (str(meant.get("bridge")), str(meant.get("topic")))
 
 
 def _address(value: Any) -> str:

@@ -72,7 +72,7 @@ def read_robot(
         robot.cameras = read_cameras(value["cameras"], where, mistakes)
     if "buttons" in value:
         robot.buttons = read_buttons(value["buttons"], (*path, "buttons"), mistakes)
-    robot.modules = _modules(
+    robot.modules = read_modules(
         value.get("modules", []), (*path, "modules"), bridges, mistakes
     )
     return robot
@@ -127,9 +127,10 @@ def _scans(value: Any, path: Path, mistakes: Mistakes) -> list[str]:
     ]
 
 
-def _modules(
+def read_modules(
     value: Any, path: Path, bridges: dict[str, str], mistakes: Mistakes
 ) -> list[ModuleLine]:
+    """Return what an array of modules means; mistakes are noted."""
     if not isinstance(value, list):
         mistakes.add(path, f"got {checks.show(value)}, expected an array of tables")
         return []

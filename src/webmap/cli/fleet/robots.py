@@ -13,6 +13,7 @@ from webmap.console import RobotDescription
 from webmap.console.fleet import make_robot
 from webmap.core.module_arguments import WrongArgument, WrongArguments
 from webmap.core.registry import robot_modules
+from webmap.discovery.drawing import scan_name
 from webmap.errors import WebMapError
 
 if TYPE_CHECKING:
@@ -48,9 +49,14 @@ def _robot(
     robot.base_link = line.base_link
     if line.alignment is not None:
         robot.set_alignment(*line.alignment)
-    for topic in others:
+    for number, topic in enumerate(others, 2):
         scanner = robot.add_module(
-            "LaserScanner", bridge, topic, max_dots=None, throttle=100
+            "LaserScanner",
+            bridge,
+            topic,
+            max_dots=None,
+            throttle=100,
+            name=scan_name(number),
         )
         robot.svg.insert(1, scanner.svg)
     setters: dict[str, tuple[dict[str, Any] | None, Callable[..., None]]] = {
@@ -87,8 +93,8 @@ def _add_module(
     bridges: Mapping[str, "Bridge"],
     mistakes: Mistakes,
 ) -> None:
-    args = [_meant(value, bridges) for value in module.args]
-    options = {key: _meant(value, bridges) for key, value in module.options.items()}
+    args = [meant(value, bridges) for value in module.args]
+    options = {key: meant(value, bridges) for key, value in module.options.items()}
     try:
         robot_modules[module.name]
     except WebMapError as error:
@@ -98,7 +104,7 @@ def _add_module(
         robot.add_module(module.name, *args, **options)
     except WrongArguments as error:
         for wrong in error.wrong:
-            mistakes.add((*module.path, *wrong.way), _in_words(module, wrong))
+            mistakes.add((*module.path, *wrong.way), in_words(module, wrong))
     except WebMapError as error:
         # What a module says of a value begins with the name of the argument.
         key = str(error).partition(" ")[0].rstrip(":")
@@ -109,7 +115,8 @@ def _add_module(
         mistakes.add(module.path, f"{module.name} refused its arguments: {said}")
 
 
-def _in_words(module: ModuleLine, wrong: WrongArgument) -> str:
+def in_words(module: ModuleLine, wrong: WrongArgument) -> str:
+    """Return what is wrong with an argument, as a fleet file's reader says it."""
     if not wrong.got:
         return f"{module.name}: {wrong.words}"
     expected = wrong.words
@@ -119,7 +126,8 @@ def _in_words(module: ModuleLine, wrong: WrongArgument) -> str:
     return f"got {checks.show(wrong.got[0])}, expected {expected}{of}"
 
 
-def _meant(value: Any, bridges: Mapping[str, "Bridge"]) -> Any:
+def meant(value: Any, bridges: Mapping[str, "Bridge"]) -> Any:
+    """Return an argument, and for ``{ bridge = "north" }`` that bridge."""
     if isinstance(value, dict) and set(value) == {"bridge"}:
         return bridges[value["bridge"]]
     return value

@@ -10,7 +10,17 @@ from webmap.cli.fleet.checks import Check
 from webmap.cli.fleet.lines import Path
 from webmap.cli.fleet.places import Places
 
-TOP = ("title", "floor", "map", "tiles", "labels", "bridges", "robots")
+TOP = (
+    "title",
+    "floor",
+    "map",
+    "image",
+    "modules",
+    "tiles",
+    "labels",
+    "bridges",
+    "robots",
+)
 ODOMETRY: dict[str, Check] = {
     "topic": checks.topic,
     "type": checks.message_type(
@@ -74,7 +84,7 @@ MODULE = ("name", "args", "options")
 
 @dataclass(slots=True)
 class ModuleLine:
-    """One module of a robot."""
+    """One module of a robot, or of the map."""
 
     name: str
     args: list[Any]
@@ -117,8 +127,14 @@ class Fleet:
     robots: list[RobotLine] = field(default_factory=list)
     title: str = ""
     floor: str = ""
-    map: tuple[str, str] | None = None
-    """The map under the robots: the name of a bridge, and a topic."""
+    maps: list[dict[str, Any]] = field(default_factory=list)
+    """The maps under the robots: the name of a ``bridge``, a ``topic``, and options."""
+
+    images: list[dict[str, Any]] = field(default_factory=list)
+    """Pictures under everything: ``file``, ``x``, ``y``, ``width`` and ``height``."""
+
+    modules: list[ModuleLine] = field(default_factory=list)
+    """Modules of the map."""
 
     tiles: dict[str, Any] | None = None
     labels: Places | None = None

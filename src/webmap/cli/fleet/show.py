@@ -10,6 +10,12 @@ from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.file import read_fleet
 from webmap.cli.fleet.places import label_options, tile_options
 from webmap.cli.fleet.robots import make_bridges, make_robots
+from webmap.cli.fleet.scenery import (
+    MapModule,
+    check_images,
+    check_modules,
+    show_scenery,
+)
 from webmap.cli.fleet.schema import Fleet
 from webmap.errors import ConfigError
 
@@ -27,6 +33,10 @@ class ReadyFleet:
     floor: Path | None
     modules: dict[str, dict[str, Any]]
     """Modules of the map with their arguments, by their names."""
+    images: list[tuple[str, float, float, float, float]]
+    """Pictures as ``Map.add_image`` takes them."""
+    others: list[MapModule]
+    """The modules of the map that the file names."""
 
 
 def prepare(file: Path) -> ReadyFleet:
@@ -57,8 +67,10 @@ def prepare(file: Path) -> ReadyFleet:
         modules["TileLayer"] = tile_options(fleet.tiles, file.parent, mistakes)
     if fleet.labels is not None:
         modules["Labels"] = label_options(fleet.labels, file.parent, mistakes)
+    images = check_images(fleet.images, file.parent, mistakes)
+    others = check_modules(fleet.modules, bridges, mistakes)
     text.refuse(mistakes)
-    return ReadyFleet(fleet, bridges, robots, floor, modules)
+    return ReadyFleet(fleet, bridges, robots, floor, modules, images, others)
 
 
 def open_fleet(ready: ReadyFleet) -> None:
@@ -68,9 +80,8 @@ def open_fleet(ready: ReadyFleet) -> None:
     shown = console.open_console(bridges, [], floor=ready.floor, **options)
     for name, arguments in ready.modules.items():
         shown.set_module(name, **arguments)
-    if ready.fleet.map is not None:
-        bridge, topic = ready.fleet.map
-        shown.add_grid(ready.bridges[bridge], topic)
+    maps = ready.fleet.maps
+    show_scenery(shown, maps, ready.images, ready.others, ready.bridges)
     restore(ready.robots)
     for robot in ready.robots:
         shown.add(robot)
