@@ -1,9 +1,12 @@
 """What was found, for people and as a file."""
 
 import tomllib
+from pathlib import Path
 
 from webmap.discovery import discover
+from webmap.discovery.drawing import drawing
 from webmap.discovery.fleet_toml import fleet_toml
+from webmap.discovery.layers import RULES, FoundLayer
 from webmap.discovery.naming import same_name, unique_names
 from webmap.discovery.words import in_one_line, report
 
@@ -42,6 +45,37 @@ def test_one_line_has_what_is_used():
         "bob: odometry /odom, velocity /cmd_vel, scan /scan, "
         "goal /move_base_simple/goal, plan /plan"
     )
+
+
+def test_the_report_says_what_is_drawn_by_which_rule_and_what_is_used():
+    more = {"/other/odom": "nav_msgs/Odometry", "/trajectory": "nav_msgs/Path"}
+    more |= {f"/cloud_{n}": "sensor_msgs/PointCloud2" for n in range(3)}
+    said = report("ws://bob:9090", discover(TOPICS | more, "bob"))
+    lines = [" ".join(line.split()) for line in said.splitlines()]
+    assert "/rear/scan LaserScanner the usual name" in lines
+    assert "/trajectory Path named a way to go" in lines
+    assert "/cloud_1 PointCloud named points or a cloud" in lines
+    left = "not drawn, since there are enough of their kind: /cloud_2"
+    assert left in lines
+
+
+def test_of_several_topics_of_a_role_the_report_says_which_is_used():
+    more = {"/odometry/filtered": "nav_msgs/Odometry"}
+    said = report("ws://bob:9090", discover(TOPICS | more, "bob"))
+    lines = [" ".join(line.split()) for line in said.splitlines()]
+    used = "odometry /odometry/filtered nav_msgs/Odometry a filter's estimate, used"
+    assert used in lines
+    assert "/odom nav_msgs/Odometry the usual name, not used" in lines
+    assert not any("/cmd_vel" in line and line.endswith("used") for line in lines)
+
+
+def test_every_layer_rule_is_in_the_documentation():
+    page = Path(__file__).parents[2] / "docs/howto/connect-a-robot.md"
+    rows = [line for line in page.read_text().splitlines() if line.startswith("|")]
+    for rule in RULES:
+        type = rule.types[0].partition("/")[2]
+        module = drawing(FoundLayer(rule.kind, "/a/x", ""), "/a", None).module
+        assert any(f"`{type}`" in row and f"`{module}`" in row for row in rows), rule
 
 
 def test_the_file_is_toml_with_every_topic_that_is_used():

@@ -1,5 +1,6 @@
 """What was found, as a table for a terminal."""
 
+from webmap.discovery.drawing import drawing
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
@@ -13,6 +14,19 @@ USED: tuple[Role, ...] = (
     "plan",
     "map",
 )
+
+ONE: tuple[Role, ...] = (
+    "odometry",
+    "pose",
+    "velocity",
+    "battery",
+    "goal",
+    "action",
+    "cancel",
+    "initialpose",
+    "tf",
+)
+"""Roles of which a robot uses the best topic alone; of the others all are drawn."""
 
 OVERRULE = (
     "Wrong? Say it with --robot NAME:ODOM:CMD_VEL:SCAN, which takes the place of the "
@@ -28,7 +42,7 @@ def report(url: str, findings: Findings) -> str:
         f"{number or 'no'} robot{'' if number == 1 else 's'}"
     ]
     for robot in findings.robots:
-        lines += ["", *robot_table(robot)]
+        lines += ["", *robot_table(robot), *layer_table(robot, findings)]
     lines += ["", *findings.notes]
     if findings.robots:
         lines.append(OVERRULE)
@@ -39,7 +53,12 @@ def robot_table(robot: FoundRobot) -> list[str]:
     """Return one robot's topics, one a line, with the rule that chose each."""
     where = f"in {robot.namespace}" if robot.namespace else "without a namespace"
     rows = [
-        ("" if place else role, guess.topic, guess.type, guess.rule)
+        (
+            "" if place else role,
+            guess.topic,
+            guess.type,
+            guess.rule + _use(robot, role, place),
+        )
         for role in ROLES
         for place, guess in enumerate(robot.guesses.get(role, ()))
     ]
@@ -56,6 +75,36 @@ def robot_table(robot: FoundRobot) -> list[str]:
         lines.append(f"  not found: {', '.join(missing)}")
     lines += [f"  note: {note}" for note in robot.notes]
     return lines
+
+
+def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
+    """Return what is drawn of a robot, one topic a line, by which module and rule."""
+    rows = [
+        (layer.topic, drawing(layer, robot.namespace, None).module, layer.rule)
+        for layer in findings.layers.get(robot.namespace, ())
+    ]
+    if not rows:
+        return []
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    lines = ["  drawn by webmap view:"]
+    lines += [
+        f"    {topic:<{widths[0]}}  {module:<{widths[1]}}  {rule}"
+        for topic, module, rule in rows
+    ]
+    others = findings.left_out.get(robot.namespace, ())
+    if others:
+        listed = ", ".join(layer.topic for layer in others)
+        lines.append(f"  not drawn, since there are enough of their kind: {listed}")
+    return lines
+
+
+def _use(robot: FoundRobot, role: Role, place: int) -> str:
+    """Return whether one of several topics of a role is used."""
+    if role not in ONE or len(robot.guesses[role]) == 1:
+        return ""
+    if role == "pose" and robot.first("odometry") is not None:
+        return ""  # a note says so
+    return ", not used" if place else ", used"
 
 
 def in_one_line(robot: FoundRobot) -> str:
