@@ -52,7 +52,10 @@ def helper(script, *arguments):
             assert process.poll() is None, f"{script} has ended"
         finally:
             process.stdin.close()
-            process.wait(20)
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()  # the machine gives it no time to end in order
 
 
 @contextlib.contextmanager

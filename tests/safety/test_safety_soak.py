@@ -45,17 +45,26 @@ def processes(bench):
     return found
 
 
-def memory(bench):
-    """Return the resident bytes of each of them, the least of some seconds.
+class Memory:
+    """Resident bytes of each of the processes, second by second.
 
-    A map of 16 million cells comes and goes: what is left between two is what is kept.
+    A map of 16 million cells comes and goes, in several copies: what is left between
+    two of them is what is kept, so of a stretch of minutes the least counts.
     """
-    seen = {}
-    for _ in range(40):
-        for name, process in processes(bench).items():
-            seen.setdefault(name, []).append(process.memory_info().rss)
-        pass_time(0.25)
-    return {name: min(sizes) for name, sizes in seen.items()}
+
+    def __init__(self, bench):
+        self._bench = bench
+        self._seen = []
+
+    def look(self):
+        sizes = {n: p.memory_info().rss for n, p in processes(self._bench).items()}
+        self._seen.append((time.monotonic(), sizes))
+
+    def least(self, since, until):
+        """Return the least of each between two times."""
+        sizes = [sizes for at, sizes in self._seen if since <= at <= until]
+        names = set.intersection(*map(set, sizes))
+        return {name: min(one[name] for one in sizes) for name in sorted(names)}
 
 
 def say_stop(bench):
@@ -66,23 +75,25 @@ def say_stop(bench):
 @pytest.mark.skipif(not MINUTES, reason="takes half an hour: WEBMAP_SAFETY_TRIALS=50")
 @pytest.mark.timeout(5400)
 def test_half_an_hour_of_everything_grows_nothing_and_delays_no_zero(bench):
+    memory = Memory(bench)
     with under_load(bench), maps_coming(bench):
         say_stop(bench)
         pids = {name: process.pid for name, process in processes(bench).items()}
         pass_time(60 * min(WARM, MINUTES / 3))
-        before = memory(bench)
-        begun = time.monotonic()
-        end, again = begun + 60 * MINUTES, begun
+        again = begun = time.monotonic()
+        end = begun + 60 * MINUTES
         while time.monotonic() < end:
             if time.monotonic() > again:
                 say_stop(bench)
                 again = time.monotonic() + STOP_AGAIN
-                SHOW[-1](f"soak: {(end - again) / 60:.0f} min, {memory(bench)}")
+                SHOW[-1](f"soak: {(end - again + STOP_AGAIN) / 60:.0f} min to go")
+            memory.look()
             pass_time(1.0)
         wait_for(lambda: bench.robot.log.told[-1].at > end, "a zero")
         told = [told for told in bench.robot.log.told if told.at >= begun]
-        kept = memory(bench)
         alive = {name: process.pid for name, process in processes(bench).items()}
+    part = (end - begun) / 4
+    before, kept = memory.least(begun, begun + part), memory.least(end - part, end)
     assert all(one.is_zero for one in told), "STOP stands"
     gaps = [after.at - one.at for one, after in itertools.pairwise(told)]
     late = sorted(max(0.0, gap - HELD_PERIOD - STEP) for gap in gaps)
