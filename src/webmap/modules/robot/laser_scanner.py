@@ -5,10 +5,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from webmap.core.from_above import levelled
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ProtocolError
-from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg

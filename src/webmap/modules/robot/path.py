@@ -6,10 +6,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from webmap.core.from_above import flat, in_space
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed, check_finite, rounded, thinned
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
-from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import PathMsg
 from webmap.scene import svg

@@ -4,10 +4,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from webmap.core.from_above import flat, in_space
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed, check_finite, rounded
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError
-from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import PolygonStampedMsg
 from webmap.scene import svg

@@ -3,11 +3,11 @@
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed, thinned
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
-from webmap.modules.robot.labelled import label
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import ParticleCloudMsg, PoseArrayMsg
 from webmap.ros.names import split_type

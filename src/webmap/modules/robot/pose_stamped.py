@@ -3,12 +3,11 @@
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
-from webmap.modules.robot.labelled import label
-from webmap.modules.robot.pose_array import arrow
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import PoseStampedMsg
 from webmap.scene import svg
@@ -66,7 +65,7 @@ class PoseStamped:
         self.pose: Pose | None = None
         """The newest pose, as the message has it."""
         self.arrow = svg.path(class_="arrow", fill="#b3261e", fill_opacity=0.85)
-        self.arrow.set(d=arrow(Pose(0.0, 0.0, 0.0), length))
+        self.arrow.set(d=arrow(length))
         self._ends = name == "goal" and frame == "map"
         self._goes_to: Pose | None = None
         """What is drawn until the robot gets there."""
@@ -119,3 +118,13 @@ class PoseStamped:
         frames = self.robot.tf
         known = "map" if frames is None else frames["map_frame"]
         return frame_id.strip("/") in ("", "map", known)
+
+
+def arrow(length: float) -> str:
+    """Return the path of an arrow along x, whose head is a third of it."""
+    shaft, half = length * 2 / 3, length / 20
+    wide = length / 6
+    return (
+        f"M0 {half:.3f}L{shaft:.3f} {half:.3f}L{shaft:.3f} {wide:.3f}L{length:.3f} 0"
+        f"L{shaft:.3f} {-wide:.3f}L{shaft:.3f} {-half:.3f}L0 {-half:.3f}z"
+    )
