@@ -2,13 +2,14 @@
 
 import math
 import re
+import time
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from webmap import console
-from webmap.console.floor import COLOURS, load_floor
+from webmap.console.floor import COLOURS, MAX_YAML, load_floor
 from webmap.errors import ConfigError
 
 WALL, UNKNOWN, FREE = 0, 205, 254
@@ -152,3 +153,23 @@ def test_an_image_that_is_none_is_refused(tmp_path):
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"none\.yaml"):
         load_floor(tmp_path / "none.yaml", tmp_path)
+
+
+def test_a_yaml_that_would_take_long_to_read_is_refused_soon(tmp_path):
+    draw(tmp_path)
+    file = write(tmp_path)
+    file.write_text(file.read_text() + "\n# " + "x" * MAX_YAML)
+    with pytest.raises(ConfigError, match="bytes are no map's YAML, which has 16384"):
+        load_floor(file, tmp_path)
+
+
+def test_mappings_that_are_merged_into_one_another_take_no_time_to_speak_of(tmp_path):
+    draw(tmp_path)
+    file = write(tmp_path)
+    depth, many = 150, ", ".join(f"k{number}: 0" for number in range(1200))
+    nested = "<<: {" * depth + many + "}" * depth
+    file.write_text(f"{file.read_text()}\n{nested}\n")
+    assert file.stat().st_size < MAX_YAML
+    before = time.process_time()
+    assert load_floor(file, tmp_path).width == 4.0
+    assert time.process_time() - before < 3.0

@@ -19,6 +19,10 @@ from webmap.lined_yaml import LinedYaml
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+MAX_YAML = 1 << 14
+"""Bytes of the YAML; a map's own has 200. Reading takes longer than in proportion where
+mappings are merged into one another."""
+
 MAX_PIXELS = 1 << 26
 
 UNKNOWN = 205
@@ -79,6 +83,7 @@ def load_floor(file: Path, folder: Path) -> Floor:
     """
     from PIL import ImageOps
 
+    _check_size(file)
     said = LinedYaml(file)
     plan = read_plan(said)
     grey = read_image(_image_file(said, plan.image))
@@ -92,6 +97,24 @@ def load_floor(file: Path, folder: Path) -> Floor:
     width, height = (pixels * plan.resolution for pixels in grey.size)
     bounds = known_part(grey, plan)
     return Floor(images["day"], images["night"], x, y, width, height, yaw, bounds)
+
+
+def _check_size(file: Path) -> None:
+    """Refuse a YAML file that is no map's before it is taken apart.
+
+    Raises:
+        ConfigError: If it is too large.
+
+    """
+    try:
+        size = file.stat().st_size
+    except OSError:
+        return  # whoever reads it says so
+    if size > MAX_YAML:
+        raise ConfigError(
+            f"floor {file}: {size} bytes are no map's YAML, which has {MAX_YAML} at "
+            "the most; name the .yaml beside the image"
+        )
 
 
 def read_plan(said: LinedYaml) -> FloorFile:
