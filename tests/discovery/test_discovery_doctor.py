@@ -13,6 +13,8 @@ from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
 from webmap.discovery.doctor.observed import Clock, Way
 from webmap.discovery.doctor.ports import is_loopback, listening_addresses
+from webmap.discovery.doctor.sampling import MOST_BYTES, Sampling
+from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
 from webmap.ros.events import Publish
 
@@ -187,6 +189,85 @@ def test_a_battery_may_be_slow():
     assert said(replace(seen, heard=slow), "/battery_state: 0.3 messages") == "good"
     broken = {**LISTENED, "/battery_state": Heard(1, 3.0, trouble="not JSON")}
     assert said(replace(seen, heard=broken), "cannot be read: not JSON") == "warning"
+
+
+def test_a_battery_has_an_age():
+    topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
+    seen = replace(GOOD, findings=discover(topics, "bob"))
+    came = Heard(3, 3.0, 1.0, stamp=99.0, arrived=100.0)
+    fresh = {**LISTENED, "/battery_state": came}
+    assert (
+        said(replace(seen, heard=fresh), "1.0 messages a second, 1.0 s old") == "good"
+    )
+    old = {**LISTENED, "/battery_state": replace(came, stamp=10.0)}
+    assert said(replace(seen, heard=old), "what is shown is no more so") == "warning"
+
+
+SHOWN = TOPICS | {
+    "/camera/image_raw/compressed": "sensor_msgs/CompressedImage",
+    "/points": "sensor_msgs/PointCloud2",
+    "/local_costmap/costmap": "nav_msgs/OccupancyGrid",
+    "/map": "nav_msgs/OccupancyGrid",
+    "/plan": "nav_msgs/Path",
+    "/rear/scan": "sensor_msgs/LaserScan",
+    "/move_base/goal": "move_base_msgs/MoveBaseActionGoal",
+}
+STATUS = "/move_base/status"
+CAMERA = "/camera/image_raw/compressed"
+CAME = Heard(4, 0.6, 0.2, stamp=99.95, arrived=100.0, every=0.2)
+
+
+def shown(topic, came):
+    seen = replace(GOOD, findings=discover(SHOWN, "bob"))
+    return replace(seen, heard={**LISTENED, topic: came})
+
+
+@pytest.mark.parametrize(
+    ("topic", "changes", "level", "words"),
+    [
+        (CAMERA, {}, "good", f"{CAMERA}: 5.0 messages a second, 60 ms old."),
+        (CAMERA, {"count": 0}, "warning", "who drives by this camera is stopped"),
+        (CAMERA, {"every": 2.0}, "warning", "whenever its picture is older than 1 s"),
+        (CAMERA, {"every": 0.0, "longest_gap": 2.5}, "warning", "older than 1 s"),
+        (CAMERA, {"stamp": 97.0}, "warning", "come too late to drive by"),
+        (CAMERA, {"trouble": "not JSON"}, "warning", "cannot be read: not JSON"),
+        ("/points", {}, "good", "/points: 5.0 messages a second"),
+        ("/points", {"stamp": 97.0}, "warning", "its points lie where the robot was"),
+        ("/points", {"count": 0}, "warning", "so no points are drawn"),
+        ("/local_costmap/costmap", {"count": 0}, "warning", "so no costs are drawn"),
+        ("/map", {"count": 1, "every": 0.0, "stamp": -7300.0}, "good", ", 2 h old"),
+        ("/map", {"count": 1, "every": 0.0, "stamp": -900.0}, "good", ", 17 min old"),
+        ("/map", {"count": 0}, "warning", "so there is no map under it"),
+        ("/plan", {"count": 0}, "note", "it may come with a goal"),
+        (STATUS, {"count": 0}, "note", "it may come with a goal"),
+        (STATUS, {}, "good", f"{STATUS}: 5.0 messages a second"),
+        (
+            "/rear/scan",
+            {"count": 0, "seconds": 3.0},
+            "warning",
+            "Nothing came on /r",
+        ),
+    ],
+)
+def test_every_topic_in_use_has_a_rate_and_an_age(topic, changes, level, words):
+    assert said(shown(topic, replace(CAME, **changes)), words) == level
+
+
+def test_the_status_of_goals_is_asked_for_by_the_action_that_the_robot_has():
+    (robot,) = discover(SHOWN, "bob").robots
+    found = {kind: (topic, type) for kind, topic, type in shown_topics(robot)}
+    assert found["status"] == (STATUS, "actionlib_msgs/GoalStatusArray")
+    topics = TOPICS | {
+        "/navigate_to_pose/_action/feedback": (
+            "nav2_msgs/action/NavigateToPose_FeedbackMessage"
+        )
+    }
+    (robot,) = discover(topics, "bob").robots
+    found = {kind: (topic, type) for kind, topic, type in shown_topics(robot)}
+    assert found["status"] == (
+        "/navigate_to_pose/_action/status",
+        "action_msgs/msg/GoalStatusArray",
+    )
 
 
 def test_a_bridge_without_rosapi_is_told_what_to_do():
@@ -388,3 +469,25 @@ def test_a_message_that_is_none_is_said():
     broken = Publish("/odom", b'{"op":"publish","topic":"/odom","msg":[}')
     listening.received(broken, 1.0, 1.0)
     assert "not JSON" in listening.end(2.0)["/odom"].trouble
+
+
+def test_a_topic_is_left_after_a_few_messages():
+    sampling = Sampling(["/a", "/b"], 0.0)
+    left = [sampling.received(message("/a"), now, now) for now in (1.0, 1.5, 2.0, 2.5)]
+    assert left == [False, False, False, True]
+    assert not sampling.received(message("/a"), 9.0, 9.0)
+    assert not sampling.received(message("/other"), 9.0, 9.0)
+    assert not sampling.done
+    found = sampling.end(3.0)
+    assert (found["/a"].count, found["/a"].every, found["/a"].seconds) == (4, 0.5, 2.5)
+    assert (found["/b"].count, found["/b"].every, found["/b"].seconds) == (0, 0.0, 3.0)
+
+
+def test_a_large_topic_is_left_sooner_and_all_when_it_is_too_much():
+    sampling = Sampling([f"/{n}" for n in range(12)], 0.0)
+    large = b"x" * MOST_BYTES
+    for n in range(8):
+        assert not sampling.done
+        assert sampling.received(Publish(f"/{n}", large), 1.0, 1.0)
+    assert sampling.done
+    assert set(sampling.end(1.0)) == {f"/{n}" for n in range(8)}, "silence is not told"

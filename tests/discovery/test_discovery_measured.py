@@ -10,6 +10,7 @@ from websockets.asyncio.server import serve
 from webmap.discovery.doctor import judge
 from webmap.discovery.doctor.heard_from import listen
 from webmap.discovery.doctor.measure import observe
+from webmap.discovery.doctor.sampling import ENOUGH
 
 SECONDS = 0.4
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
@@ -50,7 +51,28 @@ def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
     }, "ends or hangs rosapi"
     assert all(name.startswith("/rosapi/") for name in there.called)
     assert progress[0].startswith("Asking")
-    assert progress[-1] == f"Listening for {SECONDS:g} s."
+    assert progress[-2] == f"Listening for {SECONDS:g} s."
+    assert progress[-1] == "Listening for a few pictures, maps and plans."
+
+
+@DIALECTS
+def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
+    _, findings, seen = looked_at(site(dialect))
+    camera = "/robot_0/camera/image_raw/compressed"
+    assert said(findings, f"{camera}: ") == "good"
+    assert said(findings, "/map: 1 message, ") == "good"
+    assert said(findings, "Nothing came on /robot_0/plan in 1 s; it may") == "note"
+    assert seen.heard[camera].count <= ENOUGH
+    assert seen.heard[camera].every > 0
+
+
+def test_a_camera_that_is_silent_is_told_with_what_it_costs():
+    def change(name, message):
+        return None if name.endswith("/compressed") else message
+
+    _, findings, _ = looked_at(site("ros1", change=change))
+    words = "could publish it, and who drives by this camera is stopped"
+    assert said(findings, words) == "warning"
 
 
 @pytest.mark.parametrize(

@@ -208,7 +208,10 @@ def _blocking(seen: Observed) -> Finding:
 
 
 def _compression(seen: Observed) -> Finding:
-    packed = [topic for topic, heard in seen.heard.items() if heard.binary]
+    robots = seen.findings.robots
+    scans = {scan.topic for one in robots for scan in one.guesses.get("scan", ())}
+    binary = [topic for topic, heard in seen.heard.items() if heard.binary]
+    packed = [topic for topic in binary if topic in scans]
     words = (
         "The socket could be compressed"
         if seen.deflate

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
 from webmap.discovery.doctor.observed import Heard
+from webmap.discovery.doctor.sampling import Sampling
 from webmap.ros import ops
 from webmap.ros.events import Publish
 from webmap.ros.protocol import MAX_FRAME, Protocol
@@ -73,5 +74,51 @@ async def listen(
                 deflate,
                 listening.end(time.monotonic()),
             )
+    except WebSocketException as error:
+        raise OSError(str(error)) from None
+
+
+async def sample(
+    url: str, topics: Mapping[str, str], seconds: float
+) -> dict[str, Heard]:
+    """Listen to a few messages of each topic, which may be large.
+
+    Args:
+        url: The bridge's address.
+        topics: The type of each.
+        seconds: How long at the most.
+
+    Returns:
+        What came on each topic.
+
+    Raises:
+        OSError: If the bridge cannot be reached.
+
+    """
+    from websockets.asyncio.client import connect
+    from websockets.exceptions import ConnectionClosed, WebSocketException
+
+    try:
+        async with connect(
+            url, max_size=MAX_FRAME, open_timeout=5.0, close_timeout=0.5, proxy=None
+        ) as socket:
+            for topic, type in topics.items():
+                request = ops.subscribe(topic, id=topic, type=type, compression="cbor")
+                await socket.send(request.decode())
+            sampling = Sampling(topics, time.monotonic())
+            protocol = Protocol()
+            try:
+                async with asyncio.timeout(seconds):
+                    while not sampling.done:
+                        frame = await socket.recv(decode=False)
+                        event = protocol.receive(frame, time.monotonic())
+                        if not isinstance(event, Publish):
+                            continue
+                        if sampling.received(event, time.monotonic(), time.time()):
+                            leave = ops.unsubscribe(event.topic, id=event.topic)
+                            await socket.send(leave.decode())
+            except (TimeoutError, ConnectionClosed):
+                pass
+            return sampling.end(time.monotonic())
     except WebSocketException as error:
         raise OSError(str(error)) from None

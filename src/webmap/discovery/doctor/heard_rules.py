@@ -10,6 +10,10 @@ SLOW = 5.0
 """Messages a second below which a pose or a scan jumps."""
 
 AGED = 0.5
+
+RARE = 60.0
+"""Seconds after which what may well be slow, as a battery's charge, is old."""
+
 AHEAD = 0.1
 
 
@@ -26,7 +30,8 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
     heard = seen.heard[guess.topic]
     bad: Level = "wrong" if needed else "warning"
     if not heard.count:
-        return _silent(name, guess, seen, bad, needed=needed)
+        blind = ", and without a pose a robot is not driven" if needed else ""
+        return silence(name, guess.topic, seen, bad, blind)
     if heard.trouble:
         return Finding(
             bad,
@@ -87,16 +92,32 @@ def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
             f"{guess.topic} cannot be read: {heard.trouble}.",
             "Look whether its type is the one that rosapi says.",
         )
-    return Finding("good", name, f"{guess.topic}: {heard.rate:.1f} messages a second.")
+    age = age_of(heard, seen)
+    old = "" if age is None else f", {max(age, 0.0):.1f} s old"
+    said = f"{guess.topic}: {heard.rate:.1f} messages a second{old}"
+    if age is not None and age > RARE:
+        return Finding(
+            "warning",
+            name,
+            f"{said}: what is shown is no more so.",
+            "Look for a queue, or a stamp that is not set anew.",
+        )
+    return Finding("good", name, f"{said}.")
 
 
-def _silent(
-    name: str, guess: Guess, seen: Observed, bad: Level, *, needed: bool
-) -> Finding:
-    seconds = seen.heard[guess.topic].seconds
-    said = f"Nothing came on {guess.topic} in {seconds:.0f} s"
-    blind = ", and without a pose a robot is not driven" if needed else ""
-    writers = seen.publishers.get(guess.topic)
+def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Finding:
+    """Say that nothing came on a topic, and who could publish it.
+
+    Args:
+        name: The robot's.
+        topic: The topic.
+        seen: All that was seen.
+        bad: How bad that is.
+        blind: What follows from it, to go on in a sentence.
+
+    """
+    said = f"Nothing came on {topic} in {seen.heard[topic].seconds:.0f} s"
+    writers = seen.publishers.get(topic)
     if writers:
         return Finding(
             bad,

@@ -58,6 +58,10 @@ class Listening:
         """Return what was heard until now."""
         return {topic: self._sum_up(topic, now) for topic in self._heard}
 
+    def end_of(self, topic: str, now: float) -> Heard:
+        """Return what was heard of one topic until now."""
+        return self._sum_up(topic, now)
+
     def _sum_up(self, topic: str, now: float) -> Heard:
         heard, seconds = self._heard[topic], now - self._began
         gap = max(self._gap[topic], now - self._last[topic])

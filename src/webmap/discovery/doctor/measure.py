@@ -4,7 +4,7 @@ Nothing is published, each socket is of its own and closed after, and only those
 services of rosapi are called that were seen to answer on every bridge.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from urllib.parse import urlsplit
 
@@ -12,13 +12,20 @@ from webmap.discovery.asking import ask_topics
 from webmap.discovery.doctor.asking import Asking
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.hanging import try_a_call
-from webmap.discovery.doctor.heard_from import listen
+from webmap.discovery.doctor.heard_from import listen, sample
 from webmap.discovery.doctor.observed import MOST_ROBOTS, Heard, Observed, Way
 from webmap.discovery.doctor.ports import is_loopback, listening_addresses
+from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.found import FoundRobot
 from webmap.discovery.robots import discover, host_name
 from webmap.errors import BridgeClosed, BridgeError
 from webmap.ros.calls import Calls
+
+SLOW_TOPICS = 1.0
+"""Seconds that maps and pictures have at the least, which come a few times a second."""
+
+MOST_SCANS = 6
+"""How many scans of a robot are listened to."""
 
 NEEDLESS = ("/rosout", "/parameter_events")
 """Topics of every ROS that no client needs; whoever hides topics hides these."""
@@ -79,7 +86,15 @@ async def observe(
             free = await try_a_call(url)
             seen = replace(seen, calls_in_threads=free, tried=free is not None)
         progress(f"Listening for {seconds:g} s.")
-        return await _listen(seen, seconds)
+        seen = await _listen(seen, seconds)
+        rest = _shown(seen.findings.robots[:MOST_ROBOTS])
+        if rest:
+            # After the rest, and on a socket of its own: pictures and clouds would
+            # hold up the poses whose age is asked for.
+            progress("Listening for a few pictures, maps and plans.")
+            heard = await sample(url, rest, max(seconds, SLOW_TOPICS))
+            seen = replace(seen, heard={**seen.heard, **heard})
+        return seen
     except (OSError, TimeoutError) as error:
         return Observed(url, trouble=str(error) or type(error).__name__)
 
@@ -90,7 +105,7 @@ async def _ask(seen: Observed, *, ask_parameters: bool) -> Observed:
     read = [
         topic
         for robot in robots[:MOST_ROBOTS]
-        for topic in (place_of(robot), robot.topic("scan"), robot.topic("map"))
+        for topic in (place_of(robot), *_scans(robot), *_shown([robot]))
     ]
     calls = Calls(seen.url)
     try:
@@ -111,7 +126,7 @@ async def _listen(seen: Observed, seconds: float) -> Observed:
     topics: dict[str, str] = {}
     for robot in robots:
         topics[place_of(robot)] = topics[robot.topic("battery")] = "none"
-        topics[robot.topic("scan")] = "cbor"
+        topics.update(dict.fromkeys(_scans(robot), "cbor"))
     topics.pop("", None)
     spaces = sorted({each.tf_namespace for each in robots} - {None})  # type: ignore[type-var]
     tf = [f"{space}/{name}" for space in spaces for name in ("tf", "tf_static")]
@@ -127,6 +142,14 @@ async def _listen(seen: Observed, seconds: float) -> Observed:
     return replace(
         seen, peer=peer, listens=listens, deflate=deflate, heard=heard, ways=ways
     )
+
+
+def _scans(robot: FoundRobot) -> list[str]:
+    return [guess.topic for guess in robot.guesses.get("scan", ())[:MOST_SCANS]]
+
+
+def _shown(robots: Iterable[FoundRobot]) -> dict[str, str]:
+    return {topic: type for each in robots for _, topic, type in shown_topics(each)}
 
 
 def place_of(robot: FoundRobot) -> str:

@@ -61,6 +61,10 @@ class Heard:
     child: str = ""
     """The frame that moves in it, where the message names one, as odometry does."""
 
+    every: float = 0.0
+    """Seconds from one message to the next, where only a few were listened for; 0 if
+    fewer than two came."""
+
     @property
     def rate(self) -> float:
         """Messages a second."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from webmap.discovery.doctor.heard_rules import heard_finding, rare_finding
 from webmap.discovery.doctor.observed import Finding, Observed, Way
+from webmap.discovery.doctor.shown_rules import shown_findings
 from webmap.discovery.found import FoundRobot, Guess
 from webmap.ros.names import is_type
 
@@ -25,12 +26,14 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
     elif where.topic in seen.heard:
         yield heard_finding(robot.name, where, seen, needed=True)
-    scan, battery = robot.first("scan"), robot.first("battery")
-    if scan is not None and scan.topic in seen.heard:
-        yield heard_finding(robot.name, scan, seen, needed=False)
+    battery = robot.first("battery")
+    for scan in robot.guesses.get("scan", ()):
+        if scan.topic in seen.heard:
+            yield heard_finding(robot.name, scan, seen, needed=False)
     if battery is not None and battery.topic in seen.heard:
         yield rare_finding(robot.name, battery, seen)
     yield from _map(robot, seen)
+    yield from shown_findings(robot, seen)
     yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
         yield Finding(

@@ -1,0 +1,105 @@
+"""What the readiness check says of topics that are shown besides pose and scan."""
+
+from collections.abc import Iterator
+
+from webmap.discovery.doctor.heard_rules import age_of, silence
+from webmap.discovery.doctor.observed import Finding, Heard, Level, Observed
+from webmap.discovery.found import FoundRobot, Role
+
+PICTURE_AGE = 1.0
+"""Seconds after which a picture is too old to drive by."""
+
+CLOUD_AGE = 1.0
+
+MOST: dict[Role, int] = {"camera": 4, "cloud": 2, "costmap": 3, "map": 1, "plan": 2}
+"""How many topics of each kind are looked at, which is what is shown of a robot."""
+
+
+def shown_topics(robot: FoundRobot) -> Iterator[tuple[str, str, str]]:
+    """Yield what else is shown of a robot: what it is, the topic, and its type."""
+    for role, most in MOST.items():
+        for guess in robot.guesses.get(role, ())[:most]:
+            yield role, guess.topic, guess.type
+    if robot.action is not None:
+        name, type = robot.action
+        nav2 = type.startswith("nav2_msgs/")
+        package = "action_msgs/msg" if nav2 else "actionlib_msgs"
+        tail = "_action/status" if nav2 else "status"
+        yield "status", f"{name}/{tail}", f"{package}/GoalStatusArray"
+
+
+def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+    """Say how often each of them comes, and how old it is."""
+    for kind, topic, _ in shown_topics(robot):
+        heard = seen.heard.get(topic)
+        if heard is None:
+            continue
+        if not heard.count:
+            yield from _silent(kind, robot.name, topic, seen)
+        elif heard.trouble:
+            yield Finding(
+                "warning",
+                robot.name,
+                f"{topic} cannot be read: {heard.trouble}.",
+                "Look whether its type is the one that rosapi says.",
+            )
+        else:
+            yield _came(kind, robot.name, topic, heard, age_of(heard, seen))
+
+
+def _came(kind: str, name: str, topic: str, heard: Heard, age: float | None) -> Finding:
+    said = f"{topic}: {heard.count} message{'s' * (heard.count != 1)}"
+    if heard.every:
+        said = f"{topic}: {1 / heard.every:.1f} messages a second"
+    if age is not None:
+        said += f", {_in_words(max(age, 0.0))} old"
+    if kind == "camera" and (heard.every or heard.longest_gap) > PICTURE_AGE:
+        return Finding(
+            "warning",
+            name,
+            f"{said}: who drives by this camera is stopped whenever its picture is "
+            f"older than {PICTURE_AGE:g} s.",
+            "Let it take 5 pictures a second or more, or choose a smaller or "
+            "compressed one.",
+        )
+    if kind == "camera" and age is not None and age > PICTURE_AGE:
+        return Finding(
+            "warning",
+            name,
+            f"{said}: its pictures come too late to drive by.",
+            "Look for a slow link or a queue, or choose a smaller or compressed one.",
+        )
+    if kind == "cloud" and age is not None and age > CLOUD_AGE:
+        return Finding(
+            "warning",
+            name,
+            f"{said}, so its points lie where the robot was.",
+            "Look for a slow link, or let the driver send fewer points.",
+        )
+    return Finding("good", name, f"{said}.")
+
+
+def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Finding]:
+    if kind == "map" and seen.publishers.get(topic) == ():
+        return  # that nobody publishes it is said already
+    if kind in ("plan", "status"):
+        seconds = seen.heard[topic].seconds
+        words = f"Nothing came on {topic} in {seconds:.0f} s; it may come with a goal."
+        yield Finding("note", name, words)
+        return
+    why = {
+        "camera": ", and who drives by this camera is stopped",
+        "costmap": ", so no costs are drawn",
+        "map": ", so there is no map under it",
+        "cloud": ", so no points are drawn",
+    }
+    level: Level = "warning"
+    yield silence(name, topic, seen, level, why[kind])
+
+
+def _in_words(seconds: float) -> str:
+    if seconds < 1.0:
+        return f"{seconds * 1000:.0f} ms"
+    if seconds < 120.0:
+        return f"{seconds:.1f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.0f} h"
