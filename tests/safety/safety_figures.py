@@ -9,6 +9,7 @@ may be cut and resumed. ``python tests/safety/safety_figures.py FILE`` makes
 import json
 import os
 import platform
+import subprocess
 import sys
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -17,6 +18,8 @@ from typing import Any
 from safety_run import TRIALS, version
 
 DOCS = Path(__file__).parents[2] / "docs"
+FIRST_PAGE = Path(__file__).with_name("safety_first_page.py")
+"""Writes the worst of them into the README."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,7 @@ def main() -> None:
     }
     (DOCS / "safety-figures.md").write_text(table(figures, soaks, content["machine"]))
     (DOCS / "safety-figures.json").write_text(json.dumps(content, indent=2) + "\n")
+    subprocess.run([sys.executable, FIRST_PAGE], check=True)
 
 
 if __name__ == "__main__":

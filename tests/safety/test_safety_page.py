@@ -3,7 +3,8 @@
 import ast
 import re
 
-from safety_figures import DOCS
+from safety_figures import DOCS, Figure
+from safety_first_page import PROMISES, README, first_page, kept_figures, worst
 
 PAGE = (DOCS / "safety.md").read_text()
 TESTS = DOCS.parent / "tests"
@@ -34,11 +35,39 @@ def test_every_file_that_the_page_names_exists():
     assert {name.rsplit("/", 1)[-1] for name in named} - there == set()
 
 
-def test_every_promise_names_a_test():
-    """Each is a term and what holds, and ends with where that is shown."""
+NUMBERS = list(range(1, 21))
+
+
+def test_every_promise_names_a_test_and_none_is_missing():
+    """Each is a term with its number and what holds, and ends with its tests."""
     begin = PAGE.index("## What is promised")
     promised = PAGE[begin : PAGE.index("## What is not", begin)]
     promises = re.findall(r"\n([A-Z][^\n]+)\n: (.*?)(?=\n\n)", promised, re.DOTALL)
-    assert len(promises) >= 12
+    numbers = [int(n) for term, _ in promises for n in re.findall(r"\bS(\d+)", term)]
+    assert sorted(numbers) == NUMBERS
     without = [term for term, text in promises if not re.search("`test_", text)]
     assert without == []
+
+
+def test_the_first_page_has_each_promise_its_figure_and_its_test():
+    assert sorted({promise.number for promise in PROMISES}) == NUMBERS
+    assert {promise.shown_by for promise in PROMISES} - functions() == set()
+    assert first_page(kept_figures()) in README.read_text(), (
+        "run python tests/safety/safety_first_page.py"
+    )
+
+
+def test_every_pattern_of_the_first_page_finds_a_figure():
+    names = [figure.name for figure in kept_figures()]
+    patterns = [promise.figures for promise in PROMISES if promise.figures]
+    found = {p for p in patterns for name in names if re.fullmatch(p, name)}
+    assert set(patterns) - found == set()
+
+
+def test_the_first_page_shows_what_comes_nearest_to_its_bound_and_what_misses_it():
+    stop = next(p for p in PROMISES if p.number == 8)
+    figure = Figure("STOP by the space bar, with W held on", "zero", 0.1, 0.017, 0, 50)
+    assert worst(stop, [figure]) == "17 of 100 ms"
+    late = Figure(figure.name, "zero", 0.1, 0.203, 0, 50)
+    assert worst(stop, [figure, late]) == "203 of 100 ms, **missed**"
+    assert worst(stop, []) == "shown by the test"
