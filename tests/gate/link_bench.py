@@ -4,9 +4,11 @@ import asyncio
 import base64
 import contextlib
 import functools
+import gc
 import hashlib
 import inspect
 import time
+import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +29,12 @@ def in_loop(test):
             async with asyncio.timeout(3 * TIMEOUT):
                 await test(*args, **kwargs)
 
-        asyncio.run(within())
+        with warnings.catch_warnings():
+            # asyncio drops a socket that has just connected when the attempt is
+            # cancelled, as it is of a lane that is closed while it connects.
+            warnings.simplefilter("ignore", ResourceWarning)
+            asyncio.run(within())
+            gc.collect()
 
     run.__signature__ = inspect.signature(test)
     return run

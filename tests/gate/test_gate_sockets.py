@@ -118,7 +118,7 @@ class TestOpen:
                 await until(lambda: heard.lost, "the end of it")
                 assert not link.is_open
 
-        asyncio.run(story())
+        in_loop(story)()
 
 
 class TestRefused:
