@@ -170,7 +170,7 @@ class TestGoals:
     ):
         with FakeRobot(answers_services=False) as fake:
             client.declare(
-                messages.msgspec.structs.replace(
+                msgspec.structs.replace(
                     robot_spec,
                     bridge_url=fake.url,
                     goal_topic=None,
@@ -202,7 +202,7 @@ class TestGoals:
     def test_move_base_says_on_its_topics_how_a_goal_goes(self, client, robot_spec):
         with FakeRobot() as fake:
             client.declare(
-                messages.msgspec.structs.replace(
+                msgspec.structs.replace(
                     robot_spec,
                     bridge_url=fake.url,
                     action="/move_base",
@@ -254,7 +254,7 @@ class TestGoals:
     ):
         with FakeRobot() as fake:
             client.declare(
-                messages.msgspec.structs.replace(
+                msgspec.structs.replace(
                     robot_spec, bridge_url=fake.url, action="/navigate_to_pose"
                 )
             )

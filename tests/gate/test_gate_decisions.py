@@ -2,6 +2,7 @@
 
 import json
 
+import msgspec
 import pytest
 from gate_harness import KEY, URL, ZERO, Bench, spec
 
@@ -651,4 +652,4 @@ class TestReports:
     def test_they_can_be_written_as_json(self, bench):
         bench.drive_off()
         for report in bench.of(messages.RobotReport):
-            json.dumps(messages.msgspec.to_builtins(report), allow_nan=False)
+            json.dumps(msgspec.to_builtins(report), allow_nan=False)

@@ -3,6 +3,7 @@
 import json
 import math
 
+import msgspec
 import pytest
 from gate_harness import Bench, spec
 from gate_robot import eventually
@@ -76,7 +77,7 @@ def gate(client, made):
 def report(holder=None, epoch=None):
     bench = Bench().begin()
     changed = {"holder": holder, "epoch": epoch}
-    return messages.msgspec.structs.replace(bench.report(), **changed)
+    return msgspec.structs.replace(bench.report(), **changed)
 
 
 def held():

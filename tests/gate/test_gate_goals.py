@@ -1,5 +1,6 @@
 """Goals: who may send them, and when they are cancelled."""
 
+import msgspec
 import pytest
 from gate_harness import URL, ZERO, Bench, spec
 
@@ -464,7 +465,7 @@ class TestWhereItIs:
         bench.tell(messages.ProgramTake(1, "r1"))
         bench.run(0.1)
         epoch = bench.report().epoch
-        bench.tell(messages.msgspec.structs.replace(told, epoch=epoch, tick=bench.tick))
+        bench.tell(msgspec.structs.replace(told, epoch=epoch, tick=bench.tick))
         assert len(bench.did(actions.TellPose)) == 1
 
     @pytest.mark.parametrize(

@@ -1,0 +1,14 @@
+"""Words that messages in both directions use."""
+
+from typing import Literal
+
+PROGRAM = "program"
+"""The connection of the display's own Python code."""
+
+Role = Literal["viewer", "operator", "admin"]
+Velocity = tuple[float, float, float]
+"""Forward, left and counter-clockwise."""
+
+Way = Literal["topic", "navigate_to_pose", "move_base"]
+"""How goals are sent: as PoseStamped on a topic, by the action of ROS 2, or by that of
+ROS 1."""
