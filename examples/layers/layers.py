@@ -19,7 +19,7 @@ robot.set_move_topic(bridge, "/robot_0/move_base_simple/goal")
 
 # What belongs to the robot. Where each sensor sits on it is known from /tf.
 robot.add_module("LaserScanner", bridge, "/robot_0/base_scan", max_dots=None)
-robot.add_module("PointCloud", bridge, "/robot_0/points", z_min=-0.1, colour_by="z")
+robot.add_module("PointCloud", bridge, "/robot_0/points", z_min=0.1, colour_by="z")
 robot.add_module("Range", bridge, "/robot_0/sonar")
 robot.add_module("Path", bridge, "/robot_0/plan")
 robot.add_module("Trail")

@@ -19,7 +19,7 @@ def robot_of(dialect: str, bridge: webmap.Bridge) -> webmap.Robot:
     robot.set_tf(bridge, base_frame="robot_0/base_link")
     scan = ("LaserScanner", bridge, "/robot_0/base_scan")
     robot.add_module(*scan, max_dots=None, throttle=0)
-    robot.add_module("PointCloud", bridge, "/robot_0/points", colour_by="z", z_min=-0.1)
+    robot.add_module("PointCloud", bridge, "/robot_0/points", colour_by="z", z_min=0.1)
     robot.add_module("Path", bridge, "/robot_0/plan")
     robot.add_module("Trail")
     robot.add_module("PoseArray", bridge, "/robot_0/particlecloud")
