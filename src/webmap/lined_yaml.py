@@ -20,17 +20,19 @@ class LinedYaml:
 
     Args:
         file: The file.
+        texts: Whether to make nothing but texts, so that "yes" is not taken for a 1.
 
     Raises:
         ConfigError: If it cannot be read or is no such YAML; file and line are named.
 
     """
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, *, texts: bool = False) -> None:
         self.file = file
         self._lines: dict[tuple[str | int, ...], int] = {}
         try:
-            loader = _Loader(read_file(file, LARGEST))
+            data = read_file(file, LARGEST)
+            loader = _Texts(data) if texts else _Loader(data)
             node = loader.get_single_node()
             if node is not None:
                 self._note((), node)
@@ -87,10 +89,20 @@ class LinedYaml:
 
 class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(
-                problem="aliases (*name) have no place in it",
-                problem_mark=event.start_mark,
-            )
+        _refuse_alias(self)
         return super().compose_node(parent, index)
+
+
+class _Texts(yaml.BaseLoader):
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        _refuse_alias(self)
+        return super().compose_node(parent, index)
+
+
+def _refuse_alias(loader: yaml.SafeLoader | yaml.BaseLoader) -> None:
+    if loader.check_event(yaml.AliasEvent):
+        event = loader.peek_event()  # type: ignore[no-untyped-call]
+        raise yaml.MarkedYAMLError(
+            problem="aliases (*name) have no place in it",
+            problem_mark=event.start_mark,
+        )

@@ -5,12 +5,14 @@ import re
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from webmap import console
-from webmap.console.floor import COLOURS, MAX_YAML, load_floor
+from webmap.console.floor import COLOURS, load_floor
 from webmap.errors import ConfigError
+from webmap.map_file import MAX_YAML
 
 WALL, UNKNOWN, FREE = 0, 205, 254
 
@@ -75,6 +77,44 @@ def test_the_floor_s_colours_are_those_of_the_style_sheet():
         assert values == [COLOURS["day"][index], COLOURS["night"][index]]
 
 
+@pytest.mark.parametrize(
+    ("form", "high"), [("png", 65535), ("pgm", 65535), ("pgm", 255)]
+)
+def test_sixteen_bits_a_pixel_are_the_same_picture(tmp_path, form, high):
+    levels = np.array([[0, 205, 254]]) * high // 255
+    name = f"floor.{form}"
+    if form == "png":
+        Image.fromarray(levels.astype(np.uint16)).save(tmp_path / name)
+    else:
+        kind = ">u2" if high > 255 else "u1"
+        head = f"P5 3 1 {high}\n".encode()
+        (tmp_path / name).write_bytes(head + levels.astype(kind).tobytes())
+    floor = load_floor(write(tmp_path, name), tmp_path)
+    painted = Image.open(floor.day).convert("RGB")
+    assert [colour(painted, (x, 0)) for x in range(3)] == list(COLOURS["day"])
+
+
+def test_the_thresholds_and_the_mode_of_the_file_count(tmp_path):
+    image = Image.new("L", (3, 1))
+    image.putdata([0, 128, 254])
+    image.save(tmp_path / "floor.png")
+
+    def drawn(**said):
+        floor = load_floor(write(tmp_path, **said), tmp_path)
+        painted = Image.open(floor.day).convert("RGB")
+        return [colour(painted, (x, 0)) for x in range(3)]
+
+    wall, unknown, free = COLOURS["day"]
+    assert drawn() == [wall, unknown, free]
+    assert drawn(occupied_thresh=0.4) == [wall, wall, free]
+    assert drawn(free_thresh=0.6) == [wall, free, free]
+    graded = drawn(mode="scale")
+    assert graded[0] == wall
+    assert graded[2] == free
+    assert graded[1] not in COLOURS["day"]
+    assert drawn(mode="raw") == [free, unknown, unknown], "0 is free there, 128 none"
+
+
 def test_a_negated_image_is_drawn_the_other_way_round(tmp_path):
     Image.new("L", (4, 4), 255).save(tmp_path / "floor.png")
     floor = load_floor(write(tmp_path, negate=1), tmp_path)
@@ -107,6 +147,8 @@ def test_what_is_clear_in_an_image_is_unknown(tmp_path):
         ({"image": "."}, "no image"),
         ({"image": "gone.png"}, "no image"),
         ({"negate": "maybe"}, "negate"),
+        ({"negate": "yes"}, "negate must be 0 or 1"),
+        ({"occupied_thresh": 0.1}, "free_thresh < occupied_thresh"),
     ],
 )
 def test_a_map_that_makes_no_sense_is_refused_in_words(tmp_path, changes, said):
@@ -146,7 +188,7 @@ def test_a_yaml_that_is_none_is_refused(tmp_path, text):
 
 def test_an_image_that_is_none_is_refused(tmp_path):
     (tmp_path / "floor.png").write_bytes(b"\x89PNG\r\n\x1a\n nothing")
-    with pytest.raises(ConfigError, match=r"floor\.png"):
+    with pytest.raises(ConfigError, match=r"floor\.yaml: the image must be PGM"):
         load_floor(write(tmp_path), tmp_path)
 
 

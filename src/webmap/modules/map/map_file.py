@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from webmap.core.grid_picture import Palette, check_palette, grid_png, place_grid
 from webmap.core.layer import Layer
-from webmap.core.map_file import MapImage, read_map
 from webmap.core.pictures import Picture
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
+from webmap.map_file import MapImage, read_map
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

@@ -3,22 +3,22 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import yaml
+from typing import TYPE_CHECKING
 
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
-from webmap.plain_files import read_file
+from webmap.lined_yaml import LinedYaml
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-MAX_YAML = 1 << 20
+MAX_YAML = 1 << 14
+"""Bytes of the YAML; a map's own has 200, and reading much of it takes long."""
+
 MAX_PIXELS = 1 << 26
-FORMATS = ("PPM", "PNG", "BMP")
-"""What map_server writes, by its magic bytes; PPM includes PGM."""
+FORMATS = ("PPM", "PNG", "BMP", "JPEG")
+"""What map_server reads, by its magic bytes; PPM includes PGM."""
 
 MODES = ("trinary", "scale", "raw")
 TRUTH = {"0": False, "1": True, "false": False, "true": True}
@@ -37,6 +37,9 @@ class MapImage:
     origin: Pose
     """The pose of the lower left corner of the first cell."""
 
+    image: Path
+    """The image that it was read from."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Settings:
@@ -47,16 +50,6 @@ class _Settings:
     occupied: float
     free: float
     mode: str
-
-
-class _Texts(yaml.BaseLoader):
-    """Makes nothing but text, so that "yes" is not taken for a 1, and no aliases."""
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        # A few of them in one another stand for more than any memory holds.
-        if self.check_event(yaml.AliasEvent):
-            raise ValueError("aliases (*name) have no place in a map's YAML")
-        return super().compose_node(parent, index)
 
 
 def read_map(file: Path) -> MapImage:
@@ -74,75 +67,76 @@ def read_map(file: Path) -> MapImage:
     light = _read_image(file, settings.image)
     # An image has its first row at the top, a grid at the bottom.
     cells = _cells(light, settings)[::-1]
-    return MapImage(cells, settings.resolution, settings.origin)
+    return MapImage(cells, settings.resolution, settings.origin, settings.image)
 
 
 def _settings(file: Path) -> _Settings:
-    said = _read_yaml(file)
-    resolution = _number(file, said, "resolution")
-    if resolution <= 0:
-        raise ConfigError(f"{file}: resolution must be above 0, got {resolution}")
-    origin = said.get("origin")
-    if not isinstance(origin, list) or len(origin) != 3:
-        raise ConfigError(f"{file}: origin must be [x, y, yaw], got {origin!r}")
-    pose = Pose(*(_number(file, {"origin": part}, "origin") for part in origin))
-    negate = TRUTH.get(str(said.get("negate", "0")).lower())
-    if negate is None:
-        raise ConfigError(f"{file}: negate must be 0 or 1, got {said['negate']!r}")
-    occupied = _number(file, said, "occupied_thresh", "0.65")
-    free = _number(file, said, "free_thresh", "0.196")
-    if not 0 <= free < occupied <= 1:
+    size = file.stat().st_size if file.is_file() else 0
+    if size > MAX_YAML:
         raise ConfigError(
-            f"{file}: needs 0 <= free_thresh < occupied_thresh <= 1, got {free} and "
-            f"{occupied}"
+            f"{file}: {size} bytes are no map's YAML, which has {MAX_YAML} at the most"
         )
-    mode = said.get("mode", "trinary")
+    said = LinedYaml(file, texts=True)
+    table = said.data
+    if not isinstance(table, dict):
+        raise said.wrong((), "needs image, resolution and origin")
+    resolution = _number(said, table.get("resolution"), ("resolution",))
+    if resolution <= 0:
+        raise said.wrong(
+            ("resolution",), f"resolution must be above 0, got {resolution}"
+        )
+    origin = table.get("origin")
+    if not isinstance(origin, list) or len(origin) != 3:
+        raise said.wrong(("origin",), f"origin must be [x, y, yaw], got {origin!r}")
+    x, y, yaw = (
+        _number(said, part, ("origin", place)) for place, part in enumerate(origin)
+    )
+    negate = TRUTH.get(str(table.get("negate", "0")).lower())
+    if negate is None:
+        raise said.wrong(("negate",), f"negate must be 0 or 1, got {table['negate']!r}")
+    occupied = _number(said, table.get("occupied_thresh"), ("occupied_thresh",), "0.65")
+    free = _number(said, table.get("free_thresh"), ("free_thresh",), "0.196")
+    if not 0 <= free < occupied <= 1:
+        raise said.wrong(
+            ("free_thresh",),
+            f"needs 0 <= free_thresh < occupied_thresh <= 1, got {free} and {occupied}",
+        )
+    mode = table.get("mode", "trinary")
     if mode not in MODES:
-        raise ConfigError(f"{file}: mode must be {', '.join(MODES)}, got {mode!r}")
-    image = _image_path(file, said.get("image"))
+        raise said.wrong(("mode",), f"mode must be {', '.join(MODES)}, got {mode!r}")
+    image = _image_path(said, table.get("image"))
+    pose = Pose(x, y, yaw)
     return _Settings(image, resolution, pose, negate, occupied, free, mode)
 
 
-def _read_yaml(file: Path) -> dict[str, Any]:
-    try:
-        said = yaml.load(read_file(file, MAX_YAML), _Texts)  # noqa: S506
-    except FileNotFoundError:
-        raise ConfigError(f"{file}: there is no such file") from None
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        if isinstance(error, ConfigError):
-            raise
-        raise ConfigError(f"{file}: {error}") from error
-    if not isinstance(said, dict):
-        raise ConfigError(f"{file}: needs image, resolution and origin")
-    return said
-
-
 def _number(
-    file: Path, said: dict[str, Any], key: str, default: str | None = None
+    said: LinedYaml, value: object, way: tuple[str | int, ...], default: str = ""
 ) -> float:
-    text = said.get(key, default)
+    text = default if value is None and default else value
     try:
-        value = float(text) if isinstance(text, str) else math.nan
+        number = float(text) if isinstance(text, str) else math.nan
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ConfigError(f"{file}: {key} must be a finite number, got {text!r}")
-    return value
+        number = math.nan
+    if not math.isfinite(number):
+        raise said.wrong(way, f"{way[0]} must be a finite number, got {text!r}")
+    return number
 
 
-def _image_path(file: Path, name: object) -> Path:
+def _image_path(said: LinedYaml, name: object) -> Path:
+    way = ("image",)
     if not isinstance(name, str) or not name or "\0" in name:
-        raise ConfigError(f"{file}: image must be the name of a file, got {name!r}")
-    folder = file.resolve().parent
+        raise said.wrong(way, f"image must be the name of a file, got {name!r}")
+    folder = said.file.resolve().parent
     image = (folder / name).resolve()
     if Path(name).is_absolute() or not image.is_relative_to(folder):
-        raise ConfigError(
-            f"{file}: the image {name!r} is not in the folder of the YAML file; put it "
-            "there and write its bare name"
+        raise said.wrong(
+            way,
+            f"the image {name!r} is not in the folder of the YAML file; put it there "
+            "and write its bare name",
         )
     # A pipe or a device would be waited for, or read without an end.
     if not image.is_file():
-        raise ConfigError(f"{file}: there is no image file {name!r}")
+        raise said.wrong(way, f"there is no image file {name!r}")
     return image
 
 
@@ -167,7 +161,7 @@ def _read_image(file: Path, image: Path) -> "NDArray[np.float32]":
         if isinstance(error, ConfigError):
             raise
         raise ConfigError(
-            f"{file}: the image must be PGM, PNG or BMP: {error}"
+            f"{file}: the image must be PGM, PNG, BMP or JPEG: {error}"
         ) from error
     if deep:
         return np.asarray(pixels / 65535, np.float32)
