@@ -19,6 +19,8 @@ expect.set_options(timeout=10_000)
 SIZES = {
     "desk": {"viewport": {"width": 1280, "height": 800}},
     "phone": {"viewport": {"width": 390, "height": 844}, "has_touch": True},
+    "on its side": {"viewport": {"width": 844, "height": 390}, "has_touch": True},
+    "small phone": {"viewport": {"width": 320, "height": 568}, "has_touch": True},
 }
 
 

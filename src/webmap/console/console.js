@@ -60,11 +60,11 @@ export default function attach(map, options, send) {
     listenToActions(map, send, signal),
     nameSheet(map),
     spreadNames(map),
+    listenToHelp(map.drive, signal),
   ];
   listenToTools(map, options, signal);
   listenToSearch(signal);
   listenToSheet(signal);
-  listenToHelp(map.drive, signal);
   return {
     destroy() {
       ending.abort();

@@ -33,4 +33,7 @@ export function listenToHelp(drive, signal) {
     turn();
   };
   document.addEventListener("keydown", key, { signal });
+  return drive.on("stop", () => {
+    if (help.open) turn();
+  });
 }

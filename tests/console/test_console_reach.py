@@ -1,0 +1,119 @@
+"""STOP, the stick and what is said of motion are in reach, whatever is open."""
+
+import re
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+pytestmark = pytest.mark.browser
+
+COVERED = """(e, reach) => {
+  const box = e.getBoundingClientRect();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  const [across, down] = [reach * box.width / 2, reach * box.height / 2];
+  return [[0, 0], [across, 0], [-across, 0], [0, down], [0, -down]]
+    .map(([dx, dy]) => document.elementFromPoint(x + dx, y + dy))
+    .filter((hit) => hit === null || !e.contains(hit))
+    .map((hit) => hit?.outerHTML.slice(0, 80) ?? "nothing");
+}"""
+"""What is hit in place of an element, at its middle and near its four edges."""
+
+PANELS = """() => [...document.querySelectorAll("details")]
+  .filter((e) => e.checkVisibility()).length"""
+
+OPEN_PANEL = """(index) => [...document.querySelectorAll("details")]
+  .filter((e) => e.checkVisibility())
+  .forEach((e, i) => { e.open = index === null || i === index; })"""
+
+
+def assert_free(what: Locator, reach: float = 0.9) -> None:
+    """See that nothing lies over a thing."""
+    expect(what).to_be_in_viewport(ratio=0.99)
+    for _ in range(20):  # what was opened just now may still be laid out
+        covered = what.evaluate(COVERED, reach)
+        if not covered:
+            return
+        what.page.wait_for_timeout(100)
+    raise AssertionError(covered)
+
+
+@pytest.mark.parametrize("size", ["desk", "phone", "on its side", "small phone"])
+def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
+    page = open_console(size)
+    every = page.get_by_role("button", name="Stop all")
+    one = page.get_by_role("button", name="Stop Robot 1", exact=True)
+    stops = [every] if size == "desk" else [every, one]
+    if size != "desk":
+        page.locator("#sheet").click()
+        assert_free(every)
+    page.locator("#robots .row", has_text="Robot 1").locator("button").first.click()
+    # With the sheet open, on a phone.
+    for stop in (every, one):
+        assert_free(stop)
+    if size != "desk":
+        page.locator("#sheet").click()
+        assert_free(page.locator(".webmap-stick"))
+    for index in [*range(page.evaluate(PANELS)), None]:
+        page.evaluate(OPEN_PANEL, index)
+        for stop in stops:
+            assert_free(stop)
+    page.evaluate(OPEN_PANEL, -1)
+    page.keyboard.press("?")
+    help_ = page.get_by_role("dialog", name="Keys and gestures")
+    expect(help_).to_be_visible()
+    for stop in stops:
+        assert_free(stop)
+    every.click()
+    expect(page.locator(".webmap-stop-verdict")).to_have_count(10)
+    expect(help_).to_be_hidden()
+    reset(page)
+    # Esc is STOP there, too.
+    page.keyboard.press("?")
+    expect(help_).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.locator("#card .state .holder")).to_have_text("Stopped")
+    reset(page)
+
+
+def reset(page: Page) -> None:
+    """End every STOP."""
+    page.evaluate("document.querySelector('.webmap-stop-list .webmap-reset').click()")
+    page.wait_for_timeout(450)
+    page.evaluate("document.querySelector('.webmap-stop-list .webmap-reset').click()")
+    expect(page.locator("#card .state .holder")).to_have_text("Free")
+
+
+def test_the_card_tests_whether_a_robot_of_which_that_is_stated_stops(open_console):
+    page = open_console()
+    page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
+    test = page.locator("[data-act=stop-test]")
+    expect(test).to_have_text(re.compile("Take it to test its stop"))
+    expect(test).to_be_disabled()
+    bound = page.locator("#card .own-stop")
+    expect(bound).to_contain_text(re.compile(r"stands within \d\.\d\d s"))
+    expect(bound).to_contain_text("(stated)")
+    page.get_by_role("button", name="Take Robot 2").click()
+    # With a camera above them the figures would lie below the edge of the card.
+    expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
+    page.wait_for_function(
+        "document.querySelector('.cameras img').naturalWidth === 320"
+    )
+    figures = page.locator("#card .speeds")
+    assert page.locator("#card").evaluate("e => e.scrollHeight > e.clientHeight + 40")
+    assert_free(figures)
+    tested = re.compile(r"\(tested \d{4}-\d\d-\d\d\)")
+    for _ in range(8):
+        for words in ("Test its stop", "It will creep: press again"):
+            button = page.get_by_role("button", name=words, exact=True)
+            page.wait_for_timeout(450)
+            button.click()
+        expect(test).not_to_have_attribute("data-test", "asking")
+        page.wait_for_timeout(300)
+        expect(test).to_have_attribute("data-test", "ready")
+        if tested.search(bound.inner_text()):
+            break
+        # On a busy machine a late command ends it, which the card says.
+        expect(page.locator("#card .test")).to_contain_text("Stop test: ")
+    expect(bound).to_contain_text(tested)
+    expect(page.get_by_role("button", name="Test its stop", exact=True)).to_be_enabled()
+    page.get_by_role("button", name="Hand back", exact=True).last.click()
