@@ -103,6 +103,33 @@ def test_what_a_page_sends_is_checked(map, page, said, add, words):
     assert words in answer["refused"]
 
 
+def test_a_label_is_moved_for_everybody_and_stays_there(map, page, state, said):
+    async def scenario():
+        one = map.add_module("Labels", [DESK])
+        other = Map(page.element("other"), 100, 100).add_module("Labels", [DESK])
+        one.on_message(
+            {"add": {"name": "Dock", "x": 3, "y": 4, "icon": "charger", "yaw": 1}}
+        )
+        desk, dock = other.layer.svg.children
+        one.on_message({"move": dock.get("data-label"), "to": {"x": -1.5, "y": 7}})
+        assert dock._transform == (-1.5, 7.0, 0.0)
+        assert said == [{"done": True}] * 2
+        for wrong, words in (
+            ({"move": dock.get("data-label"), "to": {"x": 1}}, "y: expected a number"),
+            ({"move": dock.get("data-label")}, "x and y, in metres"),
+            ({"move": desk.get("data-label"), "to": {"x": 1, "y": 1}}, "configuration"),
+            ({"move": "nobody", "to": {"x": 1, "y": 1}}, "gone already"),
+        ):
+            one.on_message(wrong)
+            assert words in said.pop()["refused"]
+        await saved(one.layer)
+        page.close()
+
+    asyncio.run(scenario())
+    (kept,) = json.loads(state.read_text())["labels"]
+    assert kept == {"name": "Dock", "x": -1.5, "y": 7.0, "icon": "charger", "yaw": 1.0}
+
+
 def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
     page = Page(
@@ -110,7 +137,7 @@ def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
     )
     module = Map(page.element("map"), 700, 500).add_module("Labels")
     module.on_message({"add": DESK})
-    assert said == [{"refused": "only an operator adds labels and takes them away"}]
+    assert said == [{"refused": "only an operator adds, moves and deletes labels"}]
     assert module.layer.labels == {}
     page.close()
 

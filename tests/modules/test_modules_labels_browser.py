@@ -206,12 +206,52 @@ def test_a_label_that_is_added_is_on_other_pages_and_there_after_a_restart(
         expect(wall).to_have_class(re.compile("charger"))
         m = wall.evaluate("e => e.transform.baseVal.getItem(0).matrix.e")
         assert m == pytest.approx(6.0, abs=0.1)
+        moved(later, wall)
         wall.locator(".spot").click()
         later.locator(".webmap-labels-remove").click()
         expect(wall).to_have_count(0)
         label(later, "Äpfel <b>").press("Enter")
         expect(later.locator(".webmap-labels-send")).to_be_visible()
         expect(later.locator(".webmap-labels-remove")).to_be_hidden()
+
+
+def moved(tab: Page, wall) -> None:
+    """Drag a label, then move it by keys, and see that only Save keeps that."""
+
+    def where() -> tuple[float, float]:
+        return tuple(
+            wall.evaluate(
+                "e => { const { matrix: m } = e.transform.baseVal.getItem(0);"
+                " return [m.e, m.f]; }"
+            )
+        )
+
+    before, seen = where(), tab.evaluate("document.querySelector('.world').getCTM().e")
+    spot, keep = wall.locator(".spot"), tab.locator(".webmap-labels-keep")
+    x, y = place(tab, 8.0, 1.0)
+    for ending in ("cancel", "keep"):
+        spot.click()
+        tab.locator(".webmap-labels-move").click()
+        box = spot.bounding_box()
+        tab.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        tab.mouse.down()
+        tab.mouse.move(x, y, steps=3)
+        tab.mouse.up()
+        assert where() == pytest.approx((8.0, 1.0), abs=0.1)
+        tab.locator('[data-axis="x"]').press("ArrowUp")
+        assert where()[0] == pytest.approx(8.1, abs=0.11)
+        there = where()
+        tab.locator(f".webmap-labels-{ending}").click()
+        expect(keep).to_be_hidden()
+        assert where() == pytest.approx(before if ending == "cancel" else there)
+    assert tab.evaluate("document.querySelector('.world').getCTM().e") == seen
+    # What the disk has is what a page that opens now shows.
+    tab.reload()
+    expect(tab.locator("#link")).to_have_attribute("data-link", "open")
+    expect(tab.locator(".webmap-labels-go")).to_be_visible()
+    expect(wall).to_have_count(1)
+    assert where() == pytest.approx(there)
+    tab.locator("#show-all").click()
 
 
 def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, bridge):

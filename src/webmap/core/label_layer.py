@@ -2,8 +2,9 @@
 
 import asyncio
 import logging
+from typing import Any
 
-from webmap.core.labels import ICONS, MAX_LABELS, Label, LabelStore
+from webmap.core.labels import ICONS, MAX_LABELS, Label, LabelStore, moved_label
 from webmap.core.layer import Layer
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
@@ -66,15 +67,36 @@ class LabelLayer(Layer):
             ConfigError: If it is in the configuration, or there is none.
 
         """
+        label = self._kept(id)
+        del self.labels[label.id]
+        self._drawn.pop(label.id).remove()
+        self._save()
+
+    def move(self, id: str, place: Any) -> None:
+        """Put one elsewhere that was added on a page.
+
+        Args:
+            id: Which one.
+            place: A table with ``x`` and ``y`` in metres.
+
+        Raises:
+            ConfigError: If it is in the configuration, there is none, or the place
+                makes no sense.
+
+        """
+        label = moved_label(self._kept(id), place)
+        self.labels[label.id] = label
+        self._drawn[label.id].set_pose(label.x, label.y, 0.0)
+        self._save()
+
+    def _kept(self, id: str) -> Label:
         self._check_writable()
         label = self.labels.get(id)
         if label is None:
             raise ConfigError("this label is gone already")
         if not label.kept:
             raise ConfigError(f"{label.name} is in the configuration and stays")
-        del self.labels[id]
-        self._drawn.pop(id).remove()
-        self._save()
+        return label
 
     def _check_writable(self) -> None:
         if not self.readable:

@@ -128,6 +128,24 @@ def new_label(data: Mapping[str, Any]) -> Label:
     return msgspec.structs.replace(_label(data, ""), id=generate_id(), kept=True)
 
 
+def moved_label(label: Label, data: Any) -> Label:
+    """Return a place that somebody moves on a page.
+
+    Args:
+        label: The place as it is.
+        data: A table with ``x`` and ``y`` in metres.
+
+    Raises:
+        ConfigError: If it makes no sense; the key is named.
+
+    """
+    if not isinstance(data, Mapping):
+        raise ConfigError("a label is moved to x and y, in metres")
+    plain = {key: getattr(label, key) for key in _KEYS}
+    moved = _label({**plain, "x": data.get("x"), "y": data.get("y")}, "")
+    return msgspec.structs.replace(moved, id=label.id, kept=label.kept)
+
+
 class LabelStore:
     """The places that were added on pages, in a file.
 

@@ -44,7 +44,7 @@ class Labels:
             ``kind`` (a class) and ``yaw`` in radians.
         file: A YAML or JSON file with such a list.
         name: Which file of the state folder keeps those that are added.
-        editable: Whether they can be added and taken away on the page.
+        editable: Whether they can be added, moved and taken away on the page.
         key: The key that begins to add one.
 
     Raises:
@@ -85,14 +85,17 @@ class Labels:
         )
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Add a label, take one away, or note where a robot was sent."""
+        """Add a label, move or take one away, or note where a robot was sent."""
         try:
             if "goal" in message:
                 self._note_goal(message["goal"])
             elif not self.may_edit:
-                raise ConfigError("only an operator adds labels and takes them away")
+                raise ConfigError("only an operator adds, moves and deletes labels")
             elif "add" in message:
                 self.layer.add(new_label(message["add"]))
+                self.half.send({"done": True})
+            elif "move" in message:
+                self.layer.move(str(message["move"]), message.get("to"))
                 self.half.send({"done": True})
             elif "remove" in message:
                 self.layer.remove(str(message["remove"]))

@@ -3,6 +3,7 @@ import { attentive } from "../motion/attention.js";
 import { unapply } from "../view.js";
 import { button, html, say } from "./elements.js";
 import { keepLabels } from "./label_sizes.js";
+import { LabelMove } from "./labels_move.js";
 import { lay } from "./overlay.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -11,7 +12,7 @@ import { lay } from "./overlay.js";
 /** @typedef {(message: Record<string, unknown>) => void} Send */
 
 /**
- * Labels: kept upright, pressed to send a robot there, added and taken away.
+ * Labels: kept upright, pressed to send a robot there, added, moved and taken away.
  *
  * Options: `editable`, whether this viewer may; `key`, which begins to add one; `icons`
  * to choose from; `longest`, characters of a name.
@@ -45,6 +46,8 @@ class Labels {
     this._active = false;
     /** @type {SVGGraphicsElement | null} The label whose sheet is open. */
     this._chosen = null;
+    /** @type {LabelMove | null} */
+    this._move = null;
     this._go = button("webmap-labels-go", "Label", () => this._activate(!this._active));
     this._go.title = `Key ${key}`;
     this._go.hidden = !editable;
@@ -71,14 +74,17 @@ class Labels {
 
   destroy() {
     this._map.svg.classList.remove("webmap-labelling");
-    this._chosen?.classList.remove("chosen");
+    this._close("");
     this._ending.abort();
     for (const off of this._offs) off();
   }
 
   /** @param {{done?: boolean, refused?: string}} message */
   receive({ done, refused }) {
-    if (done) this._close("");
+    if (done) {
+      this._move?.accepted();
+      this._close("");
+    }
     if (typeof refused === "string") say(this._word, refused);
     this._fit();
   }
@@ -148,6 +154,8 @@ class Labels {
 
   /** @param {string} words */
   _close(words) {
+    this._move?.destroy();
+    this._move = null;
     this._chosen?.classList.remove("chosen");
     this._chosen = null;
     this._sheet.replaceChildren();
@@ -176,7 +184,7 @@ class Labels {
   /** Show what can be done with the label that is chosen. */
   _refresh() {
     const label = this._chosen;
-    if (!label) return;
+    if (!label || this._move) return;
     const title = html("p", "title wide", {}, label.dataset.name ?? "");
     const send = button("webmap-labels-send wide", "Send the robot here", () => {
       void this._sendRobot(label);
@@ -188,8 +196,25 @@ class Labels {
     const remove = button("webmap-labels-remove", "Delete", () => {
       this._send({ remove: label.dataset.label ?? "" });
     });
+    const move = button("webmap-labels-move wide", "Move", () => this._openMove(label));
     remove.hidden = !this._editable || label.dataset.kept !== "true";
-    this._sheet.replaceChildren(title, send, close, remove);
+    move.hidden = remove.hidden;
+    this._sheet.replaceChildren(title, send, move, close, remove);
+  }
+
+  /** @param {SVGGraphicsElement} label */
+  _openMove(label) {
+    const place = placeOf(label);
+    if (!place) return;
+    say(this._word, "Drag it on the map, or say where it is.");
+    this._move = new LabelMove(this._map, label, place, (to) => {
+      if (to) this._send({ move: label.dataset.label ?? "", to });
+      else this._close("");
+    });
+    const title = html("p", "title wide", {}, label.dataset.name ?? "");
+    this._sheet.replaceChildren(title, ...this._move.fields);
+    this._fit();
+    this._move.focus();
   }
 
   /** @param {{x: number, y: number}} place In metres. */
