@@ -144,17 +144,30 @@ def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":
 
 def line(finding: "Finding") -> "Element":
     """Return one finding: a shape, a word, what is so, and what to do."""
-    outline, mark = SHAPES[finding.level]
+    return entry(
+        finding.level, f"{WORDS[finding.level]}: ", finding.words, finding.advice
+    )
+
+
+def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
+    """Return a line of a list with the shape of its level.
+
+    Args:
+        level: ``"wrong"``, ``"warning"``, ``"note"`` or ``"good"``.
+        word: What stands out.
+        words: What is so.
+        advice: What stands below it, if anything.
+
+    """
+    outline, mark = SHAPES[level]
     shape = svg.svg(
         svg.path(d=outline, class_="solid"),
         svg.path(d=mark, class_="cut"),
         viewBox="0 0 24 24",
         class_="icon",
     )
-    said = html.div(
-        html.p(html.strong(text=f"{WORDS[finding.level]}: "), finding.words),
-    )
-    if finding.advice:
-        said.append(html.p(text=finding.advice, class_="advice"))
+    said = html.div(html.p(html.strong(text=word), words))
+    if advice:
+        said.append(html.p(text=advice, class_="advice"))
     item = html.li(shape.set("aria-hidden", "true"), said, class_="finding")
-    return item.set("data-level", finding.level)
+    return item.set("data-level", level)

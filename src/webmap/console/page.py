@@ -17,6 +17,7 @@ from webmap.console.doctor import DoctorReports
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
+from webmap.console.health import RobotHealth
 from webmap.console.opened import Console
 from webmap.console.refused import RefusedList
 from webmap.console.robot_buttons import RobotButtons
@@ -107,11 +108,12 @@ def build(
     most = (SPEED, ROTATION_SPEED)
     card = map.add_module(RobotCard, page.element("card"), goals, poses, most)
     cameras = map.add_module(CameraPanel)
+    health = map.add_module(RobotHealth, page.element("card"))
     map.add_module(RobotButtons, page.element("card"))
     doctor = map.add_module(DoctorReports, page.element("bridges"), bridges)
     links = BridgeList(page.element("bridges"), bridges, doctor.buttons)
     refused = RefusedList(page.element("refused"), page.viewer.role)
-    polls = [frame.place, listed.poll, card.poll, cameras.poll]
+    polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [links.poll, refused.poll, doctor.poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)

@@ -1,0 +1,77 @@
+"""The health of the selected robot, on its card."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from webmap import html
+from webmap.console.health import MOST, RobotHealth
+
+
+class Diagnosing:
+    hold = 10.0
+
+    def __init__(self, *parts):
+        self.parts = [
+            SimpleNamespace(name=name, level=level, message=message)
+            for name, level, message in parts
+        ]
+
+
+@pytest.fixture
+def map():
+    return SimpleNamespace(selected=None)
+
+
+def chosen(map, *modules):
+    map.selected = SimpleNamespace(modules=[*modules, object()])
+
+
+def said(health):
+    items = health.element.children[1].children
+    return [(item.get("data-level"), item.text) for item in items]
+
+
+def test_what_is_not_well_is_listed_by_word_and_shape_the_worst_first(map):
+    card = html.section()
+    health = RobotHealth(map, card)
+    assert health.element.get("hidden") is not None
+    diagnosing = Diagnosing(
+        ("motors", "error", "<b>hot</b>"),
+        ("laser", "stale", "silent for 12 s"),
+        ("battery", "warn", "low"),
+        ("wheels", "ok", "fine"),
+    )
+    chosen(map, diagnosing)
+    health.on_select()
+    assert health.element.get("hidden") is None
+    assert said(health) == [
+        ("wrong", "Error: motors: <b>hot</b>"),
+        ("note", "Silent: laser"),
+        ("warning", "Warning: battery: low"),
+    ]
+    first = health.element.children[1].children[0]
+    health.poll()
+    assert health.element.children[1].children[0] is first, "nothing is new"
+    diagnosing.parts = diagnosing.parts[3:]
+    health.poll()
+    assert said(health) == [("good", "All is well: 1 part")]
+    map.selected = None
+    health.on_select()
+    assert health.element.get("hidden") is not None
+    health.destroy()
+    assert not card.children
+
+
+def test_a_robot_without_diagnostics_has_no_health(map):
+    chosen(map, SimpleNamespace(parts=["of something else"]))
+    health = RobotHealth(map, html.section())
+    assert health.element.get("hidden") is not None
+
+
+def test_very_many_parts_are_counted(map):
+    parts = [(f"part {number}", "error", "bad") for number in range(MOST + 3)]
+    chosen(map, Diagnosing(*parts))
+    health = RobotHealth(map, html.section())
+    assert len(said(health)) == MOST + 1
+    assert said(health)[-1] == ("note", "and 3 more parts")
