@@ -141,8 +141,12 @@ WHOLE = publish("/map", grid(50))
 TEN_MILLION = scan(1.0, ranges=typed(85, np.full(10_000_000, 2, "<f4")))
 
 SAID = {
-    "a frame that was cut": ("/map", WHOLE[: len(WHOLE) - 30], "/map"),
-    "two objects in one frame": ("/map", WHOLE + WHOLE, "/map"),
+    "a frame that was cut": (
+        "/map",
+        WHOLE[: len(WHOLE) - 30],
+        "got a frame that was cut",
+    ),
+    "two objects in one frame": ("/map", WHOLE + WHOLE, "or is not one message: not"),
     "braces without end": (None, "{" * 800 + "}" * 800, "not rosbridge"),
     "a cut frame of braces": (None, '{"op":' * 1500, "not rosbridge"),
     "bytes that are nothing": (None, b"\xa1\xff\x00", "not rosbridge"),
@@ -170,7 +174,7 @@ SAID = {
     "an increment of NaN": ("/scan", scan(1, angle_increment=None), "increment"),
     "an angle of NaN": ("/scan", scan(1, angle_min=None), "angle_min"),
     "ten million beams": ("/scan", TEN_MILLION, "10000000 rays"),
-    "ranges of text": ("/scan", scan(1, ranges=["far"]), "array of numbers"),
+    "ranges of text": ("/scan", scan(1, ranges=["far"]), "no whole sensor_msgs/Laser"),
     "another type": ("/scan", {"data": "hello"}, "angle_min"),
 }
 """What is refused: its topic, the frame or the message, and what is said."""
@@ -178,17 +182,25 @@ SAID = {
 TAKEN = {
     "a bare NaN": ("/scan", publish("/scan", scan(math.nan)), 4),
     "a bare infinity": ("/scan", publish("/scan", scan(-math.inf)), 4),
-    "no ranges": ("/scan", scan(1, ranges=[]), 0),
-    "nothing but null": ("/scan", scan(1, ranges=[None] * 5), 0),
     "one ray with no increment": ("/scan", scan(1, ranges=[2.0], angle_increment=0), 1),
     "a stamp of zero": ("/scan", scan(1, header=header() | {"stamp": {}}), 5),
-    "nanoseconds over a second": (
-        "/scan",
-        scan(1, header=header() | {"stamp": {"secs": 1, "nsecs": 2_000_000_005}}),
-        5,
-    ),
 }
 """What looks odd and is drawn: how many dots."""
+
+DOUBTED = {
+    "no ranges": (scan(1, ranges=[]), 0, "its scans have no ranges"),
+    "nothing but null": (
+        scan(1, ranges=[None] * 5),
+        0,
+        "none of its 5 ranges is a nu",
+    ),
+    "nanoseconds over a second": (
+        scan(1, header=header() | {"stamp": {"secs": 1, "nsecs": 2_000_000_005}}),
+        5,
+        "2000000005 nanoseconds; expected 0 to 999999999",
+    ),
+}
+"""What is drawn as far as it goes: how many dots, and what is said."""
 
 HOUR = 3600
 OFF = {"ahead": HOUR, "behind": -HOUR}
@@ -298,10 +310,9 @@ def test_what_makes_no_sense_is_said_once_and_disturbs_nothing(map, channel, nam
         for told in (scene.errors, scene.said):
             found = [line for line in told if said in line]
             assert len(found) == len(told) <= 1, "three times the same is said once"
-        if topic:
-            (line,) = scene.errors
-            assert topic in line, "people read where it came from"
-            assert "Ann" not in line
+        (line,) = scene.errors
+        assert (topic or "sent ") in line, "people read where it came from"
+        assert "Ann" not in line
 
     with_scene(map, channel, scenario)
 
@@ -318,6 +329,26 @@ def test_what_is_only_odd_is_drawn_without_a_word(map, channel, name):
         assert len(dots_of(scene)) == count
         await scene.say_good(0, 3.0)
         assert [*scene.errors, *scene.said] == []
+
+    with_scene(map, channel, scenario)
+
+
+@pytest.mark.parametrize("name", DOUBTED)
+def test_what_is_wrong_and_can_be_drawn_is_drawn_and_said_once(map, channel, name):
+    what, count, said = DOUBTED[name]
+
+    async def scenario(scene: Scene) -> None:
+        await scene.say_good(0, 1.0)
+        theirs = await scene.say_good(1, 1.0)
+        for _ in range(3):
+            await scene.servers[0].send(publish("/scan", what))
+        await until(lambda: scene.errors != [])
+        await until(lambda: len(dots_of(scene)) == count)
+        await scene.say_good(0, 3.0)
+        (line,) = scene.errors
+        assert line.startswith("Bob: /scan: ")
+        assert said in line
+        assert scene.state(1) == theirs
 
     with_scene(map, channel, scenario)
 
@@ -382,5 +413,33 @@ def test_a_map_of_fifty_megabytes_is_drawn_while_the_rest_goes_on(map, channel):
         assert layer.cells.shape == (SIDE, SIDE)
         assert layer.cells[-1, -1] == 100
         assert [*scene.errors, *scene.said] == []
+
+    with_scene(map, channel, scenario)
+
+
+BEAMS = publish("/scan", scan(1, ranges=[-7])).replace(
+    "[-7]", "[" + "2," * 9_999_999 + "2]"
+)
+
+
+@pytest.mark.slow
+def test_ten_million_beams_as_text_are_said_while_the_rest_goes_on(map, channel):
+    async def scenario(scene: Scene) -> None:
+        mine = await scene.say_good(0, 1.0)
+        seen: list[float] = []
+        scene.bridges[1].subscribe(
+            "/odom", lambda message: seen.append(time.monotonic())
+        )
+        sending = asyncio.create_task(scene.servers[0].send(BEAMS))
+        async with asyncio.timeout(3 * DEADLINE):
+            while scene.errors == []:
+                await scene.servers[1].send(publish("/odom", odometry(4.0)))
+                await asyncio.sleep(0.01)
+        await sending
+        assert max(np.diff(seen)) < 1.0, "the other robot went on meanwhile"
+        (line,) = scene.errors
+        assert "/scan: a scan of 10000000 rays" in line
+        assert scene.state(0) == mine, "what was drawn stays"
+        await scene.say_good(0, 2.0)
 
     with_scene(map, channel, scenario)

@@ -344,7 +344,11 @@ class Bridge:
     def _other(self, event: Event) -> None:
         if isinstance(event, Malformed):
             self.stats.malformed += 1
-            self._trouble.malformed(event)
+            said = self._trouble.malformed(event)
+            if said is not None:
+                # It belongs to no topic, so it is told to one of those who listen.
+                listeners = (one for t in self._topics.values() for one in t.listeners)
+                any(listener.mention(said) for listener in listeners)
         elif isinstance(event, Status) and event.level == "error":
             error = BridgeError(f"{self.name} says: {event.msg}")
             log.warning("%s", error)

@@ -22,6 +22,10 @@ MAX_DEPTH = 32
 _FAILURES = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
+class Unreadable(ProtocolError):
+    """What came is no JSON at all, whatever type was expected."""
+
+
 @lru_cache(maxsize=256)
 def _decoder(type: Any) -> "msgspec.json.Decoder[Any]":
     return msgspec.json.Decoder(type, dec_hook=dec_hook)
@@ -41,12 +45,12 @@ def decode_json(text: bytes, type: Any) -> Any:
     except _FAILURES as error:
         # Only these tokens can make good text of what is bad JSON.
         if b"NaN" not in text and b"Infinity" not in text:
-            raise ProtocolError(f"not JSON: {error}") from None
+            raise Unreadable(f"not JSON: {error}") from None
         reason = error
     try:
         value = json.loads(text.decode())
     except (ValueError, RecursionError):
-        raise ProtocolError(f"not JSON: {reason}") from None
+        raise Unreadable(f"not JSON: {reason}") from None
     return convert(value, type)
 
 

@@ -10,8 +10,9 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from webmap.errors import ProtocolError
+from webmap.ros.decoding import Unreadable
 from webmap.ros.graph import Graph
-from webmap.ros.names import same_type
+from webmap.ros.names import is_type, same_type
 from webmap.ros.subscriptions import Topic
 from webmap.scope import no_scope
 
@@ -41,6 +42,11 @@ class Doubts:
 
     def message_failed(self, topic: Topic, expected: str, error: ProtocolError) -> None:
         """Report a message that does not decode, with the type that it really has."""
+        if isinstance(error, Unreadable):
+            # No type would make sense of it, so none is asked for or named.
+            words = "got a frame that was cut off, or is not one message"
+            self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"))
+            return
         self._ask(self._explain(topic, expected, error))
 
     def watch(self, topic: Topic) -> None:
@@ -63,7 +69,12 @@ class Doubts:
     async def _explain(self, topic: Topic, expected: str, error: ProtocolError) -> None:
         got = await self._graph.topic_type(topic.name)
         said = f"the bridge says it is {got}" if got else "its type is not known"
-        full = ProtocolError(f"{topic.name}: expected {expected}, {said}: {error}")
+        words = f"expected {expected}, {said}"
+        if got and is_type(got, expected):
+            words = f"got what is no whole {got}, though the bridge says it is"
+        self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"))
+
+    def _told(self, topic: Topic, full: ProtocolError) -> None:
         log.warning("%s: %s", self._name, full)
         self._report(full)
         topic.failed(full)

@@ -48,8 +48,14 @@ class LinkTrouble:
         log.log(level, "%s", error)
         self._report(error)
 
-    def malformed(self, event: Malformed) -> None:
-        """Report what is not rosbridge, once for each link; the rest is counted."""
+    def malformed(self, event: Malformed) -> ProtocolError | None:
+        """Report what is not rosbridge, once for each link; the rest is counted.
+
+        Returns:
+            What people are to be told; None if it was said already.
+
+        """
+        error = None
         if not self._complained:
             self._complained = True
             error = ProtocolError(
@@ -58,3 +64,4 @@ class LinkTrouble:
             )
             log.warning("%s", error)
             self._report(error)
+        return error

@@ -82,6 +82,13 @@ class Subscription:
         if self._scope is not None and self._scope.report is not None:
             self._scope.report(str(fault), True)
 
+    def mention(self, fault: ProtocolError) -> bool:
+        """Tell whoever subscribed of what passes; False if nobody is to be told."""
+        if self._scope is None or self._scope.report is None:
+            return False
+        self._scope.report(str(fault), False)
+        return True
+
     def hold(self, loop: AbstractEventLoop, release: Callable[[], None]) -> None:
         """Come back for what the throttle holds."""
         due = self.throttle.due

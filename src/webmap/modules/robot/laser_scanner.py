@@ -8,10 +8,12 @@ from webmap.core.from_above import levelled
 from webmap.core.layer_names import label
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
+from webmap.core.scan_doubts import scan_doubt
 from webmap.errors import ProtocolError
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg
+from webmap.scope import Removal, keep
 
 if TYPE_CHECKING:
     import numpy as np
@@ -100,6 +102,7 @@ class LaserScanner:
         )
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        keep(Removal(lambda: robot.clear_problem(self)))
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_scan),
@@ -116,6 +119,11 @@ class LaserScanner:
 
         """
         check_rays(scan)
+        doubt = scan_doubt(scan)
+        if doubt is None:
+            self.robot.clear_problem(self)
+        else:
+            self.robot.set_problem(self, f"{self.topic}: {doubt}")
         found = scan_points(scan, self.max_dots)
         if found is None:
             return
