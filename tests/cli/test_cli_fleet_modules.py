@@ -106,7 +106,7 @@ def test_every_wrong_argument_is_named_at_once(refused):
     ("options", "said"),
     [
         ('palette = "foo"', 'options.palette: got the text "foo", expected "map" or "'),
-        ("pallette = 1", 'there is no argument "pallette"; did you mean "palette"?'),
+        ("pallet = 1", 'there is no argument "pallet"; did you mean "palette"?'),
         ('throttle = "1"', 'options.throttle: got the text "1", expected a whole'),
     ],
 )

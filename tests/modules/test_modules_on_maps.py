@@ -63,7 +63,7 @@ def test_a_module_that_there_is_not_is_named(robot):
     ("module", "options", "said"),
     [
         ("OccupancyGrid", {"palette": "grey"}, 'palette: expected "map" or "costmap"'),
-        ("OccupancyGrid", {"pallette": "map"}, 'did you mean "palette"'),
+        ("OccupancyGrid", {"pallet": "map"}, 'did you mean "palette"'),
         ("Markers", {"type": "std_msgs/String"}, "type: expected"),
     ],
 )
