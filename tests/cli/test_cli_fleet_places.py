@@ -1,6 +1,7 @@
 """Labels and tiles in a fleet file: read strictly, each mistake with its line."""
 
 import io
+import os
 
 import pytest
 from PIL import Image
@@ -66,7 +67,7 @@ def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
             "labels = 3\n",
             "fleet.toml:1: labels: got the whole number 3, expected a file",
         ),
-        ('labels = "no.yaml"\n', "fleet.toml:1: labels: labels '"),
+        ('labels = "no.yaml"\n', "no.yaml: No such file or directory"),
         (
             '[[labels]]\nname = "A"\nx = 1\ny = "2"\n',
             "fleet.toml:1: labels[0]: y: expected a number of metres, got '2'",
@@ -92,3 +93,22 @@ def test_what_makes_no_sense_is_named_with_its_line(prepared, text, said):
     with pytest.raises(ConfigError) as error:
         prepared(text)
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["floor", "labels"])
+def test_a_file_beside_it_is_named_with_its_own_line_too(prepared, tmp_path, key):
+    (tmp_path / "own.yaml").write_text(
+        "image: none.png\nresolution: 0.1\norigin: [0, 0, north]\n"
+        if key == "floor"
+        else "- {name: Dock, x: 1, y: 2}\n- name: Desk\n  x: far\n  y: 2\n"
+    )
+    with pytest.raises(ConfigError) as error:
+        prepared(f'{key} = "own.yaml"\n')
+    assert f"fleet.toml:1: {key}: {tmp_path / 'own.yaml'}:3: " in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["floor", "labels"])
+def test_a_pipe_beside_it_is_refused_and_not_waited_for(prepared, tmp_path, key):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="pipe: expected a file, got a pipe"):
+        prepared(f'{key} = "pipe"\n')

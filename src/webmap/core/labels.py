@@ -33,7 +33,6 @@ ICONS = {
 
 MAX_LABELS = 2000
 MAX_NAME = 60
-MAX_BYTES = 1 << 20
 FARTHEST = 1e6
 """Metres from the origin."""
 
@@ -78,7 +77,7 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
     if isinstance(data, Mapping) and set(data) == {"labels"}:
         data = data["labels"]
     if isinstance(data, str | bytes) or not isinstance(data, Iterable):
-        raise ConfigError(f"{of}: expected a list of labels, got {_show(data)}")
+        raise _Misplaced((), of, f"expected a list of labels, got {_show(data)}")
     found: list[Label] = []
     for number, each in enumerate(data):
         if len(found) == MAX_LABELS:
@@ -86,36 +85,44 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
         if isinstance(each, Label):
             each = msgspec.structs.asdict(each)
             each = {key: each[key] for key in _KEYS}
-        found.append(_label(each, f"{of}[{number}]"))
+        try:
+            found.append(_label(each, f"{of}[{number}]"))
+        except _Misplaced as error:
+            raise error.inside(number) from None
     return tuple(
         msgspec.structs.replace(label, id=f"c{number}")
         for number, label in enumerate(found)
     )
 
 
+class _Misplaced(ConfigError):
+    """What is wrong with a label, and where in its file."""
+
+    def __init__(self, way: tuple[str | int, ...], of: str, words: str) -> None:
+        super().__init__(f"{of}: {words}" if of else words)
+        self.way, self.of, self.words = way, of, words
+
+    def inside(self, number: int) -> "_Misplaced":
+        return _Misplaced((number, *self.way), self.of, self.words)
+
+
 def label_file(file: str | Path) -> tuple[Label, ...]:
     """Return the places of a YAML or JSON file.
 
     Raises:
-        ConfigError: If it is none, or one of them makes no sense.
+        ConfigError: If it is none, or one of them makes no sense; the file and the
+            line in it are named.
 
     """
-    import yaml
+    from webmap.lined_yaml import LinedYaml
 
-    path = Path(file)
+    said = LinedYaml(Path(file))
     try:
-        with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise ConfigError(f"labels {str(file)!r}: {error.strerror}") from None
-    if len(data) > MAX_BYTES:
-        raise ConfigError(f"labels {str(file)!r}: larger than 1 MiB")
-    try:
-        plain = yaml.safe_load(data)  # JSON is YAML too
-    except (yaml.YAMLError, UnicodeError, ValueError, RecursionError) as error:
-        words = " ".join(str(error).split())[:200]
-        raise ConfigError(f"labels {str(file)!r}: no YAML: {words}") from None
-    return read_labels(plain, f"labels {path.name}")
+        return read_labels(said.data, "labels")
+    except _Misplaced as error:
+        table = isinstance(said.data, Mapping) and set(said.data) == {"labels"}
+        way = ("labels", *error.way) if table else error.way
+        raise said.wrong(way, str(error)) from None
 
 
 def new_label(data: Mapping[str, Any]) -> Label:
@@ -206,10 +213,10 @@ class LabelStore:
 
 def _label(data: Any, of: str) -> Label:
     def wrong(key: str, words: str) -> ConfigError:
-        return ConfigError(f"{of}{'.' if of else ''}{key}: {words}".rstrip(": "))
+        return _Misplaced((key.strip("'"),), f"{of}{'.' if of else ''}{key}", words)
 
     if not isinstance(data, Mapping):
-        raise ConfigError(f"{of}: expected a table with name, x and y")
+        raise _Misplaced((), of, "expected a table with name, x and y")
     for key in data:
         if key not in _KEYS:
             near = difflib.get_close_matches(str(key), _KEYS, n=1)
