@@ -16,7 +16,7 @@ sys.path.append(str(Path(__file__).parents[1] / "browser"))
 
 @pytest.fixture(scope="module")
 def ros() -> Iterator[real_ros.Ros]:
-    """A robot, and a rosbridge without rosapi in front of it."""
+    """A robot without frames, and a rosbridge without rosapi in front of it."""
     about, why = real_ros.installed()
     if about is None:
         pytest.skip(f"no real ROS here: {why}")

@@ -1,4 +1,10 @@
-"""A real ROS 2 graph behind a rosbridge that this project did not write."""
+"""A real ROS 2 graph behind a rosbridge that this project did not write.
+
+The robot is told by ``--robot``, for discovery has nothing to ask there: the bridge's
+own rosapi needs the types of ``rosapi_msgs``, and the graph has no ``/tf``, which needs
+those of ``tf2_msgs``. No registry has wheels of either. Discovery by rosapi and frames
+are tested with the simulator, and with frames captured from real bridges.
+"""
 
 import math
 import re
