@@ -94,7 +94,7 @@ def open_page(chromium, url, camera):
         page.goto(url)
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(1)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")
-        if page.viewport_size["width"] < 500:
+        if page.viewport_size["width"] < 900:
             page.locator("#sheet").click()
         page.locator("#robots button").first.click()
         return page
@@ -223,13 +223,13 @@ def can_be_pressed(what) -> None:
     )
 
 
-@pytest.mark.parametrize("device", ["desk", "phone"])
-def test_wherever_it_is_neither_stop_nor_the_stick_is_covered(open_page, device):
-    if device == "desk":
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844), (844, 390), (320, 568)])
+def test_wherever_it_is_neither_stop_nor_the_stick_is_covered(open_page, size):
+    if size == (1280, 800):
         page = open_page()
         docks = ["Beside", "Above or below", "Over the map", "Over the map"]
     else:
-        page = open_page((390, 844), has_touch=True, is_mobile=True)
+        page = open_page(size, has_touch=True, is_mobile=True)
         docks = ["Above or below", "Over the map", "Over the map"]
     panel = large(page)
     stick = page.locator(".webmap-stick")
