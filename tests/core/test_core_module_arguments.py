@@ -27,7 +27,7 @@ def made(annotation):
 
 
 def named(value):
-    """Return what stands for a value in the name of a test, the same in each process."""
+    """Return what a value is called in the name of a test, in each process."""
     return str(value).partition(" object at")[0]
 
 
