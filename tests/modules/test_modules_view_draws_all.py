@@ -31,8 +31,18 @@ OF_A_ROBOT = (
     ".navsatfix > .cross:not([visibility])",
     ".diagnostics.ok",
 )
+# What a real robot has besides, under names that nobody can know.
+ODD = (
+    '.laserscan.scan-2[data-layer="rear/ranges"] > .dot[d]',
+    '.path[data-layer="transformed_global_plan"] > polyline[points]',
+    '.posestamped[data-layer="dock"]:not([visibility]) > .arrow[d]',
+    '.posearray[data-layer="trees"] > .arrow[d]',
+    '.polygon.other[data-layer="keep_in"] > polygon[points]',
+)
 ON_THE_MAP = {
-    ".occupancy-grid.map > image[href]": 1,
+    ".occupancy-grid.map > image[href]": 3,
+    '.occupancy-grid.map[data-layer="/robot_0/map"] > image[href]': 1,
+    '.occupancy-grid.map[data-layer="/second_map"] > image[href]': 1,
     ".occupancy-grid.costmap > image[href]": 2,
     ".markers": 2,
 }
@@ -46,6 +56,7 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
     with simulators(dialect, tilted=tilted) as found:
         world = found[dialect].world
         found[dialect].do(lambda: face_a_wall(world, 1))
+        found[dialect].do(lambda: say_more(found[dialect].node))
         process = subprocess.Popen(
             [*VIEW, found[dialect].url, "--port", "0", "--no-browser"],
             stdout=subprocess.PIPE,
@@ -61,6 +72,9 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
                     for name in ("robot_0", "robot_1"):
                         inside = f'.robot[data-name="{name}"] {selector}'
                         tab.wait_for_selector(inside, state="attached")
+                for selector in ODD:
+                    inside = f'.robot[data-name="robot_0"] {selector}'
+                    tab.wait_for_selector(inside, state="attached")
                 for selector, count in ON_THE_MAP.items():
                     tab.locator(selector).nth(count - 1).wait_for(state="attached")
                     assert tab.locator(selector).count() == count
@@ -70,6 +84,9 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
                 pose = world.robots[1].pose
                 assert math.dist((x, y), (pose.x, pose.y)) < 0.05
                 dots_are_where_walls_are(tab, world, clouds=2 if tilted else 1)
+                x, y = tab.evaluate(PLACE, '[data-layer="dock"] > .arrow')
+                assert math.dist((x, y), (DOCK.x, DOCK.y)) < 0.05
+                switch_one_map(tab)
                 assert tab.locator(".webmap-notice").count() == 0
         finally:
             process.terminate()
@@ -124,6 +141,58 @@ def _sees_only_ahead(tab: Page, robot: str, number: int, pose) -> bool:
     x, y = (np.array(tab.evaluate(f"dots('{robot} {nth}')")) - (pose.x, pose.y)).T
     aside = np.arctan2(y, x) - pose.yaw
     return bool(abs((aside + math.pi) % math.tau - math.pi).max() < math.radians(32))
+
+
+DOCK = Pose(3.0, -2.0, 1.0)
+
+
+def say_more(node):
+    """Let the first robot have a second scan, a map of its own, and odd names."""
+    robot, plan = node.world.robots[0], node.world.plan
+    kinds = {
+        "rear/ranges": "sensor_msgs/LaserScan",
+        "transformed_global_plan": "nav_msgs/Path",
+        "dock": "geometry_msgs/PoseStamped",
+        "trees": "geometry_msgs/PoseArray",
+        "keep_in": "geometry_msgs/PolygonStamped",
+    }
+    for name, type in kinds.items():
+        node.advertise(f"{robot.topics}/{name}", type)
+    for topic in (f"{robot.topics}/map", "/second_map"):
+        node.advertise(topic, "nav_msgs/OccupancyGrid", latch=True)
+        node.publish(topic, node.messages.grid(topic, node.graph.clock(), plan))
+    corners = [{"x": float(x), "y": float(y), "z": 0.0} for x, y in SQUARE]
+
+    def say():
+        now, messages = node.graph.clock(), node.messages
+        topic = f"{robot.topics}/rear/ranges"
+        (ranges,) = node.world.sweep([0])
+        scanner = node.world.options.scanner
+        node.publish(topic, messages.scan(topic, now, robot, scanner, ranges))
+        topic = f"{robot.topics}/transformed_global_plan"
+        node.publish(topic, messages.path(topic, now, [(0.0, 0.0), (2.0, 1.0)]))
+        at = messages.pose_stamped(now, DOCK)
+        node.publish(f"{robot.topics}/dock", at)
+        trees = {"header": at["header"], "poses": [at["pose"]]}
+        node.publish(f"{robot.topics}/trees", trees)
+        fence = {"header": at["header"], "polygon": {"points": corners}}
+        node.publish(f"{robot.topics}/keep_in", fence)
+
+    node.on_step.append(say)
+
+
+SQUARE = ((0, 0), (4, 0), (4, 4), (0, 4))
+
+
+def switch_one_map(tab):
+    """Switch one of three maps off by itself, and see the others stay."""
+    seen = """() => [...document.querySelectorAll(".occupancy-grid.map")]
+      .filter((grid) => getComputedStyle(grid).display !== "none")
+      .map((grid) => grid.dataset.layer).sort()"""
+    tab.locator(".webmap-layers > summary").click()
+    assert tab.evaluate(seen) == ["/map", "/robot_0/map", "/second_map"]
+    tab.get_by_role("checkbox", name="/second_map", exact=True).uncheck()
+    assert tab.evaluate(seen) == ["/map", "/robot_0/map"]
 
 
 PLACE = """(selector) => {
