@@ -37,11 +37,19 @@ READY = "rosbridge is ready at "
 @click.option(
     "--seed", type=int, default=1, show_default=True, help="Where they start."
 )
+@click.option(
+    "--dialect",
+    type=click.Choice(["ros1", "ros2"]),
+    default="ros1",
+    show_default=True,
+    help="Which ROS the simulator plays: move_base's actions, or Nav2's.",
+)
 @web_options
 def demo(
     robots: int,
     bridge_port: int,
     seed: int,
+    dialect: str,
     host: str,
     port: int,
     no_browser: bool,
@@ -55,15 +63,16 @@ def demo(
     import webmap
     from webmap import console
 
+    told = ("--robots", robots, "--port", bridge_port, "--seed", seed)
     with (
-        simulator("--robots", robots, "--port", bridge_port, "--seed", seed) as url,
+        simulator(*told, "--dialect", dialect) as url,
         as_file(files("webmap.sim") / "data") as data,
     ):
         bridge = webmap.Bridge(url, name="simulator")
         floor = data / "floor.yaml"
         opened = console.open_console([bridge], [], floor=floor, title="WebMap demo")
         for index in range(robots):
-            opened.add(demo_robot(bridge, index))
+            opened.add(demo_robot(bridge, index, dialect))
         webmap.run(
             host=host,
             port=port,
@@ -72,7 +81,7 @@ def demo(
         )
 
 
-def demo_robot(bridge: "Bridge", index: int) -> "Robot":
+def demo_robot(bridge: "Bridge", index: int, dialect: str = "ros1") -> "Robot":
     """Return one of the simulator's robots, with what helps to see what it does.
 
     More of what it says would hide the map; ``webmap view`` shows all of it.
@@ -80,12 +89,20 @@ def demo_robot(bridge: "Bridge", index: int) -> "Robot":
     Args:
         bridge: The simulator's.
         index: Which of them, from 0.
+        dialect: Which ROS the simulator plays, ``"ros1"`` or ``"ros2"``.
 
     """
     from webmap.console import RobotDescription
     from webmap.console.fleet import make_robot
 
     topics = f"/robot_{index}"
+    if dialect == "ros2":
+        goal, cancel = f"{topics}/goal_pose", ""
+        action = (f"{topics}/navigate_to_pose", "nav2_msgs/action/NavigateToPose")
+    else:
+        goal = f"{topics}/move_base_simple/goal"
+        cancel = f"{topics}/move_base/cancel"
+        action = (f"{topics}/move_base", "move_base_msgs/MoveBaseAction")
     robot = make_robot(
         RobotDescription(
             name=f"Robot {index}",
@@ -95,9 +112,9 @@ def demo_robot(bridge: "Bridge", index: int) -> "Robot":
             scan=f"{topics}/base_scan",
             battery=f"{topics}/battery_state",
             cameras=(f"{topics}/camera/image_raw/compressed",),
-            goal=f"{topics}/move_base_simple/goal",
-            cancel=f"{topics}/move_base/cancel",
-            action=(f"{topics}/move_base", "move_base_msgs/MoveBaseAction"),
+            goal=goal,
+            cancel=cancel,
+            action=action,
             initial_pose=f"{topics}/initialpose",
             stops_within=0.25,
         )
