@@ -55,7 +55,7 @@ def refused(tmp_path):
         ),
         (module("Path", 'max_points = "9"'), "FILE:11: robots[0].modules[0].options.m"),
         (module("Diagnostics", "hold = true"), "got the boolean true, expected a num"),
-        (module("Range", "x = nan"), "got the number nan, expected a number, for x of"),
+        (module("Trail", "step = nan", args=""), "options.step: Trail: step must be m"),
         (module("Range", "x = [1]"), "got the array [1], expected a number, for x of"),
         (module("Camera", 'throttle = "x"'), 'got the text "x", expected a whole num'),
         (module("Camera", "throttle = -1"), "expected milliseconds, 0 or more, for"),

@@ -66,7 +66,7 @@ def test_a_tile_that_is_none_is_said_once_and_the_others_are_drawn(
     ("change", "words"),
     [
         ({"datum": (91, 0)}, "datum is a latitude and a longitude"),
-        ({"datum": (50,)}, "datum is a latitude and a longitude"),
+        ({"datum": (50,)}, "datum: expected 2 in a list: a number, a number"),
         ({"tile_size": 100}, "tile_size is 256 or 512"),
         ({"most": 0}, "most is a number of tiles up to 256"),
         ({"opacity": 2}, "opacity is from 0 to 1"),

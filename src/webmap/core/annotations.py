@@ -108,10 +108,15 @@ def _is_one(annotation: Any, value: Any) -> bool:
 
 
 def _unusable(value: Any) -> bool:
+    """Tell whether it is a whole number of hundreds of digits, which is no float.
+
+    NaN and infinity are floats; what they would mean, their taker says better.
+    """
     try:
-        return math.isnan(value)
-    except OverflowError:  # a whole number of hundreds of digits
+        math.isnan(value)
+    except OverflowError:
         return True
+    return False
 
 
 def _of_several(kinds: tuple[Any, ...], value: Any) -> Misfit | None:
