@@ -276,3 +276,11 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
         await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
         gate.say(op="stop", robot="r1")
         await until(lambda: Records(tmp_path).latch_of(key) == "Ann", "the file")
+
+
+@in_loop
+async def test_a_gate_that_has_failed_decides_nothing_more(tmp_path):
+    failed = Running(tmp_path).shell
+    failed.failed = True
+    async with asyncio.timeout(5):
+        await failed._keep_stepping()
