@@ -47,13 +47,14 @@ def test_scan_assist_is_told_to_the_gate(tmp_path):
         DRIVEN
         + '[robots.scan_assist]\ntopic = "/scan"\n'
         + "footprint = [[0.3, 0.2], [-0.3, 0], [0.3, -0.2]]\n"
-        + 'x = 0.25\nangle = 180\nblind = "creep"\ncreep = 0\n',
+        + 'x = 0.25\nangle = 180\nupside_down = true\nblind = "creep"\ncreep = 0\n',
     )
     assist = spec(ready).assist
     assert assist.topic == "/scan"
     assert assist.footprint == ((0.3, 0.2), (-0.3, 0.0), (0.3, -0.2))
     assert assist.sensor == pytest.approx((0.25, 0.0, math.pi))
     assert (assist.blind, assist.creep) == ("creep", 0.0)
+    assert assist.upside_down
 
 
 def test_a_footprint_may_be_a_radius(tmp_path):
@@ -95,6 +96,7 @@ def test_a_hook_that_makes_no_sense_is_named_with_its_line(tmp_path, hooks, said
         ("footprint = nan", "radius in metres"),
         ("x = inf", "x: got the number inf, expected a number of metres"),
         ('angle = "left"', "expected a number of degrees"),
+        ("upside_down = 1", "expected true or false"),
         ("stop_distance = -1", "expected a number of metres from 0 on"),
         ("creep = true", "expected a number of metres per second from 0 on"),
         ("brake = 0", "expected a number of metres per second squared above 0"),

@@ -81,13 +81,15 @@ def test_what_cannot_move_is_neither_stopped_nor_reset(robot, gate, ask):
 
 def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
     drivable(robot, stop_hooks=[LOCK, E_STOP])
-    robot.set_scan_assist("/scan", [(0.3, 0.2), (-0.3, 0), (0.3, -0.2)], angle=30)
+    corners = [(0.3, 0.2), (-0.3, 0), (0.3, -0.2)]
+    robot.set_scan_assist("/scan", corners, angle=30, upside_down=True)
     data = json.loads(json.dumps(robot.to_dict()))
     assert data["twist"]["stop_hooks"] == [LOCK, E_STOP]
     assert data["scan_assist"] == data["scan_assist"] | {
         "topic": "/scan",
         "footprint": [[0.3, 0.2], [-0.3, 0.0], [0.3, -0.2]],
         "angle": 30.0,
+        "upside_down": True,
     }
     again = Robot.from_dict(data, {Link.url: Link()})
     assert json.loads(json.dumps(again.to_dict())) == data

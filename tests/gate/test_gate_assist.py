@@ -104,6 +104,20 @@ def test_the_robot_s_own_body_is_not_in_its_way():
     assert assist(SPEC, body, Twist(1.0, 0.0, 0.0), 0.1).scale == 1.0
 
 
+def test_a_scanner_that_hangs_head_down_minds_the_side_that_it_sees():
+    """A wall to the robot's left: a scanner upside down finds it at its right."""
+    left = sweep_of(lambda b: 0.45 if 0.3 < b < 2.0 else math.inf)
+    right = sweep_of(lambda b: 0.45 if 0.3 < -b < 2.0 else math.inf)
+    hanging = msgspec.structs.replace(SPEC, upside_down=True)
+    to_the_left = Twist(0.3, 0.3, 0.0)
+    assert assist(SPEC, left, to_the_left, 0.1).scale < 1.0
+    assert assist(SPEC, right, to_the_left, 0.1).scale == 1.0
+    assert assist(hanging, right, to_the_left, 0.1) == assist(
+        SPEC, left, to_the_left, 0.1
+    )
+    assert assist(hanging, left, to_the_left, 0.1).scale == 1.0
+
+
 def test_too_near_to_measure_is_an_obstacle():
     spec = AssistSpec(topic="/scan", footprint=BOX, sensor=(0.3, 0.0, 0.0))
     near = sweep_of(lambda bearing: -math.inf if abs(bearing) < 0.5 else math.inf)

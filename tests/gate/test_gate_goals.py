@@ -144,6 +144,17 @@ def test_without_a_link_goals_are_refused_and_the_cancel_is_kept(bench):
     assert cancels(bench) == 1
 
 
+def test_an_action_is_cancelled_without_the_link_too_and_again_with_it():
+    """Its service is called on a socket of its own, which may well get through."""
+    bench = Bench().begin(spec(action="/go", cancel_topic=None))
+    bench.take()
+    bench.tell(events.LinkDown(URL, "tasks"))
+    bench.say("a", op="cancel", robot="r1")
+    assert cancels(bench) == 1
+    bench.tell(events.LinkUp(URL, "tasks"))
+    assert cancels(bench) == 2
+
+
 def test_a_goal_that_could_not_be_written_is_told(bench):
     bench.take()
     bench.clear = False

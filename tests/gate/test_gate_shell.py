@@ -134,7 +134,7 @@ async def test_goals_that_are_to_be_cancelled_are_before_the_gate_ends(
         goal = {"op": "goal", "robot": "r1", "epoch": epoch, "seq": 1, "tick": tick}
         gate.say(**goal, x=1.0, y=2.0, yaw=0.0)
         await until(lambda: bridge.of("send_action_goal"), "the goal")
-        await until(lambda: len(bridge.of("advertise", "/goal")) == 2, "the next link")
+        # Its socket is spent: whether there is another yet makes no difference.
         await gate.end()
         assert [t.message["service"] for t in bridge.of("call_service")] == [
             "/go/_action/cancel_goal"

@@ -110,6 +110,7 @@ class Driven(Extendable):
         x: float = 0.0,
         y: float = 0.0,
         angle: float = 0.0,
+        upside_down: bool = False,
         stop_distance: float = 0.15,
         brake: float = 0.5,
         blind: Literal["stop", "creep"] = "stop",
@@ -127,6 +128,7 @@ class Driven(Extendable):
             x: Where the scanner is on the robot, in metres forward.
             y: In metres to the left.
             angle: Where it looks, in degrees from the robot's x, counter-clockwise.
+            upside_down: Whether it hangs head down: a scan is then swept clockwise.
             stop_distance: What stays free before the robot, in metres.
             brake: How hard the robot slows down, in metres per second squared.
             blind: Whether it stops or creeps while the scan is older than 0.3 s, is
@@ -147,6 +149,7 @@ class Driven(Extendable):
                 topic=topic,
                 footprint=corners,
                 sensor=(x, y, math.radians(angle)),
+                upside_down=upside_down,
                 stop_distance=stop_distance,
                 brake=brake,
                 blind=blind,

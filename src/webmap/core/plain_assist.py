@@ -16,6 +16,7 @@ class ScanAssistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=T
     x: float = 0.0
     y: float = 0.0
     angle: float = 0.0
+    upside_down: bool = False
     stop_distance: float = 0.15
     brake: float = 0.5
     blind: Literal["stop", "creep"] = "stop"
@@ -33,6 +34,7 @@ def assist_data(assist: AssistSpec | None) -> ScanAssistData | None:
         x,
         y,
         round(math.degrees(yaw), 9),  # so that 30 degrees are 30 again
+        assist.upside_down,
         assist.stop_distance,
         assist.brake,
         assist.blind,

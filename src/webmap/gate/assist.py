@@ -42,6 +42,8 @@ class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
     """The corners of the robot in its own frame, in order, in metres."""
     sensor: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the scanner is on it: x, y in metres, yaw in radians."""
+    upside_down: bool = False
+    """Whether it hangs head down, so that its rays go round the other way."""
     stop_distance: float = 0.15
     """What stays free before the robot, in metres."""
     brake: float = 0.5
@@ -90,6 +92,8 @@ def assist(spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float) -> 
     speed = _reach_speed(spec, wanted)
     if speed == 0.0:
         return FREE
+    if sweep is not None and spec.upside_down:
+        sweep = _turned_over(sweep)
     if reason := _blindness(spec, sweep, wanted, now):
         return _blind(spec, speed, reason)
     assert sweep is not None
@@ -162,6 +166,15 @@ def inside(corners: Sequence[Point], point: Point) -> bool:
         if (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax):
             odd = not odd
     return odd
+
+
+def _turned_over(sweep: Sweep) -> Sweep:
+    """Return what a scanner that hangs head down would say if it stood upright."""
+    return msgspec.structs.replace(
+        sweep,
+        angle_min=-sweep.angle_min,
+        angle_increment=-sweep.angle_increment,
+    )
 
 
 def _reach_speed(spec: AssistSpec, twist: Twist) -> float:

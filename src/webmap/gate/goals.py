@@ -66,6 +66,11 @@ class Goals:
         return self.spec.cancel_topic is not None or self.spec.action is not None
 
     @property
+    def _cancels_apart(self) -> bool:
+        """Whether that goes by a service, called on a socket of its own."""
+        return self.spec.action is not None and not is_move_base(self.spec)
+
+    @property
     def following(self) -> bool:
         """Whether the robot follows a goal, as far as is known."""
         return self.report is not None and self.report.state not in OVER
@@ -167,7 +172,7 @@ class Goals:
             raise Refusal("no cancel topic and no action is known")
         self._running, self._by, self._perhaps = None, None, False
         self._cancel_owed = not self.link.up
-        if self.link.up:
+        if self.link.up or self._cancels_apart:
             self._emit(CancelGoals(self._key, self.spec.id))
         if self.following:
             assert self.report is not None  # only then does it follow one

@@ -105,6 +105,7 @@ ASSIST: dict[str, Check] = {
     "x": _any("metres"),
     "y": _any("metres"),
     "angle": _any("degrees"),
+    "upside_down": checks.yes_or_no,
     "stop_distance": _from_zero("metres"),
     "brake": checks.above_zero("metres per second squared"),
     "blind": checks.one_of("stop", "creep"),
