@@ -13,8 +13,8 @@ from cli_simulator import simulator
 
 from webmap.cli.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
 from webmap.gate.events import Key, StopRecord
-from webmap.gate.records import Records
-from webmap.gate.stoptest import MOVES_ON
+from webmap.gate.kept.records import Records
+from webmap.gate.rules.stoptest import MOVES_ON
 from webmap.testing import WitnessRobot
 
 TODAY = datetime.datetime.now().astimezone().date().isoformat()

@@ -4,7 +4,7 @@ import pytest
 from gate_page import Page
 from gate_robot import FakeRobot
 
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 from webmap.gate.messages import RobotSpec
 
 

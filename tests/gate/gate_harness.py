@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key
-from webmap.gate.gate import Gate
-from webmap.gate.lease import Epochs
 from webmap.gate.messages import RobotSpec
-from webmap.gate.ticks import Ticks
+from webmap.gate.rules.gate import Gate
+from webmap.gate.rules.lease import Epochs
+from webmap.gate.rules.ticks import Ticks
 from webmap.geometry import Twist
 
 URL = "ws://robot:9090"

@@ -12,8 +12,8 @@ import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
-from webmap.gate.lanes import Lane
-from webmap.gate.sockets import Ears
+from webmap.gate.lanes.lane import Lane
+from webmap.gate.lanes.sockets import Ears
 from webmap.testing.rosbridge import WitnessBridge
 
 TIMEOUT = 30.0

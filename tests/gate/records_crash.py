@@ -10,9 +10,9 @@ import signal
 import sys
 from pathlib import Path
 
-from webmap.gate import records
 from webmap.gate.events import Key
-from webmap.gate.records import Records
+from webmap.gate.kept import records
+from webmap.gate.kept.records import Records
 
 KEY = Key("ws://127.0.0.1:9090", "/cmd_vel")
 

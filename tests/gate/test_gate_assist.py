@@ -7,15 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.assist import (
-    AssistSpec,
-    Sweep,
-    assist,
-    free_way,
-    inside,
-    points_of,
-    polygon_around,
-)
+from webmap.gate.events import Sweep
+from webmap.gate.messages import AssistSpec
+from webmap.gate.rules.assist import assist, free_way, inside, points_of, polygon_around
 from webmap.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))

@@ -4,8 +4,8 @@ import json
 
 from link_bench import in_loop, noting_bridge, raw_bridge, until
 
-from webmap.gate import calls
-from webmap.gate.calls import Calls
+from webmap.gate.lanes import calls
+from webmap.gate.lanes.calls import Calls
 
 
 def request(id, service="/e_stop"):

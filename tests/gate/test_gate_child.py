@@ -9,8 +9,9 @@ import threading
 import pytest
 from gate_robot import eventually
 
-from webmap.gate import child, framing
-from webmap.gate.child import Child
+from webmap.gate import framing
+from webmap.gate.display import child
+from webmap.gate.display.child import Child
 from webmap.gate.messages import Ready, RefusedCount, Tick
 
 

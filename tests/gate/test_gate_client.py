@@ -11,7 +11,7 @@ from gate_robot import FakeRobot, eventually
 
 from webmap.errors import ConfigError, MotionError, NoLease
 from webmap.gate import messages
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 from webmap.geometry import Twist
 
 JITTER = 0.15

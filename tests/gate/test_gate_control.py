@@ -4,10 +4,10 @@ import json
 
 from link_bench import in_loop, noting_bridge, raw_bridge, until
 
-from webmap.gate import control
-from webmap.gate.control import BUSY_PING, IDLE_PING, ControlLane
 from webmap.gate.events import Alive, Echoed, Key, LinkDown, LinkUp
-from webmap.gate.unproven import MOST
+from webmap.gate.lanes import control
+from webmap.gate.lanes.control import BUSY_PING, IDLE_PING, ControlLane
+from webmap.gate.lanes.unproven import MOST
 from webmap.geometry import Twist
 
 ZERO, SLOW = Twist(), Twist(0.1)

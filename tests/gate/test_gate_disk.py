@@ -6,9 +6,9 @@ import datetime
 import pytest
 
 from webmap.gate.actions import KeepLatch, KeepStopTest
-from webmap.gate.disk import Disk
 from webmap.gate.events import Key, LatchKept, LockState, StopTestKept
-from webmap.gate.records import Records
+from webmap.gate.kept.disk import Disk
+from webmap.gate.kept.records import Records
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 

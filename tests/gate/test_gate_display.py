@@ -9,8 +9,9 @@ from gate_harness import Bench, spec
 from gate_robot import eventually
 
 from webmap.errors import ConfigError, MotionError, NoLease
-from webmap.gate import messages, supervisor
-from webmap.gate.client import GateClient
+from webmap.gate import messages
+from webmap.gate.display import supervisor
+from webmap.gate.display.client import GateClient
 from webmap.gate.messages import PROGRAM, Holder
 from webmap.geometry import Twist
 

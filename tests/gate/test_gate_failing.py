@@ -10,7 +10,7 @@ from gate_robot import eventually
 from webmap.core.runtime import Runtime
 from webmap.errors import NoLease
 from webmap.gate import messages
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 
 
 @pytest.fixture

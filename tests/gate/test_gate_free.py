@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.gate import messages
+from webmap.gate.display.pages import Pages
 from webmap.gate.limits import Cap, Speed, offered, page_cap, speed_in_force
-from webmap.gate.pages import Pages
 
 INF = math.inf
 LIMITS = st.sampled_from([0.0, 0.2, 0.3, 0.6, 1.0, INF])

@@ -7,7 +7,8 @@ from gate_harness import KEY, Bench, spec
 
 from webmap.errors import ConfigError
 from webmap.gate import events
-from webmap.gate.assist import AssistSpec, Sweep
+from webmap.gate.events import Sweep
+from webmap.gate.messages import AssistSpec
 from webmap.gate.specs import checked
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))

@@ -14,8 +14,8 @@ from link_bench import (
     until,
 )
 
-from webmap.gate import lanes
-from webmap.gate.sockets import Ears
+from webmap.gate.lanes import lane as lanes
+from webmap.gate.lanes.sockets import Ears
 
 
 def advertise(topic):

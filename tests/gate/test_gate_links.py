@@ -4,9 +4,9 @@ from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.gate import actions
-from webmap.gate.assist import AssistSpec
 from webmap.gate.events import Echoed, Key, LinkDown, LinkUp, Measured, Wrote
-from webmap.gate.links import Links
+from webmap.gate.lanes.links import Links
+from webmap.gate.messages import AssistSpec
 from webmap.geometry import Twist
 
 SLOW, ZERO = Twist(0.1), Twist()

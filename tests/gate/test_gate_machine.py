@@ -35,11 +35,11 @@ from hypothesis.stateful import (
 from machine_bench import PacedBench
 
 from webmap.gate import actions, events, messages
-from webmap.gate.gate import Gate
-from webmap.gate.lease import Epochs
 from webmap.gate.messages import PROGRAM
+from webmap.gate.rules.gate import Gate
+from webmap.gate.rules.lease import Epochs
+from webmap.gate.rules.ticks import Ticks
 from webmap.gate.shell import STEP
-from webmap.gate.ticks import Ticks
 from webmap.geometry import Twist
 
 PEOPLE = ("a", "b")

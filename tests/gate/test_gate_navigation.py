@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from webmap.gate import navigation
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import GoalEnded, GoalProgress, Key
+from webmap.gate.lanes import navigation
 from webmap.gate.messages import RobotSpec
 
 KEY = Key("ws://robot:9090", "/cmd_vel")

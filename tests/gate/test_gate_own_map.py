@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from webmap.errors import ConfigError
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import Key
+from webmap.gate.lanes.own_map import in_own_map
 from webmap.gate.messages import RobotSpec
-from webmap.gate.own_map import in_own_map
 from webmap.gate.specs import checked
 from webmap.geometry import Pose
 

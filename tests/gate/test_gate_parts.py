@@ -8,14 +8,14 @@ from gate_harness import spec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.burst import Burst
-from webmap.gate.connection import Connection, Rate
-from webmap.gate.deadman import DEADMAN, NEUTRAL, DeadMan
-from webmap.gate.health import Health, Pulse
-from webmap.gate.lease import Epochs, Lease, check_lease, check_role, check_take
 from webmap.gate.limits import Cap, Speed, caps_of, fit, ramp, speed_in_force
 from webmap.gate.refusal import Refusal
-from webmap.gate.ticks import Ticks
+from webmap.gate.rules.burst import Burst
+from webmap.gate.rules.connection import Connection, Rate
+from webmap.gate.rules.deadman import DEADMAN, NEUTRAL, DeadMan
+from webmap.gate.rules.health import Health, Pulse
+from webmap.gate.rules.lease import Epochs, Lease, check_lease, check_role, check_take
+from webmap.gate.rules.ticks import Ticks
 from webmap.geometry import Twist
 
 axis = st.floats(-1e308, 1e308)

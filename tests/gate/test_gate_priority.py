@@ -9,7 +9,7 @@ import pytest
 from gate_robot import eventually
 
 from webmap.gate import priority
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="Linux's way to say it")
 

@@ -12,10 +12,10 @@ import pytest
 from gate_robot import eventually
 
 from webmap.gate import framing, process
-from webmap.gate.child import gate_command
-from webmap.gate.gate import Gate
+from webmap.gate.display.child import gate_command
 from webmap.gate.messages import FromGate, Heartbeat, Ready
 from webmap.gate.outbox import Outbox
+from webmap.gate.rules.gate import Gate
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from gate_page import Page
 from gate_robot import eventually
 
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 from webmap.testing import (
     Bounds,
     Sentinel,

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from webmap.gate.events import Key, StopRecord
-from webmap.gate.records import UNKNOWN, Records, path_of
+from webmap.gate.kept.records import UNKNOWN, Records, path_of
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 OTHER = Key("ws://robot:9090", "/other")

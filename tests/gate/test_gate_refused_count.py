@@ -3,8 +3,8 @@
 import pytest
 
 from webmap.gate.actions import Say
-from webmap.gate.gate import Gate
 from webmap.gate.messages import Connect, Disconnect, FromBrowser, RefusedCount
+from webmap.gate.rules.gate import Gate
 
 
 @pytest.fixture

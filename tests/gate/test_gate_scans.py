@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.scans import hear_scan, subscribe
+from webmap.gate.lanes.scans import hear_scan, subscribe
 
 CAPTURED = Path(__file__).parents[1] / "sim" / "captured"
 

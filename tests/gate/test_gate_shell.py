@@ -9,10 +9,10 @@ from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.gate import events, messages, shell
-from webmap.gate.disk import Disk
 from webmap.gate.events import Key
-from webmap.gate.locks import Locks
-from webmap.gate.records import UNKNOWN, Records, path_of
+from webmap.gate.kept.disk import Disk
+from webmap.gate.kept.locks import Locks
+from webmap.gate.kept.records import UNKNOWN, Records, path_of
 from webmap.gate.shell import Shell
 
 

@@ -22,8 +22,8 @@ from link_bench import (
 from websockets.asyncio.server import serve
 
 from webmap.errors import BridgeClosed
-from webmap.gate import sockets
-from webmap.gate.sockets import Socket, open_socket
+from webmap.gate.lanes import sockets
+from webmap.gate.lanes.sockets import Socket, open_socket
 
 
 async def opened(url, heard):

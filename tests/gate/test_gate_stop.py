@@ -377,7 +377,7 @@ class TestConfirmation:
         assert seen.report().stop.confirmed is True
 
     def test_one_that_never_answered_says_so_in_the_end(self):
-        from webmap.gate.confirm import Confirmation
+        from webmap.gate.rules.confirm import Confirmation
 
         confirmation = Confirmation()
         confirmation.begin(0.0)

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.assist import AssistSpec, Sweep, assist, polygon_around
-from webmap.gate.sweptway import Fan, looks_ahead
+from webmap.gate.events import Sweep
+from webmap.gate.messages import AssistSpec
+from webmap.gate.rules.assist import assist, polygon_around
+from webmap.gate.rules.sweptway import Fan, looks_ahead
 from webmap.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))

@@ -5,7 +5,6 @@ import json
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate import tasks
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import (
     GoalEnded,
@@ -15,7 +14,8 @@ from webmap.gate.events import (
     LinkDown,
     LinkUp,
 )
-from webmap.gate.tasks import TasksLane, goal_topics, hook_topics
+from webmap.gate.lanes import tasks
+from webmap.gate.lanes.tasks import TasksLane, goal_topics, hook_topics
 
 MOVE_BASE = spec(
     action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None

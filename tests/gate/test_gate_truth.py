@@ -5,8 +5,8 @@ from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.gate import actions, events
 from webmap.gate.limits import Speed
-from webmap.gate.loopage import LoopAge, governed, reaction
-from webmap.gate.obedience import Obedience
+from webmap.gate.rules.loopage import LoopAge, governed, reaction
+from webmap.gate.rules.obedience import Obedience
 from webmap.geometry import Twist
 
 

@@ -9,10 +9,10 @@ from gate_page import Page
 from gate_robot import eventually
 
 from webmap.gate import actions
-from webmap.gate.client import GateClient
-from webmap.gate.disk import Disk
+from webmap.gate.display.client import GateClient
 from webmap.gate.events import Key, LatchKept, LatchSeen, LockState
-from webmap.gate.records import Records
+from webmap.gate.kept.disk import Disk
+from webmap.gate.kept.records import Records
 
 
 @pytest.fixture

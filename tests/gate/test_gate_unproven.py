@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.unproven import MOST, REMEMBERED, Unproven
+from webmap.gate.lanes.unproven import MOST, REMEMBERED, Unproven
 from webmap.geometry import Twist
 
 ZERO = Twist()

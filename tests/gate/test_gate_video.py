@@ -5,7 +5,7 @@ from gate_harness import Bench
 
 from webmap.gate.commands import parse
 from webmap.gate.refusal import Refusal
-from webmap.gate.video import Video
+from webmap.gate.rules.video import Video
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import cbor2
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.gate.events import Key, LinkDown, LinkUp, Measured, Scanned
-from webmap.gate.witness import WitnessLane
+from webmap.gate.lanes.witness import WitnessLane
 from webmap.geometry import Twist
 
 ANN, BEN = Key("ws://a", "/cmd_vel"), Key("ws://b", "/cmd_vel")

@@ -6,8 +6,8 @@ import math
 import pytest
 from gate_harness import KEY, spec
 
-from webmap.gate import words
 from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.lanes import words
 from webmap.geometry import Twist
 
 

@@ -9,7 +9,7 @@ import json
 import sys
 import threading
 
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 from webmap.gate.messages import RobotSpec
 
 

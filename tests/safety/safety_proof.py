@@ -8,7 +8,7 @@ from safety_bench import V_MAX, W_MAX, Bench, pass_time, wait_for
 from safety_figures import Figure, note
 from safety_run import FULL, TRIALS, Progress, grace, is_measured
 
-from webmap.gate.burst import LENGTH, NEW_LINK_LENGTH
+from webmap.gate.rules.burst import LENGTH, NEW_LINK_LENGTH
 from webmap.testing import Bounds, Quiet, check_invariants
 
 EVERY = 5

@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from real_browser import watched_tab
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 from webmap.gate.messages import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot
 

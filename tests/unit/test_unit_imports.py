@@ -29,7 +29,9 @@ def test_importing_webmap_loads_no_heavy_package() -> None:
     assert not loaded_by("import webmap") & (HEAVY | {"websockets", "msgspec"})
 
 
-@pytest.mark.parametrize("module", ["webmap.gate.__main__", "webmap.gate.client"])
+@pytest.mark.parametrize(
+    "module", ["webmap.gate.__main__", "webmap.gate.display.client"]
+)
 def test_the_gate_loads_no_heavy_package(module: str) -> None:
     assert not loaded_by(f"import {module}") & HEAVY
 
@@ -37,7 +39,7 @@ def test_the_gate_loads_no_heavy_package(module: str) -> None:
 def test_a_scan_costs_the_gate_cbor_and_nothing_else_that_is_heavy() -> None:
     loaded = loaded_by(
         "import webmap.gate.__main__, cbor2\n"
-        "from webmap.gate.scans import hear_scan\n"
+        "from webmap.gate.lanes.scans import hear_scan\n"
         "fields = ('angle_min', 'angle_increment', 'range_min', 'range_max')\n"
         "scan = dict.fromkeys(fields, 1.0)\n"
         "scan['ranges'] = cbor2.CBORTag(85, bytes(8))\n"

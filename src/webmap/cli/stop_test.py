@@ -19,9 +19,9 @@ from webmap.discovery import FoundRobot, discover
 from webmap.discovery.asking import ask_topics
 from webmap.discovery.robots import host_name
 from webmap.errors import BridgeError, ConfigError
-from webmap.gate.client import GateClient
+from webmap.gate.display.client import GateClient
 from webmap.gate.messages import RobotSpec
-from webmap.gate.stoptest import MOVES_ON
+from webmap.gate.rules.stoptest import MOVES_ON
 from webmap.ros.names import normalise_url
 
 PERIOD = 0.05

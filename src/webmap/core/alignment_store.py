@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from webmap.core.alignment import alignment, alignments, numbers
 from webmap.errors import ConfigError
-from webmap.gate.locks import state_folder
+from webmap.gate.kept.locks import state_folder
 from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
 

@@ -17,8 +17,8 @@ from webmap.core.goal_topics import (
 from webmap.core.motion import MotionRoad, TwistTopic
 from webmap.core.registry import Namespace
 from webmap.errors import MotionError
-from webmap.gate.assist import AssistSpec, polygon_around
-from webmap.gate.messages import RobotReport
+from webmap.gate.messages import AssistSpec, RobotReport
+from webmap.gate.rules.assist import polygon_around
 from webmap.geometry import Quaternion, Twist
 from webmap.ros.bridge import Bridge
 from webmap.scope import no_scope

@@ -8,7 +8,7 @@ from webmap.core.labels import ICONS, MAX_LABELS, Label, LabelStore, moved_label
 from webmap.core.layer import Layer
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
-from webmap.gate.locks import state_folder
+from webmap.gate.kept.locks import state_folder
 from webmap.scene import svg
 from webmap.scene.element import Element
 

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 from webmap.core.goal_topics import InitialPoseTopic, MoveTopic
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError, MotionError
-from webmap.gate.assist import AssistSpec
 from webmap.gate.hookspecs import checked_hooks
-from webmap.gate.messages import RobotSpec
+from webmap.gate.messages import AssistSpec, RobotSpec
 from webmap.gate.specs import checked_assist
 from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
@@ -21,7 +20,7 @@ from webmap.ros.names import normalise_topic, same_type
 from webmap.scope import Removable
 
 if TYPE_CHECKING:
-    from webmap.gate.client import GateClient
+    from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 import msgspec
 
-from webmap.gate.assist import AssistSpec
+from webmap.gate.messages import AssistSpec
 
 
 class ScanAssistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):

@@ -28,7 +28,7 @@ from webmap.lifecycle import lifecycle
 from webmap.scope import Removal
 
 if TYPE_CHECKING:
-    from webmap.gate.client import GateClient
+    from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap")
 
@@ -131,7 +131,7 @@ class Runtime:
             ready.set()
 
     async def _live(self, ready: threading.Event) -> None:
-        from webmap.gate.client import GateClient
+        from webmap.gate.display.client import GateClient
 
         loop = self._loop = asyncio.get_running_loop()
         gate = self.gate = GateClient()

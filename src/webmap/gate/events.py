@@ -1,9 +1,11 @@
 """What the shell tells the decisions, besides what comes over the pipe."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from webmap.gate.assist import Sweep
+import msgspec
+
 from webmap.geometry import Twist
 
 Lane = Literal["control", "witness", "tasks"]
@@ -15,6 +17,19 @@ class Key(NamedTuple):
 
     url: str
     topic: str
+
+
+class Sweep(msgspec.Struct, frozen=True):
+    """The newest scan."""
+
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: Sequence[float]
+    """In metres: inf is nothing there, -inf too near, NaN unknown (REP 117)."""
+    arrived: float
+    """When it came, on the gate's clock."""
 
 
 @dataclass(frozen=True, slots=True)

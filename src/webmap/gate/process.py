@@ -16,11 +16,11 @@ from types import FrameType
 
 from webmap.errors import WireError
 from webmap.gate import events, framing, messages
-from webmap.gate.disk import Disk
-from webmap.gate.locks import Locks, state_folder
+from webmap.gate.kept.disk import Disk
+from webmap.gate.kept.locks import Locks, state_folder
+from webmap.gate.kept.records import Records
 from webmap.gate.outbox import BackgroundHandler, Outbox
 from webmap.gate.priority import rise
-from webmap.gate.records import Records
 from webmap.gate.shell import Shell
 
 

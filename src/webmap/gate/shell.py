@@ -11,11 +11,11 @@ from collections import deque
 
 from webmap.gate import actions, events, messages
 from webmap.gate.clock import now
-from webmap.gate.disk import Disk
-from webmap.gate.gate import Gate
-from webmap.gate.links import Links
-from webmap.gate.locks import Locks
+from webmap.gate.kept.disk import Disk
+from webmap.gate.kept.locks import Locks
+from webmap.gate.lanes.links import Links
 from webmap.gate.outbox import Outbox
+from webmap.gate.rules.gate import Gate
 
 log = logging.getLogger("webmap.gate")
 

@@ -5,10 +5,9 @@ import math
 import msgspec
 
 from webmap.errors import ConfigError
-from webmap.gate.assist import AssistSpec
 from webmap.gate.events import Key
 from webmap.gate.hookspecs import checked_hooks
-from webmap.gate.messages import RobotSpec
+from webmap.gate.messages import AssistSpec, RobotSpec
 from webmap.ros.names import is_type, normalise_topic, normalise_url, split_type
 
 ACTIONS = ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction")

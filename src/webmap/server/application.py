@@ -11,7 +11,7 @@ from webmap.core.runtime import runtime
 from webmap.errors import WebMapError
 
 if TYPE_CHECKING:
-    from webmap.gate.client import DriveConnection
+    from webmap.gate.display.client import DriveConnection
     from webmap.gate.messages import Role
     from webmap.server.app import WebApp
     from webmap.server.settings import Authenticate

@@ -4,10 +4,12 @@ Speeds are metres and radians per second in the robot's own frame (x forward, y 
 turn counter-clockwise); times are seconds. A robot is named by a short opaque text
 that the display makes up; a connection (one page's socket) likewise.
 
-``spec`` is what the display declares of a robot, ``to_gate`` what it says otherwise,
-``robot_report`` what the gate tells of a robot, ``from_gate`` the rest of its words.
+``spec`` is what the display declares of a robot, with ``assist`` in it, ``to_gate``
+what it says otherwise, ``robot_report`` what the gate tells of a robot, ``from_gate``
+the rest of its words.
 """
 
+from webmap.gate.messages.assist import AssistSpec, Point
 from webmap.gate.messages.from_gate import (
     CloseConnection,
     FromGate,
@@ -63,6 +65,7 @@ from webmap.gate.messages.to_gate import (
 __all__ = [
     "PROGRAM",
     "AskerReport",
+    "AssistSpec",
     "CloseConnection",
     "Connect",
     "Disconnect",
@@ -75,6 +78,7 @@ __all__ = [
     "Heartbeat",
     "Hello",
     "Holder",
+    "Point",
     "ProgramCancel",
     "ProgramLocate",
     "ProgramMove",

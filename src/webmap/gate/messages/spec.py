@@ -4,7 +4,7 @@ from typing import Literal
 
 import msgspec
 
-from webmap.gate.assist import AssistSpec
+from webmap.gate.messages.assist import AssistSpec
 
 
 class RobotSpec(

@@ -10,7 +10,7 @@ import msgspec
 from webmap.core.route_store import RouteStore, read_name, read_route
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
-from webmap.gate.locks import state_folder
+from webmap.gate.kept.locks import state_folder
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

@@ -1,0 +1,1 @@
+"""The display's end of the pipe: it starts the gate, watches it and speaks to it."""

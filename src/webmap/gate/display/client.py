@@ -1,0 +1,260 @@
+"""The display's end of the pipe: what WebMap says to the gate, and what it hears.
+
+Every method may be called from any thread and none waits for the gate. Callbacks come
+in a thread of the client's own and must be quick.
+"""
+
+import concurrent.futures
+import contextlib
+import itertools
+import json
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+from webmap.gate import commands, messages
+from webmap.gate.display.pages import DriveConnection, Pages
+from webmap.gate.display.program import ProgramRoad
+from webmap.gate.display.supervisor import Supervisor
+from webmap.gate.display.unheard import Unheard
+from webmap.gate.messages import FromGate, Report, RobotSpec, Role
+from webmap.gate.refusal import Refusal
+from webmap.gate.specs import checked
+from webmap.geometry import Twist
+from webmap.scope import Removal
+
+__all__ = ["DriveConnection", "GateClient"]
+
+log = logging.getLogger("webmap.gate")
+
+
+class GateClient:
+    """Starts the gate and talks to it, and starts it again if it ends.
+
+    Robots that were declared, and connections, are told to every new gate; leases are
+    not: they have ended with the old one.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._supervisor = Supervisor(self, self._lock)
+        self._pages = Pages(self.tell, self._lock, self._heed)
+        self._program = ProgramRoad(self.tell, self._lock)
+        self._unheard = Unheard()
+        self._numbers = itertools.count(1)
+        self._specs: dict[str, RobotSpec] = {}
+        self._listeners: dict[int, Callable[[Report], None]] = {}
+
+    # Life.
+
+    def start(self) -> None:
+        """Start the gate and keep it running; the second call does nothing."""
+        self._supervisor.start()
+
+    def stop(self) -> None:
+        """Have every driven robot stopped and the gate ended; returns after that."""
+        self._supervisor.stop()
+
+    @property
+    def pid(self) -> int | None:
+        """The number of the gate's process, if it runs."""
+        return self._supervisor.pid
+
+    @property
+    def ready(self) -> bool:
+        """Whether the gate runs and hears."""
+        return self._supervisor.ready
+
+    # Robots and pages.
+
+    def declare(self, spec: RobotSpec) -> None:
+        """Tell the gate of a robot, or what changed of it.
+
+        Raises:
+            ConfigError: If something in ``spec`` cannot be meant.
+
+        """
+        spec = checked(spec)
+        with self._lock:
+            self._specs[spec.id] = spec
+            self.tell(spec)
+
+    def forget(self, robot_id: str) -> None:
+        """Have the gate drop a robot; it is stopped if it is driven."""
+        with self._lock:
+            if self._specs.pop(robot_id, None) is not None:
+                self.tell(messages.Forget(robot_id))
+
+    def connect(
+        self,
+        name: str,
+        role: Role,
+        send: Callable[[str], None],
+        close: Callable[[str], None],
+    ) -> DriveConnection:
+        """Introduce a page's socket to the gate.
+
+        Args:
+            name: Who that is, for people.
+            role: What they may do.
+            send: Takes each text for the page, in the client's thread.
+            close: Takes the reason why the socket should be closed, likewise.
+
+        Raises:
+            ConfigError: If there is no such role.
+
+        """
+        return self._pages.connect(name, role, send, close)
+
+    def on_report(self, fn: Callable[[Report], None]) -> Removal:
+        """Call ``fn`` with every report, in the client's thread."""
+        number = next(self._numbers)
+        with self._lock:
+            self._listeners[number] = fn
+        return Removal(lambda: self._listeners.pop(number, None))
+
+    # The program's road.
+
+    def take(self, robot_id: str) -> "concurrent.futures.Future[int]":
+        """Ask for the lease of a robot, for this program.
+
+        Returns:
+            A future of the lease's epoch; its exception is ``NoLease`` if the robot
+            is not to be had.
+
+        """
+        trouble = None
+        if not self.ready:
+            trouble = self._supervisor.trouble or "the gate does not run (yet)"
+        return self._program.take(robot_id, trouble)
+
+    def release(self, robot_id: str) -> None:
+        """Give the program's lease back; the robot is stopped if it is driven."""
+        self._program.release(robot_id)
+
+    def twist(self, robot_id: str, twist: Twist) -> None:
+        """Send one velocity; without another within 200 ms the robot is stopped.
+
+        Raises:
+            NoLease: If this program does not hold the lease.
+            MotionError: If the velocity is not made of finite numbers.
+
+        """
+        self._program.twist(robot_id, twist)
+
+    def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal: metres and radians in the robot's ``goal_frame``.
+
+        Raises:
+            NoLease: If this program does not hold the lease.
+            MotionError: If the pose is not made of finite numbers.
+
+        """
+        self._program.move(robot_id, x, y, yaw)
+
+    def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
+        """Tell where a robot is: metres and radians in its ``goal_frame``.
+
+        Raises:
+            NoLease: If this program does not hold the lease.
+            MotionError: If the pose is not made of finite numbers.
+
+        """
+        self._program.locate(robot_id, x, y, yaw)
+
+    def cancel(self, robot_id: str) -> None:
+        """Cancel the robot's goals; needs no lease."""
+        self._program.cancel(robot_id)
+
+    def stop_robot(self, robot_id: str | None) -> None:
+        """STOP a robot or, with ``None``, all of them."""
+        with self._lock:
+            self._keep_stop(None, robot_id)
+            self.tell(messages.Stop(robot_id))
+
+    def reset(self, robot_id: str | None) -> None:
+        """End the STOP of a robot or, with ``None``, of all; moves nothing."""
+        with self._lock:
+            if self.ready:
+                self._unheard.reset(robot_id)
+                self.tell(messages.Reset(robot_id))
+            else:
+                log.error("the gate does not run: reset is not kept for later")
+
+    def tell(self, message: messages.ToGate) -> None:
+        """Send a message to the gate, if it runs."""
+        self._supervisor.tell(message)
+
+    # STOPs that may not have been heard.
+
+    def _heed(self, message: messages.FromBrowser) -> None:
+        """Keep a page's STOP, in case that no gate hears it."""
+        if b"stop" not in message.text:
+            return
+        with contextlib.suppress(Refusal):
+            command = commands.parse(message.text)
+            if isinstance(command, commands.Stop):
+                self._keep_stop(message.connection, command.robot)
+
+    def _keep_stop(self, by: str | None, robot: str | None) -> None:
+        if not self.ready:
+            log.error("STOP: the gate does not run; it is told as soon as it does")
+        self._unheard.say(by, robot, time.monotonic())
+
+    def _stop_again(self, by: str | None, robot: str | None) -> messages.ToGate:
+        if by is None or not self._pages.knows(by):
+            return messages.Stop(robot)
+        text = json.dumps({"op": "stop", "robot": robot or "*"})
+        return messages.FromBrowser(by, text.encode())
+
+    # The gate.
+
+    def introduction(self) -> list[messages.ToGate]:
+        """Return what a new gate must hear first."""
+        stops = [self._stop_again(by, robot) for by, robot in self._unheard]
+        return [*self._specs.values(), *self._pages.introduction, *stops]
+
+    def hear(self, message: FromGate) -> None:
+        """Take in what the gate says."""
+        match message:
+            case messages.Tick(tick):
+                self._program.hear_tick(tick)
+                self._pages.hear_tick(message)
+                with self._lock:
+                    self._unheard.lives(time.monotonic())
+            case messages.RobotReport():
+                self._program.hear_robot(message)
+                self._pages.hear_robot(message)
+                self._report(message)
+            case messages.Hello():
+                self._pages.greet(message)
+            case messages.Refused():
+                self._pages.hear_refusal(message)
+                self._report(message)
+            case messages.CloseConnection():
+                self._pages.hear_close(message)
+            case messages.TakeReply():
+                self._program.hear_take(message)
+            case messages.RobotGone():
+                self._pages.hear_gone(message)
+                self._report(message)
+            case messages.Ready():
+                with self._lock:
+                    self._unheard.told(time.monotonic())
+                self._report(messages.GateUp())
+            case _:  # for listeners alone
+                self._report(message)
+
+    def gone(self, down: messages.GateDown) -> None:
+        """Note that the gate is gone, and every lease with it."""
+        self._pages.gone()
+        self._program.gone(down.why)
+        self._report(down)
+
+    def _report(self, report: Report) -> None:
+        for listener in list(self._listeners.values()):
+            try:
+                listener(report)
+            except Exception:
+                log.exception("a listener to the gate failed")

@@ -1,0 +1,1 @@
+"""The gate's sockets to the robots' bridges, and what is written to them and read."""

@@ -1,0 +1,102 @@
+"""The control lane: velocity out, its echo back, and nothing else."""
+
+from collections.abc import Callable
+
+from webmap.gate.events import Alive, Echoed, Event, Key, LinkDown, LinkUp
+from webmap.gate.lanes import words
+from webmap.gate.lanes.lane import Lane
+from webmap.gate.lanes.unproven import Unproven
+from webmap.geometry import Twist
+from webmap.ros import ops
+
+BUSY_PING = 0.1
+"""Seconds between pings while somebody holds a lease on a machine behind the lane."""
+
+IDLE_PING = 0.5
+"""Seconds between pings otherwise; well below the time after which a stall is cut."""
+
+
+class ControlLane:
+    """The socket of one bridge that velocity goes through.
+
+    Args:
+        url: The bridge's address.
+        tell: Takes the events.
+
+    """
+
+    def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
+        self._url = url
+        self._tell = tell
+        self._types: dict[str, str] = {}
+        self._listened: set[str] = set()
+        self._unproven = Unproven()
+        self.lane = Lane(
+            url,
+            up=self._open,
+            down=lambda: tell(LinkDown(url, "control")),
+            text=self._hear,
+            pinged=self._unproven.pinged,
+            pong=self._answer,
+        )
+        self.lane.hurry(IDLE_PING)
+
+    def attach(self, topic: str, type: str) -> None:
+        """Announce that velocity will be written to ``topic``."""
+        self._types[topic] = type
+        id = f"webmap-gate advertise {topic} {type}"
+        self.lane.hold(
+            id, ops.advertise(topic, type, id=id), ops.unadvertise(topic, id=id)
+        )
+
+    def detach(self, topic: str, type: str) -> None:
+        """Undo one :meth:`attach`."""
+        self.lane.let_go(f"webmap-gate advertise {topic} {type}")
+
+    def listen(self, topic: str) -> None:
+        """Hear what is said on ``topic``, ours and others'."""
+        self._listened.add(topic)
+        id = f"webmap-gate echo {topic}"
+        self.lane.hold(
+            id,
+            ops.subscribe(topic, id=id, type=self._types[topic]),
+            ops.unsubscribe(topic, id=id),
+        )
+        self.lane.hurry(BUSY_PING)
+
+    def ignore(self, topic: str) -> None:
+        """Undo :meth:`listen`."""
+        self._listened.remove(topic)
+        self.lane.let_go(f"webmap-gate echo {topic}")
+        if not self._listened:
+            self.lane.hurry(IDLE_PING)
+
+    def write(self, topic: str, twist: Twist) -> bool:
+        """Write a velocity now or drop it; return whether it went out.
+
+        Zero may wait behind other bytes, anything else may not, nor may it be one
+        more than may lie on the way.
+        """
+        if not (twist.is_zero or self._unproven.room(topic)):
+            return False
+        data = words.velocity(topic, self._types[topic], twist)
+        done = self.lane.write(data, only_if_clear=not twist.is_zero)
+        if done:
+            self._unproven.wrote(topic, twist)
+        return done
+
+    def _open(self) -> None:
+        self._unproven.begin()  # what the link before held went with it
+        self._tell(LinkUp(self._url, "control"))
+
+    def _answer(self, number: int) -> None:
+        self._unproven.ponged(number)
+        self._tell(Alive(self._url))
+
+    def _hear(self, data: bytes) -> None:
+        heard = words.hear(data)
+        if heard is None or heard.topic not in self._listened or heard.twist is None:
+            return
+        if self._unproven.echoed(heard.topic, heard.twist):
+            self._tell(Alive(self._url))
+        self._tell(Echoed(Key(self._url, heard.topic), heard.twist))

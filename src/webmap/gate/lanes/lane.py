@@ -1,0 +1,196 @@
+"""Lanes: one WebSocket each to a bridge, kept open as long as somebody holds it."""
+
+import asyncio
+import contextlib
+import logging
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from webmap.errors import BridgeClosed
+from webmap.gate.lanes.sockets import Ears, Socket, open_socket
+
+log = logging.getLogger("webmap.gate")
+
+FIRST_WAIT = 0.1
+"""Seconds until the first attempt to connect again."""
+
+LONGEST_WAIT = 3.0
+"""Seconds between attempts at most."""
+
+DEAD = 3.0
+"""A link whose ping is unanswered for so long is cut, in seconds."""
+
+
+@dataclass(slots=True)
+class Hold:
+    """Something that is said whenever the lane opens, and how to take it back."""
+
+    hello: bytes
+    goodbye: bytes
+    count: int = 1
+
+
+class Lane:
+    """One WebSocket to a bridge and what is said whenever it opens.
+
+    Args:
+        url: The bridge's address.
+        up: Called when the lane is open and has said what it has to.
+        down: Called when it is not open any more.
+        text: Called with each message.
+        pinged: Called with the number of each ping that goes out; they grow.
+        pong: Called with the number of a ping that the bridge has answered.
+
+    """
+
+    PING = 1.0
+    """Seconds between pings."""
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        up: Callable[[], None],
+        down: Callable[[], None],
+        text: Callable[[bytes], None],
+        pinged: Callable[[int], None] = lambda _: None,
+        pong: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        self.url = url
+        self.ping_period = self.PING
+        self._up = up
+        self._down = down
+        self._text = text
+        self._pinged = pinged
+        self._pong = pong
+        self._holds: dict[str, Hold] = {}
+        self._socket: Socket | None = None
+        self._changed = asyncio.Event()
+        self._pings = 0
+        self._answered = 0
+        self._answered_at = 0.0
+        self._task = asyncio.get_running_loop().create_task(self._run())
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody holds the lane."""
+        return bool(self._holds)
+
+    def hold(self, id: str, hello: bytes = b"", goodbye: bytes = b"") -> None:
+        """Have ``hello`` said now and whenever the lane opens."""
+        held = self._holds.get(id)
+        if held is not None:
+            held.count += 1
+            return
+        self._holds[id] = Hold(hello, goodbye)
+        self._say(hello)
+
+    def let_go(self, id: str) -> None:
+        """Undo one :meth:`hold`; after the last one ``goodbye`` is said."""
+        held = self._holds[id]
+        held.count -= 1
+        if held.count == 0:
+            del self._holds[id]
+            self._say(held.goodbye)
+
+    def write(self, data: bytes, *, only_if_clear: bool) -> bool:
+        """Write a message now or not at all; return whether it went out.
+
+        Args:
+            data: The message.
+            only_if_clear: Drop it if anything waits to be sent before it.
+
+        """
+        link = self._socket
+        if link is None or not link.is_open or (only_if_clear and link.unsent):
+            return False
+        link.send(data)
+        return True
+
+    def cut(self, why: str) -> None:
+        """Throw the socket away, with all that it has not sent, and connect anew."""
+        if self._socket is not None:
+            self._socket.abort(why)
+
+    def spend(self, ears: Ears) -> Socket:
+        """Hand over the open socket to somebody else and connect anew."""
+        link = self._socket
+        assert link is not None  # it has just been written to
+        link.ears = ears
+        self._drop()
+        return link
+
+    def close(self) -> None:
+        """End for good."""
+        self._task.cancel()
+        link, self._socket = self._socket, None
+        if link is not None:
+            link.close()
+
+    def _say(self, data: bytes) -> None:
+        if data:
+            self.write(data, only_if_clear=False)
+
+    def _lost(self, why: str) -> None:
+        log.warning("lost the link to %s: %s", self.url, why)
+        self._drop()
+
+    def _drop(self) -> None:
+        self._socket = None
+        self._changed.set()
+        self._down()
+
+    def _on_pong(self, data: bytes) -> None:
+        number = int.from_bytes(data, "big")
+        # A bridge may send pongs that nobody asked for; those prove nothing.
+        if self._answered < number <= self._pings:
+            self._answered = number
+            self._answered_at = asyncio.get_running_loop().time()
+            self._pong(number)
+
+    async def _run(self) -> None:
+        wait, complained = FIRST_WAIT, ""
+        while True:
+            try:
+                ears = Ears(self._text, self._on_pong, self._lost)
+                self._socket = await open_socket(self.url, ears)
+            except BridgeClosed as error:
+                if str(error) != complained:
+                    complained = str(error)
+                    log.warning("no link: %s", complained)
+                await asyncio.sleep(wait * random.uniform(0.5, 1.0))  # noqa: S311
+                wait = min(2 * wait, LONGEST_WAIT)
+                continue
+            wait, complained = FIRST_WAIT, ""
+            if self._socket.is_open:  # and not closed again in the same breath
+                for held in list(self._holds.values()):
+                    self._say(held.hello)
+                self._up()
+                await self._keep_pinging()
+            # A bridge that closes the link while it reads nothing would keep it, and
+            # what waits in it, beside the next one.
+            self.cut("the bridge is closing it")
+            await asyncio.sleep(FIRST_WAIT * random.uniform(0.5, 1.0))  # noqa: S311
+
+    async def _keep_pinging(self) -> None:
+        """Ping until the lane's socket is gone."""
+        loop = asyncio.get_running_loop()
+        self._answered, self._answered_at = self._pings, loop.time()
+        while self._socket is not None and self._socket.is_open:
+            if loop.time() - self._answered_at > DEAD:
+                self.cut(f"no answer for {DEAD:g} s")
+                return
+            self._pings += 1
+            self._socket.ping(self._pings.to_bytes(8, "big"))
+            self._pinged(self._pings)
+            self._changed.clear()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(self.ping_period):
+                    await self._changed.wait()
+
+    def hurry(self, period: float) -> None:
+        """Ping every ``period`` seconds from now on, beginning now."""
+        if period < self.ping_period:
+            self._changed.set()
+        self.ping_period = period

@@ -1,0 +1,193 @@
+"""Every lane to every bridge, and which robot needs which of them."""
+
+import asyncio
+from collections.abc import Callable
+
+from webmap.gate import actions
+from webmap.gate.events import Event, Key, Wrote, WroteGoal, WrotePose
+from webmap.gate.lanes.control import ControlLane
+from webmap.gate.lanes.tasks import TasksLane, Topic, goal_topics, hook_topics
+from webmap.gate.lanes.witness import WitnessLane
+from webmap.gate.messages import RobotSpec
+from webmap.gate.rules.motion import ZERO
+
+
+class Links:
+    """Does what the decisions ask for on the links to the bridges.
+
+    Args:
+        tell: Takes the events; may be called from within :meth:`perform`.
+
+    """
+
+    def __init__(self, tell: Callable[[Event], None]) -> None:
+        self._tell = tell
+        self._control: dict[str, ControlLane] = {}
+        self._witness: dict[str, WitnessLane] = {}
+        self._tasks: dict[str, TasksLane] = {}
+        self._robots: dict[Key, dict[str, RobotSpec]] = {}
+        self._watched: dict[Key, list[RobotSpec]] = {}
+
+    def perform(self, action: actions.Action) -> Event | None:
+        """Do one thing; return what came of it, where that matters."""
+        match action:
+            case actions.WriteTwist(key, twist, epoch, by):
+                lane = self._control.get(key.url)
+                done = lane is not None and lane.write(key.topic, twist)
+                return Wrote(key, twist, epoch, by, done)
+            case actions.SendGoal():
+                return self._send_goal(action)
+            case actions.TellPose(key, robot, x, y, yaw, by):
+                spec = self._robots[key][robot]
+                done = self._tasks[_goal_url(spec)].tell_pose(spec, action)
+                return WrotePose(robot, x, y, yaw, by, done)
+            case actions.CancelGoals(key, robot):
+                spec = self._robots[key][robot]
+                self._tasks[_goal_url(spec)].cancel(spec)
+            case actions.RunHook(key, robot, hook, stopped):
+                spec = self._robots[key][robot]
+                self._tasks[spec.bridge_url].run_hook(hook, stopped)
+            case actions.Watch(key, on):
+                self._unwatch(key)
+                if on:
+                    self._watch(key)
+            case actions.CutLink(url):
+                if url in self._control:
+                    self._control[url].lane.cut("it carries nothing")
+            case actions.Attach(key, spec):
+                self._attach(key, spec)
+            case actions.Detach(key, robot):
+                watched = key in self._watched
+                self._unwatch(key)
+                spec = self._robots[key].pop(robot)
+                self._tasks[_goal_url(spec)].forget(robot)
+                self._detach(key, spec)
+                if watched and self._robots[key]:
+                    self._watch(key)
+                self._close_unwanted()
+        return None
+
+    def zero_all(self) -> None:
+        """Write zero to whatever may be driven, by itself and without asking."""
+        for key in self._watched:
+            if key.url in self._control:
+                self._control[key.url].write(key.topic, ZERO)
+
+    async def settle(self) -> None:
+        """Wait until cancels that are under way have arrived, or cannot."""
+        await asyncio.gather(*(tasks.settle() for tasks in self._tasks.values()))
+
+    def close(self) -> None:
+        """End every link for good."""
+        for tasks in self._tasks.values():
+            tasks.close()
+        for witness in self._witness.values():
+            witness.lane.close()
+        for control in self._control.values():
+            control.lane.close()
+
+    def _send_goal(self, goal: actions.SendGoal) -> WroteGoal:
+        spec = self._robots[goal.key][goal.robot]
+        done = self._tasks[_goal_url(spec)].send(spec, goal)
+        return WroteGoal(goal.robot, goal.id, goal.x, goal.y, goal.yaw, goal.by, done)
+
+    # Which lane is needed.
+
+    def _attach(self, key: Key, spec: RobotSpec) -> None:
+        robots = self._robots.setdefault(key, {})
+        earlier = robots.pop(spec.id, None)
+        watched = key in self._watched
+        self._unwatch(key)
+        if earlier is not None:
+            if (_goal_url(earlier), earlier.action) != (_goal_url(spec), spec.action):
+                self._tasks[_goal_url(earlier)].forget(spec.id)
+            self._detach(key, earlier)
+        robots[spec.id] = spec
+        if spec.twist_topic is not None:
+            control = self._control.get(spec.bridge_url)
+            if control is None:
+                control = ControlLane(spec.bridge_url, self._tell)
+                self._control[spec.bridge_url] = control
+            control.attach(spec.twist_topic, spec.twist_type)
+        for url in _witnesses_of(spec):
+            self._witness_at(url).lane.hold("robots")
+        for url, topics in _tasks_of(spec).items():
+            tasks = self._tasks.get(url)
+            if tasks is None:
+                tasks = self._tasks[url] = TasksLane(url, self._tell)
+            tasks.lane.hold("robots")
+            tasks.attach(topics)
+        if watched:
+            self._watch(key)
+        self._close_unwanted()
+
+    def _detach(self, key: Key, spec: RobotSpec) -> None:
+        if spec.twist_topic is not None:
+            self._control[spec.bridge_url].detach(spec.twist_topic, spec.twist_type)
+        for url in _witnesses_of(spec):
+            self._witness_at(url).lane.let_go("robots")
+        for url, topics in _tasks_of(spec).items():
+            self._tasks[url].detach(topics)
+            self._tasks[url].lane.let_go("robots")
+
+    def _watch(self, key: Key) -> None:
+        specs = list(self._robots[key].values())
+        self._watched[key] = specs
+        if any(spec.twist_topic is not None for spec in specs):
+            self._control[key.url].listen(key.topic)
+        for spec in specs:
+            if spec.odometry_topic is not None:
+                self._witness_at(_odometry_url(spec)).watch(
+                    spec.odometry_topic, spec.odometry_type, key
+                )
+            if spec.assist is not None:
+                self._witness_at(spec.bridge_url).watch_scan(spec.assist.topic, key)
+
+    def _unwatch(self, key: Key) -> None:
+        specs = self._watched.pop(key, [])
+        if any(spec.twist_topic is not None for spec in specs):
+            self._control[key.url].ignore(key.topic)
+        for spec in specs:
+            if spec.odometry_topic is not None:
+                witness = self._witness_at(_odometry_url(spec))
+                witness.unwatch(spec.odometry_topic, key)
+            if spec.assist is not None:
+                self._witness_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
+
+    def _witness_at(self, url: str) -> WitnessLane:
+        if url not in self._witness:
+            self._witness[url] = WitnessLane(url, self._tell)
+        return self._witness[url]
+
+    def _close_unwanted(self) -> None:
+        for url, control in list(self._control.items()):
+            if not control.lane.wanted:
+                self._control.pop(url).lane.close()
+        for url, witness in list(self._witness.items()):
+            if not witness.lane.wanted:
+                self._witness.pop(url).lane.close()
+        for url, tasks in list(self._tasks.items()):
+            if not tasks.lane.wanted:
+                self._tasks.pop(url).close()
+
+
+def _odometry_url(spec: RobotSpec) -> str:
+    return spec.odometry_url or spec.bridge_url
+
+
+def _witnesses_of(spec: RobotSpec) -> list[str]:
+    """Return the bridges that odometry and scans of a robot come from."""
+    urls = [] if spec.odometry_topic is None else [_odometry_url(spec)]
+    return urls if spec.assist is None else [*urls, spec.bridge_url]
+
+
+def _goal_url(spec: RobotSpec) -> str:
+    return spec.goal_url or spec.bridge_url
+
+
+def _tasks_of(spec: RobotSpec) -> dict[str, list[Topic]]:
+    """Return the tasks lanes that a robot needs, and the topics written on each."""
+    needed = {_goal_url(spec): goal_topics(spec)}
+    if spec.stop_hooks:
+        needed.setdefault(spec.bridge_url, []).extend(hook_topics(spec))
+    return needed

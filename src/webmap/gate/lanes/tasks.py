@@ -1,0 +1,237 @@
+"""The tasks lane: goals and their cancelling, which may hang.
+
+Some bridges do nothing else for a socket until the action goal that came through it
+has ended. So a goal of an action uses up a socket: it is kept for the result, and the
+lane opens another for what comes next. For the same reason, and because the handle of
+an action goal belongs to the socket that sent it, the cancel service is called on a
+socket of its own (``calls``).
+
+move_base is an action of topics, which block nothing: its words come on the lane
+itself, its status only while a goal of ours is followed.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable
+
+from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
+from webmap.gate.lanes import navigation, words
+from webmap.gate.lanes.calls import Calls
+from webmap.gate.lanes.lane import Lane
+from webmap.gate.lanes.own_map import in_own_map
+from webmap.gate.lanes.sockets import Ears, Socket
+from webmap.gate.messages import RobotSpec
+from webmap.gate.rules.goals import is_move_base
+from webmap.identifiers import generate_id
+from webmap.ros import ops
+
+MAX_SPENT = 8
+"""How many sockets of action goals are kept for their results at most."""
+
+FEEDBACK_PERIOD = 0.2
+"""The least time between two words on how a goal goes, in seconds."""
+
+GOAL_ID = "actionlib_msgs/GoalID"
+
+_ACTIONLIB = {
+    "status": ("actionlib_msgs/GoalStatusArray", 200),
+    "feedback": ("move_base_msgs/MoveBaseActionFeedback", 200),
+    "result": ("move_base_msgs/MoveBaseActionResult", 0),
+}
+"""What is heard of a goal of move_base: the type, and milliseconds between two."""
+
+Topic = tuple[str, str]
+"""The name of a topic and its type."""
+
+
+class TasksLane:
+    """The socket of one bridge that goals go through.
+
+    Args:
+        url: The bridge's address.
+        tell: Takes the events.
+
+    """
+
+    def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
+        self._url = url
+        self._tell = tell
+        self._spent: dict[Socket, SendGoal] = {}
+        """The sockets of action goals that are under way, the oldest first."""
+        self._calls = Calls(url)
+        self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
+        """The goals of move_base that are under way, by robot."""
+        self._spending = False
+        self.lane = Lane(
+            url,
+            up=lambda: tell(LinkUp(url, "tasks")),
+            down=self._down,
+            text=self._hear,
+        )
+
+    def attach(self, topics: Iterable[Topic]) -> None:
+        """Announce the topics that a robot needs here."""
+        for topic, type in topics:
+            id = _advertisement(topic, type)
+            hello = ops.advertise(topic, type, id=id)
+            self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
+
+    def detach(self, topics: Iterable[Topic]) -> None:
+        """Undo one :meth:`attach`."""
+        for topic, type in topics:
+            self.lane.let_go(_advertisement(topic, type))
+
+    def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
+        """Write a goal now or drop it; return whether it went out."""
+        goal = in_own_map(spec, goal)
+        if goal.way == "move_base":
+            # First, so that no word is missed: they may be on their way at once.
+            self._follow(spec, goal)
+        done = self.lane.write(words.goal(spec, goal), only_if_clear=True)
+        if done and goal.way == "navigate_to_pose":
+            self._keep_for_result(goal)
+        if not done:
+            self.forget(goal.robot)
+        return done
+
+    def tell_pose(self, spec: RobotSpec, at: TellPose) -> bool:
+        """Tell where the robot is, now or not; return whether it went out."""
+        estimate = words.pose_estimate(spec, in_own_map(spec, at))
+        return self.lane.write(estimate, only_if_clear=True)
+
+    def cancel(self, spec: RobotSpec) -> None:
+        """Cancel every goal of the robot, by every way that it has."""
+        if spec.cancel_topic is not None:
+            self.lane.write(
+                words.cancel_by_topic(spec.cancel_topic), only_if_clear=False
+            )
+        if spec.action is not None and is_move_base(spec):
+            topic = f"{spec.action}/cancel"
+            if topic != spec.cancel_topic:
+                self.lane.write(words.cancel_by_topic(topic), only_if_clear=False)
+        elif spec.action is not None:
+            id, what = generate_id(), f"cancelling the goals of {spec.action}"
+            self._calls.call(words.cancel_by_service(spec.action, id), id, what)
+
+    def run_hook(self, hook: dict[str, str], stopped: bool) -> None:
+        """Publish the Bool of a stop hook, or call its service."""
+        if "topic" in hook:
+            self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False)
+        else:
+            id, service = generate_id(), hook["service"]
+            self._calls.call(words.trigger(service, hook["type"], id), id, service)
+
+    async def settle(self) -> None:
+        """Wait until what was to be cancelled is, or cannot be."""
+        await self._calls.settle()
+
+    def close(self) -> None:
+        """End for good."""
+        self.lane.close()
+        self._calls.close()
+        for link in self._spent:
+            link.close()
+        self._spent.clear()
+
+    def _keep_for_result(self, goal: SendGoal) -> None:
+        polite = Pace()
+
+        # A socket is taken out once: of one that was closed or lost nothing is heard.
+        def hear(data: bytes) -> None:
+            word = navigation.of_action(data, goal)
+            if isinstance(word, GoalEnded):
+                del self._spent[link]
+                link.close()
+            if word is not None and polite(word):
+                self._tell(word)
+
+        def lost(why: str) -> None:
+            del self._spent[link]
+            self._tell(GoalLost(goal.robot, goal.id, f"the link is lost: {why}"))
+
+        self._spending = True
+        link = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=lost))
+        self._spending = False
+        self._spent[link] = goal
+        if len(self._spent) > MAX_SPENT:
+            oldest, given_up = next(iter(self._spent.items()))
+            del self._spent[oldest]
+            oldest.close()
+            why = f"more than {MAX_SPENT} goals are under way at {self._url}"
+            self._tell(GoalLost(given_up.robot, given_up.id, why))
+
+    # move_base.
+
+    def _follow(self, spec: RobotSpec, goal: SendGoal) -> None:
+        self.forget(goal.robot)
+        self._followed[goal.robot] = (spec, goal)
+        for part, (type, throttle) in _ACTIONLIB.items():
+            topic = f"{spec.action}/{part}"
+            id = f"webmap-gate follow {topic} {goal.robot}"
+            hello = ops.subscribe(topic, type=type, id=id, throttle_rate=throttle)
+            self.lane.hold(id, hello, ops.unsubscribe(topic, id=id))
+
+    def forget(self, robot: str) -> None:
+        """Listen no more to how a robot's goal goes."""
+        found = self._followed.pop(robot, None)
+        if found is not None:
+            for part in _ACTIONLIB:
+                topic = f"{found[0].action}/{part}"
+                self.lane.let_go(f"webmap-gate follow {topic} {robot}")
+
+    def _hear(self, data: bytes) -> None:
+        for robot, (spec, goal) in list(self._followed.items()):
+            word = navigation.of_topics(data, spec, goal)
+            if isinstance(word, GoalEnded):
+                self.forget(robot)
+            if word is not None:
+                self._tell(word)
+
+    def _down(self) -> None:
+        self._tell(LinkDown(self._url, "tasks"))
+        if self._spending:
+            return  # the socket goes on for the goal that it was spent on
+        for _, goal in list(self._followed.values()):
+            why = f"no link to {self._url}"
+            self._tell(GoalLost(goal.robot, goal.id, why))
+
+
+class Pace:
+    """Thins out what a robot may say of a goal a hundred times a second."""
+
+    def __init__(self) -> None:
+        self._at = float("-inf")
+
+    def __call__(self, word: navigation.Word) -> bool:
+        """Return whether the display should hear this word."""
+        now = asyncio.get_running_loop().time()
+        if isinstance(word, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
+            self._at = now
+            return True
+        return False
+
+
+def hook_topics(spec: RobotSpec) -> list[Topic]:
+    """Return the topics of a robot's stop hooks."""
+    hooks = spec.stop_hooks
+    return [(hook["topic"], hook["type"]) for hook in hooks if "topic" in hook]
+
+
+def goal_topics(spec: RobotSpec) -> list[Topic]:
+    """Return the topics of a robot's goals."""
+    topics = []
+    if spec.goal_topic is not None:
+        topics.append((spec.goal_topic, spec.goal_type))
+    if spec.cancel_topic is not None:
+        topics.append((spec.cancel_topic, GOAL_ID))
+    if spec.action is not None and is_move_base(spec):
+        topics.append((f"{spec.action}/goal", "move_base_msgs/MoveBaseActionGoal"))
+        if spec.cancel_topic != f"{spec.action}/cancel":
+            topics.append((f"{spec.action}/cancel", GOAL_ID))
+    if spec.pose_topic is not None:
+        topics.append((spec.pose_topic, spec.pose_type))
+    return topics
+
+
+def _advertisement(topic: str, type: str) -> str:
+    return f"webmap-gate advertise {topic} {type}"

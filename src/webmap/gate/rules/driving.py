@@ -1,0 +1,176 @@
+"""What the commands of a machine's driver come to. No I/O."""
+
+from webmap.gate.limits import fit
+from webmap.gate.refusal import Refusal
+from webmap.gate.rules.arming import Arming
+from webmap.gate.rules.guard import Guard
+from webmap.gate.rules.hands import Hands
+from webmap.gate.rules.lease import Lease
+from webmap.gate.rules.motion import Motion
+from webmap.gate.rules.robots import Robots
+from webmap.gate.rules.speeds import Speeds
+from webmap.gate.rules.stoptest import CREEP, StopTest
+from webmap.gate.rules.stoptesting import StopTesting
+from webmap.geometry import Twist
+
+
+class Driving:
+    """Takes the accepted commands for one machine, and ends on any doubt.
+
+    Args:
+        robots: The robots that it is.
+        hands: Who has it.
+        arming: What stands against its motion.
+        motion: Writes to it.
+        speeds: How fast it may go.
+        guard: What its scanners see in the way.
+        tests: Its stop tests.
+
+    """
+
+    def __init__(
+        self,
+        robots: Robots,
+        hands: Hands,
+        arming: Arming,
+        motion: Motion,
+        speeds: Speeds,
+        guard: Guard,
+        tests: StopTesting,
+    ) -> None:
+        self._robots = robots
+        self._hands = hands
+        self._arming = arming
+        self._motion = motion
+        self._speeds = speeds
+        self._guard = guard
+        self._tests = tests
+
+    def drive(self, wanted: Twist, neutral: bool, tick: int, now: float) -> str | None:
+        """Take in an accepted command of the lease's holder.
+
+        Args:
+            wanted: The velocity asked for, not yet limited.
+            neutral: Whether every input is released.
+            tick: The tick that it echoes.
+            now: The time.
+
+        Returns:
+            Why nothing moves although something should, in words, or ``None``.
+
+        """
+        lease = self._hands.lease
+        assert lease is not None
+        if reason := self._arming.doubt(now):
+            self._fault(reason, now)
+            return None if neutral else reason
+        self._hands.deadman.accept(neutral, tick, now)
+        if self._hands.deadman.expired(now):
+            self._lapse("the driver hears nothing", now)
+            return None if neutral else "no new tick has come to the driver"
+        if self._tests.running is not None:
+            return self._go_on_with_test(self._tests.running, lease, neutral, now)
+        if neutral or not self._hands.deadman.armed:
+            self._motion.halt(now)
+            return None if neutral else "release every input first"
+        self._drive(wanted, lease, now)
+        return None
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing is written now and nothing will be by itself."""
+        return self._motion.silent and self._tests.running is None
+
+    def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
+        if not self._motion.driving:
+            self._robots.make_way(now)
+        bounds = self._speeds.bounds()
+        fitted = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
+        self._motion.drive(self._guard.limit(fitted, now), lease, now)
+
+    def late(self, now: float) -> None:
+        """A command of the lease's holder came too late: that is doubt, so zero (S1).
+
+        Whatever it says, its way takes too long for anybody to drive by.
+        """
+        self._lapse("the driver's commands come too late", now)
+
+    def begin_test(self, now: float) -> None:
+        """Begin the stop test for the holder of the lease.
+
+        Raises:
+            Refusal: If the machine cannot be tested now.
+
+        """
+        if self._tests.running is not None:
+            raise Refusal("a stop test is going on")
+        if reason := self._arming.doubt(now):
+            raise Refusal(reason)
+        self._tests.begin(self._hands.deadman.armed, now)
+
+    def _go_on_with_test(
+        self, test: StopTest, lease: Lease, neutral: bool, now: float
+    ) -> str | None:
+        if not neutral:
+            self._lapse("a key was pressed", now)
+            return "a stop test was going on: release every input first"
+        if not self._hands.deadman.armed:
+            self._lapse("the driver fell silent", now)
+        if test.state == "creeping":
+            self._drive(CREEP, lease, now)
+        return None
+
+    def goal(
+        self, robot: str, pose: tuple[float, float, float], by: str, now: float
+    ) -> None:
+        """Send the machine somewhere by itself; that ends driving.
+
+        Raises:
+            Refusal: If it cannot be sent now.
+
+        """
+        if reason := self._hands.unarmable(now):
+            raise Refusal(reason)
+        self._lapse("a goal was sent", now)
+        self._robots.goals[robot].send(*pose, by)
+
+    def locate(
+        self, robot: str, pose: tuple[float, float, float], by: str, now: float
+    ) -> None:
+        """Tell the robot where it is, while nothing moves it.
+
+        Raises:
+            Refusal: If it cannot be told now.
+
+        """
+        if reason := self._hands.unarmable(now):
+            raise Refusal(reason)
+        if not self.silent:
+            raise Refusal("it is driven: let it stand first")
+        self._robots.goals[robot].locate(*pose, by)
+
+    def link_down(self, why: str, now: float) -> None:
+        """The link that velocity goes to is gone."""
+        if self._hands.lease is not None:
+            self._fault(why, now)
+
+    def step(self, now: float) -> None:
+        """Let time pass."""
+        if self._hands.lease is not None:
+            if reason := self._arming.doubt(now):
+                self._fault(reason, now)
+            elif self._hands.deadman.expired(now):
+                self._lapse("the driver fell silent", now)
+        self._tests.step(now)
+
+    def _lapse(self, why: str, now: float) -> None:
+        self._hands.deadman.disarm()
+        self._tests.halt(why, now)
+
+    def _fault(self, reason: str, now: float) -> None:
+        """Stop and disarm, because something may not be as it should."""
+        driving = self._motion.driving
+        self._lapse(reason, now)
+        # A program is not seen to let go of anything, so it has to take it again.
+        if driving and self._hands.lease is not None and self._hands.lease.program:
+            self._hands.end(reason, now)

@@ -1,0 +1,296 @@
+"""Every machine of one display, and what is heard of them. No I/O."""
+
+import logging
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from webmap.errors import ConfigError
+from webmap.gate import events
+from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
+from webmap.gate.messages import Forget, RobotGone, RobotSpec, SentGoal, SentPose
+from webmap.gate.refusal import Refusal
+from webmap.gate.rules.base import Base
+from webmap.gate.rules.goals import Goals
+from webmap.gate.rules.health import Health, Pulse
+from webmap.gate.rules.latch import Latch
+from webmap.gate.rules.lease import Epochs
+from webmap.gate.rules.reporting import Reporter, report
+from webmap.gate.specs import checked, key_of
+
+log = logging.getLogger("webmap.gate")
+
+Refuse = Callable[[str, str | None, str, str, float], None]
+
+
+class Fleet:
+    """The machines, by key and by the names that the display has for them.
+
+    Args:
+        pulse: Whether the display is there.
+        epochs: The epochs to give to leases.
+        emit: Takes the actions.
+        refuse: Tells a connection that its command was not taken.
+
+    """
+
+    def __init__(
+        self, pulse: Pulse, epochs: Epochs, emit: Emit, refuse: Refuse
+    ) -> None:
+        self._pulse = pulse
+        self._epochs = epochs
+        self._emit = emit
+        self._refuse = refuse
+        self._bases: dict[events.Key, Base] = {}
+        self._latches: dict[events.Key, Latch] = {}
+        self._by_robot: dict[str, Base] = {}
+        self._links: dict[tuple[str, events.Lane], Health] = {}
+        self._reporters: dict[str, Reporter] = {}
+        self._touched: set[events.Key] = set()
+        self.handlers: dict[type, Callable[[Any, float], None]] = {
+            RobotSpec: self._declare,
+            Forget: self._forget,
+            events.LinkUp: self._link_up,
+            events.LinkDown: self._link_down,
+            events.Alive: self._alive,
+            events.Wrote: self._wrote,
+            events.WroteGoal: self._wrote_goal,
+            events.WrotePose: self._wrote_pose,
+            events.GoalProgress: self._goal_progress,
+            events.GoalLost: self._goal_lost,
+            events.GoalEnded: self._goal_ended,
+            events.Echoed: self._echoed,
+            events.Measured: self._measured,
+            events.Scanned: self._scanned,
+            events.LockState: self._locked,
+            events.LatchKept: self._latch_kept,
+            events.LatchSeen: self._latch_seen,
+            events.StopTestKept: self._stop_test_kept,
+        }
+
+    def __iter__(self) -> Iterator[Base]:
+        """Go through the machines, which may all change by that."""
+        for base in list(self._bases.values()):
+            self._touched.add(base.key)
+            yield base
+
+    def look(self) -> None:
+        """Have it said of every machine how it stands, as all may have changed."""
+        self._touched.update(self._bases)
+
+    @property
+    def busy(self) -> bool:
+        """Whether time may make a difference to some machine."""
+        return any(base.active for base in self._bases.values())
+
+    @property
+    def silent(self) -> bool:
+        """Whether no machine is driven or being stopped."""
+        return all(base.silent for base in self._bases.values())
+
+    def find(self, robot: str) -> Base:
+        """Return the machine behind a robot, which may change by that.
+
+        Raises:
+            Refusal: If there is no such robot.
+
+        """
+        base = self._by_robot.get(robot)
+        if base is None:
+            raise Refusal(f"there is no robot {robot!r}")
+        self._touched.add(base.key)
+        return base
+
+    def step(self, now: float) -> None:
+        """Let time pass."""
+        for base in list(self._bases.values()):
+            if base.active:
+                base.step(now)
+                self._touched.add(base.key)
+                self._drop_if_empty(base)
+        for (url, lane), link in self._links.items():
+            if lane == "control" and link.stalled(now):
+                self._emit(CutLink(url))
+                self._link_down(events.LinkDown(url, lane), now)
+
+    def report(self, now: float) -> None:
+        """Say what is new of the machines that may have changed."""
+        touched, self._touched = self._touched, set()
+        for key in touched:
+            base = self._bases.get(key)
+            # Before it is known whether STOP stands, nothing true can be said of it.
+            if base is not None and base.known:
+                for spec in list(base.robots.specs.values()):
+                    self._report(base, spec, now)
+
+    def _report(self, base: Base, spec: RobotSpec, now: float) -> None:
+        reporter = self._reporters.get(spec.id)
+        if reporter is None:  # forgotten already, and only there until it stands
+            return
+        news = report(base, spec, now)
+        said = reporter.worth_saying(news, now)
+        if said:
+            self._emit(Say(news))
+        elif said is None:
+            self._touched.add(base.key)
+
+    # What the display declares.
+
+    def _declare(self, spec: RobotSpec, now: float) -> None:
+        try:
+            spec = checked(spec)
+        except ConfigError as error:
+            log.error("a robot was declared that makes no sense: %s", error)
+            return
+        key, earlier = key_of(spec), self._by_robot.get(spec.id)
+        if earlier is not None and earlier.key != key:
+            self._forget(Forget(spec.id), now)
+        elif earlier is not None and earlier.robots.specs[spec.id] == spec:
+            return
+        base = self._bases.get(key) or self._new_base(key)
+        tasks = self._link(spec.goal_url or key.url, "tasks")
+        base.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
+        self._emit(Attach(key, spec))
+        if not base.known:
+            self._emit(Lock(key))
+        base.attached(now)
+        self._by_robot[spec.id] = base
+        self._reporters.setdefault(spec.id, Reporter())
+        self._touched.add(key)
+
+    def _new_base(self, key: events.Key) -> Base:
+        if key not in self._latches:
+            self._latches[key] = Latch(key, self._emit)
+        control, latch = self._link(key.url, "control"), self._latches[key]
+        base = Base(key, control, self._pulse, latch, self._epochs, self._emit)
+        self._bases[key] = base
+        return base
+
+    def _forget(self, message: Forget, now: float) -> None:
+        base = self._by_robot.pop(message.robot, None)
+        if base is None:
+            return
+        del self._reporters[message.robot]
+        self._emit(Say(RobotGone(message.robot)))
+        base.forget(message.robot, now)
+        self._touched.add(base.key)
+        self._drop_if_empty(base)
+
+    def _drop_if_empty(self, base: Base) -> None:
+        if not base.robots.specs:
+            del self._bases[base.key]
+            self._emit(Unlock(base.key))
+
+    # What the shell hears.
+
+    def _link(self, url: str, lane: events.Lane) -> Health:
+        return self._links.setdefault((url, lane), Health())
+
+    def _link_up(self, event: events.LinkUp, now: float) -> None:
+        link = self._link(event.url, event.lane)
+        link.opened(now)
+        for base in self:
+            if base.control is link:
+                base.link_up(now)
+            base.standing.tasks_up(link)
+
+    def _link_down(self, event: events.LinkDown, now: float) -> None:
+        link = self._link(event.url, event.lane)
+        link.closed()
+        for base in self:
+            if base.control is link:
+                base.link_down(now)
+
+    def _alive(self, event: events.Alive, now: float) -> None:
+        self._link(event.url, "control").answered(now)
+
+    def _wrote(self, event: events.Wrote, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is None:
+            return
+        base.wrote(event, now)
+        if event.by is not None and not event.done:
+            why = "the link is backed up: a command was dropped"
+            self._refuse(event.by, base.robots.newest.id, "drive", why, now)
+
+    def _wrote_goal(self, event: events.WroteGoal, now: float) -> None:
+        base = self._by_robot.get(event.robot)
+        if base is None:
+            return
+        if event.done:
+            self._touched.add(base.key)
+            base.wrote_goal(event)
+            sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
+            self._emit(Say(sent))
+        else:
+            why = "the link is backed up: the goal was dropped"
+            self._refuse(event.by, event.robot, "goal", why, now)
+
+    def _wrote_pose(self, event: events.WrotePose, now: float) -> None:
+        if event.done:
+            told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
+            self._emit(Say(told))
+        else:
+            why = "the link is backed up: the pose was dropped"
+            self._refuse(event.by, event.robot, "locate", why, now)
+
+    def _goal_progress(self, event: events.GoalProgress, now: float) -> None:
+        if goals := self._goals_of(event.robot):
+            goals.progress(event)
+
+    def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
+        if goals := self._goals_of(event.robot):
+            goals.ended(event)
+
+    def _goal_lost(self, event: events.GoalLost, now: float) -> None:
+        if goals := self._goals_of(event.robot):
+            goals.gone_dark(event)
+
+    def _goals_of(self, robot: str) -> Goals | None:
+        """Return a robot's goals, which may change by that; it may be gone."""
+        base = self._by_robot.get(robot)
+        if base is None:
+            return None
+        self._touched.add(base.key)
+        return base.robots.goals[robot]
+
+    def _echoed(self, event: events.Echoed, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.sight.saw_echo(event.twist)
+
+    def _measured(self, event: events.Measured, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.saw(event.twist, now)
+
+    def _scanned(self, event: events.Scanned, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None and base.sight.on:
+            base.guard.saw(event.topic, event.sweep)
+
+    def _locked(self, event: events.LockState, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.locked(event, now)
+
+    def _latch_kept(self, event: events.LatchKept, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.latch.kept(event)
+        else:  # the robot was forgotten meanwhile; its STOP was not
+            self._latches[event.key].kept(event)
+
+    def _latch_seen(self, event: events.LatchSeen, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.saw_stop_file(event.by, now)
+
+    def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
+        base = self._of_key(event.key)
+        if base is not None:
+            base.speeds.tested = event.record
+
+    def _of_key(self, key: events.Key) -> Base | None:
+        """Return a machine, which may change by that; it may be gone meanwhile."""
+        self._touched.add(key)
+        return self._bases.get(key)

@@ -1,0 +1,233 @@
+"""The goals of one robot: sent, perhaps running, to be cancelled. No I/O."""
+
+import msgspec
+
+from webmap.gate.actions import CancelGoals, Emit, SendGoal, TellPose
+from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, WroteGoal
+from webmap.gate.messages import GoalReport, RobotSpec, Way
+from webmap.gate.refusal import Refusal
+from webmap.gate.rules.health import Health
+from webmap.identifiers import generate_id
+from webmap.ros.names import is_type
+
+MOVE_BASE = "move_base_msgs/MoveBaseAction"
+"""The type of the action of ROS 1."""
+
+LATELY = 2.0
+"""Seconds after such a cancel in which another one is not worth it."""
+
+OVER = ("reached", "failed", "cancelled")
+"""The states of a goal that nothing follows any more."""
+
+
+class Goals:
+    """What is known of the goals that one robot follows by itself.
+
+    Args:
+        key: The machine.
+        spec: The robot.
+        link: The link that its goals go to.
+        emit: Takes the actions.
+
+    """
+
+    def __init__(self, key: Key, spec: RobotSpec, link: Health, emit: Emit) -> None:
+        self.spec = spec
+        self.link = link
+        self.report: GoalReport | None = None
+        """How it stands with the newest goal."""
+        self._key = key
+        self._emit = emit
+        self._running: str | None = None
+        self._by: str | None = None
+        # An earlier gate may have sent a goal that still runs.
+        self._perhaps = True
+        self._cancel_owed = False
+        self._made_way_at: float | None = None
+        self._no_actions = False
+        """Whether the bridge said that it takes no goals of actions."""
+
+    @property
+    def way(self) -> Way | None:
+        """How goals are sent to this robot; ``None`` if they cannot be."""
+        spec = self.spec
+        if spec.action is None or (self._no_actions and spec.goal_topic is not None):
+            return None if spec.goal_topic is None else "topic"
+        return "move_base" if is_move_base(spec) else "navigate_to_pose"
+
+    @property
+    def can_send(self) -> bool:
+        """Whether goals can be sent to this robot."""
+        return self.way is not None
+
+    @property
+    def can_cancel(self) -> bool:
+        """Whether its goals can be cancelled."""
+        return self.spec.cancel_topic is not None or self.spec.action is not None
+
+    @property
+    def _cancels_apart(self) -> bool:
+        """Whether that goes by a service, called on a socket of its own."""
+        return self.spec.action is not None and not is_move_base(self.spec)
+
+    @property
+    def following(self) -> bool:
+        """Whether the robot follows a goal, as far as is known."""
+        return self.report is not None and self.report.state not in OVER
+
+    def send(self, x: float, y: float, yaw: float, by: str) -> None:
+        """Send a goal; metres and radians in the robot's goal frame.
+
+        Raises:
+            Refusal: If the robot takes no goals, or its link is down.
+
+        """
+        way = self.way
+        if way is None:
+            raise Refusal("no goal topic is known")
+        if not self.link.up:
+            raise Refusal("no link to where its goals go")
+        self._emit(SendGoal(self._key, self.spec.id, generate_id(), x, y, yaw, by, way))
+
+    def locate(self, x: float, y: float, yaw: float, by: str) -> None:
+        """Tell the robot where it is; metres and radians in its goal frame.
+
+        Raises:
+            Refusal: If it cannot be told, or follows a goal, which it would then
+                follow from another place than it is at.
+
+        """
+        if self.spec.pose_topic is None:
+            raise Refusal("no topic for its initial pose is known")
+        # Of a goal that nobody tells of and nobody can cancel there is no end to see.
+        if self.following and (self.can_cancel or self.way != "topic"):
+            raise Refusal("it follows a goal: cancel that first")
+        if not self.link.up:
+            raise Refusal("no link to where its initial pose goes")
+        self._emit(TellPose(self._key, self.spec.id, x, y, yaw, by))
+
+    def wrote(self, goal: WroteGoal) -> None:
+        """Note that a goal went out."""
+        self._running, self._by, self._perhaps = goal.id, goal.by, True
+        way = self.way or "topic"
+        self.report = GoalReport(
+            id=goal.id,
+            x=goal.x,
+            y=goal.y,
+            yaw=goal.yaw,
+            by=goal.by,
+            way=way,
+            state="sent",
+            why="this robot does not say how it goes" if way == "topic" else "",
+        )
+
+    def progress(self, news: GoalProgress) -> None:
+        """Note how a goal goes; only the newest one is of interest."""
+        report = self._about(news.id)
+        if report is None or report.state in OVER:
+            return
+        state = "under way" if news.active else "accepted"
+        if report.state != "cancelling":
+            report = msgspec.structs.replace(report, state=state, why="")
+        # What a word does not tell was told by another: status and feedback of
+        # actionlib come on two topics.
+        told = {
+            name: value
+            for name in ("left", "time", "eta", "recoveries")
+            if (value := getattr(news, name)) is not None
+        }
+        self.report = msgspec.structs.replace(report, **told)
+
+    def ended(self, end: GoalEnded) -> None:
+        """Note that the action ended a goal; the newest one is what counts."""
+        if end.id == self._running:
+            self._running, self._by, self._perhaps = None, None, False
+        self._no_actions |= end.no_actions
+        report = self._about(end.id)
+        if report is not None and report.state not in OVER:
+            why = end.why
+            if end.no_actions and self.spec.goal_topic is not None:
+                why = f"{why}; the next one goes to {self.spec.goal_topic}"
+            if end.outcome == "cancelled":
+                why = report.why if report.state == "cancelling" else why
+            self._show(end.outcome, why or _OTHERWISE[end.outcome])
+
+    def gone_dark(self, lost: GoalLost) -> None:
+        """Note that nobody tells any more how a goal goes."""
+        report = self._about(lost.id)
+        if report is not None and report.state not in OVER:
+            self._show("unknown", lost.why)
+
+    def cancel(self, why: str = "") -> None:
+        """Cancel every goal, now or as soon as there is a link.
+
+        Args:
+            why: Whose doing it is, in words.
+
+        Raises:
+            Refusal: If the robot has no way to do that.
+
+        """
+        if not self.can_cancel:
+            raise Refusal("no cancel topic and no action is known")
+        self._running, self._by, self._perhaps = None, None, False
+        self._cancel_owed = not self.link.up
+        if self.link.up or self._cancels_apart:
+            self._emit(CancelGoals(self._key, self.spec.id))
+        if self.following:
+            assert self.report is not None  # only then does it follow one
+            waits = self._cancel_owed or self.report.way != "topic"
+            self._show("cancelling" if waits else "cancelled", why)
+
+    def make_way(self, now: float) -> None:
+        """Cancel a goal that may be running, because somebody is going to drive.
+
+        Others send goals to a robot too, and nobody tells the gate. So whoever drives
+        off cancels what may run, but not again with each touch of a key.
+        """
+        lately = self._made_way_at is not None and now - self._made_way_at < LATELY
+        if self.can_cancel and (self._perhaps or not lately):
+            self._made_way_at = now
+            self.cancel("somebody drives the robot")
+
+    def stop(self) -> None:
+        """Cancel every goal if there is a way to."""
+        if self.can_cancel:
+            self.cancel("STOP")
+
+    def lost(self, connection: str | None = None) -> None:
+        """Do what the robot's settings say when whoever sent its goal is lost.
+
+        Args:
+            connection: Who is lost; ``None`` is everybody.
+
+        """
+        if self._by is None or connection not in (None, self._by):
+            return
+        if self.spec.on_operator_loss == "cancel" and self._perhaps and self.can_cancel:
+            self.cancel("who sent it is gone")
+
+    def link_up(self) -> None:
+        """Send the cancel that could not be sent before."""
+        if self._cancel_owed:
+            self.cancel(self.report.why if self.report is not None else "")
+
+    def _about(self, id: str) -> GoalReport | None:
+        report = self.report
+        return report if report is not None and report.id == id else None
+
+    def _show(self, state: str, why: str) -> None:
+        assert self.report is not None  # there is something to be said
+        self.report = msgspec.structs.replace(self.report, state=state, why=why)
+
+
+_OTHERWISE = {
+    "reached": "",
+    "failed": "the robot does not say why",
+    "cancelled": "by the robot, or by somebody else",
+}
+
+
+def is_move_base(spec: RobotSpec) -> bool:
+    """Return whether the robot's action is that of ROS 1."""
+    return is_type(spec.action_type, MOVE_BASE)

@@ -1,0 +1,55 @@
+"""The scans of one machine, and what they leave of its commands (S17). No I/O."""
+
+from webmap.gate.events import Sweep
+from webmap.gate.rules.assist import FREE, Verdict, assist
+from webmap.gate.rules.robots import Robots
+from webmap.geometry import Twist
+
+
+class Guard:
+    """Keeps the newest scans of one machine and slows it down before what they see.
+
+    Args:
+        robots: The robots that are the machine; each may have a scanner.
+
+    """
+
+    def __init__(self, robots: Robots) -> None:
+        self._robots = robots
+        self._sweeps: dict[str, Sweep] = {}
+        self._verdict = FREE
+
+    @property
+    def why(self) -> tuple[str, ...]:
+        """Why the last command was not let through as it was, in words."""
+        return () if self._verdict.why is None else (self._verdict.why,)
+
+    def saw(self, topic: str, sweep: Sweep) -> None:
+        """Note that a scan came."""
+        self._sweeps[topic] = sweep
+
+    def forget(self) -> None:
+        """Know nothing of before: nobody listens to the scans any more."""
+        self._sweeps.clear()
+        self._verdict = FREE
+
+    def limit(self, wanted: Twist, now: float) -> Twist:
+        """Return what every scanner's robot may do of a velocity."""
+        verdict = min(
+            (
+                assist(spec.assist, self._sweeps.get(spec.assist.topic), wanted, now)
+                for spec in self._robots.specs.values()
+                if spec.assist is not None
+            ),
+            key=_scale,
+            default=FREE,
+        )
+        self._verdict = verdict
+        if verdict.scale >= 1.0:
+            return wanted
+        s = verdict.scale
+        return Twist(s * wanted.vx, s * wanted.vy, s * wanted.wz)
+
+
+def _scale(verdict: Verdict) -> float:
+    return verdict.scale

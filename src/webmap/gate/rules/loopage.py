@@ -1,0 +1,96 @@
+"""How old the driver's picture of the robot is, and what that leaves of its speed.
+
+Nobody can react to what has not been seen yet. So over a slow link a robot is let go
+no faster than what carries it a quarter of a metre in the time from a finger to its
+wheels, at worst: the age of the loop, the dead-man, and the base's own time to stop
+(S15). Over a quick link the robot's own limits are in force and nothing else.
+"""
+
+import math
+from collections import deque
+
+from webmap.gate.limits import STOPS_WITHIN, Speed
+from webmap.gate.rules.deadman import DEADMAN
+
+WINDOW = 2.0
+"""Seconds over which the age of the loop is looked at."""
+
+SLOW = 0.15
+"""The age of a loop in seconds above which it is slow: it is told, and it counts."""
+
+QUICK = 0.13
+"""The age below which it is so no more; between the two nothing changes."""
+
+BLIND = 0.25
+"""Metres that a robot may go before anything that anybody does can take effect."""
+
+
+class LoopAge:
+    """The ages of the ticks that the holder's accepted commands echoed."""
+
+    def __init__(self) -> None:
+        self._ages: deque[tuple[float, float]] = deque()
+        self._p95: float | None = None
+        self._slow = False
+        self._stale = False
+
+    def add(self, age: float, now: float) -> None:
+        """Count one more; ``age`` in seconds."""
+        self._ages.append((now, age))
+        self._stale = True
+
+    def forget_old(self, now: float) -> None:
+        """Look at the last two seconds only."""
+        while self._ages and now - self._ages[0][0] > WINDOW:
+            self._ages.popleft()
+            self._stale = True
+
+    def clear(self) -> None:
+        """Forget everything: another driver has another loop."""
+        self._ages.clear()
+        self._stale = True
+
+    @property
+    def p95(self) -> float | None:
+        """The age in seconds that 95 of 100 commands stay below, if any came."""
+        if self._stale:
+            ages = sorted(age for _, age in self._ages)
+            self._p95 = ages[math.ceil(0.95 * len(ages)) - 1] if ages else None
+            self._stale = False
+        return self._p95
+
+    @property
+    def slow(self) -> float | None:
+        """The same if the loop is slow, else None."""
+        age = self.p95
+        self._slow = age is not None and age > (QUICK if self._slow else SLOW)
+        return age if self._slow else None
+
+
+def reaction(age: float | None, stop_time: float | None) -> float:
+    """Return the seconds from a finger to the robot, at worst.
+
+    Args:
+        age: The age of the loop in seconds, if it is known.
+        stop_time: Seconds within which the base stops by itself, if that is known.
+
+    """
+    own = STOPS_WITHIN if stop_time is None else stop_time
+    return (age or 0.0) + DEADMAN + own
+
+
+def governed(speed: Speed, slow: float | None, stop_time: float | None) -> Speed:
+    """Return ``speed``, or what a slow loop leaves of it.
+
+    Args:
+        speed: The speeds in force on a quick link.
+        slow: The age of the loop in seconds, if it is slow.
+        stop_time: Seconds within which the base stops by itself, if that is known.
+
+    """
+    if slow is None:
+        return speed
+    # Rounded, so that the speed in force does not tremble with every command.
+    v = math.floor(100 * BLIND / reaction(slow, stop_time)) / 100
+    why = f"slow link: {math.ceil(slow * 100) * 10} ms"
+    return Speed(min(v, speed.v), speed.w, (*speed.why, why))

@@ -1,0 +1,195 @@
+"""What is written to one machine: commands as they come, then zeros, then silence.
+
+The only thing that a timer writes here is zero.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from webmap.gate.actions import Emit, MarkDriven, WriteTwist
+from webmap.gate.events import Key, Wrote
+from webmap.gate.limits import Speed, fit, ramp
+from webmap.gate.rules.burst import HELD_LENGTH, HELD_PERIOD, NEW_LINK_LENGTH, Burst
+from webmap.gate.rules.health import Health
+from webmap.gate.rules.lease import Lease
+from webmap.geometry import Twist
+
+WRITE_INTERVAL = 0.02
+"""The shortest time between two moving commands on the wire, in seconds."""
+
+WAIT_LIMIT = 0.05
+"""The longest time that a moving command waits for its turn, in seconds. Only a gate
+that stood still keeps one longer, and then it is too old to be written (S2)."""
+
+RAMP_INTERVAL = 0.1
+"""The longest time that the ramp counts between two commands, in seconds."""
+
+ZERO = Twist()
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What a machine may do at most, now."""
+
+    speed: Speed
+    a_max: float | None
+    holonomic: bool
+
+
+class Motion:
+    """The velocities of one machine.
+
+    Args:
+        key: The machine.
+        control: The link that they go to.
+        bounds: Gives the bounds that hold now.
+        emit: Takes the actions.
+
+    """
+
+    def __init__(
+        self, key: Key, control: Health, bounds: Callable[[], Bounds], emit: Emit
+    ) -> None:
+        self.driving = False
+        self.sent = ZERO
+        """What was written last."""
+        self.owes_zero = False
+        """Whether it may still move by our doing: it gets a zero in any case."""
+        self._key = key
+        self._control = control
+        self._bounds = bounds
+        self._emit = emit
+        self._burst = Burst()
+        self._held = Burst(HELD_PERIOD, HELD_LENGTH)
+        self._left_alone = False
+        self._pending: tuple[Twist, Lease, float] | None = None
+        self._tried_at = float("-inf")
+        self._sent_at = self._moved_at = float("-inf")
+        self._sent_epoch: int | None = None
+
+    @property
+    def stopping(self) -> bool:
+        """Whether zeros are being written."""
+        return self._burst.running
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing is written now and nothing will be by itself."""
+        return not (self.driving or self.stopping or self._left_alone)
+
+    def drive(self, wanted: Twist, lease: Lease, now: float) -> None:
+        """Write ``wanted``, within the bounds, on behalf of ``lease``."""
+        if not self.driving:
+            self._burst.end()
+            self.driving = True
+            self._owe_zero()
+        self._pending = (wanted, lease, now)
+        self._flush(now)
+
+    def leave_alone(self) -> None:
+        """Write nothing more, not even zero, though it moves (stop test only)."""
+        self.driving, self._pending = False, None
+        self._left_alone = True
+
+    @property
+    def moved_at(self) -> float:
+        """When the machine was last told to move."""
+        return self._moved_at
+
+    def halt(self, now: float) -> None:
+        """Go from driving to zeros; nothing happens if it was not driven."""
+        if self.driving:
+            self.zero(now)
+
+    def zero(self, now: float, length: float | None = None) -> None:
+        """Write zero at once, whatever was before, and for a moment from here on.
+
+        Args:
+            now: Seconds, monotonic.
+            length: Seconds of that moment, in place of the usual ones.
+
+        """
+        if self.stopping and self._burst.started_at == now:
+            return
+        self.driving, self._pending, self._left_alone = False, None, False
+        self._burst.start(now, length)
+        self._owe_zero()
+        self._write_zero_if_due(now)
+
+    def hold(self, now: float) -> None:
+        """Write zero at once, and go on with that while STOP stands (S8)."""
+        self.zero(now)
+        self._held.start(now)
+
+    def let_go(self) -> None:
+        """STOP stands no longer; nothing moves by that."""
+        self._held.end()
+
+    @property
+    def held(self) -> bool:
+        """Whether zeros are written because STOP stands."""
+        return self._held.running
+
+    def pay(self, now: float) -> None:
+        """Write the zero that is owed, now that there is a link again."""
+        if self.owes_zero:
+            self._burst.end()  # what it wrote just now went to the link before
+            self.zero(now, NEW_LINK_LENGTH)
+
+    def owe_from_before(self) -> None:
+        """Note that an earlier gate may have left the machine moving."""
+        self._owe_zero()
+
+    def step(self, now: float) -> None:
+        """Write what is due."""
+        self._flush(now)
+        self._write_zero_if_due(now)
+        answered = self._control.answered_since(self._burst.started_at)
+        if self.owes_zero and self.silent and answered:
+            # Only now are the zeros believed to have arrived.
+            self.owes_zero = False
+            self._emit(MarkDriven(self._key, False))
+
+    def wrote(self, write: Wrote, now: float) -> None:
+        """Note a velocity that went out."""
+        self.sent, self._sent_at, self._sent_epoch = write.twist, now, write.epoch
+        if not write.twist.is_zero:
+            self._moved_at = now
+
+    def _owe_zero(self) -> None:
+        if not self.owes_zero:
+            self.owes_zero = True
+            self._emit(MarkDriven(self._key, True))
+
+    def _write_zero_if_due(self, now: float) -> None:
+        due = self._burst.zero_due(now)
+        if not due and not self.stopping and self._control.up:
+            due = self._held.zero_due(now)
+        if due:
+            self._write_zero()
+
+    def _write_zero(self) -> None:
+        self._emit(WriteTwist(self._key, ZERO, self._sent_epoch, None))
+
+    def _flush(self, now: float) -> None:
+        """Write the newest command, unless one has just been written."""
+        if self._pending is None or now < self._tried_at + WRITE_INTERVAL:
+            return
+        wanted, lease, since = self._pending
+        if now - since > WAIT_LIMIT:
+            self._pending = None
+            return
+        if lease.epoch != self._sent_epoch and not self.sent.is_zero:
+            self._write_zero()  # between two epochs there is a zero, whatever happened
+            return
+        self._pending, self._tried_at = None, now
+        twist = self._bounded(wanted, now)
+        self._emit(WriteTwist(self._key, twist, lease.epoch, lease.connection))
+
+    def _bounded(self, wanted: Twist, now: float) -> Twist:
+        bounds = self._bounds()
+        twist = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
+        if bounds.a_max is None:
+            return twist
+        elapsed = min(now - self._sent_at, RAMP_INTERVAL)
+        return ramp(self.sent, twist, bounds.a_max, elapsed)

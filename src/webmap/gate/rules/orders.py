@@ -1,0 +1,180 @@
+"""What the commands of pages and of the program come to. No I/O."""
+
+import logging
+
+from webmap.gate.commands import (
+    Ask,
+    Command,
+    Deny,
+    Drive,
+    Goal,
+    Grant,
+    Locate,
+    Release,
+    Reset,
+    Stop,
+    StopTest,
+    Take,
+)
+from webmap.gate.refusal import Refusal
+from webmap.gate.rules.base import Base
+from webmap.gate.rules.connection import Connection
+from webmap.gate.rules.fleet import Fleet
+from webmap.gate.rules.lease import check_lease, check_role, check_take
+from webmap.gate.rules.ticks import Ticks
+from webmap.geometry import Twist
+
+log = logging.getLogger("webmap.gate")
+
+
+class Orders:
+    """Does what is ordered, or refuses it whole.
+
+    Args:
+        fleet: The machines.
+        ticks: The ticks that commands echo.
+
+    """
+
+    def __init__(self, fleet: Fleet, ticks: Ticks) -> None:
+        self._fleet = fleet
+        self._ticks = ticks
+
+    def obey(self, connection: Connection, command: Command, now: float) -> None:
+        """Do what a page commands.
+
+        Raises:
+            Refusal: If that is not done.
+
+        """
+        match command:
+            case Stop(robot):
+                # Before any check: a stop is always allowed.
+                self.stop(robot, connection, now)
+            case Reset(robot):
+                self.reset(robot, connection, now)
+            case Drive():
+                self._drive(connection, command, now)
+            case Goal(robot):
+                base, _ = self._licensed(connection, command, now)
+                pose = (command.x, command.y, command.yaw)
+                base.driving.goal(robot, pose, connection.id, now)
+            case Locate(robot):
+                base, _ = self._licensed(connection, command, now)
+                pose = (command.x, command.y, command.yaw)
+                base.driving.locate(robot, pose, connection.id, now)
+            case Take(robot):
+                self.take(connection, robot, now)
+            case Release(robot):
+                self.release(connection, robot, now)
+            case Ask(robot):
+                self._ask(connection, robot, now)
+            case Grant() | Deny():
+                self._answer(connection, command, now)
+            case StopTest(robot):
+                base = self._fleet.find(robot)
+                if not base.hands.is_held_by(connection.id):
+                    raise Refusal("take it first")
+                base.driving.begin_test(now)
+            case _:
+                self.cancel(connection, command.robot)
+
+    def cancel(self, connection: Connection, robot: str) -> None:
+        """Call off a robot's goals; that needs no lease."""
+        check_role(connection.role)
+        self._fleet.find(robot).robots.goals[robot].cancel()
+
+    def stop(self, robot: str | None, by: Connection, now: float) -> None:
+        """STOP a robot or, with ``None``, all."""
+        for base in self._fleet if robot is None else [self._fleet.find(robot)]:
+            base.stop(by.name or by.id, now)
+
+    def reset(self, robot: str | None, by: Connection, now: float) -> None:
+        """End the STOP of a robot or, with ``None``, every one that stands."""
+        check_role(by.role)
+        if robot is not None:
+            self._fleet.find(robot).reset(now)
+            return
+        for base in self._fleet:
+            if base.latch.on and not base.arming.lock.elsewhere:
+                base.reset(now)
+
+    def take(self, connection: Connection, robot: str, now: float) -> int | None:
+        """Give somebody the lease; ``None`` if it comes when the machine stands."""
+        base = self._fleet.find(robot)
+        if base.hands.is_held_by(connection.id):
+            return base.hands.lease.epoch  # type: ignore[union-attr]
+        if base.hands.handover.heir is connection:
+            return None
+        check_take(base.hands.lease, connection.role, connection.program)
+        if reason := base.hands.unarmable(now):
+            raise Refusal(reason)
+        if base.hands.lease is not None:
+            base.hands.hand_over(connection, now)
+            return None
+        return base.hands.give(connection, now)
+
+    def release(self, connection: Connection, robot: str, now: float) -> None:
+        """Have somebody let go of a robot."""
+        self._fleet.find(robot).hands.release(connection.id, now)
+
+    def _ask(self, connection: Connection, robot: str, now: float) -> None:
+        check_role(connection.role)
+        base = self._fleet.find(robot)
+        if base.hands.is_held_by(connection.id):
+            raise Refusal("you have it already")
+        base.hands.ask(connection, now)
+
+    def _answer(self, connection: Connection, answer: Grant | Deny, now: float) -> None:
+        base = self._fleet.find(answer.robot)
+        if not base.hands.is_held_by(connection.id):
+            raise Refusal("only who has it can answer")
+        asker = base.hands.handover.asker
+        if asker is None:
+            raise Refusal("nobody asks for it")
+        if isinstance(answer, Grant):
+            base.hands.hand_over(asker, now)
+        else:
+            base.hands.deny(f"{connection.name or connection.id} keeps it")
+
+    def checked(
+        self, connection: Connection, robot: str, epoch: int, tick: int, now: float
+    ) -> tuple[Base, float]:
+        """Return the machine if this connection may move it by this command.
+
+        Besides it, the age of the command's loop in seconds.
+        """
+        base = self._fleet.find(robot)
+        check_lease(base.hands.lease, connection.id, epoch)
+        try:
+            return base, self._ticks.check(tick, now)
+        except Refusal:
+            base.driving.late(
+                now
+            )  # after the lease was checked: no stranger's word stops it
+            raise
+
+    def _licensed(
+        self, connection: Connection, command: Drive | Goal | Locate, now: float
+    ) -> tuple[Base, float]:
+        base, age = self.checked(
+            connection, command.robot, command.epoch, command.tick, now
+        )
+        if command.seq <= connection.acked:
+            raise Refusal("its seq is not larger than the one before")
+        connection.acked = command.seq
+        return base, age
+
+    def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
+        base, age = self._licensed(connection, drive, now)
+        base.speeds.ages.add(age, now)
+        if drive.clamped and not connection.flagged:
+            connection.flagged = True
+            log.warning("connection %s asks for more than full speed", connection.id)
+        # What the page showed when it spoke has aged on the way here.
+        seen = None if drive.video is None else drive.video + age
+        base.arming.video.saw(seen, now)
+        speed = base.speeds.speed
+        wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
+        if reason := base.driving.drive(wanted, drive.neutral, drive.tick, now):
+            raise Refusal(reason)

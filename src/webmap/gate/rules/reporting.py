@@ -1,0 +1,150 @@
+"""Reports on machines: what changed is said, but not more often than anybody looks."""
+
+from typing import Literal
+
+import msgspec
+
+from webmap.gate.messages import (
+    AskerReport,
+    Holder,
+    RobotReport,
+    RobotSpec,
+    StopReport,
+    TestReport,
+    Velocity,
+)
+from webmap.gate.rules.base import Base
+from webmap.gate.rules.loopage import reaction
+from webmap.geometry import Twist
+
+INTERVAL = 0.1
+"""The shortest time between two reports that differ only in numbers that flow."""
+
+BRAKE = 0.5
+"""The deceleration that is assumed of a base of which none was stated, in m/s²."""
+
+_DIGITS = 3
+_REST = (0.0, 0.0, 0.0)
+
+
+def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
+    """Return how it stands with one robot at ``now``."""
+    lease = base.hands.lease
+    speed = base.speeds.own if lease is None else base.speeds.speed
+    age, test = base.speeds.ages.p95, base.tests.last
+    unarmable = base.hands.unarmable(now)
+    holder = None if lease is None else Holder(lease.connection, lease.name)
+    goals = base.robots.goals[spec.id]
+    link = base.control if spec.twist_topic else goals.link
+    return RobotReport(
+        robot=spec.id,
+        name=spec.name,
+        state=base.state,
+        latched=base.latch.acknowledged,
+        stop=_stop(base),
+        holder=holder,
+        epoch=None if lease is None else lease.epoch,
+        asker=_asker(base, now),
+        changing=base.hands.handover.heir is not None,
+        armed=lease is not None and base.hands.deadman.armed,
+        v=speed.v,
+        w=speed.w,
+        why=speed.why + base.guard.why,
+        link="up" if link.up else "down",
+        sent=_velocity(base.motion.sent) or _REST,
+        echoed=_velocity(base.sight.echoed),
+        measured=_velocity(base.sight.measured),
+        alarm=base.obedience.alarm(now),
+        age=None if age is None else round(age * 1000, 0),
+        reaction=round(reaction(age, base.speeds.stop_time), 3),
+        brake=base.robots.a_max or BRAKE,
+        stop_time=base.speeds.stop_time,
+        stop_source=_stop_source(base),
+        stop_date=None if base.speeds.tested is None else base.speeds.tested.date,
+        test=None if test is None else TestReport(test.state, test.text),
+        armable=unarmable is None,
+        reason=unarmable if lease is None else base.arming.doubt(now),
+        way=goals.way,
+        cancels=goals.can_cancel,
+        locates=spec.pose_topic is not None,
+        goal=goals.report,
+    )
+
+
+def _stop_source(base: Base) -> Literal["stated", "tested"] | None:
+    if base.speeds.tested is not None:
+        return "tested"
+    return None if base.speeds.stop_time is None else "stated"
+
+
+def _asker(base: Base, now: float) -> AskerReport | None:
+    asker = base.hands.handover.asker
+    if asker is None:
+        return None
+    return AskerReport(asker.id, asker.name, round(base.hands.handover.left(now), 1))
+
+
+def _stop(base: Base) -> StopReport | None:
+    if not base.latch.acknowledged:
+        return None
+    seen = base.standing.confirmation
+    why = seen.why
+    if base.latch.trouble is not None:
+        why = f"{why}; a restart would forget this STOP: {base.latch.trouble}"
+    return StopReport(base.latch.by or "", seen.confirmed, why)
+
+
+def _velocity(twist: Twist | None) -> Velocity | None:
+    if twist is None:
+        return None
+    return (
+        round(twist.vx, _DIGITS) + 0.0,
+        round(twist.vy, _DIGITS) + 0.0,
+        round(twist.wz, _DIGITS) + 0.0,
+    )
+
+
+class Reporter:
+    """Decides for one robot which report is worth saying."""
+
+    def __init__(self) -> None:
+        self._last: RobotReport | None = None
+        self._at = float("-inf")
+
+    def worth_saying(self, report: RobotReport, now: float) -> bool | None:
+        """Return whether to say ``report`` now; ``None`` means later."""
+        last = self._last
+        if report == last:
+            return False
+        if last is not None and now < self._at + INTERVAL and _alike(report, last):
+            return None
+        self._last, self._at = report, now
+        return True
+
+
+def _alike(one: RobotReport, other: RobotReport) -> bool:
+    """Return whether two reports differ only in numbers that flow."""
+    return _gist(one) == _gist(other)
+
+
+def _gist(report: RobotReport) -> RobotReport:
+    """Return ``report`` without the numbers that change all the time."""
+    asker, stop, alarm, goal = report.asker, report.stop, report.alarm, report.goal
+    if goal is not None:
+        goal = msgspec.structs.replace(goal, left=None, time=None, eta=None)
+    if asker is not None:
+        asker = msgspec.structs.replace(asker, left=0.0)
+    if stop is not None:
+        stop = msgspec.structs.replace(stop, why="")
+    return msgspec.structs.replace(
+        report,
+        sent=_REST,
+        echoed=None,
+        measured=None,
+        asker=asker,
+        stop=stop,
+        alarm=None if alarm is None else "",
+        age=None,
+        reaction=0.0,
+        goal=goal,
+    )

@@ -1,0 +1,95 @@
+"""The robots of the display that are one machine, and what holds for it by them."""
+
+from webmap.gate.actions import Detach, Emit, Say
+from webmap.gate.events import Key
+from webmap.gate.messages import Refused, RobotSpec
+from webmap.gate.rules.goals import Goals
+from webmap.gate.rules.health import Health
+from webmap.gate.rules.hooks import Hooks
+
+
+class Robots:
+    """Everything that was declared for one machine. No I/O.
+
+    Args:
+        key: The machine.
+        emit: Takes the actions.
+
+    """
+
+    def __init__(self, key: Key, emit: Emit) -> None:
+        self.specs: dict[str, RobotSpec] = {}
+        """By the name that the display has for each; the newest is the last."""
+        self.goals: dict[str, Goals] = {}
+        self.hooks: dict[str, Hooks] = {}
+        self.leaving: set[str] = set()
+        """Those that were forgotten and are there until the machine has stopped."""
+        self._key = key
+        self._emit = emit
+
+    @property
+    def newest(self) -> RobotSpec:
+        """The one that was declared last."""
+        return next(reversed(self.specs.values()))
+
+    @property
+    def drivable(self) -> bool:
+        """Whether velocity can be sent to it at all, not goals only."""
+        return self.newest.twist_topic is not None
+
+    @property
+    def has_odometry(self) -> bool:
+        """Whether its odometry is known."""
+        return any(spec.odometry_topic is not None for spec in self.specs.values())
+
+    @property
+    def holonomic(self) -> bool:
+        """Whether everybody says that it can move sideways."""
+        return all(spec.holonomic for spec in self.specs.values())
+
+    @property
+    def a_max(self) -> float | None:
+        """The greatest growth of its speed, in m/s², if one was stated."""
+        return min((s.a_max for s in self.specs.values() if s.a_max), default=None)
+
+    @property
+    def stops_within(self) -> float | None:
+        """The seconds within which everybody says that it stops by itself."""
+        stated = [spec.stops_within for spec in self.specs.values()]
+        known = [seconds for seconds in stated if seconds is not None]
+        return max(known) if len(known) == len(stated) else None
+
+    def declare(self, spec: RobotSpec, tasks: Health, hooks: Health) -> None:
+        """Take in a robot, or what changed of it.
+
+        Args:
+            spec: The robot.
+            tasks: The link that its goals go to.
+            hooks: The link that its stop hooks go to.
+
+        """
+        self.leaving.discard(spec.id)
+        self.specs.pop(spec.id, None)
+        self.specs[spec.id] = spec
+        goals = self.goals.get(spec.id)
+        if goals is None:
+            self.goals[spec.id] = Goals(self._key, spec, tasks, self._emit)
+        else:
+            goals.spec, goals.link = spec, tasks
+        self.hooks[spec.id] = Hooks(self._key, spec, hooks, self._emit)
+
+    def drop(self, robot: str) -> None:
+        """Have a robot gone."""
+        self.leaving.discard(robot)
+        del self.specs[robot], self.goals[robot], self.hooks[robot]
+        self._emit(Detach(self._key, robot))
+
+    def make_way(self, now: float) -> None:
+        """Cancel a goal that may be running: somebody is going to drive."""
+        for goals in self.goals.values():
+            goals.make_way(now)
+
+    def refuse(self, connection: str, what: str, why: str) -> None:
+        """Tell somebody what does not happen, under each of the names."""
+        for robot in self.specs:
+            self._emit(Say(Refused(connection, robot, what, why)))

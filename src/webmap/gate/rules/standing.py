@@ -1,0 +1,133 @@
+"""A STOP that stands: what is said because of it, and what is known of it. No I/O."""
+
+from webmap.gate.events import Key
+from webmap.gate.refusal import Refusal
+from webmap.gate.rules.confirm import Confirmation
+from webmap.gate.rules.health import Health
+from webmap.gate.rules.latch import Latch
+from webmap.gate.rules.motion import Motion
+from webmap.gate.rules.robots import Robots
+
+
+class StandingStop:
+    """The STOP of one machine, from the first zero to the reset.
+
+    Args:
+        key: The machine.
+        latch: Whether it stands.
+        robots: The robots that the machine is.
+        control: The link that velocity goes to.
+        motion: Writes the zeros.
+
+    """
+
+    def __init__(
+        self,
+        key: Key,
+        latch: Latch,
+        robots: Robots,
+        control: Health,
+        motion: Motion,
+    ) -> None:
+        self.latch = latch
+        self.confirmation = Confirmation()
+        self._url = key.url
+        self._robots = robots
+        self._control = control
+        self._motion = motion
+
+    @property
+    def confirming(self) -> bool:
+        """Whether it stands and nobody knows yet that the machine does as well."""
+        return self.latch.on and not self.confirmation.confirmed
+
+    def press(self, by: str, now: float) -> None:
+        """Have it stand from now on; zero goes before everything else."""
+        if self._robots.drivable:
+            self._motion.zero(now)
+        self.latch.set(by)
+        self.say_all(now)
+
+    def say_all(self, now: float) -> None:
+        """Say everything that it has to say, as far as there are links."""
+        if self._robots.drivable:
+            self._motion.hold(now)
+        for goals in self._robots.goals.values():
+            goals.stop()
+        for hooks in self._robots.hooks.values():
+            hooks.say(stopped=True)
+        self.confirmation.begin(now)
+        self.confirm(now)
+
+    def reset(self) -> None:
+        """Have it stand no longer; nothing moves by that.
+
+        Raises:
+            Refusal: If none stands.
+
+        """
+        if not self.latch.on:
+            raise Refusal("no STOP stands")
+        self.latch.reset()
+        self._motion.let_go()
+        for hooks in self._robots.hooks.values():
+            hooks.say(stopped=False)
+
+    def saw_file(self, by: str | None, elsewhere: bool) -> bool:
+        """Note that the file of the STOP changed, by another hand than this gate's.
+
+        Args:
+            by: Whose STOP it says that stands, if one does.
+            elsewhere: Whether another gate has the machine.
+
+        Returns:
+            Whether a STOP is to be taken over that was said to another gate.
+
+        """
+        latch = self.latch
+        if not latch.settled or (by is None) == (not latch.on):
+            return False
+        if by is not None:
+            return not elsewhere
+        if elsewhere:  # it was reset where the machine is, and this is an onlooker
+            latch.drop()
+            self._motion.let_go()
+        else:
+            latch.keep_again()  # a file that is gone is no reset
+        return False
+
+    def take_over(self, by: str, now: float) -> None:
+        """Have it stand because another gate was told so; zero goes first."""
+        if self._robots.drivable:
+            self._motion.zero(now)
+        self.latch.found(by)
+        self.say_all(now)
+
+    def tasks_up(self, link: Health) -> None:
+        """Say what could not be said, or may not have arrived, for want of a link."""
+        for goals in self._robots.goals.values():
+            if goals.link is link and self.latch.on:
+                goals.stop()
+            elif goals.link is link:
+                goals.link_up()
+        for hooks in self._robots.hooks.values():
+            if hooks.link is link and self.latch.on:
+                hooks.say(stopped=True)
+            elif hooks.link is link:
+                hooks.link_up()
+
+    def confirm(self, now: float) -> None:
+        """Decide anew whether it is confirmed."""
+        since = self.confirmation.since
+        delivered = not self._robots.drivable or self._control.answered_since(since)
+        self.confirmation.judge(self._cannot_tell(), delivered, now)
+
+    def _cannot_tell(self) -> str | None:
+        """Return why nobody can tell whether the machine stands, in words."""
+        robots = self._robots
+        link = self._control
+        if not robots.drivable:
+            link = robots.goals[robots.newest.id].link
+        if not link.up:
+            return f"no link to {self._url}"
+        return None if robots.has_odometry else "no odometry"

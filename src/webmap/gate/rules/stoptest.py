@@ -1,0 +1,92 @@
+"""The stop test: does the base stop by itself when commands cease? (S12) No I/O.
+
+::
+
+    creeping ── odometry shows motion ──▶ waiting ── it stands ──▶ done
+        │                                    │
+        └── no motion for 1.5 s              └── it moves on for 3 s
+                    └──────────▶ failed ◀──────────┘
+                                   ▲ any doubt, any key, STOP
+
+While it creeps, each creeping command answers one of the driver's own, which say that
+every input is released; the test writes nothing by a timer. While it waits nothing is
+written at all, not even zero: that is what is tested. It always ends with zero.
+"""
+
+from typing import Literal
+
+from webmap.gate.rules.standstill import STILL_V, speed_of
+from webmap.geometry import Twist
+
+CREEP = Twist(0.1)
+"""How fast it creeps."""
+
+CREEP_FOR = 1.5
+"""Seconds within which odometry must show that it moves."""
+
+MOVES = 0.05
+"""Metres per second from which it moves."""
+
+WAIT_FOR = 3.0
+"""Seconds after the last command for which a base is waited for."""
+
+MOVES_ON = f"it did not stop by itself within {WAIT_FOR:g} s"
+"""What is said of a base that has no timeout of its own."""
+
+State = Literal["creeping", "waiting", "done", "failed"]
+
+
+class StopTest:
+    """One test of one machine.
+
+    Args:
+        now: When it begins.
+
+    """
+
+    def __init__(self, now: float) -> None:
+        self.state: State = "creeping"
+        self.text = "creeping until odometry shows it"
+        self.concluded = False
+        """Whether the base itself decided how it ended."""
+        self.seconds: float | None = None
+        """How long the base went on after the last command, if it stopped."""
+        self._began_at = now
+        self._left_alone_at = now
+
+    @property
+    def running(self) -> bool:
+        """Whether it goes on."""
+        return self.state in ("creeping", "waiting")
+
+    def saw(self, twist: Twist | None, last_command_at: float, now: float) -> None:
+        """Take in a message of odometry.
+
+        Args:
+            twist: The velocity that it tells, if it tells one.
+            last_command_at: When the machine was last told to move.
+            now: The time.
+
+        """
+        if twist is None:
+            return
+        speed = speed_of(twist)
+        if self.state == "creeping" and speed > MOVES:
+            self.state, self.text = "waiting", "no more commands: does it stop?"
+            self._left_alone_at = last_command_at
+        elif self.state == "waiting" and speed < STILL_V:
+            self.state, self.concluded = "done", True
+            self.seconds = round(now - self._left_alone_at, 3)
+            self.text = f"stopped by itself after {self.seconds:.2f} s"
+
+    def step(self, now: float) -> None:
+        """Let time pass."""
+        if self.state == "creeping" and now - self._began_at >= CREEP_FOR:
+            self.abort(f"it did not move within {CREEP_FOR:g} s")
+        elif self.state == "waiting" and now - self._left_alone_at >= WAIT_FOR:
+            self.abort(MOVES_ON)
+            self.concluded = True
+
+    def abort(self, why: str) -> None:
+        """End it without a result."""
+        self.state, self.text = "failed", why
