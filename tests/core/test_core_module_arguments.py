@@ -127,8 +127,24 @@ def test_more_arguments_than_there_are_and_fewer_are_named():
         check_arguments(factory, [1, 2], {})
     with pytest.raises(WrongArguments, match='no argument "tow"; did you mean "two"'):
         check_arguments(factory, [1], {"tow": 2})
-    with pytest.raises(WrongArguments, match="multiple values"):
+    twice = '"one" has multiple values: one by its place, one by its name'
+    with pytest.raises(WrongArguments, match=twice) as error:
         check_arguments(factory, [1], {"one": 2})
+    assert error.value.wrong[0].way == ("options", "one")
+
+
+def test_the_owner_is_no_argument_even_of_what_takes_any_name():
+    def factory(owner, one=0, **others): ...
+
+    said = r'no argument "owner"; .* takes \(one, \*\*others\)'
+    with pytest.raises(WrongArguments, match=said):
+        check_arguments(factory, [1], {"owner": 2})
+
+
+def test_a_name_that_only_a_place_has_is_free_for_what_is_passed_on():
+    def factory(owner, one, /, **others): ...
+
+    check_arguments(factory, [1], {"owner": 2, "one": 3})
 
 
 def test_what_has_no_signature_speaks_for_itself():

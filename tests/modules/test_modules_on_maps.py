@@ -3,7 +3,7 @@
 import pytest
 from module_fakes import header, pose
 
-from webmap import Map
+from webmap import Map, Robot
 from webmap.core.layer import Layer
 from webmap.errors import ConfigError, ModuleNotFound
 
@@ -72,6 +72,23 @@ def test_arguments_of_the_wrong_kind_are_refused_before_any_map(
 ):
     with pytest.raises(ConfigError, match=said):
         robot.add_module("OnMaps", module, link, "/c", **options)
+
+
+def test_what_it_brings_belongs_to_this_robot_unless_another_is_told(map, robot, link):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
+    other = Robot("Other")
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/d", robot=other)
+    owners = [grid.layer.svg.get("data-layer-of") for grid in grids(map)]
+    assert owners == [robot.id, other.id]
+    other.destroy()
+
+
+def test_another_robot_is_refused_by_what_belongs_to_none(robot):
+    with pytest.raises(ConfigError, match=r'Follow: there is no argument "robot"'):
+        robot.add_module("OnMaps", "Follow", robot=robot)
+    with pytest.raises(ConfigError, match="robot: expected a Robot, got 'Bob'"):
+        robot.add_module("OnMaps", "Markers", robot="Bob")
 
 
 def test_arguments_that_make_no_sense_are_said_on_the_map(map, robot, channel):

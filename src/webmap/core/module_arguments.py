@@ -107,9 +107,16 @@ def _wrong(
         parameter = by_place[place] if place < len(by_place) else more
         if parameter is not None:
             yield from _one(factory, parameter, value, ("args", first + place))
+    placed = {each.name for each in by_place[: len(args)]}
+    every = signature.parameters.values()
+    # The owner comes by its place, and by its name nobody else can.
+    owner = {each.name for each in every if each.kind in _NAMED} - set(by_name)
     for name, value in options.items():
-        parameter = by_name.get(name, others)
-        if parameter is None:
+        parameter = by_name.get(name, None if name in owner else others)
+        if name in placed and name in by_name:
+            words = f'"{name}" has multiple values: one by its place, one by its name'
+            yield WrongArgument(("options", name), words)
+        elif parameter is None:
             near = difflib.get_close_matches(name, by_name, n=1)
             hint = f'; did you mean "{near[0]}"?' if near else ""
             words = f'there is no argument "{name}"{hint}; it takes {_names(signature)}'

@@ -32,7 +32,9 @@ class OnMaps:
 
     """
 
-    def __init__(self, robot: "Robot", module: str, *args: Any, **options: Any) -> None:
+    def __init__(
+        self, robot: "Robot", /, module: str, *args: Any, **options: Any
+    ) -> None:
         factory = map_modules[module]
         check_arguments(factory, args, options, first=1)
         if "robot" in inspect.signature(factory).parameters:
