@@ -99,6 +99,8 @@ class TestInitialPose:
         for broken in (
             {"told": {"robot": robot.id, "x": 1, "y": 2}},
             {"told": {"robot": "r999", "x": 1, "y": 2, "yaw": 0}},
+            {"told": {"robot": robot.id, "x": 10**400, "y": 2, "yaw": 0}},
+            {"told": {"robot": robot.id, "x": 1, "y": math.nan, "yaw": 0}},
             {"told": None},
             {},
         ):

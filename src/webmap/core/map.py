@@ -71,6 +71,15 @@ class Map(WorldView):
         robot.on_map(self, False)
         self.notify_modules("on_remove_robot", robot)
 
+    def find_robot(self, id: object) -> Robot | None:
+        """Return the robot of this map that has an id, if there is one.
+
+        Args:
+            id: As a page says it, so it may be anything.
+
+        """
+        return next((robot for robot in self.robots if robot.id == id), None)
+
     def add_layer(self, layer: Layer, *, order: float = LAYER_ORDER) -> Removal:
         """Show a shared layer until the removal that is returned, or the map's end.
 

@@ -67,7 +67,7 @@ class AlignTool:
             log.warning("%r: an unknown message of the page was ignored", self.map)
 
     def _begin(self, id: str) -> None:
-        robot = self._robot(id)
+        robot = self.map.find_robot(id)
         why = self._barred(robot)
         if robot is None or why is not None:
             self.half.send({"refused": why})
@@ -91,7 +91,7 @@ class AlignTool:
         )
 
     def _save(self, wanted: dict[str, Any]) -> None:
-        robot = self._robot(wanted.get("robot"))
+        robot = self.map.find_robot(wanted.get("robot"))
         pose = alignment(*(wanted.get(key) for key in ("x", "y", "angle")))  # type: ignore[arg-type]
         whole = wanted.get("whole") is True
         why = self._barred(robot, whole=whole)
@@ -149,6 +149,3 @@ class AlignTool:
                 and each.whereabouts.own_alignment is None
             )
         ]
-
-    def _robot(self, id: object) -> "Robot | None":
-        return next((robot for robot in self.map.robots if robot.id == id), None)

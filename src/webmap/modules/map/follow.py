@@ -24,6 +24,4 @@ class Follow:
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Follow the robot that the page names, or none."""
-        wanted = message.get("follow")
-        robots = (robot for robot in self.map.robots if robot.id == wanted)
-        self.map.follow(next(robots, None))
+        self.map.follow(self.map.find_robot(message.get("follow")))

@@ -3,6 +3,8 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
+from webmap.core.robot_and_pose import robot_and_pose
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
     from webmap.core.robot import Robot
@@ -66,20 +68,16 @@ class GoalTool:
         """Take what the page says that it sent."""
         goal, canceled = message.get("goal"), message.get("cancel")
         if isinstance(goal, dict):
-            robot = self._robot(goal.get("robot"))
-            pose = [goal.get(name) for name in ("x", "y", "yaw")]
-            if robot is not None and all(isinstance(n, int | float) for n in pose):
-                self.map.notify_modules("on_goal_sent", robot, *pose)
+            sent = robot_and_pose(self.map, goal)
+            if sent is not None:
+                self.map.notify_modules("on_goal_sent", *sent)
         elif isinstance(message.get("mark"), str):
-            robot = self._robot(message["mark"])
+            robot = self.map.find_robot(message["mark"])
             if robot is not None:
                 self.map.toggle_marked(robot)
         elif isinstance(canceled, str):
-            robot = self._robot(canceled)
+            robot = self.map.find_robot(canceled)
             if robot is not None:
                 self.map.notify_modules("on_goal_canceled", robot)
         else:
             log.warning("%r: an unknown message of the page was ignored", self.map)
-
-    def _robot(self, id: object) -> "Robot | None":
-        return next((robot for robot in self.map.robots if robot.id == id), None)

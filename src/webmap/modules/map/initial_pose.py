@@ -1,12 +1,12 @@
 """A person tells the selected robot where it is."""
 
 import logging
-import math
 from typing import TYPE_CHECKING, Any
+
+from webmap.core.robot_and_pose import robot_and_pose
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.initial_pose")
 
@@ -51,23 +51,15 @@ class InitialPoseTool:
         """Take what the page says that it told, or tell it how sure that will be."""
         if "doubt" in message:
             self._tell_doubt(message["doubt"])
-            return
-        told = message.get("told")
-        if isinstance(told, dict):
-            pose = [told.get(name) for name in ("x", "y", "yaw")]
-            robot = self._robot(told.get("robot"))
-            if robot is not None and all(
-                isinstance(n, int | float) and math.isfinite(n) for n in pose
-            ):
-                self.map.notify_modules("on_pose_told", robot, *pose)
-            return
-        log.warning("%r: an unknown message of the page was ignored", self.map)
-
-    def _robot(self, id: Any) -> "Robot | None":
-        return next((r for r in self.map.robots if r.id == id), None)
+        elif isinstance(message.get("told"), dict):
+            told = robot_and_pose(self.map, message["told"])
+            if told is not None:
+                self.map.notify_modules("on_pose_told", *told)
+        else:
+            log.warning("%r: an unknown message of the page was ignored", self.map)
 
     def _tell_doubt(self, id: Any) -> None:
-        robot = self._robot(id)
+        robot = self.map.find_robot(id)
         spec = robot.motion.spec() if robot is not None else None
         if robot is None or spec is None or spec.pose_topic is None:
             self.half.send({"doubt": None})

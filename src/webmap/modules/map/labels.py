@@ -15,6 +15,7 @@ from webmap.core.labels import (
     new_label,
     read_labels,
 )
+from webmap.core.robot_and_pose import robot_and_pose
 from webmap.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -88,7 +89,9 @@ class Labels:
         """Add a label, move or take one away, or note where a robot was sent."""
         try:
             if "goal" in message:
-                self._note_goal(message["goal"])
+                sent = robot_and_pose(self.map, message["goal"])
+                if sent is not None:
+                    self.map.notify_modules("on_goal_sent", *sent)
             elif not self.may_edit:
                 raise ConfigError("only an operator adds, moves and deletes labels")
             elif "add" in message:
@@ -102,13 +105,3 @@ class Labels:
                 self.half.send({"done": True})
         except ConfigError as error:
             self.half.send({"refused": str(error)})
-
-    def _note_goal(self, goal: Any) -> None:
-        if not isinstance(goal, dict):
-            return
-        pose = [goal.get(name) for name in ("x", "y", "yaw")]
-        for robot in self.map.robots:
-            if robot.id == goal.get("robot") and all(
-                isinstance(number, int | float) for number in pose
-            ):
-                self.map.notify_modules("on_goal_sent", robot, *pose)
