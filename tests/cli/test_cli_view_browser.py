@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import pytest
 from cli_simulator import simulator
 from playwright.sync_api import expect
+from websockets.sync.client import connect
 
 from real_browser import Complaints
 
@@ -52,6 +53,38 @@ def test_everything_that_is_found_is_on_the_page(chromium, ros1):
         expect_two_robots_on_their_map(page)
         names = page.locator("#robots .row .name").all_inner_texts()
         assert names == ["robot_0", "robot_1"]
+
+
+def test_a_robot_that_is_told_has_all_that_is_in_its_namespace(chromium, ros1):
+    told = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
+    with shown(chromium, "view", ros1, "--robot", told) as page:
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(1, timeout=15_000)
+        for drawn in (
+            ".occupancy-grid.map image",
+            ".occupancy-grid.costmap image",
+            ".robot .pointcloud",
+            ".robot .path",
+        ):
+            expect(page.locator(drawn).first).to_be_attached(timeout=15_000)
+        assert page.locator("#robots .row .name").all_inner_texts() == ["Bob"]
+        assert page.locator(".laserscan").count() == 0, "it was told to have none"
+
+
+def test_a_list_of_topics_says_what_is_drawn_where_there_is_no_rosapi(
+    chromium, tmp_path
+):
+    listed = tmp_path / "topics.txt"
+    listed.write_text(
+        "/odom nav_msgs/msg/Odometry\n"
+        "/local_costmap/costmap nav_msgs/msg/OccupancyGrid\n"
+    )
+    with simulator("--port", "0", "--dialect", "ros2", "--flat") as url:
+        with connect(url, proxy=None) as other:  # as ROS 2 has it, this ends rosapi
+            other.send('{"op":"call_service","service":"/rosapi/message_details",'
+                       '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
+        with shown(chromium, "view", url, "--topics", str(listed)) as page:
+            costmap = page.locator(".occupancy-grid.costmap image")
+            expect(costmap).to_have_count(1, timeout=15_000)
 
 
 def test_a_bridge_that_comes_later_brings_its_robots_to_the_open_page(chromium):

@@ -1,14 +1,16 @@
-"""What else is drawn of robots that were found: all that their topics offer."""
+"""What else is drawn of robots that were found or told: all their topics offer."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 import click
 
 from webmap.cli.draw_layer import draw_layer, meant
 from webmap.cli.looking import Looking
 from webmap.cli.overruling import Overruling
-from webmap.discovery import FoundRobot, discover
+from webmap.cli.told import Offer, offer
+from webmap.console import RobotDescription
+from webmap.discovery import Findings, FoundRobot, discover
 from webmap.discovery.late_frames import late_frames
 from webmap.discovery.layers import FoundLayer
 from webmap.discovery.robots import host_name
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 SOON, LATER = 1.0, 15.0
 """Seconds between two looks: until something was found, and from then on."""
 
+Told: TypeAlias = "Sequence[tuple[RobotDescription, Robot]]"
+"""Robots that were told by hand, as they were told and as they are shown."""
+
 _services: list[object] = []
 """What runs as long as the process does; nobody else holds it."""
 
@@ -31,6 +36,8 @@ def draw_layers(
     overruling: Overruling | None = None,
     *,
     console: "Console | None" = None,
+    told: Told = (),
+    topics: Mapping[str, str] | None = None,
 ) -> None:
     """Draw, as long as the process runs, what the robots of bridges offer.
 
@@ -39,10 +46,15 @@ def draw_layers(
         robots: The robots that are shown; more may come.
         overruling: What was said of robots better than it is guessed.
         console: Where maps are shown; none are without it.
+        told: Those that were told by hand, of which more is drawn than was told.
+        topics: Types by topic, where a bridge cannot be asked for them.
 
     """
     said = overruling or Overruling()
-    _services.extend(DrawnLayers(bridge, robots, said, console) for bridge in bridges)
+    _services.extend(
+        DrawnLayers(bridge, robots, said, console, told=told, topics=topics)
+        for bridge in bridges
+    )
 
 
 class DrawnLayers(Looking):
@@ -53,6 +65,8 @@ class DrawnLayers(Looking):
         robots: The robots that are shown; more may come.
         overruling: What was said of robots better than it is guessed.
         console: Where maps are shown; none are without it.
+        told: Those that were told by hand, of which more is drawn than was told.
+        topics: Types by topic, where the bridge cannot be asked for them.
 
     """
 
@@ -62,9 +76,13 @@ class DrawnLayers(Looking):
         robots: Sequence["Robot"],
         overruling: Overruling,
         console: "Console | None" = None,
+        *,
+        told: Told = (),
+        topics: Mapping[str, str] | None = None,
     ) -> None:
-        super().__init__(bridge)
+        super().__init__(bridge, topics)
         self._console = console
+        self._told = [pair for pair in told if pair[0].bridge is bridge]
         self._robots = robots
         self._overruling = overruling
         self._drawn: set[tuple[int, str]] = set()
@@ -76,8 +94,11 @@ class DrawnLayers(Looking):
 
     async def take(self, topics: dict[str, str]) -> None:
         """Draw what is new among the topics behind the bridge."""
-        trees = late_frames(self.bridge).trees
-        behind = discover(topics, host_name(self.bridge.url), trees)
+        frames = late_frames(self.bridge)
+        if any(robot.tf is None for _, robot in self._told):
+            await frames.listen(topics)
+        behind = discover(topics, host_name(self.bridge.url), frames.trees)
+        self._take_told(topics, behind)
         said = self._overruling
         for guessed in behind.robots:
             one = said.apply(self.bridge.url, guessed, behind.dialect)
@@ -86,14 +107,43 @@ class DrawnLayers(Looking):
                 continue
             fixed = said.fixed(self.bridge.url, guessed)
             space = guessed.namespace
-            for layer in meant(behind.layers[space], guessed, fixed):
-                if self._is_new(robot, layer):
-                    draw_layer(robot, self.bridge, layer, space, self._console)
+            layers = meant(behind.layers[space], guessed, fixed)
+            self._draw(robot, layers, space)
             self._say(robot, behind.left_out[space])
-            if (id(robot), "") not in self._drawn:
-                self._drawn.add((id(robot), ""))
-                with no_scope():
-                    robot.add_module("Trail", length=10.0)
+
+    def _take_told(self, topics: dict[str, str], behind: Findings) -> None:
+        """Draw what is new of the robots that were told by hand."""
+        taken: set[str] = set()
+        for about, robot in self._told:
+            offered = offer(about, topics, behind)
+            if offered.namespace in taken:  # what is in it is drawn once
+                continue
+            taken.add(offered.namespace)
+            self._place(about, robot, offered)
+            self._draw(robot, offered.layers, offered.namespace)
+            self._say(robot, offered.left_out)
+
+    def _place(self, about: RobotDescription, robot: "Robot", offered: Offer) -> None:
+        """Draw a robot in the frame of the map, as one that was found is."""
+        found = offered.found
+        if found is None or found.tf_namespace is None or not about.odometry:
+            return
+        if robot.tf is None:
+            options = {**found.tf_options, "quiet": True}
+            options.pop("map_frame", None)
+            with no_scope():
+                robot.set_tf(self.bridge, **options)
+
+    def _draw(
+        self, robot: "Robot", layers: Sequence[FoundLayer], namespace: str
+    ) -> None:
+        for layer in layers:
+            if self._is_new(robot, layer):
+                draw_layer(robot, self.bridge, layer, namespace, self._console)
+        if (id(robot), "") not in self._drawn:
+            self._drawn.add((id(robot), ""))
+            with no_scope():
+                robot.add_module("Trail", length=10.0)
 
     def _shown(self, found: FoundRobot) -> "Robot | None":
         """Return the robot that is shown for one that was found."""

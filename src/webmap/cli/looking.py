@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from webmap.errors import BridgeError
@@ -22,11 +23,15 @@ class Looking(ABC):
 
     Args:
         bridge: The bridge.
+        known: Types by topic, where the bridge cannot be asked for them.
 
     """
 
-    def __init__(self, bridge: "Bridge") -> None:
+    def __init__(
+        self, bridge: "Bridge", known: Mapping[str, str] | None = None
+    ) -> None:
         self.bridge = bridge
+        self._given = known
         self._task: asyncio.Task[None] | None = None
         lifecycle.add(self)
 
@@ -56,9 +61,14 @@ class Looking(ABC):
                 pause = self.period
             else:
                 try:
-                    await self.take(await self.bridge.topics())
+                    await self.take(await self._topics())
                     pause = self.period
                 except BridgeError as error:
                     log.debug("%s: %s", self.bridge.url, error)
                     pause = min(2 * pause, LONGEST)
             await asyncio.sleep(pause)
+
+    async def _topics(self) -> dict[str, str]:
+        if self._given is not None:
+            return dict(self._given)
+        return await self.bridge.topics()

@@ -18,6 +18,13 @@ from webmap.cli.topic_list import one_bridge, topics_option
     "behind which the robot is: 2@bob:/odom:/cmd_vel:",
 )
 @click.option(
+    "--as-told",
+    is_flag=True,
+    help="Draw of the robots of --robot no more than what is said there. Otherwise "
+    "costmaps, clouds, paths and what else is in their namespaces are drawn too, as "
+    "of robots that are found.",
+)
+@click.option(
     "--set",
     "settings",
     multiple=True,
@@ -61,6 +68,7 @@ from webmap.cli.topic_list import one_bridge, topics_option
 def view(
     url: tuple[str, ...],
     robots: tuple[str, ...],
+    as_told: bool,
     settings: tuple[str, ...],
     show: bool,
     stops_within: float | None,
@@ -119,8 +127,15 @@ def view(
     opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:
         fleet.show(opened, grid=plan is None)
-        maps = opened if plan is None else None
-        draw_layers(bridges, opened.robots, overruling, console=maps)
+    if fleet is not None or not as_told:
+        draw_layers(
+            bridges,
+            opened.robots,
+            overruling,
+            console=opened if plan is None else None,
+            told=() if as_told else list(zip(told, opened.told, strict=True)),
+            topics=topics,
+        )
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

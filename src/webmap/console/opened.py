@@ -1,6 +1,7 @@
 """The console that is open: what comes later is shown on all its pages."""
 
 import weakref
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,9 +12,16 @@ TOP = 10.0
 
 
 class Console:
-    """What is shown on every page of the console besides what it was opened with."""
+    """What is shown on every page of the console besides what it was opened with.
 
-    def __init__(self) -> None:
+    Args:
+        told: The robots that it was opened with.
+
+    """
+
+    def __init__(self, told: "Sequence[Robot]" = ()) -> None:
+        self.told = tuple(told)
+        """The robots that it was opened with, in that order."""
         self.robots: list[Robot] = []
         """The robots that were added, in that order."""
         self.grids: dict[tuple[Bridge, str], dict[str, Any]] = {}

@@ -65,7 +65,7 @@ def open_console(
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(about) for about in robots]
     remember(robots)
-    opened = Console()
+    opened = Console(fleet)
     opened.set_module("Labels", name=place_of(bridges))
 
     @webmap.page("/", html="console.html", title=title)

@@ -1,0 +1,171 @@
+"""Robots that are told by hand have what else is in their namespaces."""
+
+import asyncio
+
+import pytest
+from click.testing import CliRunner
+
+import webmap
+import webmap.console
+from webmap import Bridge
+from webmap.cli import found_layers
+from webmap.cli.found_layers import DrawnLayers
+from webmap.cli.overruling import Overruling
+from webmap.cli.told import namespace_of, offer, same_robot
+from webmap.cli.view import view
+from webmap.console import Console, RobotDescription
+from webmap.console.fleet import make_robot
+from webmap.discovery import discover
+from webmap.modules.robot.on_maps import OnMaps
+
+URL = "ws://bob:9090"
+GRID = "nav_msgs/OccupancyGrid"
+ONE = {
+    "odom": "nav_msgs/Odometry",
+    "ekf/odometry/filtered": "nav_msgs/Odometry",
+    "cmd_vel": "geometry_msgs/Twist",
+    "front/scan": "sensor_msgs/LaserScan",
+    "rear/scan": "sensor_msgs/LaserScan",
+    "local_costmap/costmap": GRID,
+    "points": "sensor_msgs/PointCloud2",
+    "plan": "nav_msgs/Path",
+    "markers": "visualization_msgs/MarkerArray",
+}
+TOPICS = {f"/{name}/{topic}": type for name in "ab" for topic, type in ONE.items()}
+TOPICS |= {"/map": GRID}
+FRAMES = {"/tf": "tf2_msgs/TFMessage"}
+
+
+@pytest.fixture
+def bridge():
+    return Bridge(URL)
+
+
+def described(bridge, name="Bob", **topics):
+    return RobotDescription(name=name, bridge=bridge, **topics)
+
+
+def drawn(bridge, topics, *told):
+    """Draw what is behind a bridge of robots that were told; return all of it."""
+    console = Console([make_robot(about) for about in told])
+    pairs = list(zip(told, console.told, strict=True))
+    layers = DrawnLayers(bridge, console.robots, Overruling(), console, told=pairs)
+    asyncio.run(layers.take(topics))
+    return console
+
+
+def what_of(robot):
+    made = []
+    for module in robot.modules:
+        if isinstance(module, OnMaps):
+            made.append((module.module, module._arguments[0][1]))
+        elif getattr(module, "topic", None):
+            made.append((type(module).__name__, module.topic))
+    return sorted(made)
+
+
+def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
+    told = described(
+        bridge, odometry="/a/odom", twist="/a/cmd_vel", scan="/a/rear/scan"
+    )
+    console = drawn(bridge, TOPICS, told)
+    (robot,) = console.told
+    assert what_of(robot) == [
+        ("LaserScanner", "/a/rear/scan"),
+        ("Markers", "/a/markers"),
+        ("OccupancyGrid", "/a/local_costmap/costmap"),
+        ("Path", "/a/plan"),
+        ("PointCloud", "/a/points"),
+    ]
+    assert [type(module).__name__ for module in robot.modules].count("Trail") == 1
+    assert list(console.grids) == [(bridge, "/map")]
+    assert robot.feed.topic == "/a/odom", "its odometry is as it was told"
+    robot.destroy()
+
+
+@pytest.mark.parametrize(("said", "drawn_of"), [([], ["Bob"]), (["--as-told"], [])])
+def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
+    asked = []
+
+    def draw_layers(bridges, robots, overruling, *, told, **options):
+        asked.extend(robot.name for _, robot in told)
+
+    def open_console(bridges, told, floor):
+        return Console([make_robot(about) for about in told])
+
+    monkeypatch.setattr(webmap.console, "open_console", open_console)
+    monkeypatch.setattr(webmap, "run", lambda **options: None)
+    monkeypatch.setattr(found_layers, "draw_layers", draw_layers)
+    done = CliRunner().invoke(view, [URL, "--robot", "Bob:/a/odom", *said])
+    assert (done.exit_code, asked) == (0, drawn_of)
+
+
+def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(bridge):
+    placed = described(bridge, odometry="/a/odom")
+    nowhere = described(bridge, name="b", twist="/b/cmd_vel")
+    console = drawn(bridge, TOPICS | FRAMES, placed, nowhere)
+    one, other = console.told
+    assert (one.tf["map_frame"], one.tf["quiet"]) == ("map", True)
+    assert other.tf is None, "without odometry it was to be nowhere"
+    one.destroy()
+    other.destroy()
+
+
+def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge):
+    topics = TOPICS | {"/c/where": "geometry_msgs/Pose", "/c/plan": "nav_msgs/Path"}
+    told = described(bridge, odometry="/c/where")
+    assert offer(told, topics, discover(topics)).found is None
+    console = drawn(bridge, topics, told)
+    assert what_of(console.told[0]) == [("Path", "/c/plan")]
+    console.told[0].destroy()
+
+
+def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge):
+    first = described(bridge, name="Al", odometry="/a/odom")
+    second = described(bridge, name="Bo", odometry="/a/ekf/odometry/filtered")
+    console = drawn(bridge, TOPICS, first, second)
+    assert [len(what_of(robot)) for robot in console.told] == [4, 0]
+    for robot in console.told:
+        robot.destroy()
+
+
+def test_robots_behind_another_bridge_are_left_alone(bridge):
+    elsewhere = described(Bridge("ws://al:9090"), odometry="/a/odom")
+    console = drawn(bridge, TOPICS, elsewhere)
+    assert what_of(console.told[0]) == []
+    assert console.grids == {}
+    console.told[0].destroy()
+
+
+@pytest.mark.parametrize(
+    ("told", "namespace"),
+    [
+        ({"odometry": "/a/ekf/odometry/filtered"}, "/a"),  # not the best of its role
+        ({"odometry": "a/odom/"}, "/a"),
+        ({"twist": "/b/cmd_vel"}, "/b"),
+        ({"name": "b", "scan": "/scan"}, "/b"),
+        ({"scan": "/a/front/scan"}, None),
+        ({"odometry": "/none of a topic"}, None),
+    ],
+)
+def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
+    bridge, told, namespace
+):
+    found = same_robot(described(bridge, **told), discover(TOPICS).robots)
+    assert (None if found is None else found.namespace) == namespace
+
+
+@pytest.mark.parametrize(
+    ("told", "namespace"),
+    [
+        ({"odometry": "/c/odom", "twist": "/c/cmd_vel", "scan": "/c/scan"}, "/c"),
+        ({"odometry": "/c/base/odom", "twist": "/c/cmd_vel"}, "/c"),
+        ({"odometry": "/c/platform/odom"}, "/c"),
+        ({"odometry": "/c/odom", "twist": "/d/cmd_vel"}, ""),
+        ({"odometry": "/odom", "twist": "/c/cmd_vel"}, ""),
+    ],
+)
+def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
+    bridge, told, namespace
+):
+    assert namespace_of(described(bridge, **told)) == namespace
