@@ -4,6 +4,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
+from webmap.core.dots import in_units
 from webmap.core.from_above import levelled
 from webmap.core.layer_names import label
 from webmap.core.placed import Placed
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
     from webmap.geometry import Pose
     from webmap.tf import Transform
-
-UNIT = 0.001
-"""Metres per unit of the dots on the wire, as long as they fit in 16 bits."""
 
 AGE_LIMIT = 1.0
 """Seconds after which a scan is drawn as old."""
@@ -138,11 +136,7 @@ class LaserScanner:
 
     def _draw(self, points: "NDArray[np.float64]", tilt: "Transform") -> None:
         points, _ = levelled(points, tilt)
-        unit = UNIT
-        if len(points):
-            reach = float(abs(points).max())
-            unit = max(UNIT, reach / 32767)
-        dots = (points / unit).round().astype("<i2")
+        dots, unit = in_units(points)
         self._dots.set_dots(dots.tobytes(), unit)
 
 

@@ -4,6 +4,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING
 
+from webmap.core.dots import in_units
 from webmap.core.from_above import levelled
 from webmap.core.layer_names import label
 from webmap.core.placed import Placed
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
 
     from webmap.core.robot import Robot
     from webmap.tf import Transform
-
-UNIT = 0.001
-"""Metres per unit of the dots on the wire, as long as they fit in 16 bits."""
 
 MANY = 100_000
 """Points of which no more are looked at one by one."""
@@ -193,16 +191,15 @@ class PointCloud:
         chosen = self._choose(places, heights if points.shape[1] == 3 else None)
         places = places[chosen]
         bands = None if values is None else self._bands(values[chosen])
-        center, unit = (0.0, 0.0), UNIT
+        center = (0.0, 0.0)
         if len(places):
             middle = (places.min(axis=0) + places.max(axis=0)) / 2
             center = (float(round(middle[0])), float(round(middle[1])))
             places = places - center
-            unit = max(UNIT, float(abs(places).max()) / 32767)
-        packed = (places / unit).round().astype("<i2")
+        dots, unit = in_units(places)
         for number, path in enumerate(self.dots):
             path.set_pose(*center, 0.0)
-            mine = packed if bands is None else packed[bands == number]
+            mine = dots if bands is None else dots[bands == number]
             path.set_dots(mine.tobytes(), unit)
 
     def _choose(
