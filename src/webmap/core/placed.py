@@ -184,8 +184,8 @@ class Placed:
     def _say(self, found: Sighting) -> None:
         """Say what is wrong with the place, once; take it back when that is mended."""
         tf = self.robot.tf if found.trouble else None
-        frames = tf and frames_of(tf["bridge"], tf["namespace"])
-        trouble = self._lasting.look(found.trouble, frames or None)
+        frames = None if tf is None else frames_of(tf["bridge"], tf["namespace"])
+        trouble = self._lasting.look(found.trouble, frames)
         if trouble == self._trouble:
             return
         self._trouble = trouble

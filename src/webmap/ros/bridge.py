@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.errors import BridgeClosed, BridgeError
+from webmap.errors import BridgeClosed, BridgeError, ProtocolError
 from webmap.lifecycle import lifecycle
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.calls import Calls
@@ -346,9 +346,7 @@ class Bridge:
             self.stats.malformed += 1
             said = self._trouble.malformed(event)
             if said is not None:
-                # It belongs to no topic, so it is told to one of those who listen.
-                listeners = (one for t in self._topics.values() for one in t.listeners)
-                any(listener.mention(said) for listener in listeners)
+                self._mention(said)
         elif isinstance(event, Status) and event.level == "error":
             error = BridgeError(f"{self.name} says: {event.msg}")
             log.warning("%s", error)
@@ -357,3 +355,10 @@ class Bridge:
             answer = "this client offers no services"
             id = None if event.id is None else str(event.id)
             self._send(service_response(event.service, answer, id=id, result=False))
+
+    def _mention(self, fault: ProtocolError) -> None:
+        """Tell one of those who subscribed of what belongs to no topic."""
+        for topic in self._topics.values():
+            for listener in topic.listeners:
+                if listener.mention(fault):
+                    return
