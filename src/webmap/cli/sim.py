@@ -86,6 +86,12 @@ from webmap.cli.options import PORT, verbose_option
     is_flag=True,
     help="A rosbridge that says what is wrong; real ones are silent.",
 )
+@click.option(
+    "--http-camera",
+    type=PORT,
+    help="Serve the cameras over HTTP too, as web_video_server does, on this port; 0 "
+    "lets the system choose.",
+)
 @click.option("--with-parent", is_flag=True, hidden=True)
 @verbose_option
 def sim(
@@ -103,6 +109,7 @@ def sim(
     extras: bool,
     tilted: bool,
     polite: bool,
+    http_camera: int | None,
     with_parent: bool,
 ) -> None:
     """Simulate robots with laser scanners, behind a rosbridge.
@@ -131,6 +138,8 @@ def sim(
             extras=extras,
             tilted=tilted,
             quirks="polite" if polite else "real",
+            http_camera=http_camera,
+            on_http_camera=lambda url: click.echo(f"cameras are at {url}", err=True),
             on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),
         )
     )

@@ -27,11 +27,17 @@ async def _run(options: dict[str, Any]) -> None:
     stop = asyncio.Event()
     if options.pop("until_eof"):
         end_with_stdin(stop)
-    await run_simulator(**options, on_ready=_say_ready, stop=stop)
+    await run_simulator(
+        **options, on_http_camera=_say_cameras, on_ready=_say_ready, stop=stop
+    )
 
 
 def _say_ready(url: str) -> None:
     print(f"rosbridge is ready at {url}", flush=True)
+
+
+def _say_cameras(url: str) -> None:
+    print(f"cameras are at {url}", file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -73,6 +79,12 @@ def _parser() -> argparse.ArgumentParser:
         dest="refuse_nan",
         action="store_false",
         help="bases that run on a twist with NaN or infinity",
+    )
+    add(
+        "--http-camera",
+        type=int,
+        metavar="PORT",
+        help="the cameras over HTTP too, as web_video_server has them",
     )
     add("--until-eof", action="store_true", help="end when standard input ends")
     return parser

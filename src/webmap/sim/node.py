@@ -20,8 +20,11 @@ from webmap.sim.world import World
 log = logging.getLogger(__name__)
 
 NODE = "/robots"
-CAMERA = "camera/image_raw/compressed"
-"""The camera's topic, below the robot's."""
+IMAGE = "camera/image_raw"
+"""What the camera's image is called, below the robot's name."""
+
+CAMERA = f"{IMAGE}/compressed"
+"""The topic of its pictures, which come as JPEG only."""
 
 STEP = 0.025
 """Seconds of one step of the world."""

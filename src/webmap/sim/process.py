@@ -38,6 +38,8 @@ async def run_simulator(
     tilted: bool = False,
     host: str = "127.0.0.1",
     refuse_nan: bool = True,
+    http_camera: int | None = None,
+    on_http_camera: Callable[[str], None] | None = None,
     on_ready: Callable[[str], None] | None = None,
     stop: asyncio.Event | None = None,
 ) -> None:
@@ -65,6 +67,10 @@ async def run_simulator(
             depth camera whose cloud is in its optical frame.
         host: The address to listen on.
         refuse_nan: Whether the bases ignore a twist with NaN or infinity.
+        http_camera: Port of the cameras over HTTP, as web_video_server has them; 0
+            lets the kernel choose, None for no such server.
+        on_http_camera: Called with the URL of the first robot's stream, before
+            ``on_ready``.
         on_ready: Called with the URL once clients can connect.
         stop: Ends the run when it is set.
 
@@ -75,7 +81,7 @@ async def run_simulator(
     """
     # Heavy, and needed by nobody who only imports the name.
     from webmap.sim.maps import FLOOR, load_map
-    from webmap.sim.node import RobotsNode
+    from webmap.sim.node import IMAGE, RobotsNode
     from webmap.sim.robot import BaseOptions
     from webmap.sim.rosbridge.dialect import Dialect
     from webmap.sim.rosbridge.encode import Encoder
@@ -85,6 +91,7 @@ async def run_simulator(
     from webmap.sim.rosbridge.schema import Schema
     from webmap.sim.rosbridge.server import RosbridgeServer
     from webmap.sim.scanner import ScannerOptions
+    from webmap.sim.web_video import WebVideoServer
     from webmap.sim.world import World, WorldOptions
 
     _check(robots, dialect, twist, robot_timeout)
@@ -107,14 +114,20 @@ async def run_simulator(
     node.start()
     server = RosbridgeServer(graph, Encoder(schema, behaviour))
     stop = stop or asyncio.Event()
-    with signals_set(stop):
+    async with contextlib.AsyncExitStack() as running:
+        running.enter_context(signals_set(stop))
+        if http_camera is not None:
+            video = WebVideoServer(graph)
+            running.push_async_callback(video.stop)
+            url = await video.start(host, http_camera)
+            if on_http_camera:
+                topic = f"{world.robots[0].topics}/{IMAGE}"
+                on_http_camera(f"{url}/stream?topic={topic}&type=mjpeg")
+        running.push_async_callback(server.stop)
         url = await server.start(host, port)
-        try:
-            if on_ready:
-                on_ready(url)
-            await _turn_the_clock(node, stop)
-        finally:
-            await server.stop()
+        if on_ready:
+            on_ready(url)
+        await _turn_the_clock(node, stop)
 
 
 def _check(robots: int, dialect: str, twist: str, robot_timeout: float | None) -> None:

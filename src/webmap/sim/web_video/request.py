@@ -1,0 +1,121 @@
+"""What a client of the cameras asks for, as it stands in its request. No I/O."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+from urllib.parse import parse_qsl, urlsplit
+
+from webmap.sim.rosbridge.dialect import resolve
+from webmap.sim.web_video.form import MOST_SIDE, Form
+
+EXAMPLE = "/stream?topic=/robot_0/camera/image_raw&type=mjpeg"
+
+_PATHS: dict[str, Literal["list", "stream", "snapshot"]] = {
+    "/": "list",
+    "/stream": "stream",
+    "/snapshot": "snapshot",
+}
+_TYPES = ("mjpeg", "ros_compressed")
+_MOST_PARAMETERS = 32
+_SHOWN = 80
+
+
+class Refusal(Exception):
+    """A request that is refused, with the status and the words of the answer."""
+
+    def __init__(self, status: int, words: str) -> None:
+        super().__init__(words)
+        self.status = status
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked for."""
+
+    what: Literal["list", "stream", "snapshot"]
+    topic: str = ""
+    """Of ``sensor_msgs/Image``, as web_video_server has it."""
+    form: Form = field(default_factory=Form)
+
+
+def read_request(head: bytes) -> Request:
+    """Return what the head of an HTTP request asks for.
+
+    The parameters are those of web_video_server: ``topic``, ``type``, ``quality``,
+    ``width``, ``height`` and ``invert``. As there, others are passed over.
+
+    Args:
+        head: All up to the blank line.
+
+    Raises:
+        Refusal: If it is no such request.
+
+    """
+    line = head.decode("latin-1").partition("\n")[0].rstrip("\r")
+    words = line.split(" ")
+    if len(words) != 3 or not words[2].startswith("HTTP/1."):
+        raise Refusal(
+            400, f"{_plain(line)} is no request of HTTP/1.0 or 1.1, as GET / HTTP/1.1"
+        )
+    method, target, _ = words
+    if method != "GET":
+        raise Refusal(405, f"pictures are asked for with GET, got {_plain(method)}")
+    try:
+        parts = urlsplit(target)
+        said = dict(
+            reversed(  # of two, the first counts
+                parse_qsl(
+                    parts.query,
+                    keep_blank_values=True,
+                    max_num_fields=_MOST_PARAMETERS,
+                )
+            )
+        )
+    except ValueError:
+        raise Refusal(
+            400, f"{_plain(target)} is no address with parameters, as {EXAMPLE}"
+        ) from None
+    what = _PATHS.get(parts.path)
+    if what is None:
+        raise Refusal(
+            404,
+            f"there is nothing at {_plain(parts.path)}; there are / with a list of the "
+            "cameras, /stream?topic=... and /snapshot?topic=...",
+        )
+    if what == "list":
+        return Request(what)
+    if not said.get("topic", "").strip("/"):
+        raise Refusal(400, f"the topic of the camera is missing, as in {EXAMPLE}")
+    kind = said.get("type", "mjpeg")
+    if what == "stream" and kind not in _TYPES:
+        raise Refusal(
+            400, f"type must be {' or '.join(_TYPES)} here, got {_plain(kind)}"
+        )
+    # What ros_compressed streams is what the camera's topic has, as it is.
+    as_it_is = what == "stream" and kind == "ros_compressed"
+    return Request(what, resolve(said["topic"]), Form() if as_it_is else _form(said))
+
+
+def _form(said: Mapping[str, str]) -> Form:
+    return Form(
+        quality=_number(said, "quality", 100),
+        width=_number(said, "width", MOST_SIDE),
+        height=_number(said, "height", MOST_SIDE),
+        inverted="invert" in said,
+    )
+
+
+def _number(said: Mapping[str, str], name: str, most: int) -> int | None:
+    text = said.get(name)
+    if text is None or text == "-1":  # -1 is web_video_server's word for "as it is"
+        return None
+    if text.isascii() and text.isdigit() and len(text) < 6 and 1 <= int(text) <= most:
+        return int(text)
+    raise Refusal(
+        400, f"{name} must be a whole number from 1 to {most}, got {_plain(text)}"
+    )
+
+
+def _plain(text: str) -> str:
+    cut = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+    return repr("".join(c if c.isprintable() else "?" for c in cut))

@@ -1,0 +1,239 @@
+"""The shell around it: HTTP connections, none of which holds another up."""
+
+import asyncio
+import contextlib
+import html
+import logging
+import socket
+from urllib.parse import quote
+
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.web_video.feed import NewestPicture, image_topics
+from webmap.sim.web_video.form import NoPicture
+from webmap.sim.web_video.request import Refusal, Request, read_request
+
+log = logging.getLogger(__name__)
+
+MOST_CONNECTIONS = 64
+MOST_HEAD = 8192
+"""Bytes of a request, at the most."""
+
+PATIENCE = 5.0
+"""Seconds for a request to come, for a first picture, and for one to be taken."""
+
+_BOUNDARY = "boundarydonotcross"
+_SEND_BUFFER = 1 << 14
+_REASONS = {
+    200: "OK",
+    400: "Bad Request",
+    404: "Not Found",
+    405: "Method Not Allowed",
+    408: "Request Timeout",
+    431: "Request Header Fields Too Large",
+    503: "Service Unavailable",
+}
+_NEVER_KEPT = "Cache-Control: no-cache, no-store, must-revalidate\r\nPragma: no-cache"
+
+
+class WebVideoServer:
+    """Answers ``/stream`` and ``/snapshot`` from the camera topics of a graph.
+
+    A client that reads slowly misses pictures and gets the newest one next; one that
+    reads nothing is let go. Pictures are worked out only while somebody asks.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self._clients: set[asyncio.Task[None]] = set()
+        self._server: asyncio.Server | None = None
+
+    async def start(self, host: str, port: int) -> str:
+        """Listen, and return the URL, without a path.
+
+        Raises:
+            OSError: If the port is in use or the host is not this machine's.
+
+        """
+        self._server = await asyncio.start_server(
+            self._serve_client, host, port, limit=MOST_HEAD
+        )
+        bound = self._server.sockets[0].getsockname()[1]
+        name = f"[{host}]" if ":" in host else host
+        return f"http://{name}:{bound}"
+
+    async def stop(self) -> None:
+        """Close every connection and stop listening."""
+        if self._server:
+            self._server.close()
+        clients = list(self._clients)
+        for client in clients:
+            client.cancel()
+        await asyncio.gather(*clients, return_exceptions=True)
+
+    async def _serve_client(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._clients.add(task)
+        try:
+            with contextlib.suppress(OSError, TimeoutError):
+                await self._answer(reader, writer)
+                async with asyncio.timeout(PATIENCE):
+                    writer.write_eof()
+                    # Closed with something unread, its end would lose the answer.
+                    while await reader.read(MOST_HEAD):
+                        pass
+        except asyncio.CancelledError:
+            pass  # by ``stop``; the server would take it for a failure
+        finally:
+            self._clients.discard(task)
+            writer.transport.abort()
+
+    async def _answer(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        # Whatever lies in buffers when the next picture comes is the past.
+        writer.get_extra_info("socket").setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER
+        )
+        writer.transport.set_write_buffer_limits(high=0)
+        try:
+            request = await self._read(reader)
+            if request.what == "stream":
+                await self._stream(request, reader, writer)
+            elif request.what == "snapshot":
+                await self._send_snapshot(request, writer)
+            else:
+                await _send(writer, 200, "text/html; charset=utf-8", self._list())
+        except Refusal as refusal:
+            words = f"{refusal}\n".encode()
+            await _send(writer, refusal.status, "text/plain; charset=utf-8", words)
+
+    async def _read(self, reader: asyncio.StreamReader) -> Request:
+        if len(self._clients) > MOST_CONNECTIONS:
+            raise Refusal(
+                503, f"{MOST_CONNECTIONS} clients have the cameras; end one of them"
+            )
+        try:
+            async with asyncio.timeout(PATIENCE):
+                head = await reader.readuntil(b"\r\n\r\n")
+        except TimeoutError:
+            raise Refusal(408, f"no whole request came within {PATIENCE:g} s") from None
+        except asyncio.LimitOverrunError:
+            raise Refusal(431, f"a request has {MOST_HEAD} bytes at the most") from None
+        except asyncio.IncompleteReadError:
+            raise ConnectionError("hung up before the end of a request") from None
+        request = read_request(head)
+        known = image_topics(self.graph)
+        if request.what != "list" and request.topic not in known:
+            raise Refusal(
+                404,
+                f"there is no camera on {request.topic!r:.200}; there are: "
+                f"{', '.join(known) or 'none'}",
+            )
+        return request
+
+    async def _send_snapshot(
+        self, request: Request, writer: asyncio.StreamWriter
+    ) -> None:
+        newest = NewestPicture(self.graph, request.topic)
+        try:
+            async with asyncio.timeout(PATIENCE):
+                picture, stamp = await _next(newest, request)
+        except TimeoutError:
+            raise Refusal(
+                503, f"no picture came on {request.topic} for {PATIENCE:g} s"
+            ) from None
+        finally:
+            newest.close()
+        await _send(writer, 200, "image/jpeg", picture, f"X-Timestamp: {stamp:.6f}")
+
+    async def _stream(
+        self,
+        request: Request,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        newest = NewestPicture(self.graph, request.topic)
+        # A client that hangs up while no picture comes would not be noticed else.
+        sends = asyncio.create_task(_send_stream(newest, request, writer))
+        ends = asyncio.create_task(_end_of(reader))
+        try:
+            await asyncio.wait([sends, ends], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            newest.close()
+            for task in (sends, ends):
+                task.cancel()
+            await asyncio.gather(sends, ends, return_exceptions=True)
+        writer.transport.abort()
+        if not sends.cancelled():
+            sends.result()
+
+    def _list(self) -> bytes:
+        rows = "".join(
+            f"<li>{html.escape(topic)}"
+            f" <a href='/stream?topic={quote(topic)}&amp;type=mjpeg'>stream</a>"
+            f" <a href='/snapshot?topic={quote(topic)}'>snapshot</a></li>\n"
+            for topic in image_topics(self.graph)
+        )
+        return (
+            "<!DOCTYPE html>\n<html lang='en'><title>Cameras</title>\n"
+            f"<h1>Cameras</h1>\n<ul>\n{rows}</ul></html>\n"
+        ).encode()
+
+
+async def _next(newest: NewestPicture, request: Request) -> tuple[bytes, float]:
+    """Return the next picture in the form that was asked for, and its stamp."""
+    while True:
+        picture, stamp = await newest.next()
+        if request.form.is_plain:
+            return picture, stamp
+        try:
+            # In a thread, as the world's clock is in this one.
+            return await asyncio.to_thread(request.form.apply, picture), stamp
+        except NoPicture as error:
+            log.warning("%s: left out a picture: %s", request.topic, error)
+
+
+async def _send_stream(
+    newest: NewestPicture, request: Request, writer: asyncio.StreamWriter
+) -> None:
+    head = (
+        f"HTTP/1.0 200 OK\r\nConnection: close\r\n{_NEVER_KEPT}\r\n"
+        f"Content-type: multipart/x-mixed-replace;boundary={_BOUNDARY}\r\n\r\n"
+        f"--{_BOUNDARY}\r\n"
+    )
+    writer.write(head.encode())
+    while True:
+        picture, stamp = await _next(newest, request)
+        part = (
+            f"Content-type: image/jpeg\r\nX-Timestamp: {stamp:.6f}\r\n"
+            f"Content-Length: {len(picture)}\r\n\r\n"
+        )
+        writer.write(part.encode() + picture + f"\r\n--{_BOUNDARY}\r\n".encode())
+        async with asyncio.timeout(PATIENCE):
+            await writer.drain()
+
+
+async def _end_of(reader: asyncio.StreamReader) -> None:
+    while await reader.read(MOST_HEAD):
+        pass
+
+
+async def _send(
+    writer: asyncio.StreamWriter, status: int, kind: str, body: bytes, more: str = ""
+) -> None:
+    lines = [
+        f"HTTP/1.0 {status} {_REASONS[status]}",
+        "Connection: close",
+        _NEVER_KEPT,
+        f"Content-type: {kind}",
+        f"Content-Length: {len(body)}",
+        "X-Content-Type-Options: nosniff",
+        *(["Allow: GET"] if status == 405 else []),
+        *([more] if more else []),
+    ]
+    writer.write("\r\n".join([*lines, "", ""]).encode() + body)
+    async with asyncio.timeout(PATIENCE):
+        await writer.drain()

@@ -1,0 +1,429 @@
+"""The simulator's cameras over HTTP, at web_video_server's addresses."""
+
+import asyncio
+import contextlib
+import io
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from PIL import Image
+from simulated import Bench
+from websockets.sync.client import connect
+
+from webmap import Robot
+from webmap.core.pictures import pictures
+from webmap.lifecycle import Lifecycle
+from webmap.modules.robot import http_camera
+from webmap.ros.image_answer import Answer
+from webmap.sim import run_simulator
+from webmap.sim.web_video import WebVideoServer, server
+from webmap.sim.web_video.form import Form, NoPicture
+from webmap.sim.web_video.request import Refusal, Request, read_request
+
+TOPIC = "/robot_0/camera/image_raw"
+STREAM = f"/stream?topic={TOPIC}&type=mjpeg"
+
+
+def asked(target):
+    return read_request(f"GET {target} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+
+
+@pytest.mark.parametrize(
+    ("target", "request_"),
+    [
+        ("/", Request("list")),
+        (STREAM, Request("stream", TOPIC)),
+        (f"/stream?topic={TOPIC}", Request("stream", TOPIC)),
+        (
+            f"/stream?topic={TOPIC}&width=-1&qos_profile=sensor",
+            Request("stream", TOPIC),
+        ),
+        (f"/stream?topic={TOPIC[1:]}&topic=/b", Request("stream", TOPIC)),
+        (f"/snapshot?topic={TOPIC.replace('/', '%2F')}", Request("snapshot", TOPIC)),
+        (
+            f"/snapshot?topic={TOPIC}&quality=7&width=64&height=48&invert",
+            Request("snapshot", TOPIC, Form(7, 64, 48, inverted=True)),
+        ),
+        (
+            f"/stream?topic={TOPIC}&type=ros_compressed&quality=7",
+            Request("stream", TOPIC),
+        ),
+    ],
+)
+def test_the_addresses_are_those_of_web_video_server(target, request_):
+    assert asked(target) == request_
+
+
+@pytest.mark.parametrize(
+    ("target", "status", "said"),
+    [
+        ("/stream", 400, "the topic of the camera is missing, as in /stream?topic="),
+        ("/snapshot?topic=/", 400, "the topic of the camera is missing"),
+        (
+            f"{STREAM[:-5]}vp8",
+            400,
+            "type must be mjpeg or ros_compressed here, got 'vp8'",
+        ),
+        (f"{STREAM}&quality=101", 400, "quality must be a whole number from 1 to 100"),
+        (f"{STREAM}&quality=", 400, "from 1 to 100, got ''"),
+        (f"{STREAM}&width=0", 400, "width must be a whole number from 1 to 4096"),
+        (f"{STREAM}&height=99999999999", 400, "height must be a whole number"),
+        (f"{STREAM}&height=²", 400, "height must be a whole number"),
+        (f"{STREAM}{'&a=b' * 40}", 400, "no address with parameters"),
+        ("http://[", 400, "no address with parameters"),
+        ("/stream_viewer", 404, "there is nothing at '/stream_viewer'; there are /"),
+        ("/../etc/passwd", 404, "there is nothing at"),
+    ],
+)
+def test_what_is_asked_wrongly_is_refused_in_words(target, status, said):
+    with pytest.raises(Refusal) as refused:
+        asked(target)
+    assert refused.value.status == status
+    assert said in str(refused.value)
+    assert len(str(refused.value)) < 250
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        (b"\x16\x03\x01\r\n\r\n", 400),
+        (b"GET /\r\n\r\n", 400),
+        (b"GET / HTTP/2\r\n\r\n", 400),
+        (b"POST / HTTP/1.1\r\n\r\n", 405),
+    ],
+)
+def test_what_is_no_request_for_pictures_is_refused(head, status):
+    with pytest.raises(Refusal) as refused:
+        read_request(head)
+    assert refused.value.status == status
+    assert str(refused.value).isprintable()
+
+
+def a_picture(size=(32, 20), colour=(200, 30, 30)):
+    """A JPEG that is blue in its lower half."""
+    image = Image.new("RGB", size, colour)
+    image.paste((0, 0, 255), (0, size[1] // 2, *size))
+    file = io.BytesIO()
+    image.save(file, "JPEG", quality=90)
+    return file.getvalue()
+
+
+def opened(jpeg):
+    image = Image.open(io.BytesIO(jpeg))
+    assert image.format == "JPEG"
+    return image
+
+
+def test_a_picture_takes_the_form_that_was_asked_for():
+    shown = opened(Form(width=64, height=10, inverted=True).apply(a_picture()))
+    assert shown.size == (64, 10)
+    red, _, blue = shown.getpixel((5, 1))
+    assert blue > 200 > 50 > red
+    assert opened(Form(width=64).apply(a_picture())).size == (64, 20)
+    least, most = (len(Form(quality=q).apply(a_picture())) for q in (1, 100))
+    assert least < most
+
+
+@pytest.mark.parametrize(
+    "data", [b"\xff\xd8\xff", a_picture()[:200], b"", a_picture((5000, 8))]
+)
+def test_what_cannot_be_read_is_no_picture(data):
+    with pytest.raises(NoPicture):
+        Form(quality=50).apply(data)
+
+
+class Served:
+    """A server over a graph whose cameras send what the test has them send."""
+
+    def __init__(self):
+        self.bench = Bench(robots=1)
+        self.graph = self.bench.graph
+        self.server = WebVideoServer(self.graph)
+
+    @property
+    def watchers(self):
+        return len(self.graph.topics[f"{TOPIC}/compressed"].subscribers)
+
+    def send(self, data):
+        header = self.bench.node.messages.dialect.header("", 12.5, "camera")
+        message = {"header": header, "format": "jpeg", "data": data}
+        self.bench.node.publish(f"{TOPIC}/compressed", message)
+
+    async def connect(self, target, sock=None):
+        if sock is None:
+            sock = socket.create_connection(("127.0.0.1", self.port))
+        reader, writer = await asyncio.open_connection(sock=sock)
+        writer.write(f"GET {target} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+        return reader, writer
+
+    async def answer(self, target):
+        reader, writer = await self.connect(target)
+        async with asyncio.timeout(10):
+            data = await reader.read()
+        writer.close()
+        head, _, body = data.partition(b"\r\n\r\n")
+        return head.decode(), body
+
+
+def serving(scenario):
+    async def whole():
+        served = Served()
+        url = await served.server.start("127.0.0.1", 0)
+        served.port = int(url.rpartition(":")[2])
+        try:
+            await scenario(served)
+        finally:
+            await served.server.stop()
+        assert served.watchers == 0
+        assert not served.server._clients
+
+    asyncio.run(whole())
+
+
+async def until(condition, seconds=10.0):
+    patience = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < patience, "it never came true"
+        await asyncio.sleep(0.005)
+
+
+def test_a_stream_is_read_by_the_display_as_one_and_its_end_is_noticed():
+    async def scenario(served):
+        reader, writer = await served.connect(STREAM)
+        answer, seen = Answer(), []
+        for picture in (a_picture(), a_picture(colour=(0, 255, 0))):
+            await until(lambda: served.watchers == 1)
+            served.send(picture)
+            while not (found := answer.feed(await reader.read(1 << 16))):
+                pass
+            seen += found
+            assert seen[-1] == picture
+        assert answer.streams
+        # No picture comes any more, and yet.
+        writer.close()
+        await until(lambda: served.watchers == 0)
+
+    serving(scenario)
+
+
+def test_a_snapshot_is_the_next_picture_with_its_stamp():
+    async def scenario(served):
+        asks = asyncio.create_task(served.answer(f"/snapshot?topic={TOPIC}"))
+        await until(lambda: served.watchers == 1)
+        served.bench.time = 12.5
+        served.send(a_picture())
+        head, body = await asks
+        assert head.startswith("HTTP/1.0 200 OK\r\n")
+        assert "\r\nContent-type: image/jpeg\r\n" in head
+        assert head.endswith("\r\nX-Timestamp: 12.500000")
+        assert body == a_picture()
+
+    serving(scenario)
+
+
+def test_what_a_camera_sends_that_is_no_picture_is_left_out(caplog):
+    async def scenario(served):
+        target = f"/snapshot?topic={TOPIC}&width=64"
+        asks = asyncio.create_task(served.answer(target))
+        await until(lambda: served.watchers == 1)
+        served.send(b"\x89PNG")
+        served.send(b"\xff\xd8\xff and no more")
+        await until(lambda: "left out a picture" in caplog.text)
+        served.send(a_picture())
+        assert opened((await asks)[1]).size == (64, 20)
+        assert "left out what is no JPEG" in caplog.text
+
+    serving(scenario)
+
+
+def test_a_reader_that_was_slow_gets_the_newest_picture_and_few_old_ones():
+    size, count = 20_000, 500
+
+    async def scenario(served):
+        slow = socket.socket()
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.connect(("127.0.0.1", served.port))
+        # What a stream reader takes before it pauses is what its limit says.
+        reader, writer = await asyncio.open_connection(sock=slow, limit=4096)
+        writer.write(f"GET {STREAM} HTTP/1.0\r\n\r\n".encode())
+        await until(lambda: served.watchers == 1)
+        for number in range(count):
+            served.send(b"\xff\xd8\xff" + number.to_bytes(2) + bytes(size))
+            await asyncio.sleep(0)
+        answer, numbers = Answer(), []
+        async with asyncio.timeout(10):
+            while not numbers or numbers[-1] != count - 1:
+                found = answer.feed(await reader.read(1 << 16))
+                numbers += [int.from_bytes(picture[3:5]) for picture in found]
+        assert len(numbers) < 20
+        writer.close()
+
+    serving(scenario)
+
+
+def test_a_reader_that_takes_nothing_is_let_go(monkeypatch):
+    monkeypatch.setattr(server, "PATIENCE", 0.05)
+
+    async def scenario(served):
+        stuck = socket.socket()
+        stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        stuck.connect(("127.0.0.1", served.port))
+        stuck.sendall(f"GET {STREAM} HTTP/1.0\r\n\r\n".encode())
+        await until(lambda: served.watchers == 1)
+        served.send(b"\xff\xd8\xff" + bytes(1 << 20))
+        await until(lambda: served.watchers == 0)
+        stuck.close()
+
+    serving(scenario)
+
+
+@pytest.mark.parametrize(
+    ("sent", "status", "said"),
+    [
+        (b"GET /stream HTTP/1.1\r\n\r\n", 400, "the topic of the camera is missing"),
+        (b"PUT / HTTP/1.1\r\n\r\n", 405, "asked for with GET, got 'PUT'"),
+        (b"GET /" + b"x" * 100_000, 431, "8192 bytes at the most"),
+        (b"GET / HTTP/1.1\r\n", 408, "no whole request came within 0.1 s"),
+        (
+            b"GET /stream?topic=/robot_7/camera/image_raw HTTP/1.0\r\n\r\n",
+            404,
+            f"no camera on '/robot_7/camera/image_raw'; there are: {TOPIC}",
+        ),
+        (
+            f"GET /snapshot?topic={TOPIC} HTTP/1.0\r\n\r\n".encode(),
+            503,
+            f"no picture came on {TOPIC} for 0.1 s",
+        ),
+    ],
+)
+def test_a_refusal_reaches_who_asked(monkeypatch, sent, status, said):
+    monkeypatch.setattr(server, "PATIENCE", 0.1)
+
+    async def scenario(served):
+        reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
+        writer.write(sent)
+        async with asyncio.timeout(10):
+            answer = (await reader.read()).decode()
+        assert answer.startswith(f"HTTP/1.0 {status} ")
+        assert said in answer.partition("\r\n\r\n")[2]
+        writer.close()
+
+    serving(scenario)
+
+
+def test_one_client_too_many_is_told_so(monkeypatch):
+    monkeypatch.setattr(server, "MOST_CONNECTIONS", 2)
+
+    async def scenario(served):
+        writers = [(await served.connect(STREAM))[1] for _ in range(2)]
+        await until(lambda: served.watchers == 2)
+        head, body = await served.answer("/")
+        assert head.startswith("HTTP/1.0 503 ")
+        assert b"2 clients have the cameras" in body
+        writers[0].close()
+        await until(lambda: served.watchers == 1)
+        assert (await served.answer("/"))[0].startswith("HTTP/1.0 200 ")
+        writers[1].close()
+
+    serving(scenario)
+
+
+def test_the_list_names_every_camera_and_is_no_way_in():
+    async def scenario(served):
+        odd = "/<b>'&"
+        served.graph.advertise("x", f"{odd}/compressed", "sensor_msgs/CompressedImage")
+        head, body = await served.answer("/")
+        assert "text/html" in head
+        assert f"<a href='{STREAM.replace('&', '&amp;')}'>".encode() in body
+        assert b"/&lt;b&gt;&#x27;&amp;" in body
+        assert odd.encode() not in body
+
+    serving(scenario)
+
+
+def test_who_hangs_up_at_once_leaves_nothing():
+    async def scenario(served):
+        for sent in (b"", b"GET / HT", f"GET {STREAM} HTTP/1.0\r\n\r\n".encode()):
+            with socket.create_connection(("127.0.0.1", served.port)) as client:
+                client.sendall(sent)
+        await until(lambda: not served.server._clients)
+
+    serving(scenario)
+
+
+@contextlib.contextmanager
+def simulator():
+    """Run ``webmap sim`` and give the addresses of its rosbridge and its camera."""
+    command = [sys.executable, "-m", "webmap", "sim", "--port", "0", "--robots", "1"]
+    with subprocess.Popen(
+        [*command, "--http-camera", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            ready = process.stdout.readline()
+            bridge = re.fullmatch(r"rosbridge is ready at (ws://\S+)\n", ready)
+            camera = re.search(r"cameras are at (\S+)", process.stderr.readline())
+            assert bridge
+            assert camera
+            yield bridge[1], camera[1]
+        finally:
+            process.send_signal(signal.SIGTERM)
+            out, err = process.communicate(timeout=20)
+    assert (process.returncode, out) == (0, "")
+    assert "Traceback" not in err
+
+
+def test_the_display_shows_what_a_simulated_camera_sees(monkeypatch):
+    monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
+
+    def shown(camera):
+        published = pictures.get(camera.url.rpartition("/")[2])
+        return opened(published.data)
+
+    def turn(bridge):
+        with connect(bridge) as client:
+            client.send(
+                '{"op": "publish", "topic": "/robot_0/cmd_vel", '
+                '"msg": {"angular": {"z": 2.0}}}'
+            )
+
+    async def scenario(bridge, stream):
+        robot = Robot("Bob")
+        http_camera.lifecycle.begin(asyncio.get_running_loop())
+        snapshot = stream.replace("/stream", "/snapshot") + "&width=64"
+        cameras = [
+            robot.add_module("HttpCamera", address, throttle=0)
+            for address in (stream, snapshot)
+        ]
+        try:
+            for camera, size in zip(cameras, [(320, 200), (64, 200)], strict=True):
+                camera.watch(lambda: None)
+                await until(lambda camera=camera: camera.url)
+                assert shown(camera).size == size
+            before = shown(cameras[0]).tobytes()
+            await asyncio.to_thread(turn, bridge)
+            await until(lambda: shown(cameras[0]).tobytes() != before)
+            assert not robot.problems
+        finally:
+            robot.destroy()
+            await http_camera.lifecycle.end()
+
+    with simulator() as (bridge, stream):
+        assert stream.endswith(STREAM)
+        asyncio.run(scenario(bridge, stream))
+
+
+def test_a_port_of_the_cameras_that_is_in_use_is_an_error():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(OSError, match=f"{port}.*in use"):
+            asyncio.run(run_simulator(http_camera=port))
