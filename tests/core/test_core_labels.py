@@ -88,6 +88,7 @@ def test_a_file_is_yaml_or_json(tmp_path, name, text):
             b"- name: A\n  x: 1\n  y: 2\n  iocn: pin\n",
             r":4: labels\[0\]\.'iocn': no",
         ),
+        (b"- name: A\n  x: 1\n  y: 2\n  it's: 3\n", r":4: labels\[0\]\.\"it's\": no"),
         (b"x" * (1 << 20) + b"xx", "larger than 1 MiB"),
     ],
 )

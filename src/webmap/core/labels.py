@@ -212,8 +212,9 @@ class LabelStore:
 
 
 def _label(data: Any, of: str) -> Label:
-    def wrong(key: str, words: str) -> ConfigError:
-        return _Misplaced((key.strip("'"),), f"{of}{'.' if of else ''}{key}", words)
+    def wrong(key: object, words: str) -> ConfigError:
+        shown = key if key in _KEYS else _show(key)
+        return _Misplaced((str(key),), f"{of}{'.' if of else ''}{shown}", words)
 
     if not isinstance(data, Mapping):
         raise _Misplaced((), of, "expected a table with name, x and y")
@@ -221,7 +222,7 @@ def _label(data: Any, of: str) -> Label:
         if key not in _KEYS:
             near = difflib.get_close_matches(str(key), _KEYS, n=1)
             hint = f'; did you mean "{near[0]}"?' if near else ""
-            raise wrong(_show(key), f"no such key{hint}; there are {', '.join(_KEYS)}")
+            raise wrong(key, f"no such key{hint}; there are {', '.join(_KEYS)}")
     name = data.get("name")
     if not isinstance(name, str) or not name.strip() or len(name) > MAX_NAME:
         raise wrong("name", f"expected 1 to {MAX_NAME} characters, got {_show(name)}")
