@@ -129,7 +129,37 @@ def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
     assert scan.split() == [
         *("scan", "/robot_0/base_scan", "said", "with", "--set"),
     ]
+    drawn = bob.partition("drawn by webmap view:")[2]
+    assert "/robot_1/points" in drawn
+    assert "/robot_1/base_scan" not in drawn, "another one was said"
+    assert "--set ROBOT.ROLE=TOPIC" in shown.stdout
     refused = view(ros1, "--show", "--set", "robot_9.scan=/scan")
     assert refused.returncode == 2
     assert "there is no robot 'robot_9'" in refused.stderr
     assert refused.stdout == ""
+
+
+def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
+    told = (ros1, "--show", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:/odd")
+    shown = view(*told)
+    assert shown.returncode == 0, shown.stderr
+    bob, _, drawn = shown.stdout.partition("drawn by webmap view:")
+    assert [line.split() for line in bob.splitlines()] == [
+        ["Bob", "(told", "with", "--robot)"],
+        ["odometry", "/robot_0/odom"],
+        ["velocity", "/robot_0/cmd_vel"],
+        ["scan", "/odd"],
+        [],
+    ]
+    assert "/robot_0/points" in drawn
+    assert " /map " in drawn
+    assert "robot_1" not in shown.stdout
+    assert view(*told, "--as-told").stdout.strip() == bob.strip()
+
+
+def test_view_says_of_a_told_robot_why_no_more_is_known():
+    shown = view("ws://127.0.0.1:1", "--show", "--wait", "0", "--robot", "Bob:/odom")
+    said = shown.stdout.splitlines()
+    assert said == ["Bob (told with --robot)", "  odometry    /odom"]
+    assert "cannot reach the rosbridge" in shown.stderr
+    assert "No more is known" in shown.stderr

@@ -31,6 +31,7 @@ def test_the_table_names_each_topic_with_its_rule():
     missing = "pose, battery, action, initialpose, map, costmap, camera, cloud, tf"
     assert f"not found: {missing}" in text
     assert "--robot NAME:ODOM:CMD_VEL:SCAN" in text
+    assert "--set ROBOT.ROLE=TOPIC" in text
 
 
 def test_a_type_with_control_characters_does_not_reach_the_terminal():

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import click
 
@@ -30,6 +30,8 @@ class Found:
 
     findings: Findings
     trouble: BridgeError | None = None
+    topics: Mapping[str, str] = field(default_factory=dict)
+    """Types by topic, if the bridge said them or somebody else did."""
 
     @property
     def why(self) -> str:
@@ -61,16 +63,13 @@ async def find(
     if topics is None:
         asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
     else:
-        asked = [
-            (discover(topics, host_name(url), await hear_frames(url, topics)), None)
-            for url in urls
-        ]
+        asked = [(await _behind(url, topics), topics, None) for url in urls]
     named = unique_names(
-        [(host_name(url), one) for url, (one, _) in zip(urls, asked, strict=True)]
+        [(host_name(url), one) for url, (one, _, _) in zip(urls, asked, strict=True)]
     )
     return [
-        Found(url, label, findings, trouble)
-        for url, label, findings, (_, trouble) in zip(
+        Found(url, label, findings, trouble, said)
+        for url, label, findings, (_, said, trouble) in zip(
             urls, labels(urls), named, asked, strict=True
         )
     ]
@@ -89,16 +88,21 @@ def labels(urls: Sequence[str]) -> list[str]:
     return found
 
 
-async def _ask(url: str, wait: float) -> tuple[Findings, BridgeError | None]:
+async def _ask(
+    url: str, wait: float
+) -> tuple[Findings, Mapping[str, str], BridgeError | None]:
     def waiting(why: str) -> None:
         click.echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
 
     try:
         topics = await ask_topics(url, wait=wait, waiting=waiting)
     except BridgeError as error:
-        return Findings(), error
-    trees = await hear_frames(url, topics)
-    return discover(topics, host_name(url), trees), None
+        return Findings(), {}, error
+    return await _behind(url, topics), topics, None
+
+
+async def _behind(url: str, topics: Mapping[str, str]) -> Findings:
+    return discover(topics, host_name(url), await hear_frames(url, topics))
 
 
 def without_named(findings: Findings, names: set[str]) -> Findings:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import click
 
 from webmap.cli.described import describe, overrules
-from webmap.cli.draw_layer import shared_map
-from webmap.cli.finding import find
-from webmap.cli.overruling import Overruling
+from webmap.cli.draw_layer import meant, shared_map
+from webmap.cli.finding import Found, find
+from webmap.cli.overruling import TOLD, Overruling
+from webmap.cli.told import offer
 from webmap.console import RobotDescription
 from webmap.discovery import FoundRobot
-from webmap.discovery.words import in_one_line, robot_table
+from webmap.discovery.layers import FoundLayer
+from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
 from webmap.errors import BridgeClosed
 
 if TYPE_CHECKING:
@@ -32,17 +34,38 @@ class FoundFleet:
     robots: list[tuple[FoundRobot, RobotDescription]] = field(default_factory=list)
     """Robots that were found, and the same as the console takes them."""
 
-    known: list[tuple["Bridge", tuple[FoundRobot, ...]]] = field(default_factory=list)
-    """For each bridge the robots that were found, also those told by hand."""
+    behind: "dict[Bridge, Found]" = field(default_factory=dict)
+    """What was found behind each bridge, before anybody said anything."""
 
     overruling: Overruling = field(default_factory=Overruling)
     """What was said of robots better than it was guessed."""
 
-    def table(self) -> str:
-        """Return what the page would use, and why, for people."""
-        lines = [f"{about.name} (told with --robot)" for about in self.told]
+    def table(self, *, grid: bool, as_told: bool) -> str:
+        """Return what the page would use and draw, and why, for people.
+
+        Args:
+            grid: Whether the robots' own maps are shown under them.
+            as_told: Whether of robots that were told no more is drawn than that.
+
+        """
+        lines = []
+        for about in self.told:
+            lines += ["", f"{about.name} (told with --robot)", *_told_table(about)]
+            found = self.behind.get(about.bridge)
+            if found is not None and not as_told:
+                there = offer(about, found.topics, found.findings)
+                layers = _on_page(there.layers, grid)
+                lines += drawn_table(there.namespace, layers, there.left_out)
         for robot, about in self.robots:
             lines += ["", f"behind {about.bridge.url}:", *robot_table(robot)]
+            findings = self.behind[about.bridge].findings
+            space = robot.namespace
+            guessed = next(r for r in findings.robots if r.namespace == space)
+            fixed = self.overruling.fixed(about.bridge.url, guessed)
+            layers = _on_page(meant(findings.layers[space], guessed, fixed), grid)
+            lines += drawn_table(space, layers, findings.left_out[space])
+        if self.robots:
+            lines += ["", OVERRULE]
         return "\n".join(lines).lstrip("\n") or "No robot is known."
 
     def show(self, console: "Console", *, grid: bool) -> None:
@@ -65,7 +88,8 @@ class FoundFleet:
         came = greet(
             late, names, self.stops_within, grid=grid, overruling=self.overruling
         )
-        for bridge, robots in self.known:
+        for bridge, found in self.behind.items():
+            robots = found.findings.robots
             _services.append(LookingForRobots(bridge, robots, came))
 
 
@@ -115,5 +139,44 @@ def find_fleet(
                 continue
             click.echo(f"Found {in_one_line(robot)}", err=True)
             fleet.robots.append((robot, about))
-        fleet.known.append((bridge, one.findings.robots))
+        fleet.behind[bridge] = one
     return fleet
+
+
+def told_fleet(
+    bridges: Sequence["Bridge"], told: Sequence[RobotDescription], *, wait: float
+) -> FoundFleet:
+    """Return robots that were told, with what is behind their bridges besides.
+
+    Says on standard error if a bridge does not tell that.
+
+    Args:
+        bridges: The bridges.
+        told: The robots.
+        wait: How long to wait for a bridge that cannot be reached, in seconds.
+
+    """
+    found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
+    for one in found:
+        if one.trouble is not None:
+            click.echo(
+                f"{one.url}: {one.trouble}. No more is known of what can be drawn "
+                f"than was told with --robot.",
+                err=True,
+            )
+    return FoundFleet([*told], behind=dict(zip(bridges, found, strict=True)))
+
+
+def _told_table(about: RobotDescription) -> list[str]:
+    """Return what was said of a robot, one role a line."""
+    lines = []
+    for role, name in TOLD.items():
+        said = getattr(about, name)
+        topics = [said] if isinstance(said, str) else said
+        lines += [f"  {role:<11} {topic}" for topic in topics if topic]
+    return lines
+
+
+def _on_page(layers: Sequence[FoundLayer], grid: bool) -> list[FoundLayer]:
+    """Return the layers without maps, where a floor plan is in their place."""
+    return [layer for layer in layers if grid or layer.kind not in ("map", "grid")]

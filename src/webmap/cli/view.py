@@ -36,7 +36,8 @@ from webmap.cli.topic_list import one_bridge, topics_option
 @click.option(
     "--show",
     is_flag=True,
-    help="Print the robots and the topics that would be used, and why, and end.",
+    help="Print the robots, the topics that would be used and what would be drawn, "
+    "and why, and end.",
 )
 @click.option(
     "--stops-within",
@@ -96,7 +97,7 @@ def view(
 
     import webmap
     from webmap import console
-    from webmap.cli.found_fleet import FoundFleet, find_fleet
+    from webmap.cli.found_fleet import FoundFleet, find_fleet, told_fleet
     from webmap.cli.found_layers import draw_layers
     from webmap.cli.overruling import Overruling, parse_setting
 
@@ -122,7 +123,10 @@ def view(
         overruling.check([robot.name for robot in told], all_known=True)
         told = overruling.tell(told)
     if show:
-        click.echo((fleet or FoundFleet(told)).table())
+        if fleet is None:
+            looked = FoundFleet(told)
+            fleet = looked if as_told else told_fleet(bridges, told, wait=wait)
+        click.echo(fleet.table(grid=plan is None, as_told=as_told))
         return
     opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:

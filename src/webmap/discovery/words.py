@@ -1,7 +1,10 @@
 """What was found, as a table for a terminal."""
 
+from collections.abc import Sequence
+
 from webmap.discovery.drawing import drawing
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
+from webmap.discovery.layers import FoundLayer
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
 
@@ -29,8 +32,9 @@ ONE: tuple[Role, ...] = (
 """Roles of which a robot uses the best topic alone; of the others all are drawn."""
 
 OVERRULE = (
-    "Wrong? Say it with --robot NAME:ODOM:CMD_VEL:SCAN, which takes the place of the "
-    "robot of that name, or keep a file: webmap discover URL --toml > fleet.toml"
+    "Wrong? Say it to webmap view, one topic with --set ROBOT.ROLE=TOPIC or a robot "
+    "with --robot NAME:ODOM:CMD_VEL:SCAN, or keep a file: "
+    "webmap discover URL --toml > fleet.toml"
 )
 
 
@@ -65,7 +69,7 @@ def robot_table(robot: FoundRobot) -> list[str]:
     widths = [max((len(row[column]) for row in rows), default=0) for column in (1, 2)]
     lines = [f"{robot.name} ({where})"]
     if robot.base_frame:
-        lines.append(f"  {'frames':<9} {robot.base_frame} in {robot.root_frame}")
+        lines.append(f"  {'frames':<11} {robot.base_frame} in {robot.root_frame}")
     lines += [
         f"  {role:<11} {topic:<{widths[0]}}  {type:<{widths[1]}}  {rule}"
         for role, topic, type, rule in rows
@@ -78,10 +82,26 @@ def robot_table(robot: FoundRobot) -> list[str]:
 
 
 def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
-    """Return what is drawn of a robot, one topic a line, by which module and rule."""
+    """Return what is drawn of a robot that was found."""
+    space = robot.namespace
+    others = findings.left_out.get(space, ())
+    return drawn_table(space, findings.layers.get(space, ()), others)
+
+
+def drawn_table(
+    namespace: str, drawn: Sequence[FoundLayer], others: Sequence[FoundLayer]
+) -> list[str]:
+    """Return what is drawn of a robot, one topic a line, by which module and rule.
+
+    Args:
+        namespace: The robot's.
+        drawn: What is drawn.
+        others: What could be drawn too, but for its number.
+
+    """
     rows = [
-        (layer.topic, drawing(layer, robot.namespace, None).module, layer.rule)
-        for layer in findings.layers.get(robot.namespace, ())
+        (layer.topic, drawing(layer, namespace, None).module, layer.rule)
+        for layer in drawn
     ]
     if not rows:
         return []
@@ -91,7 +111,6 @@ def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
         f"    {topic:<{widths[0]}}  {module:<{widths[1]}}  {rule}"
         for topic, module, rule in rows
     ]
-    others = findings.left_out.get(robot.namespace, ())
     if others:
         listed = ", ".join(layer.topic for layer in others)
         lines.append(f"  not drawn, since there are enough of their kind: {listed}")
