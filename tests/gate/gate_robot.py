@@ -5,29 +5,13 @@ import contextlib
 import json
 import threading
 import time
-from dataclasses import dataclass
-from typing import Any
 
+from bridge_notes import Noting, Told
 from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
 
 
-@dataclass
-class Told:
-    at: float
-    link: int
-    message: dict[str, Any]
-
-    @property
-    def op(self):
-        return self.message["op"]
-
-    @property
-    def topic(self):
-        return self.message.get("topic")
-
-
-class FakeRobot:
+class FakeRobot(Noting):
     """Serves in a thread, so that a test may block; used as a context manager.
 
     It echoes what is published on a topic to whoever subscribes to it, and sends
@@ -35,7 +19,7 @@ class FakeRobot:
     """
 
     def __init__(self, *, answers_services=True):
-        self.told: list[Told] = []
+        self.told = []
         self.answers_services = answers_services
         self.sends_odometry = True
         self.at_rest = False
@@ -153,11 +137,6 @@ class FakeRobot:
                 do(socket.transport)
 
         self._loop.call_soon_threadsafe(work)
-
-    def of(self, op, topic=None):
-        return [
-            t for t in self.told if t.op == op and (topic is None or t.topic == topic)
-        ]
 
     @property
     def velocities(self):

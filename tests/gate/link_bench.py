@@ -10,7 +10,8 @@ import inspect
 import time
 import warnings
 from dataclasses import dataclass, field
-from typing import Any
+
+from bridge_notes import Noting, Told
 
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.sockets import Ears
@@ -49,26 +50,15 @@ async def until(check, what):
     return found
 
 
-@dataclass
-class Told:
-    link: int
-    message: dict[str, Any]
-
-    @property
-    def op(self):
-        return self.message["op"]
-
-    @property
-    def topic(self):
-        return self.message.get("topic")
-
-
-class NotingBridge(WitnessBridge):
+class NotingBridge(Noting, WitnessBridge):
     """The witness's rosbridge, which also notes what it was told."""
 
     def __init__(self):
-        self.told: list[Told] = []
-        super().__init__(lambda link, message: self.told.append(Told(link, message)))
+        self.told = []
+        super().__init__(self._note)
+
+    def _note(self, link, message):
+        self.told.append(Told(time.monotonic(), link, message))
 
     @property
     def url(self):
@@ -78,11 +68,6 @@ class NotingBridge(WitnessBridge):
     def links(self):
         """The numbers of the links that are open now."""
         return set(self._sockets)
-
-    def of(self, op, topic=None):
-        return [
-            t for t in self.told if t.op == op and (topic is None or t.topic == topic)
-        ]
 
     async def send(self, link, text):
         await self._sockets[link].connection.send(text)

@@ -200,16 +200,23 @@ async def test_a_link_that_stalls_is_cut_and_on_the_next_zero_goes_first(tmp_pat
         assert on_the_next()[0] == 0.0
 
 
-@in_loop
-async def test_a_robot_that_another_gate_has_is_asked_for_until_it_is_free(
-    tmp_path, monkeypatch
-):
+@contextlib.asynccontextmanager
+async def robot_of_another_gate(tmp_path, monkeypatch):
+    """Run a gate and tell it of a robot for which another one has the lock."""
     monkeypatch.setattr(shell, "LOCK_RETRY", 0.05)
     other = Locks(tmp_path)
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         key = Key(bridge.url, "/cmd_vel")
         assert other.acquire(key).held
         gate.shell.tell(robot(bridge))
+        yield gate, other, key
+
+
+@in_loop
+async def test_a_robot_that_another_gate_has_is_asked_for_until_it_is_free(
+    tmp_path, monkeypatch
+):
+    async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
         await gate.reported(
             lambda r: "another WebMap" in (r.reason or ""), "the reason"
         )
@@ -222,12 +229,7 @@ async def test_a_robot_that_another_gate_has_is_asked_for_until_it_is_free(
 async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(shell, "LOCK_RETRY", 0.05)
-    other = Locks(tmp_path)
-    async with noting_bridge() as bridge, Running(tmp_path) as gate:
-        key = Key(bridge.url, "/cmd_vel")
-        assert other.acquire(key).held
-        gate.shell.tell(robot(bridge))
+    async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
         await gate.reported(lambda r: not r.armable, "that it is not to be had")
         gate.shell.tell(messages.Forget("r1"))
         gone = messages.RobotGone("r1")
