@@ -64,7 +64,7 @@ def read_map(file: Path) -> MapImage:
 
     """
     settings = _settings(file)
-    light = _read_image(file, settings.image)
+    light = _read_image(file, settings)
     # An image has its first row at the top, a grid at the bottom.
     cells = _cells(light, settings)[::-1]
     return MapImage(cells, settings.resolution, settings.origin, settings.image)
@@ -140,21 +140,28 @@ def _image_path(said: LinedYaml, name: object) -> Path:
     return image
 
 
-def _read_image(file: Path, image: Path) -> "NDArray[np.float32]":
-    """Return how light each pixel is, 0 to 1, the upper row first; NaN if clear."""
+def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
+    """Return how light each pixel is, 0 to 1, the upper row first.
+
+    As map_server has it, colours count by their mean. What an alpha channel means
+    hangs on the mode: in ``trinary`` it is one more colour, in ``scale`` whatever is
+    not opaque is unknown, here NaN, and in ``raw`` it is nothing.
+    """
     import numpy as np
     from PIL import Image
 
     too_many = (Image.DecompressionBombError, Image.DecompressionBombWarning)
     try:
-        with Image.open(image, formats=FORMATS) as opened:
+        with Image.open(settings.image, formats=FORMATS) as opened:
             if opened.width * opened.height > MAX_PIXELS:
                 raise ConfigError(
                     f"{file}: the image has {opened.width} x {opened.height} pixels; "
                     f"{MAX_PIXELS} in all are the limit"
                 )
             deep = opened.mode.startswith("I")
-            pixels = np.asarray(opened if deep else opened.convert("RGBA"))
+            has_alpha = not deep and opened.has_transparency_data
+            colours = "RGBA" if has_alpha else "RGB"
+            pixels = np.asarray(opened if deep else opened.convert(colours))
     except too_many as error:
         raise ConfigError(f"{file}: the image is too large: {error}") from error
     except (OSError, ValueError, SyntaxError) as error:
@@ -165,21 +172,22 @@ def _read_image(file: Path, image: Path) -> "NDArray[np.float32]":
         ) from error
     if deep:
         return np.asarray(pixels / 65535, np.float32)
-    # As map_server has it, colours count by their mean.
-    light: NDArray[np.float32] = pixels[..., :3].mean(axis=2, dtype=np.float32) / 255
-    light[pixels[..., 3] == 0] = np.nan
+    counted = pixels if settings.mode == "trinary" else pixels[..., :3]
+    light: NDArray[np.float32] = counted.mean(axis=2, dtype=np.float32) / 255
+    if has_alpha and settings.mode == "scale":
+        light[pixels[..., 3] < 255] = np.nan
     return light
 
 
 def _cells(light: "NDArray[np.float32]", settings: _Settings) -> "NDArray[np.int8]":
     import numpy as np
 
-    clear = np.isnan(light)
-    light = np.nan_to_num(light)
     if settings.mode == "raw":
         values = np.rint(light * 255)
-        values[(values > 100) | clear] = -1
+        values[values > 100] = -1
         return values.astype(np.int8)
+    clear = np.isnan(light)
+    light = np.nan_to_num(light)
     chance = light if settings.negate else 1 - light
     low, high = settings.free, settings.occupied
     cells = np.full(light.shape, -1, np.int8)

@@ -65,11 +65,55 @@ def test_other_images_are_the_same_map(tmp_path, suffix):
     assert read.cells.tolist() == [[0, -1, -1], [100, 0, 0]]
 
 
-def test_what_is_clear_in_an_image_is_unknown(tmp_path):
-    Image.fromarray(np.array([[[0, 0, 0, 0], [0, 0, 0, 255]]], np.uint8)).save(
-        tmp_path / "map.png"
-    )
-    assert read_map(described(tmp_path, image="map.png")).cells.tolist() == [[-1, 100]]
+SEE_THROUGH = [
+    # Red, green, blue, alpha; what map_server makes of it in each of its modes.
+    ((0, 0, 0, 255), {"trinary": 100, "scale": 100, "raw": 0}),
+    ((254, 254, 254, 255), {"trinary": 0, "scale": 0, "raw": -1}),
+    # 205 is unknown by itself; with 255 for its alpha the mean is 217, which is free.
+    ((205, 205, 205, 255), {"trinary": 0, "raw": -1}),
+    ((150, 150, 150, 255), {"trinary": -1, "raw": -1}),
+    ((0, 0, 0, 0), {"trinary": 100, "scale": -1, "raw": 0}),
+    ((254, 254, 254, 0), {"trinary": -1, "scale": -1, "raw": -1}),
+    ((254, 254, 254, 254), {"trinary": 0, "scale": -1, "raw": -1}),
+    ((60, 60, 60, 128), {"trinary": 100, "scale": -1, "raw": 60}),
+]
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+def test_an_alpha_channel_means_what_it_means_to_map_server(tmp_path, mode):
+    pixels = np.array([[colour for colour, _ in SEE_THROUGH]], np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "map.png")
+    read = read_map(described(tmp_path, image="map.png", mode=mode)).cells[0]
+    wanted = [cells.get(mode) for _, cells in SEE_THROUGH]
+    for value, want in zip(read.tolist(), wanted, strict=True):
+        assert 0 <= value < 100 if want is None else value == want
+
+
+def test_greys_with_an_alpha_channel_and_palettes_are_read_alike(tmp_path):
+    colours = Image.fromarray(np.array([[[0] * 4, [150] * 3 + [255]]], np.uint8))
+    palette = Image.new("P", (2, 1), 0)
+    palette.putpalette([0, 0, 0, 150, 150, 150])
+    palette.putpixel((1, 0), 1)
+    palette.info["transparency"] = b"\x00\xff"
+    for image in (colours, colours.convert("LA"), palette):
+        image.save(tmp_path / "map.png")
+        with Image.open(tmp_path / "map.png") as written:
+            assert written.mode == image.mode
+        read = read_map(described(tmp_path, image="map.png")).cells
+        assert read.tolist() == [[100, -1]], image.mode
+
+
+@pytest.mark.parametrize(
+    ("grey", "value"), [(0, 100), (89, 100), (90, -1), (204, -1), (206, 0), (255, 0)]
+)
+def test_what_lies_between_the_thresholds_is_unknown_where_there_are_three_values(
+    tmp_path, grey, value
+):
+    # (255 - 89) / 255 is above 0.65, and (255 - 205) / 255 above 0.196.
+    pgm(tmp_path, [[grey, 205]])
+    file = described(tmp_path)
+    assert read_map(file).cells.tolist() == [[value, -1]]
+    assert load_map(file).occupancy.tolist() == [[value, -1]]
 
 
 @pytest.mark.parametrize("word", ["1", "true"])
