@@ -59,11 +59,22 @@ def write(tmp_path):
     return write_
 
 
-def test_several_maps_pictures_and_modules_of_the_map_are_shown(write, tmp_path):
-    ready = prepare(write(GOOD))
-    console = Console()
+@pytest.fixture
+def ready(write):
+    made = prepare(write(GOOD))
+    yield made
+    for robot in made.robots:
+        robot.destroy()
+
+
+def show(console, ready):
     maps = ready.fleet.maps
     show_scenery(console, maps, ready.images, ready.others, ready.bridges)
+
+
+def test_several_maps_pictures_and_modules_of_the_map_are_shown(ready, tmp_path):
+    console = Console()
+    show(console, ready)
     north, south = ready.bridges.values()
     (first, second), options = console.grids, list(console.grids.values())
     assert (first, second) == ((north, "/map"), (south, "/map"))
@@ -71,23 +82,17 @@ def test_several_maps_pictures_and_modules_of_the_map_are_shown(write, tmp_path)
     assert console.images == [(str(tmp_path / "hall.png"), -2.0, 1.5, 40.0, 20.0)]
     assert [module.name for module in ready.others] == ["Markers", "MapFile"]
     assert ready.others[0].args == (south, "/zones")
-    for robot in ready.robots:
-        robot.destroy()
 
 
-def test_a_page_gets_all_of_it(write):
-    ready = prepare(write(GOOD))
+def test_a_page_gets_all_of_it(ready):
     console, page = Console(), FakePage()
     console.opened(page)  # before, and another one after
-    maps = ready.fleet.maps
-    show_scenery(console, maps, ready.images, ready.others, ready.bridges)
+    show(console, ready)
     after = FakePage()
     console.opened(after)
     for (map,) in (page.maps, after.maps):
         assert sorted(map.modules) == ["MapFile", "Markers", *2 * ["OccupancyGrid"]]
         assert len(map.images) == 1
-    for robot in ready.robots:
-        robot.destroy()
 
 
 class FakePage:

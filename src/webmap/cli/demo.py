@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from webmap.cli.options import PORT, web_options
+from webmap.cli.sim_options import simulator_options
 from webmap.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -19,13 +20,9 @@ READY = "rosbridge is ready at "
 
 
 @click.command()
-@click.option(
-    "--robots",
-    "-n",
-    type=click.IntRange(1, 500),
-    default=2,
-    show_default=True,
-    help="How many robots.",
+@simulator_options(
+    robots="How many robots; 2 if not said.",
+    dialect="Which ROS the simulator plays: move_base's actions, or Nav2's.",
 )
 @click.option(
     "--bridge-port",
@@ -34,19 +31,9 @@ READY = "rosbridge is ready at "
     show_default=True,
     help="Port of the simulator's rosbridge; 0 lets the system choose.",
 )
-@click.option(
-    "--seed", type=int, default=1, show_default=True, help="Where they start."
-)
-@click.option(
-    "--dialect",
-    type=click.Choice(["ros1", "ros2"]),
-    default="ros1",
-    show_default=True,
-    help="Which ROS the simulator plays: move_base's actions, or Nav2's.",
-)
 @web_options
 def demo(
-    robots: int,
+    robots: int | None,
     bridge_port: int,
     seed: int,
     dialect: str,
@@ -63,7 +50,8 @@ def demo(
     import webmap
     from webmap import console
 
-    told = ("--robots", robots, "--port", bridge_port, "--seed", seed)
+    number = robots or 2
+    told = ("--robots", number, "--port", bridge_port, "--seed", seed)
     with (
         simulator(*told, "--dialect", dialect) as url,
         as_file(files("webmap.sim") / "data") as data,
@@ -71,7 +59,7 @@ def demo(
         bridge = webmap.Bridge(url, name="simulator")
         floor = data / "floor.yaml"
         opened = console.open_console([bridge], [], floor=floor, title="WebMap demo")
-        for index in range(robots):
+        for index in range(number):
             opened.add(demo_robot(bridge, index, dialect))
         webmap.run(
             host=host,

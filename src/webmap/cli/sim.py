@@ -9,14 +9,13 @@ from typing import Literal
 import click
 
 from webmap.cli.options import PORT, verbose_option
+from webmap.cli.sim_options import simulator_options
 
 
 @click.command()
-@click.option(
-    "--robots",
-    "-n",
-    type=click.IntRange(1, 500),
-    help="How many robots; 2 if not said, and 1 with --flat.",
+@simulator_options(
+    robots="How many robots; 2 if not said, and 1 with --flat.",
+    dialect="Names of types and stamps.",
 )
 @click.option(
     "--port",
@@ -27,20 +26,10 @@ from webmap.cli.options import PORT, verbose_option
     help="Port of the rosbridge; 0 lets the system choose.",
 )
 @click.option(
-    "--seed", type=int, default=1, show_default=True, help="Where they start."
-)
-@click.option(
     "--map",
     "map_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The floor, in map_server's form (YAML); a building floor if not given.",
-)
-@click.option(
-    "--dialect",
-    type=click.Choice(["ros1", "ros2"]),
-    default="ros1",
-    show_default=True,
-    help="Names of types and stamps.",
 )
 @click.option(
     "--twist",
