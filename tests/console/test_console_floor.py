@@ -128,10 +128,18 @@ def test_the_formats_of_map_saver_are_read(tmp_path, name, mode):
     assert load_floor(write(tmp_path, name), tmp_path).width == 4.0
 
 
-def test_what_is_clear_in_an_image_is_unknown(tmp_path):
-    Image.new("RGBA", (4, 4), (0, 0, 0, 0)).save(tmp_path / "floor.png")
-    painted = Image.open(load_floor(write(tmp_path), tmp_path).day).convert("RGB")
-    assert colour(painted, (0, 0)) == COLOURS["day"][1]
+@pytest.mark.parametrize(
+    ("mode", "light", "place"),
+    [("scale", 0, 1), ("scale", 255, 1), ("trinary", 0, 0), ("trinary", 255, 1)],
+)
+def test_what_is_clear_in_an_image_is_what_map_server_takes_it_for(
+    tmp_path, mode, light, place
+):
+    Image.new("RGBA", (4, 4), (*[light] * 3, 0)).save(tmp_path / "floor.png")
+    floor = load_floor(write(tmp_path, mode=mode), tmp_path)
+    painted = Image.open(floor.day).convert("RGB")
+    wall_or_unknown = COLOURS["day"][place]
+    assert colour(painted, (0, 0)) == wall_or_unknown
 
 
 @pytest.mark.parametrize(
