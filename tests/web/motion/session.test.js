@@ -90,13 +90,44 @@ describe("a STOP", () => {
     session.stopped("*", false, 0);
     session.stopped("*", false, 10);
     assert.deepEqual(session.receive(HELLO, 100).say, [{ op: "stop", robot: "*" }]);
+    session.receive({ ...REPORT, latched: true }, 150);
     session.lost(200);
     assert.deepEqual(session.receive(HELLO, 300).say, []);
   });
 
-  test("that left is not said again", () => {
-    session.stopped("r1", true, 0);
-    assert.deepEqual(session.receive(HELLO, 100).say, []);
+  test("that left by a connection which died of it is said again until answered", () => {
+    session.receive(HELLO, 0);
+    session.receive(REPORT, 0);
+    session.stopped("r1", true, 10);
+    session.receive({ ...REPORT, measured: [0.1, 0, 0] }, 20);
+    session.lost(500);
+    assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "r1" }]);
+    session.lost(700);
+    assert.deepEqual(session.receive(HELLO, 800).say, [{ op: "stop", robot: "r1" }]);
+    session.receive({ ...REPORT, latched: true }, 850);
+    session.lost(900);
+    assert.deepEqual(session.receive(HELLO, 1000).say, []);
+  });
+
+  test("for all is said again until every robot is stopped or gone", () => {
+    session.receive(HELLO, 0);
+    session.receive(REPORT, 0);
+    session.receive({ ...REPORT, robot: "r2" }, 0);
+    session.receive({ ...REPORT, robot: "r3", latched: true }, 0);
+    session.stopped("*", true, 10);
+    session.receive({ ...REPORT, latched: true }, 20);
+    session.lost(500);
+    assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "*" }]);
+    session.receive({ op: "gone", robot: "r2" }, 650);
+    session.lost(700);
+    assert.deepEqual(session.receive(HELLO, 800).say, []);
+  });
+
+  test("that a gate took to its end is said to the one started anew", () => {
+    drive();
+    session.stopped("r1", true, 800);
+    const { say } = session.receive({ op: "hello", connection: "c2" }, 810);
+    assert.deepEqual(say, [{ op: "stop", robot: "r1" }]);
   });
 
   test("ends the lease, kills the hands, and is followed up", () => {

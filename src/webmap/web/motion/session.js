@@ -4,6 +4,7 @@ import { Loop } from "./loop.js";
 import { Onset } from "./onset.js";
 import { Pilot } from "./pilot.js";
 import { Stopping } from "./stopping.js";
+import { Unanswered } from "./unanswered.js";
 
 /** @typedef {import('./news.js').Item} Item */
 /** @typedef {import('./news.js').LinkState} LinkState */
@@ -35,8 +36,9 @@ export class Session {
     this.connection = null;
     /** @type {LinkState} */
     this.state = "connecting";
+    this._unanswered = new Unanswered();
     /**
-     * STOPs that were asked for without a connection.
+     * STOPs that are the first thing to be said on the next connection.
      * @type {Set<string>}
      */
     this._unsent = new Set();
@@ -56,12 +58,14 @@ export class Session {
    * STOP was said.
    *
    * @param {string} robot Or "*".
-   * @param {boolean} left Whether it has left this page; if not, it will be the first
-   *     thing said on the next connection, as a stop that comes late is still a stop.
+   * @param {boolean} left Whether it has left this page; if not, or if the gate has not
+   *     answered it when the connection is lost, it will be the first thing said on the
+   *     next, as a stop that comes late is still a stop.
    * @param {number} now
    */
   stopped(robot, left, now) {
-    if (!left) this._unsent.add(robot);
+    if (left) this._unanswered.said(robot, this.pilot.robots);
+    else this._unsent.add(robot);
     this.pilot.stopped(robot, now);
     this.stopping.start(robot, this.pilot.robots, now);
   }
@@ -127,6 +131,7 @@ export class Session {
     if (this.connection !== null) this._forget(now);
     this.connection = connection;
     const say = [...this._unsent].map((robot) => ({ op: "stop", robot }));
+    for (const robot of this._unsent) this._unanswered.said(robot, this.pilot.robots);
     this._unsent.clear();
     return { say, news: this._change("open") };
   }
@@ -157,15 +162,17 @@ export class Session {
 
   /** Those who follow what the gate says of each robot. */
   get _watching() {
-    return [this.pilot, this.stopping, this.asking, this.onset];
+    return [this.pilot, this.stopping, this.asking, this.onset, this._unanswered];
   }
 
   /**
    * Forget leases, numbers and ticks: they belong to one connection to one gate.
+   * A STOP that it has not answered does not.
    *
    * @param {number} now
    */
   _forget(now) {
+    for (const robot of this._unanswered.take()) this._unsent.add(robot);
     this.pilot.doubt(now);
     this.pilot.disconnect();
     this.asking.forget();
