@@ -8,7 +8,7 @@ import pytest
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate import events, messages, shell
+from webmap.gate import actions, events, messages, shell
 from webmap.gate.events import Key
 from webmap.gate.kept.disk import Disk
 from webmap.gate.kept.locks import Locks
@@ -177,6 +177,31 @@ async def test_a_gate_that_fails_sends_zero_and_ends(
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         await until(lambda: not bridge.links, "the end of the links")
         assert 0.0 in speeds(bridge)[moves:]
+        gate._hand.cancel()
+
+
+@in_loop
+async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
+    tmp_path, monkeypatch
+):
+    """While it waits for a hook that hangs, the hand and the display go on as before."""
+    hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+    async with driving(tmp_path, stop_hooks=(hook,)) as (bridge, gate):
+        bridge.answers_services = False
+        key = Key(bridge.url, "/cmd_vel")
+        gate.shell._links.perform(actions.RunHook(key, "r1", hook, True))
+        await until(lambda: bridge.of("call_service"), "a call that hangs")
+        with monkeypatch.context() as patch:
+            patch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
+            gate.shell.tell(messages.Heartbeat())
+        assert gate.shell.failed
+        before = len(speeds(bridge))
+        await gate.work
+        bridge.unblock()
+        await until(lambda: not bridge.links, "the end of the links")
+        late = speeds(bridge)[before:]
+        assert late[late.index(0.0) :] == [0.0] * late.count(0.0)
+        assert late.count(0.0) >= 2
         gate._hand.cancel()
 
 

@@ -59,7 +59,12 @@ class Shell:
         self._waiting_for_lock: dict[events.Key, asyncio.TimerHandle] = {}
 
     def tell(self, event: messages.ToGate | events.Event) -> None:
-        """Bring an event; called from within an action, it waits its turn."""
+        """Bring an event; called from within an action, it waits its turn.
+
+        A gate that has failed takes in nothing more: its last word was zero.
+        """
+        if self.failed:
+            return
         if isinstance(event, events.Shutdown):
             self._ending.set()
         self._inbox.append(event)
@@ -86,6 +91,8 @@ class Shell:
                 await self._disk.settle()
         stepping.cancel()
         looking.cancel()
+        if self.failed:
+            self._links.zero_all()  # once more: the first may have met a link that broke
         self._links.close()
         await asyncio.sleep(0)  # the loop's chance to write what it still holds
 
