@@ -49,6 +49,8 @@ class Bench:
     """Whether the display sends its heartbeats by itself."""
     answering: bool = True
     """Whether the bridge answers pings by itself."""
+    rtt: float = 0.0
+    """Seconds that a ping and its answer are under way."""
     clear: bool = True
     """Whether nothing waits to be sent on the control link."""
     losing_zeros: bool = False
@@ -89,7 +91,7 @@ class Bench:
             if self.beating:
                 self.tell(messages.Heartbeat())
             if self.answering and self.up:
-                self.tell(events.Alive(URL))
+                self.tell(events.Alive(URL, self.now - self.rtt))
             if each is not None and n % round(0.05 / step) == 0:
                 each()
             self._do(self.gate.step(self.now))

@@ -1,9 +1,11 @@
 """The control lane: velocities out, what comes back, and nothing else."""
 
+import asyncio
 import json
 
-from link_bench import in_loop, noting_bridge, raw_bridge, until
+from link_bench import PONG, frame, in_loop, noting_bridge, raw_bridge, until
 
+from webmap.gate.clock import now
 from webmap.gate.events import Alive, Echoed, Key, LinkDown, LinkUp
 from webmap.gate.lanes import control
 from webmap.gate.lanes.control import BUSY_PING, IDLE_PING, ControlLane
@@ -40,15 +42,42 @@ def velocities(bridge):
 
 
 @in_loop
-async def test_an_echo_says_what_the_robot_was_told_and_that_the_link_lives():
+async def test_an_echo_says_what_the_robot_was_told_and_not_that_the_link_lives(
+    monkeypatch,
+):
+    monkeypatch.setattr(control, "IDLE_PING", 60.0)
+    monkeypatch.setattr(control, "BUSY_PING", 60.0)
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         assert noting.of(LinkUp) == [LinkUp(bridge.url, "control")]
         lane.listen("/cmd_vel")
+        await until(lambda: noting.of(Alive), "the answer to the only ping")
+        noting.events.clear()
         assert lane.write("/cmd_vel", SLOW)
         echo = Echoed(Key(bridge.url, "/cmd_vel"), SLOW)
         await until(lambda: echo in noting.events, "the echo")
-        assert noting.events[noting.events.index(echo) - 1] == Alive(bridge.url)
+        assert noting.events == [echo]
+
+
+@in_loop
+async def test_an_answer_tells_when_it_was_asked_for_and_not_when_it_came():
+    go_on = asyncio.Event()
+
+    async def talk(link):
+        await link.accept()
+        await go_on.wait()
+        link.say(frame(PONG, (1).to_bytes(8, "big")))
+        await asyncio.Event().wait()
+
+    before = now()
+    async with raw_bridge(talk) as url, Noting(url) as noting:
+        lane = await noting.up()
+        await until(lambda: lane.lane._pings, "a ping")
+        asked_by = now()
+        await until(lambda: now() > asked_by, "another moment")
+        go_on.set()
+        (alive,) = await until(lambda: noting.of(Alive), "the answer")
+        assert before < alive.asked_at <= asked_by
 
 
 @in_loop

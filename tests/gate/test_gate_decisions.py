@@ -520,6 +520,40 @@ class TestLinks:
         bench.hold(1.0, x=1.0)
         assert bench.moving_since(at) == []
 
+    def test_a_zero_that_a_stall_kept_is_owed_though_older_pings_are_answered(
+        self, bench
+    ):
+        bench.drive_off()
+        bench.answering = False
+        bench.say("a", op="release", robot="r1")
+        released = bench.now
+        assert bench.written[-1].twist == ZERO
+        bench.now += 0.003
+        bench.tell(events.Alive(URL, released - 0.03))
+        bench.run(1.5)
+        assert bench.did(actions.CutLink) == [actions.CutLink(URL)]
+        assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
+        before = len(bench.written)
+        bench.connect_links()
+        assert bench.written[before].twist == ZERO
+        bench.answering = True
+        bench.run(4.0)
+        assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
+
+    def test_a_stop_is_confirmed_only_by_a_bridge_that_was_asked_since(self):
+        bench = Bench().begin(spec(odometry_topic="/odom"))
+        stands = lambda: bench.tell(events.Measured(KEY, ZERO))  # noqa: E731
+        bench.answering = False
+        bench.say("b", op="stop", robot="r1")
+        pressed = bench.now
+        bench.run(0.1)
+        bench.tell(events.Alive(URL, pressed - 0.01))
+        bench.run(0.5, stands)
+        assert bench.report().stop.confirmed is None
+        bench.tell(events.Alive(URL, pressed + 0.01))
+        bench.run(0.1, stands)
+        assert bench.report().stop.confirmed
+
     def test_a_command_that_cannot_go_out_at_once_is_dropped_and_told(self, bench):
         bench.drive_off()
         bench.clear = False

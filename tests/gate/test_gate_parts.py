@@ -266,28 +266,46 @@ class TestHealth:
         link = Health()
         assert not link.fresh(0.0)
         link.opened(0.0)
+        assert not link.fresh(0.0), "nothing was asked yet"
+        link.answered(0.0, 0.0)
         assert link.fresh(0.3)
         assert not link.fresh(0.31)
-        link.answered(0.3)
+        link.answered(0.3, 0.3)
         assert link.fresh(0.6)
         link.closed()
         assert not link.fresh(0.6)
         assert not link.stalled(9.0)
+
+    def test_an_answer_that_was_long_under_way_does_not_make_a_link_fresh(self):
+        link = Health()
+        link.opened(0.0)
+        for asked_at in (0.0, 0.05, 0.1):
+            link.answered(asked_at, asked_at + 0.4)
+            assert not link.fresh(asked_at + 0.4)
+        assert link.trips.p95 == pytest.approx(0.4)
 
     def test_a_link_that_says_nothing_for_a_second_is_stalled(self):
         link = Health()
         link.opened(0.0)
         assert not link.stalled(1.0)
         assert link.stalled(1.01)
+        link.answered(0.1, 1.0)
+        assert not link.stalled(2.0)
+        assert link.stalled(2.01)
 
-    def test_an_answer_counts_for_what_came_before_it(self):
+    def test_an_answer_counts_for_what_came_before_its_question(self):
         link = Health()
         link.opened(1.0)
-        link.answered(2.0)
+        assert not link.answered_since(0.9), "a handshake says nothing of when"
+        link.answered(2.0, 2.5)
+        link.answered(1.0, 2.6)
         assert link.answered_since(1.9)
         assert not link.answered_since(2.0)
         link.closed()
         assert not link.answered_since(1.9)
+        link.opened(3.0)
+        assert not link.answered_since(1.9), "that was another link"
+        assert link.trips.p95 is None
 
     def test_a_display_is_there_for_250_ms_after_its_heartbeat(self):
         pulse = Pulse()

@@ -215,7 +215,7 @@ class TestDoubt:
         base.run(0.05)
         bench.now += 0.25
         bench.tell(messages.Heartbeat())
-        bench.tell(events.Alive(bench.gate._fleet._bases[KEY].key.url))
+        bench.tell(events.Alive(KEY.url, bench.now))
         bench.drive(x=0.0)
         assert bench.report().test.text == "the driver fell silent"
         assert bench.written[-1].twist == ZERO

@@ -5,6 +5,7 @@ from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.gate import actions, events
 from webmap.gate.limits import Speed
+from webmap.gate.rules.ages import Ages
 from webmap.gate.rules.loopage import LoopAge, governed, reaction
 from webmap.gate.rules.obedience import Obedience
 from webmap.geometry import Twist
@@ -90,7 +91,7 @@ class TestAlarm:
 
 class TestLoopAge:
     def test_is_what_most_commands_of_two_seconds_stay_below(self):
-        ages = LoopAge()
+        ages = LoopAge(Ages())
         assert ages.p95 is None
         for n in range(40):
             ages.add(0.05 if n else 0.25, n * 0.05)
@@ -129,7 +130,7 @@ class TestLoopAge:
         assert bench.written[-1].twist.vx == 1.0
 
     def test_a_link_is_slow_above_150_ms_and_quick_again_below_130(self):
-        ages = LoopAge()
+        ages = LoopAge(Ages())
         slow = []
         for n, ms in enumerate((50, 150, 151, 140, 131, 129, 145, 151)):
             ages.add(ms / 1000, 3.0 * n)
@@ -164,6 +165,39 @@ class TestLoopAge:
         bound = 0.25 / (report.age / 1000 + 0.2 + 0.25)
         assert bench.written[-1].twist.vx <= bound
         assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
+
+    def test_the_way_to_the_robot_and_back_is_part_of_the_loop(self):
+        trips = Ages()
+        ages = LoopAge(trips)
+        trips.add(0.12, 0.0)
+        assert ages.p95 is None, "nobody drives"
+        ages.add(0.05, 0.0)
+        assert ages.p95 == pytest.approx(0.17)
+        assert ages.slow == ages.p95
+        ages.clear()
+        ages.add(0.02, 1.0)
+        assert ages.p95 == pytest.approx(0.14), "another driver has the same robot"
+        ages.forget_old(2.5)
+        assert ages.p95 == 0.02
+
+    @pytest.mark.parametrize("rtt", [0.05, 0.1, 0.15, 0.25])
+    def test_a_robot_behind_a_slow_link_is_slowed_and_its_driver_told(self, rtt):
+        bench = Bench(rtt=rtt).begin(spec(v_max=2.0, stops_within=0.25))
+        bench.drive_off()
+        bench.hold(0.5, x=1.0)
+        report = bench.report()
+        assert rtt * 1000 <= report.age <= rtt * 1000 + 50
+        slow = report.age > 150
+        assert any(why.startswith("slow link") for why in report.why) == slow
+        bound = 0.25 / (report.age / 1000 + 0.45) if slow else 2.0
+        assert bench.written[-1].twist.vx == report.v == pytest.approx(bound, abs=0.01)
+        assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
+
+    def test_a_robot_whose_answers_take_longer_than_300_ms_is_not_driven(self):
+        bench = Bench(rtt=0.9).begin()
+        bench.drive_off()
+        assert bench.moving_since(0.0) == []
+        assert "does not answer" in bench.report().reason
 
     def test_brakes_are_what_was_stated_or_little(self):
         assert Bench().begin().report().brake == 0.5

@@ -38,45 +38,72 @@ def test_zeros_are_not_counted():
 
 def test_an_echo_makes_room_for_one():
     unproven = full()
-    assert unproven.echoed("/cmd_vel", AHEAD)
+    unproven.echoed("/cmd_vel", AHEAD)
     assert unproven.room("/cmd_vel")
     unproven.wrote("/cmd_vel", AHEAD)
     assert not unproven.room("/cmd_vel")
 
 
 def test_an_echo_proves_what_was_written_before_it_too():
-    unproven = full()
-    unproven.wrote("/cmd_vel", ZERO)
-    assert unproven.echoed("/cmd_vel", ZERO)
+    unproven = Unproven()
+    for _ in range(MOST - 1):
+        unproven.wrote("/cmd_vel", AHEAD)
+    unproven.wrote("/cmd_vel", TURN)
+    unproven.echoed("/cmd_vel", TURN)
     for _ in range(MOST):
         assert unproven.room("/cmd_vel")
         unproven.wrote("/cmd_vel", AHEAD)
 
 
-def test_what_others_say_proves_nothing():
+def test_an_echo_of_zero_proves_nothing_as_others_say_zero_too():
     unproven = full()
-    assert not unproven.echoed("/cmd_vel", TURN)
-    assert not unproven.echoed("/other/cmd_vel", AHEAD)
+    unproven.wrote("/cmd_vel", ZERO)
+    unproven.echoed("/cmd_vel", ZERO)
     assert not unproven.room("/cmd_vel")
 
 
-def test_an_echo_of_what_is_proven_already_is_still_an_answer():
+def test_what_others_say_proves_nothing():
     unproven = full()
-    unproven.pinged(1)
+    unproven.echoed("/cmd_vel", TURN)
+    unproven.echoed("/other/cmd_vel", AHEAD)
+    assert not unproven.room("/cmd_vel")
+
+
+def test_an_echo_of_what_a_ping_has_proven_already_makes_no_room_for_another():
+    unproven = full()
+    unproven.pinged(1, 0.0)
     unproven.ponged(1)
-    assert unproven.echoed("/cmd_vel", AHEAD)
-    for _ in range(REMEMBERED):
-        unproven.wrote("/cmd_vel", ZERO)
-    unproven.pinged(2)
-    unproven.ponged(2)
-    assert not unproven.echoed("/cmd_vel", AHEAD)
+    for _ in range(MOST):
+        unproven.wrote("/cmd_vel", AHEAD)
+    for _ in range(MOST):
+        unproven.echoed("/cmd_vel", AHEAD)
+        assert not unproven.room("/cmd_vel"), "it is that of an earlier one"
+    unproven.echoed("/cmd_vel", AHEAD)
+    assert unproven.room("/cmd_vel")
+
+
+def test_echoes_that_never_come_are_not_waited_for_without_end():
+    unproven = Unproven()
+    for number in range(100):
+        unproven.wrote("/cmd_vel", AHEAD)
+        unproven.pinged(number, 0.0)
+        unproven.ponged(number)
+    assert len(unproven._unechoed["/cmd_vel"]) == REMEMBERED
+
+
+def test_an_answer_tells_when_it_was_asked_for():
+    unproven = Unproven()
+    for number, at in enumerate((1.0, 1.5, 1.7)):
+        unproven.pinged(number, at)
+    assert unproven.ponged(1) == 1.5
+    assert unproven.ponged(2) == 1.7
 
 
 def test_a_ping_that_is_answered_proves_what_was_written_before_it():
     unproven = Unproven()
     for _ in range(4):
         unproven.wrote("/cmd_vel", AHEAD)
-    unproven.pinged(7)
+    unproven.pinged(7, 0.0)
     for _ in range(2):
         unproven.wrote("/cmd_vel", AHEAD)
     assert not unproven.room("/cmd_vel")
@@ -89,18 +116,17 @@ def test_a_ping_that_is_answered_proves_what_was_written_before_it():
 
 def test_a_ping_that_is_answered_answers_for_those_before_it():
     unproven = Unproven()
-    unproven.pinged(1)
+    unproven.pinged(1, 0.0)
     for _ in range(MOST):
         unproven.wrote("/cmd_vel", AHEAD)
-    unproven.pinged(2)
+    unproven.pinged(2, 0.0)
     unproven.ponged(2)
     assert unproven.room("/cmd_vel")
-    unproven.ponged(1)
 
 
 def test_an_early_ping_proves_nothing_of_what_came_after_it():
     unproven = Unproven()
-    unproven.pinged(1)
+    unproven.pinged(1, 0.0)
     for _ in range(MOST):
         unproven.wrote("/cmd_vel", AHEAD)
     unproven.ponged(1)
@@ -109,10 +135,13 @@ def test_an_early_ping_proves_nothing_of_what_came_after_it():
 
 def test_a_new_link_begins_anew():
     unproven = full()
-    unproven.pinged(1)
+    unproven.pinged(1, 0.0)
     unproven.begin()
-    assert unproven.room("/cmd_vel")
-    assert not unproven.echoed("/cmd_vel", AHEAD)
+    for _ in range(MOST):
+        assert unproven.room("/cmd_vel")
+        unproven.wrote("/cmd_vel", TURN)
+    unproven.echoed("/cmd_vel", AHEAD)
+    assert not unproven.room("/cmd_vel"), "that was said on the link before"
 
 
 @given(
@@ -134,7 +163,7 @@ def test_a_link_of_any_latency_never_holds_more_than_six(steps):
                 link.append(twist)
         elif step == "ping":
             pings += 1
-            unproven.pinged(pings)
+            unproven.pinged(pings, 0.0)
             link.append(pings)
         elif step == "deliver" and link:
             back.append(link.pop(0))

@@ -50,9 +50,11 @@ class LinkDown:
 
 @dataclass(frozen=True, slots=True)
 class Alive:
-    """The bridge answered on the control socket: a pong, or an echo of our own."""
+    """The bridge answered a ping on the control socket."""
 
     url: str
+    asked_at: float
+    """When that ping was sent: what was written before it has arrived."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from webmap.gate.clock import now
 from webmap.gate.events import Alive, Echoed, Event, Key, LinkDown, LinkUp
 from webmap.gate.lanes import words
 from webmap.gate.lanes.lane import Lane
@@ -9,7 +10,7 @@ from webmap.gate.lanes.unproven import Unproven
 from webmap.geometry import Twist
 from webmap.ros import ops
 
-BUSY_PING = 0.1
+BUSY_PING = 0.05
 """Seconds between pings while somebody holds a lease on a machine behind the lane."""
 
 IDLE_PING = 0.5
@@ -36,7 +37,7 @@ class ControlLane:
             up=self._open,
             down=lambda: tell(LinkDown(url, "control")),
             text=self._hear,
-            pinged=self._unproven.pinged,
+            pinged=self._ping,
             pong=self._answer,
         )
         self.lane.hurry(IDLE_PING)
@@ -89,14 +90,15 @@ class ControlLane:
         self._unproven.begin()  # what the link before held went with it
         self._tell(LinkUp(self._url, "control"))
 
+    def _ping(self, number: int) -> None:
+        self._unproven.pinged(number, now())
+
     def _answer(self, number: int) -> None:
-        self._unproven.ponged(number)
-        self._tell(Alive(self._url))
+        self._tell(Alive(self._url, self._unproven.ponged(number)))
 
     def _hear(self, data: bytes) -> None:
         heard = words.hear(data)
         if heard is None or heard.topic not in self._listened or heard.twist is None:
             return
-        if self._unproven.echoed(heard.topic, heard.twist):
-            self._tell(Alive(self._url))
+        self._unproven.echoed(heard.topic, heard.twist)
         self._tell(Echoed(Key(self._url, heard.topic), heard.twist))

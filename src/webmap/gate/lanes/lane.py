@@ -39,7 +39,7 @@ class Lane:
         up: Called when the lane is open and has said what it has to.
         down: Called when it is not open any more.
         text: Called with each message.
-        pinged: Called with the number of each ping that goes out; they grow.
+        pinged: Called with the number of each ping before it goes out; they grow.
         pong: Called with the number of a ping that the bridge has answered.
 
     """
@@ -182,8 +182,8 @@ class Lane:
                 self.cut(f"no answer for {DEAD:g} s")
                 return
             self._pings += 1
-            self._socket.ping(self._pings.to_bytes(8, "big"))
             self._pinged(self._pings)
+            self._socket.ping(self._pings.to_bytes(8, "big"))
             self._changed.clear()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(self.ping_period):

@@ -4,10 +4,12 @@ A link that stalls keeps what TCP has taken and delivers it when it goes on, lat
 much that can be is bounded here, whatever the link's latency: no more moving velocities
 are written than may lie on the way, and what has arrived is known by two proofs.
 
-- The robot's ROS says a velocity back (an echo). It proves the oldest one of that value
-  that is not proven yet, and all before it.
 - The bridge answers a ping. That proves what was written before the ping: a bridge
   takes what comes on one socket in order.
+- The robot's ROS says a velocity back (an echo). It proves the oldest one of that value
+  that was not said back yet, and all before it. Nothing tells it from what another
+  says there, and others say zero as well: so an echo only makes room, an echo of zero
+  not even that, and neither shows that the link lives or that a zero has arrived.
 """
 
 from collections import deque
@@ -21,7 +23,7 @@ At 20 Hz that is a link of 300 ms, beyond which nothing moves anyway.
 """
 
 REMEMBERED = 16
-"""Velocities whose echo is known for an answer to ours, proven or not."""
+"""Velocities whose echo is still waited for, whether they are proven or not."""
 
 
 class Unproven:
@@ -30,8 +32,8 @@ class Unproven:
     def __init__(self) -> None:
         self._written = 0
         self._on_the_way: dict[str, deque[tuple[int, Twist]]] = {}
-        self._said: dict[str, deque[Twist]] = {}
-        self._pings: deque[tuple[int, int]] = deque()
+        self._unechoed: dict[str, deque[tuple[int, Twist]]] = {}
+        self._pings: deque[tuple[int, int, float]] = deque()
 
     def room(self, topic: str) -> bool:
         """Return whether one more moving velocity may be written."""
@@ -41,33 +43,46 @@ class Unproven:
     def wrote(self, topic: str, twist: Twist) -> None:
         """Note a velocity that went out."""
         self._written += 1
-        self._said.setdefault(topic, deque(maxlen=REMEMBERED)).append(twist)
         self._on_the_way.setdefault(topic, deque()).append((self._written, twist))
+        if not twist.is_zero:
+            unechoed = self._unechoed.setdefault(topic, deque(maxlen=REMEMBERED))
+            unechoed.append((self._written, twist))
 
-    def pinged(self, number: int) -> None:
-        """Note that a ping went out; their numbers grow."""
-        self._pings.append((number, self._written))
+    def pinged(self, number: int, now: float) -> None:
+        """Note that a ping goes out at ``now``; their numbers grow."""
+        self._pings.append((number, self._written, now))
 
-    def ponged(self, number: int) -> None:
-        """Note that a ping was answered, and so all before it."""
-        written = 0
-        while self._pings and self._pings[0][0] <= number:
-            written = self._pings.popleft()[1]
+    def ponged(self, number: int) -> float:
+        """Note that a ping was answered, and so all before it.
+
+        Returns:
+            When that ping went out.
+
+        """
+        while self._pings[0][0] < number:
+            self._pings.popleft()
+        _, written, asked_at = self._pings.popleft()
         for waiting in self._on_the_way.values():
-            while waiting and waiting[0][0] <= written:
-                waiting.popleft()
+            _drop(waiting, written)
+        return asked_at
 
-    def echoed(self, topic: str, twist: Twist) -> bool:
-        """Return whether what is said on a topic is an echo of ours, and note that."""
-        waiting = self._on_the_way.get(topic, deque())
-        if any(sent == twist for _, sent in waiting):
-            while waiting.popleft()[1] != twist:
-                pass
-            return True
-        return twist in self._said.get(topic, ())
+    def echoed(self, topic: str, twist: Twist) -> None:
+        """Note what is said on a topic, which may be an echo of ours."""
+        unechoed = self._unechoed.get(topic, deque())
+        for written, sent in unechoed:
+            if sent == twist:
+                _drop(unechoed, written)
+                _drop(self._on_the_way[topic], written)
+                return
 
     def begin(self) -> None:
         """Begin anew: the link was cut, and what it held with it."""
         self._on_the_way.clear()
-        self._said.clear()
+        self._unechoed.clear()
         self._pings.clear()
+
+
+def _drop(waiting: deque[tuple[int, Twist]], written: int) -> None:
+    """Take what was written up to there for arrived."""
+    while waiting and waiting[0][0] <= written:
+        waiting.popleft()

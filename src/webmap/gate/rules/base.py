@@ -70,7 +70,7 @@ class Base:
         """The robots that this machine goes by."""
         self.known = False
         """Whether it was asked if this gate alone has it, and if STOP stands."""
-        self.speeds = Speeds(self.robots)
+        self.speeds = Speeds(self.robots, control)
         self.motion = Motion(key, control, self.speeds.bounds, emit)
         self.sight = Sight(key, emit)
         self.guard = Guard(self.robots)

@@ -201,7 +201,7 @@ class Fleet:
                 base.link_down(now)
 
     def _alive(self, event: events.Alive, now: float) -> None:
-        self._link(event.url, "control").answered(now)
+        self._link(event.url, "control").answered(event.asked_at, now)
 
     def _wrote(self, event: events.Wrote, now: float) -> None:
         base = self._of_key(event.key)

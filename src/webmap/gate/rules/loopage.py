@@ -7,13 +7,10 @@ wheels, at worst: the age of the loop, the dead-man, and the base's own time to 
 """
 
 import math
-from collections import deque
 
 from webmap.gate.limits import STOPS_WITHIN, Speed
+from webmap.gate.rules.ages import Ages
 from webmap.gate.rules.deadman import DEADMAN
-
-WINDOW = 2.0
-"""Seconds over which the age of the loop is looked at."""
 
 SLOW = 0.15
 """The age of a loop in seconds above which it is slow: it is told, and it counts."""
@@ -26,38 +23,39 @@ BLIND = 0.25
 
 
 class LoopAge:
-    """The ages of the ticks that the holder's accepted commands echoed."""
+    """The ages of the ticks that the holder's accepted commands echoed, and beyond.
 
-    def __init__(self) -> None:
-        self._ages: deque[tuple[float, float]] = deque()
-        self._p95: float | None = None
+    What a page shows came from the robot, and what it says has yet to go there. So the
+    way to the robot and back is part of the loop as well.
+
+    Args:
+        trips: How long questions to the robot's bridge and answers are under way.
+
+    """
+
+    def __init__(self, trips: Ages) -> None:
+        self._ticks = Ages()
+        self._trips = trips
         self._slow = False
-        self._stale = False
 
     def add(self, age: float, now: float) -> None:
-        """Count one more; ``age`` in seconds."""
-        self._ages.append((now, age))
-        self._stale = True
+        """Count one more tick; ``age`` in seconds."""
+        self._ticks.add(age, now)
 
     def forget_old(self, now: float) -> None:
         """Look at the last two seconds only."""
-        while self._ages and now - self._ages[0][0] > WINDOW:
-            self._ages.popleft()
-            self._stale = True
+        self._ticks.forget_old(now)
+        self._trips.forget_old(now)
 
     def clear(self) -> None:
-        """Forget everything: another driver has another loop."""
-        self._ages.clear()
-        self._stale = True
+        """Forget the ticks: another driver has another way to the gate."""
+        self._ticks.clear()
 
     @property
     def p95(self) -> float | None:
         """The age in seconds that 95 of 100 commands stay below, if any came."""
-        if self._stale:
-            ages = sorted(age for _, age in self._ages)
-            self._p95 = ages[math.ceil(0.95 * len(ages)) - 1] if ages else None
-            self._stale = False
-        return self._p95
+        age = self._ticks.p95
+        return None if age is None else age + (self._trips.p95 or 0.0)
 
     @property
     def slow(self) -> float | None:

@@ -2,6 +2,7 @@
 
 from webmap.gate.events import StopRecord
 from webmap.gate.limits import Cap, Speed, caps_of, least, page_cap, speed_in_force
+from webmap.gate.rules.health import Health
 from webmap.gate.rules.loopage import LoopAge, governed
 from webmap.gate.rules.motion import Bounds
 from webmap.gate.rules.robots import Robots
@@ -12,11 +13,12 @@ class Speeds:
 
     Args:
         robots: The robots that it is.
+        control: The link that velocity goes to.
 
     """
 
-    def __init__(self, robots: Robots) -> None:
-        self.ages = LoopAge()
+    def __init__(self, robots: Robots, control: Health) -> None:
+        self.ages = LoopAge(control.trips)
         """How old its driver's picture of it is."""
         self.tested: StopRecord | None = None
         """What the last stop test that came to an end found, whenever that was."""
