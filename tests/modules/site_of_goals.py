@@ -34,6 +34,8 @@ robots = [
 robots[0].set_move_topic(
     OLD, action="/robot_0/move_base", action_type="move_base_msgs/MoveBaseAction"
 )
+# Where the plain one is sent is drawn from its own topic too, whoever sends it there.
+robots[3].add_module("PoseStamped", OLD, "/robot_1/move_base_simple/goal", name="goal")
 
 
 @webmap.page("/")

@@ -3,20 +3,20 @@
 The robots are simulated, of ROS 1 and of ROS 2, each behind a rosbridge of its own.
 """
 
+import json
 import math
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
+from websockets.sync.client import connect
 
 from real_browser import watched_tab
 from webmap.cli.demo import simulator
+from webmap_process import page_of
 
 # Alone, as the gate takes no goal that is older than 0.3 s when it comes.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]
@@ -24,8 +24,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.serial]
 expect.set_options(timeout=10_000)
 
 HERE = Path(__file__).parent
-WEBMAP = [sys.executable, "-m", "webmap"]
-QUIET = ["--port", "0", "--no-browser"]
 OUTSIDE = (1180, 400)
 """A place on the screen that is outside of the house."""
 
@@ -53,11 +51,15 @@ def open_floor(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def url(tmp_path_factory) -> Iterator[str]:
-    folder = tmp_path_factory.mktemp("goals")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("goals")
+
+
+@pytest.fixture(scope="module")
+def bridges(folder) -> Iterator[dict[str, str]]:
     floor = open_floor(folder)
     with ExitStack() as stack:
-        bridges = {
+        yield {
             name.upper(): stack.enter_context(
                 simulator(
                     *("--dialect", name, "--map", floor, "--port", 0),
@@ -66,19 +68,13 @@ def url(tmp_path_factory) -> Iterator[str]:
             )
             for name in ("ros1", "ros2")
         }
-        process = stack.enter_context(
-            subprocess.Popen(
-                [*WEBMAP, "run", str(HERE / "site_of_goals.py"), *QUIET],
-                stdout=subprocess.PIPE,
-                text=True,
-                env={**os.environ, **bridges, "WEBMAP_STATE_DIR": str(folder)},
-            )
-        )
-        stack.callback(process.wait, 10)
-        stack.callback(process.terminate)
-        found = re.search(r"http\S+", process.stdout.readline())
-        assert found
-        yield found.group(0)
+
+
+@pytest.fixture(scope="module")
+def url(folder, bridges) -> Iterator[str]:
+    with ExitStack() as stack:
+        where = {**bridges, "WEBMAP_STATE_DIR": str(folder)}
+        yield stack.enter_context(page_of(HERE / "site_of_goals.py", **where))
 
 
 @pytest.fixture
@@ -197,13 +193,31 @@ def reset(tab: Page) -> None:
     expect(button).to_be_hidden()
 
 
-def test_a_plain_topic_says_that_it_says_nothing(tab):
+def send_elsewhere(bridge: str) -> None:
+    """Send the plain robot by its topic, as RViz does, to where it cannot get."""
+    pose = {"position": {"x": 40.0, "y": 40.0}, "orientation": {"w": 1.0}}
+    message = {"header": {"frame_id": "map"}, "pose": pose}
+    topic = "/robot_1/move_base_simple/goal"
+    with connect(bridge) as client:
+        client.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+
+
+def test_a_plain_topic_says_that_it_says_nothing_and_is_drawn_once(tab, bridges):
+    published = tab.locator(".posestamped.goal")
     send(tab, "Plain 1", "Old 0")
     expect(label(tab)).to_have_text(re.compile("Sent, this robot does not say"))
+    expect(published).to_have_attribute("data-pose", re.compile(r"goal \d+$"))
+    expect(published).to_be_hidden()
     label(tab).get_by_role("button", name="Cancel the goal").click()
     expect(
         tab.locator(".webmap-goal-arrow.way, .webmap-goal-arrow.sent")
     ).to_have_count(0)
+    # It has ended and is shown no more, and the topic has not told of another.
+    label(tab).get_by_role("button", name="Show this goal no more").click()
+    expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
+    expect(published).to_be_hidden()
+    send_elsewhere(bridges["ROS1"])
+    expect(published).to_be_visible()
 
 
 def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab):
