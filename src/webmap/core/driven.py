@@ -127,8 +127,10 @@ class Driven(Extendable):
                 in metres.
             x: Where the scanner is on the robot, in metres forward.
             y: In metres to the left.
-            angle: Where it looks, in degrees from the robot's x, counter-clockwise.
-            upside_down: Whether it hangs head down: a scan is then swept clockwise.
+            angle: Where it looks, in degrees from the robot's x, counter-clockwise as
+                seen from above.
+            upside_down: Whether it hangs head down, so that its rays go round the other
+                way; frames are not asked.
             stop_distance: What stays free before the robot, in metres.
             brake: How hard the robot slows down, in metres per second squared.
             blind: Whether it stops or creeps while the scan is older than 0.3 s, is
