@@ -321,6 +321,31 @@ class TestHowItGoes:
         assert (goal.state, goal.left) == ("cancelling", 1.0)
         assert self.end(bench, "cancelled", "canceled").state == "cancelled"
 
+    def test_a_goal_that_its_cancel_overtook_is_cancelled_again(self, bench):
+        """The two go by different sockets, and what is not there yet is not cancelled."""
+        self.tell(bench, active=False)
+        assert cancels(bench) == 0
+        bench.say("b", op="cancel", robot="r1")
+        assert cancels(bench) == 1
+        for _ in range(8):
+            self.tell(bench, active=True)
+        assert cancels(bench) == 3, "at once, and then once a second"
+        self.end(bench, "cancelled")
+        self.tell(bench, active=True)
+        assert cancels(bench) == 3
+
+    def test_a_goal_that_goes_on_under_a_stop_is_cancelled_whichever_it_is(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        before = cancels(bench)
+        bench.tell(events.GoalProgress("r1", "an earlier one", active=True))
+        assert cancels(bench) == before + 1
+
+    def test_a_goal_that_cannot_be_cancelled_is_not(self):
+        bench = Bench().begin(spec(cancel_topic=None))
+        bench.say("b", op="stop", robot="r1")
+        bench.tell(events.GoalProgress("r1", "g", active=True))
+        assert cancels(bench) == 0
+
     def test_a_goal_that_was_reached_before_the_cancel_came_was_reached(self, bench):
         bench.say("b", op="cancel", robot="r1")
         assert self.end(bench, "reached").state == "reached"

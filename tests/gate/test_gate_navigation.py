@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from webmap.gate import framing
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import GoalEnded, GoalProgress, Key
 from webmap.gate.lanes import navigation
@@ -56,6 +57,15 @@ class TestAction:
             '{"distance_remaining": NaN, "estimated_time_remaining": {"sec": -1}}}'
         )
         assert word == GoalProgress("r1", "g1", True)
+
+    @pytest.mark.parametrize("number", [-1, 2**31, 10**30, 10**400])
+    def test_counts_that_nobody_counted_are_left_out(self, number):
+        word = self.feedback(number_of_recoveries=number)
+        assert word == GoalProgress("r1", "g1", True)
+        assert framing.pack(word)
+
+    def test_times_beyond_all_numbers_are_no_word(self):
+        assert self.feedback(navigation_time={"sec": 10**400, "nanosec": 0}) is None
 
     @pytest.mark.parametrize(
         ("status", "values", "outcome", "why"),

@@ -309,6 +309,19 @@ class TestConfirmation:
         assert seen.report().stop.confirmed is None
         watch_it(seen, 0.4, 0.01)
         assert seen.report().stop.confirmed is True
+
+    def test_one_that_moves_again_is_confirmed_no_longer_however_late(self, seen):
+        """By a goal that begins late, by a ramp, or by another that publishes."""
+        stop(seen)
+        watch_it(seen, 0.4, 0.0)
+        seen.run(60.0)
+        assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, True)
+        watch_it(seen, 0.1, 0.4)
+        assert seen.report().stop == StopReport("B", False, "still moving at 0.40 m/s")
+        watch_it(seen, 0.4, 0.0)
+        assert seen.report().stop.confirmed is True
+        reset(seen)
+        seen.run(2.0)
         assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, False)
 
     def test_one_that_moves_on_is_not_confirmed_until_it_stands(self, seen):
@@ -322,6 +335,8 @@ class TestConfirmation:
         stop(seen)
         seen.run(1.0, lambda: seen.tell(events.Measured(KEY, Twist(0, 0, 0.1))))
         assert seen.report().stop.confirmed is None
+        seen.run(1.1, lambda: seen.tell(events.Measured(KEY, Twist(0, 0, 0.1))))
+        assert seen.report().stop.why == "still turning at 0.10 rad/s"
 
     def test_odometry_with_gaps_proves_nothing(self, seen):
         stop(seen)

@@ -175,7 +175,7 @@ def _progress(feedback: _Feedback, goal: SendGoal, frame: str) -> GoalProgress:
         left=_sensible(left),
         time=_sensible(None if time is None else time.seconds),
         eta=_sensible(None if eta is None else eta.seconds),
-        recoveries=feedback.number_of_recoveries,
+        recoveries=_countable(feedback.number_of_recoveries),
     )
 
 
@@ -184,6 +184,14 @@ def _sensible(number: float | None) -> float | None:
     if number is None or not math.isfinite(number) or number < 0:
         return None
     return round(number, 1)
+
+
+def _countable(number: int | None) -> int | None:
+    """Return a count, None if a robot could not have counted so far.
+
+    Robots write numbers of any length, and the way to the display takes 64 bits.
+    """
+    return number if number is not None and 0 <= number < 2**31 else None
 
 
 def _complaint(text: str, goal: SendGoal) -> GoalEnded | None:

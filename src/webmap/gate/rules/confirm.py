@@ -1,6 +1,6 @@
 """Whether a machine has stopped after STOP: confirmed, not confirmed, not known yet."""
 
-from webmap.gate.rules.standstill import Standstill
+from webmap.gate.rules.standstill import STILL_V, Standstill
 from webmap.geometry import Twist
 
 PATIENCE = 2.0
@@ -8,7 +8,7 @@ PATIENCE = 2.0
 
 
 class Confirmation:
-    """Looks at odometry from a STOP on, until it shows standstill. No I/O."""
+    """Looks at odometry from a STOP on for standstill, and on for motion. No I/O."""
 
     def __init__(self) -> None:
         self.confirmed: bool | None = None
@@ -23,8 +23,10 @@ class Confirmation:
         self._still.begin()
 
     def saw(self, twist: Twist | None, now: float) -> None:
-        """Take in a message of odometry."""
+        """Take in a message of odometry; one that moves again is not confirmed."""
         self._still.saw(twist, now)
+        if self.confirmed and not self._still.reached:
+            self.confirmed, self.why = False, self._moving()
 
     def judge(self, trouble: str | None, delivered: bool, now: float) -> None:
         """Decide anew.
@@ -47,7 +49,12 @@ class Confirmation:
     def _reason(self, delivered: bool, now: float) -> str:
         if not delivered:
             return "its bridge does not answer"
-        speed = self._still.speed
-        if speed is None or now - self._still.heard_at > PATIENCE:
+        if self._still.speed is None or now - self._still.heard_at > PATIENCE:
             return "no odometry"
+        return self._moving()
+
+    def _moving(self) -> str:
+        speed = self._still.speed or 0.0
+        if speed < STILL_V:
+            return f"still turning at {self._still.turn:.2f} rad/s"
         return f"still moving at {speed:.2f} m/s"

@@ -236,6 +236,7 @@ class Fleet:
     def _goal_progress(self, event: events.GoalProgress, now: float) -> None:
         if goals := self._goals_of(event.robot):
             goals.progress(event)
+            goals.insist(event, self._by_robot[event.robot].latch.on, now)
 
     def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
         if goals := self._goals_of(event.robot):

@@ -16,6 +16,9 @@ MOVE_BASE = "move_base_msgs/MoveBaseAction"
 LATELY = 2.0
 """Seconds after such a cancel in which another one is not worth it."""
 
+INSIST = 1.0
+"""Seconds between two cancels of a goal that is said to go on all the same."""
+
 OVER = ("reached", "failed", "cancelled")
 """The states of a goal that nothing follows any more."""
 
@@ -43,6 +46,7 @@ class Goals:
         # An earlier gate may have sent a goal that still runs.
         self._perhaps = True
         self._cancel_owed = False
+        self._insisted_at = float("-inf")
         self._made_way_at: float | None = None
         self._no_actions = False
         """Whether the bridge said that it takes no goals of actions."""
@@ -178,6 +182,25 @@ class Goals:
             assert self.report is not None  # only then does it follow one
             waits = self._cancel_owed or self.report.way != "topic"
             self._show("cancelling" if waits else "cancelled", why)
+
+    def insist(self, news: GoalProgress, stopped: bool, now: float) -> None:
+        """Cancel again, because a goal is said to go on that should not.
+
+        A cancel may be quicker than the goal that it is meant for, which comes by
+        another socket; it then cancels nothing, and the goal begins after it.
+
+        Args:
+            news: What is said of the goal.
+            stopped: Whether STOP stands: then no goal should go on.
+            now: The time.
+
+        """
+        report = self._about(news.id)
+        cancelled = report is not None and report.state == "cancelling"
+        due = now - self._insisted_at >= INSIST
+        if due and (stopped or cancelled) and self.can_cancel:
+            self._insisted_at = now
+            self._emit(CancelGoals(self._key, self.spec.id))
 
     def make_way(self, now: float) -> None:
         """Cancel a goal that may be running, because somebody is going to drive.

@@ -28,6 +28,8 @@ class Standstill:
     def __init__(self) -> None:
         self.speed: float | None = None
         """The newest speed in m/s; ``None`` before the first."""
+        self.turn = 0.0
+        """The newest speed of turning in rad/s, without its sign."""
         self.heard_at = float("-inf")
         """When odometry last told a velocity."""
         self._since: float | None = None
@@ -42,8 +44,8 @@ class Standstill:
             return
         if now - self.heard_at > GAP:
             self._since = None
-        self.speed, self.heard_at = speed_of(twist), now
-        if self.speed >= STILL_V or abs(twist.wz) >= STILL_W:
+        self.speed, self.turn, self.heard_at = speed_of(twist), abs(twist.wz), now
+        if self.speed >= STILL_V or self.turn >= STILL_W:
             self._since = None
         elif self._since is None:
             self._since = now
