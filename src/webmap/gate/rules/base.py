@@ -232,7 +232,7 @@ class Base:
         if not self.sight.on:
             return
         self.sight.saw(measured, now)
-        if self.standing.confirming:
+        if self.latch.on:
             self.standing.confirmation.saw(measured, now)
         if self.hands.handover.heir is not None:
             self.hands.handover.saw(measured, now)
@@ -265,7 +265,7 @@ class Base:
         self.sight.update(
             self.hands.lease is not None
             or not self.silent
-            or self.standing.confirming
+            or self.latch.on
             or self.hands.handover.heir is not None
             or (self.robots.has_odometry and self.obedience.watching(now))
         )
