@@ -1,44 +1,16 @@
 """What was found, and what comes later, in a real browser."""
 
-import re
-import signal
 import socket
 import subprocess
 import sys
-from contextlib import contextmanager
 
 import pytest
+from cli_shown import shown
 from cli_simulator import simulator
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
-from real_browser import Complaints
-
 pytestmark = pytest.mark.browser
-
-
-@contextmanager
-def shown(chromium, *arguments):
-    """Run a command that opens the console, and open its page."""
-    command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
-    with subprocess.Popen(
-        [*command, "--no-browser"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    ) as process:
-        context, complaints = chromium.new_context(), Complaints()
-        try:
-            url = re.search(r"ready at (\S+)", process.stdout.readline())[1]
-            page = context.new_page()
-            complaints.listen(page)
-            page.goto(url)
-            yield page
-        finally:
-            context.close()
-            process.send_signal(signal.SIGINT)
-            process.wait(15)
-    assert not complaints.unexpected, complaints.unexpected
 
 
 def expect_two_robots_on_their_map(page, within=15_000):

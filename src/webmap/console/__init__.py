@@ -6,5 +6,6 @@ It is built with WebMap's public API alone, so it is also the longest example of
 from webmap.console.fleet import RobotDescription, parse_robot
 from webmap.console.opened import Console
 from webmap.console.page import open_console
+from webmap.console.shapes import Picture
 
-__all__ = ["Console", "RobotDescription", "open_console", "parse_robot"]
+__all__ = ["Console", "Picture", "RobotDescription", "open_console", "parse_robot"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import webmap
-from webmap.console.shapes import NameLabel, robot_model
+from webmap.console.shapes import NameLabel, Picture, picture_model, robot_model
 from webmap.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ class RobotDescription:
     goal_frame: str = "map"
     stops_within: float | None = None
     """Seconds within which the base stops by itself when velocity ceases, if known."""
+    picture: Picture | None = None
+    """How it looks from above, if not like all others."""
 
 
 def parse_robot(
@@ -107,7 +109,9 @@ def set_goals(
 def make_robot(about: RobotDescription) -> "Robot":
     """Return the robot of a description, with what the console shows of it."""
     bridge = about.bridge
-    robot = webmap.Robot(about.name, robot_model())
+    picture = about.picture
+    model = robot_model() if picture is None else picture_model(picture)
+    robot = webmap.Robot(about.name, model)
     if about.odometry:
         robot.set_odometry_topic(bridge, about.odometry)
     if about.twist:

@@ -1,8 +1,10 @@
 """What the console draws on the map for a robot; map.css says in which colours."""
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from webmap import svg
+from webmap import geometry, svg
 
 if TYPE_CHECKING:
     from webmap import Element, Robot
@@ -30,6 +32,44 @@ def robot_model() -> "Element":
             class_="model",
         ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture of a robot from above, its nose to the right unless it is turned."""
+
+    href: str
+    """The URL that pages load it from."""
+    width: float
+    """In metres, along the picture's own edge."""
+    height: float
+    x: float = 0.0
+    """How far its middle is before the base, in metres."""
+    y: float = 0.0
+    """How far its middle is left of the base, in metres."""
+    angle: float = 0.0
+    """How far it is turned about its middle, in degrees, counter-clockwise."""
+
+
+def picture_model(picture: Picture) -> "Element":
+    """Return a model that is a picture, with the same marks as any other robot."""
+    width, height = picture.width, picture.height
+    placed = geometry.Affine.translation(picture.x, picture.y)
+    placed @= geometry.Affine.rotation(math.radians(picture.angle))
+    image = svg.image(class_="picture", href=picture.href, preserveAspectRatio="none")
+    image.set_matrix(placed @ geometry.Affine(1, 0, 0, -1, 0, 0))
+    # What is drawn over the usual body while its data is old lies over the picture.
+    hatch = svg.path(d=HATCH, class_="hatch")
+    hatch.set_matrix(placed @ geometry.Affine(width / 0.47, 0, 0, height / 0.38, 0, 0))
+    reach = svg.rect(class_="reach", fill="transparent")
+    reach.set_matrix(placed)
+    for box in (image, reach):
+        box.set(x=-width / 2, y=-height / 2, width=width, height=height)
+    around = math.hypot(width, height) / 2 + 0.02
+    ring = svg.circle(r=around, cx=picture.x, cy=picture.y, class_="ring")
+    model = svg.g(ring, image, hatch, class_="model pictured")
+    model.set_style("--length", max(width, height))
+    return svg.g(svg.circle(r=0.35, class_="hit"), reach, model)
 
 
 class NameLabel:

@@ -93,6 +93,18 @@ def above_zero(unit: str) -> Check:
     return check
 
 
+def finite(expected: str) -> Check:
+    """Return what takes any finite number of a size that makes sense."""
+
+    def check(value: Any) -> float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not math.isfinite(value) or abs(value) > LARGEST:
+            raise ConfigError(expected)
+        return float(value)
+
+    return check
+
+
 def covariance(value: Any) -> list[float]:
     """Take the variances of x, y and yaw."""
     numbers: list[Any] = [None]

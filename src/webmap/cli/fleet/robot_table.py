@@ -8,6 +8,7 @@ from webmap.cli.fleet.buttons import read_buttons
 from webmap.cli.fleet.cameras import read_cameras
 from webmap.cli.fleet.checks import Check, Mistakes
 from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.pictures import read_picture
 from webmap.cli.fleet.schema import (
     INITIAL_POSE,
     MOVE,
@@ -57,6 +58,8 @@ def read_robot(
         where = (*path, "scan_assist")
         driven = "twist" in value
         robot.scan_assist = read_assist(value["scan_assist"], where, driven, mistakes)
+    if "picture" in value:
+        robot.picture = read_picture(value["picture"], (*path, "picture"), mistakes)
     if "tf" in value:
         robot.tf = _frames(value["tf"], (*path, "tf"), mistakes)
     if "alignment" in value:

@@ -1,6 +1,7 @@
 """From a fleet file to robots."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import webmap
@@ -8,6 +9,7 @@ from webmap.cli.fleet import checks
 from webmap.cli.fleet.alignments import align_bridges
 from webmap.cli.fleet.cameras import add_cameras
 from webmap.cli.fleet.checks import Mistakes
+from webmap.cli.fleet.pictures import picture_of
 from webmap.cli.fleet.schema import Fleet, ModuleLine, RobotLine
 from webmap.console import RobotDescription
 from webmap.console.fleet import make_robot
@@ -30,20 +32,35 @@ def make_bridges(fleet: Fleet) -> dict[str, "Bridge"]:
 
 
 def make_robots(
-    fleet: Fleet, bridges: Mapping[str, "Bridge"], mistakes: Mistakes
+    fleet: Fleet, bridges: Mapping[str, "Bridge"], folder: Path, mistakes: Mistakes
 ) -> list["Robot"]:
-    """Return the robots of a file; what a robot or a module refuses is noted."""
-    return [_robot(line, bridges, mistakes) for line in fleet.robots]
+    """Return the robots of a file; what a robot or a module refuses is noted.
+
+    Args:
+        fleet: What the file says.
+        bridges: Its bridges, by name.
+        folder: The file's own, in which the robots' pictures are looked for.
+        mistakes: Where what is wrong goes.
+
+    """
+    return [_robot(line, bridges, folder, mistakes) for line in fleet.robots]
 
 
 def _robot(
-    line: RobotLine, bridges: Mapping[str, "Bridge"], mistakes: Mistakes
+    line: RobotLine, bridges: Mapping[str, "Bridge"], folder: Path, mistakes: Mistakes
 ) -> "Robot":
     bridge = bridges[line.bridge]
     first, *others = line.scans or [""]
+    picture = None
+    if line.picture is not None:
+        picture = picture_of(line.picture, folder, mistakes)
     robot = make_robot(
         RobotDescription(
-            name=line.name, bridge=bridge, scan=first, battery=line.battery
+            name=line.name,
+            bridge=bridge,
+            scan=first,
+            battery=line.battery,
+            picture=picture,
         )
     )
     robot.base_link = line.base_link

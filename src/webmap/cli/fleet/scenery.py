@@ -1,14 +1,14 @@
 """What lies under the robots of a fleet file: maps, pictures and modules of the map."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 from webmap.cli.fleet import checks
-from webmap.cli.fleet.checks import LARGEST, Check, Mistakes
+from webmap.cli.fleet.checks import Check, Mistakes
 from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.pictures import picture_file
 from webmap.cli.fleet.robots import in_words, meant
 from webmap.cli.fleet.schema import ModuleLine
 from webmap.core.module_arguments import WrongArguments, check_arguments
@@ -49,7 +49,7 @@ def read_maps(
         "bridge": known_bridge,
         "topic": checks.topic,
         "palette": checks.one_of("map", "costmap", "raw"),
-        "order": _finite("a number; robots have 100"),
+        "order": checks.finite("a number; robots have 100"),
     }
     found: list[dict[str, Any]] = []
     for path, table in _tables(value, "map"):
@@ -68,8 +68,8 @@ def read_images(value: Any, mistakes: Mistakes) -> list[dict[str, Any]]:
     """Take a table ``[image]``, or a table ``[[image]]`` for each of several."""
     fields: dict[str, Check] = {
         "file": checks.text,
-        "x": _finite("a number of metres: the left edge"),
-        "y": _finite("a number of metres: the lower edge"),
+        "x": checks.finite("a number of metres: the left edge"),
+        "y": checks.finite("a number of metres: the lower edge"),
         "width": checks.above_zero("metres"),
         "height": checks.above_zero("metres"),
     }
@@ -83,13 +83,11 @@ def check_images(
     images: list[dict[str, Any]], folder: File, mistakes: Mistakes
 ) -> list[tuple[str, float, float, float, float]]:
     """Return pictures as ``Map.add_image`` takes them; what is none is noted."""
-    from webmap.server.published import Published
-
     found = []
     for index, image in enumerate(images):
         file = folder / image["file"]
         try:
-            Published().publish_image(file)
+            picture_file(file)
         except (ConfigError, OSError) as error:
             mistakes.add(("image", index, "file"), str(error))
             continue
@@ -139,13 +137,3 @@ def _tables(value: Any, key: str) -> list[tuple[Path, Any]]:
     if isinstance(value, list):
         return [((key, index), each) for index, each in enumerate(value)]
     return [((key,), value)]
-
-
-def _finite(expected: str) -> Check:
-    def check(value: Any) -> float:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or abs(value) > LARGEST:
-            raise ConfigError(expected)
-        return float(value)
-
-    return check

@@ -8,6 +8,7 @@ from webmap.cli.fleet.alignments import Alignment
 from webmap.cli.fleet.cameras import CameraLine
 from webmap.cli.fleet.checks import Check
 from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.pictures import PictureLine
 from webmap.cli.fleet.places import Places
 
 TOP = (
@@ -66,6 +67,7 @@ ROBOT = (
     "name",
     "bridge",
     "base_link",
+    "picture",
     "odometry",
     "tf",
     "alignment",
@@ -100,6 +102,7 @@ class RobotLine:
     bridge: str
     path: Path
     base_link: str = "base_link"
+    picture: PictureLine | None = None
     odometry: dict[str, Any] | None = None
     tf: dict[str, Any] | None = None
     alignment: Alignment | None = None

@@ -54,7 +54,7 @@ def prepare(file: Path) -> ReadyFleet:
     fleet, text = read_fleet(file)
     mistakes = Mistakes()
     bridges = make_bridges(fleet)
-    robots = make_robots(fleet, bridges, mistakes)
+    robots = make_robots(fleet, bridges, file.parent, mistakes)
     floor = file.parent / fleet.floor if fleet.floor else None
     if floor is not None:
         try:
