@@ -2,14 +2,17 @@
 
 import math
 
+import msgspec
 import pytest
-from gate_harness import KEY, Bench, spec
+from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec
+from webmap.gate.rules.assist import free_way, points_of
 from webmap.gate.specs import checked
+from webmap.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 ASSIST = AssistSpec(topic="/scan", footprint=BOX)
@@ -64,6 +67,31 @@ def test_the_robot_slows_down_before_a_wall_and_says_why(bench):
     hold_seeing(bench, math.inf, 0.2, x=1.0)
     assert speeds(bench, 0)[-1] == 1.0
     assert bench.report().why == ("limit of the robot",)
+
+
+def test_what_is_judged_is_what_is_sent_also_while_it_speeds_up():
+    """It could pass the point on the wide arc that is asked for, not on the ramp's."""
+    tail = ((0.3, 0.3), (-0.9, 0.3), (-0.9, -0.3), (0.3, -0.3))
+    point = (-0.91, 0.23)
+    about = AssistSpec(topic="/scan", footprint=tail)
+    bench = Bench().begin(spec(assist=about, v_max=0.5, w_max=1.0, a_max=0.5))
+    ranges = [math.hypot(*point)] + [math.inf] * 719
+    bearing = math.atan2(point[1], point[0])
+    sweep = Sweep(bearing, math.tau / 720, 0.05, 8.0, ranges, 0.0)
+
+    def each(**axes):
+        seen = msgspec.structs.replace(sweep, arrived=bench.now)
+        bench.tell(events.Scanned(KEY, "/scan", seen))
+        bench.drive(**axes)
+
+    bench.take()
+    bench.run(0.3, each)
+    bench.run(0.05, lambda: each(x=1.0, turn=1.0))
+    points = points_of(about, sweep)
+    assert free_way(tail, points, Twist(0.5, 0.0, 1.0)) > 1.0
+    assert free_way(tail, points, Twist(0.05, 0.0, 1.0)) < 0.1
+    assert [written.twist for written in bench.written] == [ZERO]
+    assert "scan assist" in bench.report().why[-1]
 
 
 def test_a_robot_without_a_scan_does_not_move(bench):

@@ -38,6 +38,10 @@ from webmap.gate.rules.standing import StandingStop
 from webmap.gate.rules.stoptesting import StopTesting
 from webmap.geometry import Twist
 
+OWED_PATIENCE = 60.0
+"""Seconds for which a robot that was removed is kept for a zero that it is owed. After
+that the file on disk still says so, and whoever has the machine next sends it."""
+
 State = Literal["free", "held", "driving", "stopping", "stopped"]
 
 
@@ -71,9 +75,9 @@ class Base:
         self.known = False
         """Whether it was asked if this gate alone has it, and if STOP stands."""
         self.speeds = Speeds(self.robots, control)
-        self.motion = Motion(key, control, self.speeds.bounds, emit)
-        self.sight = Sight(key, emit)
         self.guard = Guard(self.robots)
+        self.motion = Motion(key, control, self.speeds.bounds, self.guard.limit, emit)
+        self.sight = Sight(key, emit)
         self.obedience = Obedience()
         self.tests = StopTesting(key, self.motion, self.sight, emit)
         self.arming = Arming(key, self.robots, latch, control, pulse, self.sight)
@@ -91,12 +95,11 @@ class Base:
             self.hands,
             self.arming,
             self.motion,
-            self.speeds,
-            self.guard,
             self.tests,
         )
         self.standing = StandingStop(key, latch, self.robots, control, self.motion)
         self._emit = emit
+        self._left_at = float("-inf")
 
     @property
     def state(self) -> State:
@@ -146,12 +149,15 @@ class Base:
         self.robots.leaving.add(robot)
         if len(self.robots.specs) == len(self.robots.leaving):
             self.hands.end("the robot was removed", now)
-        self._drop_leaving()
+        self._left_at = now
+        self._drop_leaving(now)
 
-    def _drop_leaving(self) -> None:
+    def _drop_leaving(self, now: float) -> None:
+        # What may still move by our doing gets its zero first, if there is a link soon.
+        patient = self.motion.owes_zero and now - self._left_at < OWED_PATIENCE
         for robot in list(self.robots.leaving):
             if len(self.robots.specs) == 1:
-                if not self.silent:
+                if not self.silent or patient:
                     return
                 self.sight.update(False)
             self.robots.drop(robot)
@@ -207,7 +213,7 @@ class Base:
         if self.standing.confirming:
             self.standing.confirm(now)
         self._update_watch(now)
-        self._drop_leaving()
+        self._drop_leaving(now)
 
     # What is heard of it.
 

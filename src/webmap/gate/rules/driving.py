@@ -1,14 +1,11 @@
 """What the commands of a machine's driver come to. No I/O."""
 
-from webmap.gate.limits import fit
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.arming import Arming
-from webmap.gate.rules.guard import Guard
 from webmap.gate.rules.hands import Hands
 from webmap.gate.rules.lease import Lease
 from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.robots import Robots
-from webmap.gate.rules.speeds import Speeds
 from webmap.gate.rules.stoptest import CREEP, StopTest
 from webmap.gate.rules.stoptesting import StopTesting
 from webmap.geometry import Twist
@@ -22,8 +19,6 @@ class Driving:
         hands: Who has it.
         arming: What stands against its motion.
         motion: Writes to it.
-        speeds: How fast it may go.
-        guard: What its scanners see in the way.
         tests: Its stop tests.
 
     """
@@ -34,16 +29,12 @@ class Driving:
         hands: Hands,
         arming: Arming,
         motion: Motion,
-        speeds: Speeds,
-        guard: Guard,
         tests: StopTesting,
     ) -> None:
         self._robots = robots
         self._hands = hands
         self._arming = arming
         self._motion = motion
-        self._speeds = speeds
-        self._guard = guard
         self._tests = tests
 
     def drive(self, wanted: Twist, neutral: bool, tick: int, now: float) -> str | None:
@@ -84,9 +75,7 @@ class Driving:
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         if not self._motion.driving:
             self._robots.make_way(now)
-        bounds = self._speeds.bounds()
-        fitted = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
-        self._motion.drive(self._guard.limit(fitted, now), lease, now)
+        self._motion.drive(wanted, lease, now)
 
     def late(self, now: float) -> None:
         """A command of the lease's holder came too late: that is doubt, so zero (S1).
@@ -169,8 +158,11 @@ class Driving:
 
     def _fault(self, reason: str, now: float) -> None:
         """Stop and disarm, because something may not be as it should."""
-        driving = self._motion.driving
         self._lapse(reason, now)
-        # A program is not seen to let go of anything, so it has to take it again.
-        if driving and self._hands.lease is not None and self._hands.lease.program:
+        lease = self._hands.lease
+        if lease is None or not lease.program:
+            return
+        # A program is not seen to let go of anything, so once it has driven it has to
+        # take it again: it may stand still with its display, and go on where it was.
+        if self._motion.sent_epoch == lease.epoch:
             self._hands.end(reason, now)

@@ -43,12 +43,18 @@ class Motion:
         key: The machine.
         control: The link that they go to.
         bounds: Gives the bounds that hold now.
+        guard: Gives what its scanners leave of a velocity that is about to be written.
         emit: Takes the actions.
 
     """
 
     def __init__(
-        self, key: Key, control: Health, bounds: Callable[[], Bounds], emit: Emit
+        self,
+        key: Key,
+        control: Health,
+        bounds: Callable[[], Bounds],
+        guard: Callable[[Twist, float], Twist],
+        emit: Emit,
     ) -> None:
         self.driving = False
         self.sent = ZERO
@@ -58,6 +64,7 @@ class Motion:
         self._key = key
         self._control = control
         self._bounds = bounds
+        self._guard = guard
         self._emit = emit
         self._burst = Burst()
         self._held = Burst(HELD_PERIOD, HELD_LENGTH)
@@ -65,7 +72,8 @@ class Motion:
         self._pending: tuple[Twist, Lease, float] | None = None
         self._tried_at = float("-inf")
         self._sent_at = self._moved_at = float("-inf")
-        self._sent_epoch: int | None = None
+        self.sent_epoch: int | None = None
+        """On whose behalf that was, or the motion that it ended."""
 
     @property
     def stopping(self) -> bool:
@@ -113,8 +121,8 @@ class Motion:
             return
         self.driving, self._pending, self._left_alone = False, None, False
         self._burst.start(now, length)
-        self._owe_zero()
         self._write_zero_if_due(now)
+        self._owe_zero()  # afterwards: no disk stands in the way of a stop
 
     def hold(self, now: float) -> None:
         """Write zero at once, and go on with that while STOP stands (S8)."""
@@ -152,7 +160,7 @@ class Motion:
 
     def wrote(self, write: Wrote, now: float) -> None:
         """Note a velocity that went out."""
-        self.sent, self._sent_at, self._sent_epoch = write.twist, now, write.epoch
+        self.sent, self._sent_at, self.sent_epoch = write.twist, now, write.epoch
         if not write.twist.is_zero:
             self._moved_at = now
 
@@ -169,7 +177,7 @@ class Motion:
             self._write_zero()
 
     def _write_zero(self) -> None:
-        self._emit(WriteTwist(self._key, ZERO, self._sent_epoch, None))
+        self._emit(WriteTwist(self._key, ZERO, self.sent_epoch, None))
 
     def _flush(self, now: float) -> None:
         """Write the newest command, unless one has just been written."""
@@ -179,11 +187,12 @@ class Motion:
         if now - since > WAIT_LIMIT:
             self._pending = None
             return
-        if lease.epoch != self._sent_epoch and not self.sent.is_zero:
+        if lease.epoch != self.sent_epoch and not self.sent.is_zero:
             self._write_zero()  # between two epochs there is a zero, whatever happened
             return
         self._pending, self._tried_at = None, now
-        twist = self._bounded(wanted, now)
+        # The scanners judge what is written and nothing else: a ramp bends the way.
+        twist = self._guard(self._bounded(wanted, now), now)
         self._emit(WriteTwist(self._key, twist, lease.epoch, lease.connection))
 
     def _bounded(self, wanted: Twist, now: float) -> Twist:
