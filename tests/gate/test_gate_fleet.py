@@ -107,6 +107,26 @@ class TestDeclaring:
         bench.tell(messages.Forget("r1"))
         assert not bench.gate.busy
 
+    @pytest.mark.parametrize("later", [10.0, None])
+    def test_one_that_is_owed_a_zero_is_kept_for_it_a_while(self, later):
+        bench = Bench().begin()
+        bench.drive_off()
+        bench.break_links()
+        bench.tell(messages.Forget("r1"))
+        if later is None:  # the file on disk still says so, for the next gate
+            bench.run(61.0)
+            assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
+            assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
+            return
+        bench.run(later)
+        assert bench.did(actions.Detach) == []
+        at = bench.now
+        bench.connect_links()
+        bench.run(4.0)
+        assert [w.twist for w in bench.written if w.at >= at][0] == ZERO
+        assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
+        assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
+
     def test_one_that_stands_is_dropped_at_once(self):
         bench = Bench().begin()
         bench.tell(messages.Forget("r1"))

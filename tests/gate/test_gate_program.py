@@ -117,6 +117,21 @@ def test_doubt_that_a_command_meets_first_ends_its_lease_too(bench):
     assert bench.report().holder is None
 
 
+def test_a_program_that_stood_still_with_its_display_does_not_drive_on(bench):
+    """Its dead-man ends before the silence of the display shows, as by SIGSTOP."""
+    take(bench)
+    epoch = bench.report().epoch
+    twist(bench, 0.5, 0.0, 0.0)
+    bench.beating = False
+    bench.run(10.0)
+    at = bench.now
+    bench.beating = True
+    bench.run(0.1)
+    bench.run(1.0, lambda: twist(bench, 0.5, 0.0, 0.0, epoch=epoch))
+    assert bench.moving_since(at) == []
+    assert bench.report().holder is None
+
+
 def test_doubt_while_nothing_moves_only_refuses(bench):
     take(bench)
     bench.answering = False

@@ -96,6 +96,14 @@ class TestLatch:
         bench.run(2.0)
         assert len(bench.dropped) == before
 
+    def test_its_zero_goes_before_anything_is_written_to_disk(self, bench):
+        bench.done.clear()
+        stop(bench)
+        kinds = [type(each) for each in bench.done]
+        disk = (actions.MarkDriven, actions.KeepLatch)
+        first = min(kinds.index(kind) for kind in disk)
+        assert kinds.index(actions.WriteTwist) < first
+
     def test_on_every_new_link_it_is_the_first_thing_sent(self, bench):
         bench.drive_off()
         stop(bench)
