@@ -208,19 +208,48 @@ def test_goals_of_both_navigations_are_found():
     assert robot.topic("goal") == "/goal_pose"
 
 
-def test_packed_pictures_come_before_plain_ones_and_depth_is_left_out():
-    robot = only(
+RAW, PACKED = "sensor_msgs/Image", "sensor_msgs/msg/CompressedImage"
+
+
+def cameras(topics):
+    robot = only({"/odom": ODOM, **topics})
+    return [guess.topic for guess in robot.guesses.get("camera", ())]
+
+
+def test_packed_pictures_come_before_plain_ones_and_once_for_a_camera():
+    assert cameras(
         {
-            "/odom": ODOM,
-            "/camera/image_raw": "sensor_msgs/Image",
-            "/camera/depth/image_raw": "sensor_msgs/Image",
-            "/camera/image_raw/compressed": "sensor_msgs/CompressedImage",
+            "/camera/image_raw": RAW,
+            "/camera/image_raw/compressed": PACKED,
+            "/back/image_raw": RAW,
+            "/front/image_raw/compressed": PACKED,
         }
-    )
-    assert [guess.topic for guess in robot.guesses["camera"]] == [
+    ) == [
         "/camera/image_raw/compressed",
-        "/camera/image_raw",
+        "/front/image_raw/compressed",
+        "/back/image_raw",
     ]
+
+
+@pytest.mark.parametrize(
+    "topic",
+    [
+        "/camera/depth/image_raw",
+        "/camera/depth/image_raw/compressed",
+        "/camera/depth_registered/image_raw",
+        "/camera/aligned_depth_to_color/image_raw",
+        "/camera/depth_image",
+        "/camera/image_raw/compressedDepth",
+        "/camera/image_raw/zstd",
+    ],
+)
+def test_how_far_away_things_are_is_no_camera_s_picture(topic):
+    assert cameras({topic: RAW}) == cameras({topic: PACKED}) == []
+
+
+def test_a_depth_camera_has_colours_too():
+    topics = {"/depth_camera/image_raw": RAW}
+    assert cameras(topics) == ["/depth_camera/image_raw"]
 
 
 def test_two_robots_of_one_last_name_have_their_whole_namespaces_for_names():

@@ -37,7 +37,7 @@ def discover(
     """
     topics = {name: type.strip() for name, type in topics.items() if is_topic(name)}
     found = (match(name, type) for name, type in sorted(topics.items()))
-    matches = [each for each in found if each is not None]
+    matches = _packed([each for each in found if each is not None])
     spaces = robot_namespaces(matches)
     bases, alone = owners(trees.bases() if trees else (), spaces)
     bases |= {base.space: base for base in alone}
@@ -67,6 +67,16 @@ def host_name(url: str) -> str:
     except ValueError:
         return host.partition(".")[0] or "robot"
     return host
+
+
+def _packed(matches: Sequence[Match]) -> list[Match]:
+    """Return all but the raw pictures of cameras that send the same ones compressed."""
+    there = {each.topic for each in matches if each.role == "camera"}
+    return [
+        each
+        for each in matches
+        if each.role != "camera" or f"{each.topic}/compressed" not in there
+    ]
 
 
 def _with_frames(matches: Iterable[Match], robots: Sequence[str]) -> set[str]:

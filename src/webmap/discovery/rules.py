@@ -31,6 +31,16 @@ GRID = ("nav_msgs/OccupancyGrid",)
 PATH = ("nav_msgs/Path",)
 CAMERA = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")
 
+DEPTH = (
+    r"/(?:depth(?:_registered|_image[^/]*)?|aligned_depth[^/]*|image_depth[^/]*|"
+    r"compressedDepth|zstd)(?:/|\Z)"
+)
+"""Parts of names of pictures that are no colours: how far away things are.
+
+A camera that is only called after its kind, such as ``depth_camera``, has colours too.
+What is packed by zstd is no picture that a browser shows.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Rule:
@@ -46,8 +56,8 @@ class Rule:
     words: str
     """Why such a topic fits, for people."""
 
-    unless: str = "\n"
-    """What a name must not hold anywhere."""
+    unless: str = r"(?!)"
+    """A pattern that must be found nowhere in the name."""
 
 
 RULES: tuple[Rule, ...] = (
@@ -129,8 +139,8 @@ RULES: tuple[Rule, ...] = (
     Rule("costmap", GRID, r"[^/]*costmap[^/]*(?:/[^/]+)?", "named a costmap"),
     Rule("map", GRID, r"map", "the usual name"),
     Rule("map", GRID, r"[^/]+", "its type alone"),
-    Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", "depth"),
-    Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not packed", "depth"),
+    Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", DEPTH),
+    Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not packed", DEPTH),
     Rule("cloud", ("sensor_msgs/PointCloud2",), r"[^/]+", "its type alone"),
     Rule("tf", ("tf2_msgs/TFMessage",), r"tf", "the frames of the robot"),
 )
@@ -159,7 +169,7 @@ def match(topic: str, type: str) -> Match | None:
     except ConfigError:
         return None
     for place, (rule, pattern) in enumerate(_COMPILED):
-        if plain not in rule.types or rule.unless in topic:
+        if plain not in rule.types or re.search(rule.unless, topic):
             continue
         found = pattern.match(topic)
         if found is not None:
