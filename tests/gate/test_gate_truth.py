@@ -20,9 +20,9 @@ class TestAlarm:
         self.run(bench, 0.3, 0.5, x=0.5)
         return bench
 
-    def run(self, bench, seconds, speed, x=None):
+    def run(self, bench, seconds, speed, x=None, turn=0.0):
         def each():
-            bench.tell(events.Measured(KEY, Twist(speed)))
+            bench.tell(events.Measured(KEY, Twist(speed, 0.0, turn)))
             if x is not None:
                 bench.drive(x=x)
 
@@ -34,6 +34,14 @@ class TestAlarm:
         self.run(bench, 0.2, 0.31, x=0.0)
         assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
         self.run(bench, 0.1, 0.01, x=0.0)
+        assert bench.report().alarm is None
+
+    def test_a_robot_that_spins_on_is_said_as_well(self, bench):
+        self.run(bench, 0.95, 0.0, x=0.0, turn=-0.8)
+        assert bench.report().alarm is None
+        self.run(bench, 0.2, 0.0, x=0.0, turn=-0.8)
+        assert bench.report().alarm == "zero sent, still turning at 0.80 rad/s"
+        self.run(bench, 0.1, 0.0, x=0.0, turn=-0.1)
         assert bench.report().alarm is None
 
     def test_also_when_its_driver_has_gone(self, bench):

@@ -7,7 +7,10 @@ GRACE = 1.0
 """Seconds after zero until a machine that moves on is said not to obey."""
 
 MOVES = 0.05
-"""Metres per second from which a machine is said to move on."""
+"""Metres per second above which a machine is said to move on."""
+
+TURNS = 0.1
+"""Radians per second above which it is said to turn on."""
 
 
 class Obedience:
@@ -18,7 +21,7 @@ class Obedience:
 
     def __init__(self) -> None:
         self._zero_at: float | None = None
-        self._speed: float | None = None
+        self._seen: Twist | None = None
         self._seen_at = float("-inf")
 
     def wrote(self, twist: Twist, last: Twist, now: float) -> None:
@@ -31,11 +34,11 @@ class Obedience:
     def expect(self, now: float) -> None:
         """Expect standstill from here on, unless that is expected already."""
         if self._zero_at is None:
-            self._zero_at, self._speed = now, None
+            self._zero_at, self._seen = now, None
 
     def excuse(self) -> None:
         """Note that it may move: somebody drives it, or it has a goal."""
-        self._zero_at = self._speed = None
+        self._zero_at = self._seen = None
 
     def saw(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
@@ -44,8 +47,8 @@ class Obedience:
         if not self.watching(now):
             self.excuse()  # nobody looked for a while: it may be driven by others
             return
-        self._speed, self._seen_at = speed_of(twist), now
-        if self._speed <= MOVES:
+        self._seen, self._seen_at = twist, now
+        if speed_of(twist) <= MOVES and abs(twist.wz) <= TURNS:
             self.excuse()
 
     def watching(self, now: float) -> bool:
@@ -56,8 +59,11 @@ class Obedience:
 
     def alarm(self, now: float) -> str | None:
         """Return what is wrong at ``now``, in words."""
-        if self._zero_at is None or self._speed is None:
+        if self._zero_at is None or self._seen is None:
             return None
         if now - self._zero_at < GRACE or not self.watching(now):
             return None
-        return f"zero sent, still moving at {self._speed:.2f} m/s"
+        speed = speed_of(self._seen)
+        if speed > MOVES:
+            return f"zero sent, still moving at {speed:.2f} m/s"
+        return f"zero sent, still turning at {abs(self._seen.wz):.2f} rad/s"
