@@ -641,6 +641,20 @@ class TestBlindness:
         assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
         assert bench.report().reason == "no odometry for 1 s"
 
+    def test_odometry_that_tells_no_velocity_is_no_sight(self, bench):
+        """As of a message without a twist, or one of NaN."""
+        bench.take()
+        assert self.moves(bench, seen=True)
+        at = bench.now
+
+        def each():
+            bench.tell(events.Measured(KEY, None))
+            bench.drive(x=1.0)
+
+        bench.run(2.0, each)
+        assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
+        assert bench.report().measured is None
+
     def test_it_is_listened_to_only_while_it_matters(self, bench):
         bench.tell(events.Measured(KEY, Twist(0.1)))
         assert bench.report().measured is None

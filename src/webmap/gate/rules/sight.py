@@ -5,7 +5,8 @@ from webmap.gate.events import Key
 from webmap.geometry import Twist
 
 BLIND_LIMIT = 1.0
-"""The oldest odometry or picture with which a machine is driven, in seconds (S16)."""
+"""The oldest velocity that odometry told, or picture, with which a machine is driven,
+in seconds (S16)."""
 
 
 class Sight:
@@ -22,7 +23,7 @@ class Sight:
         self.echoed: Twist | None = None
         self.measured: Twist | None = None
         self.seen_at: float | None = None
-        """When odometry last came."""
+        """When odometry last told a velocity."""
         self._key = key
         self._emit = emit
 
@@ -35,8 +36,10 @@ class Sight:
             self.measured = self.echoed = self.seen_at = None
 
     def saw(self, measured: Twist | None, now: float) -> None:
-        """Note that odometry came."""
-        self.measured, self.seen_at = measured, now
+        """Note that odometry came; what tells no velocity shows nobody anything."""
+        self.measured = measured
+        if measured is not None:
+            self.seen_at = now
 
     def saw_echo(self, twist: Twist) -> None:
         """Note what the robot's ROS says on the velocity topic."""
