@@ -156,8 +156,22 @@ def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
     assert ended.wait(30)
     gate.stop(30.0)
     assert gate.epitaph == "it was ended by SIGKILL"
-    assert "its words could not be dealt with" in caplog.text
+    assert "the gate's words could not be dealt with" in caplog.text
     assert "LookupError: Ready(pid=5)" in caplog.text
+
+
+def test_a_gate_that_its_display_cannot_deal_with_ends_in_good_order():
+    """It is this side that failed; the other still has robots to send zero to."""
+
+    def hear(child, message):
+        raise LookupError(message)
+
+    ended = threading.Event()
+    gate = Child(hear, lambda _: ended.set())
+    gate.start()
+    assert ended.wait(60)
+    gate.stop(30.0)
+    assert gate.epitaph == "exit code 0, without a word"
 
 
 def test_who_hears_of_its_end_may_stop_it_there_and_then():

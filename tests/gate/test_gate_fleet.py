@@ -123,7 +123,7 @@ class TestDeclaring:
         at = bench.now
         bench.connect_links()
         bench.run(4.0)
-        assert [w.twist for w in bench.written if w.at >= at][0] == ZERO
+        assert next(w.twist for w in bench.written if w.at >= at) == ZERO
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
         assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 

@@ -322,7 +322,7 @@ class TestHowItGoes:
         assert self.end(bench, "cancelled", "canceled").state == "cancelled"
 
     def test_a_goal_that_its_cancel_overtook_is_cancelled_again(self, bench):
-        """The two go by different sockets, and what is not there yet is not cancelled."""
+        """They go by different sockets, and what is not there yet is not cancelled."""
         self.tell(bench, active=False)
         assert cancels(bench) == 0
         bench.say("b", op="cancel", robot="r1")

@@ -13,6 +13,7 @@ from gate_robot import eventually
 
 from webmap.gate import framing, process
 from webmap.gate.display.child import gate_command
+from webmap.gate.events import Shutdown
 from webmap.gate.messages import FromGate, Heartbeat, Ready
 from webmap.gate.outbox import Outbox
 from webmap.gate.rules.gate import Gate
@@ -54,6 +55,31 @@ def test_it_says_who_it_is_and_ends_with_the_pipe(gate):
     assert said_until_ready(gate)[0] == Ready(gate.pid)
     _, err = gate.communicate(framing.pack(Heartbeat()), timeout=60)
     assert (gate.returncode, err) == (0, b"")
+
+
+def test_a_gate_that_can_hear_no_longer_is_told_to_end():
+    """Whatever kept it from reading: one that hears no STOP must not go on."""
+
+    class Loop:
+        def __init__(self):
+            self.told = []
+
+        def call_soon_threadsafe(self, tell, event):
+            self.told.append(event)
+            if isinstance(event, Heartbeat):
+                raise LookupError(event)
+
+    class Shell:
+        tell = None
+
+    out, into = os.pipe()
+    os.write(into, framing.pack(Heartbeat()))
+    loop = Loop()
+    with pytest.raises(LookupError):
+        process._read(out, loop, Shell())
+    assert isinstance(loop.told[-1], Shutdown)
+    os.close(out)
+    os.close(into)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

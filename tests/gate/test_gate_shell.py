@@ -184,7 +184,7 @@ async def test_a_gate_that_fails_sends_zero_and_ends(
 async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
     tmp_path, monkeypatch
 ):
-    """While it waits for a hook that hangs, the hand and the display go on as before."""
+    """While it waits for a hook that hangs, hand and display go on as before."""
     hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
     async with driving(tmp_path, stop_hooks=(hook,)) as (bridge, gate):
         bridge.answers_services = False

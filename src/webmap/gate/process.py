@@ -71,7 +71,8 @@ def _read(file: int, loop: asyncio.AbstractEventLoop, shell: Shell) -> None:
                     loop.call_soon_threadsafe(shell.tell, message)
         except (OSError, WireError) as error:
             why = f"the pipe from the display is broken: {error}"
-        loop.call_soon_threadsafe(shell.tell, events.Shutdown(why))
+        finally:  # whatever it was: a gate that hears no STOP must not go on
+            loop.call_soon_threadsafe(shell.tell, events.Shutdown(why))
 
 
 def _take_pipes() -> tuple[int, int]:

@@ -92,7 +92,7 @@ class Shell:
         stepping.cancel()
         looking.cancel()
         if self.failed:
-            self._links.zero_all()  # once more: the first may have met a link that broke
+            self._links.zero_all()  # again: the first may have met a broken link
         self._links.close()
         await asyncio.sleep(0)  # the loop's chance to write what it still holds
 

@@ -20,6 +20,9 @@ log = logging.getLogger("webmap.gate")
 MAX_UNSENT = 1 << 20
 """Bytes that a gate may leave unread before it is taken for hung."""
 
+END_PATIENCE = 2.0
+"""Seconds for which a gate may send zeros and end, until it is killed."""
+
 MAX_WORDS = 300
 """The longest line of a gate that is kept as its last words, in characters."""
 
@@ -149,8 +152,9 @@ class Child:
         except WireError as error:
             self.kill(str(error))
         except Exception:
-            log.exception("the reader of the gate's pipe failed")
-            self.kill("its words could not be dealt with")
+            # A fault of this side: the gate can still send its robots zero.
+            log.exception("the gate's words could not be dealt with: it is ended")
+            self.stop(END_PATIENCE)
         finally:
             self._process.stdout.close()
             self._ended(self)
