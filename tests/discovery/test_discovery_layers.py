@@ -40,6 +40,7 @@ def test_what_nav2_publishes_is_drawn_once_each():
     found = find_layers(NAV2, ["/tb"])["/tb"]
     assert kinds(found) == {
         "/local_costmap/costmap": "costmap",
+        "/global_costmap/costmap": "global costmap",
         "/local_costmap/published_footprint": "footprint",
         "/particle_cloud": "particles",
         "/amcl_pose": "doubt",
@@ -51,7 +52,18 @@ def test_what_nav2_publishes_is_drawn_once_each():
         "/plan": "path",
         "/map": "map",
     }
-    assert found[0].topic.endswith("local_costmap/costmap"), "not the global one"
+    local, whole = (drawing(layer, "/tb", None) for layer in found[:2])
+    assert local.module == whole.module == "OccupancyGrid"
+    assert whole.options["order"] < 20.0, "it lies under the local one"
+    assert whole.options["throttle"] > local.options["throttle"], "and comes less often"
+
+
+@pytest.mark.parametrize("space", ["", "/tb"])
+@pytest.mark.parametrize("above", ["", "/move_base"])
+def test_the_global_costmap_is_one_of_its_own_also_without_a_local_one(space, above):
+    topic = f"{space}{above}/global_costmap/costmap"
+    (found,) = find_layers({topic: "nav_msgs/OccupancyGrid"}, [space])[space]
+    assert (found.kind, found.topic) == ("global costmap", topic)
 
 
 def test_move_base_has_other_names():

@@ -43,7 +43,9 @@ ON_THE_MAP = {
     ".occupancy-grid.map > image[href]": 3,
     '.occupancy-grid.map[data-layer="/robot_0/map"] > image[href]': 1,
     '.occupancy-grid.map[data-layer="/second_map"] > image[href]': 1,
-    ".occupancy-grid.costmap > image[href]": 2,
+    ".occupancy-grid.costmap > image[href]": 4,
+    '.costmap[data-layer="local_costmap/costmap"] > image[href]': 2,
+    '.costmap[data-layer="global_costmap/costmap"] > image[href]': 2,
     ".markers": 2,
 }
 

@@ -25,6 +25,7 @@ ROLES: dict[Kind, Role] = {
     "path": "plan",
     "cloud": "cloud",
     "costmap": "costmap",
+    "global costmap": "costmap",
 }
 """Which role a topic may have that is drawn so."""
 

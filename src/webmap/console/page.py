@@ -13,6 +13,7 @@ import webmap
 from webmap.console.bridge_list import BridgeList
 from webmap.console.camera_panel import CameraPanel
 from webmap.console.checkup import remember
+from webmap.console.costmaps import CostmapNames
 from webmap.console.doctor import DoctorReports
 from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
@@ -108,13 +109,14 @@ def build(
     most = (SPEED, ROTATION_SPEED)
     card = map.add_module(RobotCard, page.element("card"), goals, poses, most)
     cameras = map.add_module(CameraPanel)
+    costmaps = map.add_module(CostmapNames)
     health = map.add_module(RobotHealth, page.element("card"))
     map.add_module(RobotButtons, page.element("card"))
     doctor = map.add_module(DoctorReports, page.element("bridges"), bridges)
     links = BridgeList(page.element("bridges"), bridges, doctor.buttons)
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
-    polls += [links.poll, refused.poll, doctor.poll]
+    polls += [links.poll, refused.poll, doctor.poll, costmaps.poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 

@@ -64,6 +64,10 @@ def drawing(
             return Drawing("OccupancyGrid", placed, of_maps=True)
         case "grid" if not is_own(topic, namespace):
             return Drawing("OccupancyGrid", {"palette": "costmap"}, shared=True)
+        case "global costmap":
+            # All of the map, under the local one: it is large, and changes slowly.
+            whole = {"palette": "costmap", "throttle": 5000, "order": 15.0, **placed}
+            return Drawing("OccupancyGrid", whole, of_maps=True)
         case "grid" | "costmap":
             options = {"palette": "costmap", "throttle": 500, **placed}
             return Drawing("OccupancyGrid", options, of_maps=True)

@@ -17,6 +17,7 @@ Kind: TypeAlias = Literal[
     "map",
     "grid",
     "costmap",
+    "global costmap",
     "scan",
     "cloud",
     "local plan",
@@ -86,6 +87,9 @@ HEALTH = ("diagnostic_msgs/DiagnosticArray",)
 
 RULES: tuple[LayerRule, ...] = (
     LayerRule("costmap", GRID, r"local_costmap/costmap\Z", 1, "a local costmap"),
+    LayerRule(
+        "global costmap", GRID, r"global_costmap/costmap\Z", 1, "a global costmap"
+    ),
     LayerRule("costmap", GRID, r"costmap/costmap\Z", 1, "a costmap"),
     LayerRule("costmap", GRID, r"costmap", 1, "named a costmap"),
     LayerRule("map", GRID, r"/map\Z", 4, "the usual name"),

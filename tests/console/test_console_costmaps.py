@@ -1,0 +1,40 @@
+"""Costmaps have names in the list of layers."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from webmap import svg
+from webmap.console.costmaps import CostmapNames
+
+
+def grid(topic, palette="costmap"):
+    layer = SimpleNamespace(topic=topic, palette=palette, svg=svg.g())
+    return SimpleNamespace(layer=layer)
+
+
+def named(*modules):
+    CostmapNames(SimpleNamespace(modules=modules)).poll()
+    return [module.layer.svg.attributes.get("data-layer") for module in modules]
+
+
+@pytest.mark.parametrize(
+    ("topic", "name"),
+    [
+        ("/bob/global_costmap/costmap", "global_costmap/costmap"),
+        ("/bob/move_base/local_costmap/costmap", "local_costmap/costmap"),
+        ("/costmap", "costmap"),
+    ],
+)
+def test_a_costmap_is_called_as_its_topic_ends_alike_for_all_robots(topic, name):
+    assert named(grid(topic)) == [name]
+
+
+def test_what_has_a_name_keeps_it_and_a_map_gets_none():
+    said = grid("/costmap")
+    said.layer.svg.set("data-layer", "/costmap (north)")
+    assert named(said, grid("/map", "map")) == ["/costmap (north)", None]
+
+
+def test_modules_that_draw_nothing_are_passed_over():
+    CostmapNames(SimpleNamespace(modules=[object()])).poll()
