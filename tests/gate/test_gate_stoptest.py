@@ -15,6 +15,9 @@ class Base:
         self.bench = bench
         self.timeout = timeout
         self.speaks = True
+        self.coarse = 0
+        """Every so many messages say that it stands, as a coarse encoder's do."""
+        self.said = 0
 
     @property
     def speed(self):
@@ -27,7 +30,10 @@ class Base:
     def run(self, seconds, x=0.0, who="a"):
         def each():
             if self.speaks:
-                self.bench.tell(events.Measured(KEY, Twist(self.speed)))
+                self.said += 1
+                between = self.coarse and self.said % self.coarse == 0
+                speed = 0.0 if between else self.speed
+                self.bench.tell(events.Measured(KEY, Twist(speed)))
             if x is not None:
                 self.bench.drive(who, x=x)
 
@@ -103,6 +109,50 @@ class TestRunning:
         assert (report.stop_time, report.stop_source) == (None, "tested")
         assert report.v == 0.3
         assert report.why == ("did not stop by itself when tested on 2026-11-21",)
+
+    def test_a_coarse_encoder_does_not_stop_a_base_that_moves_on(self, bench):
+        base = Base(bench, timeout=None)
+        base.coarse = 6
+        begin(bench)
+        base.run(3.5)
+        assert bench.report().test.text == "it did not stop by itself within 3 s"
+        assert bench.report().stop_time is None
+
+    def test_it_stopped_when_the_standstill_began_that_lasted(self, bench):
+        base = Base(bench, timeout=0.8)
+        base.coarse = 6
+        begin(bench)
+        base.run(1.6)
+        assert bench.report().stop_time == pytest.approx(0.85, abs=0.05)
+
+    def test_a_base_that_stops_at_the_last_moment_is_looked_at_until_it_is_sure(
+        self, bench
+    ):
+        base = Base(bench, timeout=2.8)
+        begin(bench)
+        base.run(3.1)
+        assert state(bench) == "waiting"
+        base.run(0.3)
+        assert bench.report().test.text.startswith("stopped by itself after 2.8")
+
+    @pytest.mark.parametrize("foreign", [ZERO, Twist(0.2), Twist(0.1)])
+    def test_what_another_commands_meanwhile_makes_it_void(self, bench, base, foreign):
+        begin(bench)
+        base.run(0.1)
+        assert state(bench) == "waiting"
+        for write in bench.written:
+            bench.tell(events.Echoed(KEY, write.twist))
+        assert state(bench) == "waiting", "those are ours"
+        bench.tell(events.Echoed(KEY, foreign))
+        assert "another commanded it" in bench.report().test.text
+        assert state(bench) == "failed"
+        assert bench.written[-1].twist == ZERO
+        assert bench.did(actions.KeepStopTest) == []
+
+    def test_what_others_say_while_it_creeps_ends_nothing_yet(self, bench, base):
+        begin(bench)
+        bench.tell(events.Echoed(KEY, ZERO))
+        assert state(bench) == "creeping"
 
     def test_a_base_that_stops_late_stays_slow(self, bench):
         base = Base(bench, timeout=1.0)
@@ -250,8 +300,9 @@ class TestRefused:
         base.run(0.2, x=1.0)
         assert self.why(bench) == "release every input first"
 
-    def test_while_something_else_moves_it(self, bench):
-        bench.tell(events.Measured(KEY, Twist(0.2)))
+    @pytest.mark.parametrize("motion", [Twist(0.2), Twist(0.0, 0.0, 0.3)])
+    def test_while_something_else_moves_it(self, bench, motion):
+        bench.tell(events.Measured(KEY, motion))
         assert self.why(bench) == "it moves already"
 
     def test_without_odometry(self):

@@ -228,10 +228,16 @@ class Base:
             return
         self.obedience.wrote(write.twist, self.motion.sent, now)
         self.motion.wrote(write, now)
+        self.tests.wrote(write.twist)
         twist = write.twist
         for robot in self.robots.specs:
             sent = SentTwist(robot, twist.vx, twist.vy, twist.wz, write.by)
             self._emit(Say(sent))
+
+    def heard(self, twist: Twist, now: float) -> None:
+        """Note what came back on the velocity topic, ours or another's."""
+        self.sight.saw_echo(twist)
+        self.tests.heard(twist, now)
 
     def saw(self, measured: Twist | None, now: float) -> None:
         """Note that odometry came."""

@@ -257,7 +257,7 @@ class Fleet:
     def _echoed(self, event: events.Echoed, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.sight.saw_echo(event.twist)
+            base.heard(event.twist, now)
 
     def _measured(self, event: events.Measured, now: float) -> None:
         base = self._of_key(event.key)

@@ -22,6 +22,11 @@ def speed_of(twist: Twist) -> float:
     return math.hypot(twist.vx, twist.vy)
 
 
+def moves(twist: Twist) -> bool:
+    """Return whether a machine of that velocity does not stand."""
+    return speed_of(twist) >= STILL_V or abs(twist.wz) >= STILL_W
+
+
 class Standstill:
     """Listens to odometry from a moment on, until the machine has stood for long."""
 
@@ -32,25 +37,26 @@ class Standstill:
         """The newest speed of turning in rad/s, without its sign."""
         self.heard_at = float("-inf")
         """When odometry last told a velocity."""
-        self._since: float | None = None
+        self.since: float | None = None
+        """When it was first seen to stand, if it has been seen so ever since."""
 
     def begin(self) -> None:
         """Forget what was heard before."""
-        self.speed, self.heard_at, self._since = None, float("-inf"), None
+        self.speed, self.heard_at, self.since = None, float("-inf"), None
 
     def saw(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry; ``None`` is one without a velocity."""
         if twist is None:
             return
         if now - self.heard_at > GAP:
-            self._since = None
+            self.since = None
         self.speed, self.turn, self.heard_at = speed_of(twist), abs(twist.wz), now
-        if self.speed >= STILL_V or self.turn >= STILL_W:
-            self._since = None
-        elif self._since is None:
-            self._since = now
+        if moves(twist):
+            self.since = None
+        elif self.since is None:
+            self.since = now
 
     @property
     def reached(self) -> bool:
         """Whether the machine has stood for :data:`STILL_FOR`."""
-        return self._since is not None and self.heard_at - self._since >= STILL_FOR
+        return self.since is not None and self.heard_at - self.since >= STILL_FOR

@@ -2,20 +2,24 @@
 
 ::
 
-    creeping ── odometry shows motion ──▶ waiting ── it stands ──▶ done
+    creeping ── odometry shows motion ──▶ waiting ── it stands for 0.3 s ──▶ done
         │                                    │
         └── no motion for 1.5 s              └── it moves on for 3 s
                     └──────────▶ failed ◀──────────┘
-                                   ▲ any doubt, any key, STOP
+                                   ▲ any doubt, any key, STOP, another who commands it
 
 While it creeps, each creeping command answers one of the driver's own, which say that
 every input is released; the test writes nothing by a timer. While it waits nothing is
 written at all, not even zero: that is what is tested. It always ends with zero.
+
+One message that says "it stands" shows nothing: a coarse encoder says so between two of
+its steps. The base stopped when a standstill began that lasted.
 """
 
+from collections import Counter
 from typing import Literal
 
-from webmap.gate.rules.standstill import STILL_V, speed_of
+from webmap.gate.rules.standstill import Standstill, speed_of
 from webmap.geometry import Twist
 
 CREEP = Twist(0.1)
@@ -29,6 +33,9 @@ MOVES = 0.05
 
 WAIT_FOR = 3.0
 """Seconds after the last command for which a base is waited for."""
+
+NOT_ALONE = "another commanded it meanwhile: have that silent, then test again"
+"""What is said when the gate was not the only one that commanded the base."""
 
 MOVES_ON = f"it did not stop by itself within {WAIT_FOR:g} s"
 """What is said of a base that has no timeout of its own."""
@@ -53,11 +60,23 @@ class StopTest:
         """How long the base went on after the last command, if it stopped."""
         self._began_at = now
         self._left_alone_at = now
+        self._still = Standstill()
+        self._unechoed: Counter[Twist] = Counter()
 
     @property
     def running(self) -> bool:
         """Whether it goes on."""
         return self.state in ("creeping", "waiting")
+
+    def wrote(self, twist: Twist) -> None:
+        """Note what was written to the machine, of which an echo may come."""
+        self._unechoed[twist] += 1
+
+    def heard(self, twist: Twist) -> None:
+        """Take in a velocity that was said to the machine, by whomever."""
+        self._unechoed[twist] -= 1
+        if self.state == "waiting" and self._unechoed[twist] < 0:
+            self.abort(NOT_ALONE)
 
     def saw(self, twist: Twist | None, last_command_at: float, now: float) -> None:
         """Take in a message of odometry.
@@ -70,20 +89,26 @@ class StopTest:
         """
         if twist is None:
             return
-        speed = speed_of(twist)
-        if self.state == "creeping" and speed > MOVES:
+        if self.state == "creeping" and speed_of(twist) > MOVES:
             self.state, self.text = "waiting", "no more commands: does it stop?"
             self._left_alone_at = last_command_at
-        elif self.state == "waiting" and speed < STILL_V:
-            self.state, self.concluded = "done", True
-            self.seconds = round(now - self._left_alone_at, 3)
-            self.text = f"stopped by itself after {self.seconds:.2f} s"
+        elif self.state == "waiting":
+            self._still.saw(twist, now)
+            if self._still.reached:
+                assert self._still.since is not None  # since when it stands
+                self.state, self.concluded = "done", True
+                self.seconds = round(self._still.since - self._left_alone_at, 3)
+                self.text = f"stopped by itself after {self.seconds:.2f} s"
 
     def step(self, now: float) -> None:
         """Let time pass."""
         if self.state == "creeping" and now - self._began_at >= CREEP_FOR:
             self.abort(f"it did not move within {CREEP_FOR:g} s")
-        elif self.state == "waiting" and now - self._left_alone_at >= WAIT_FOR:
+        elif (
+            self.state == "waiting"
+            and now - self._left_alone_at >= WAIT_FOR
+            and self._still.since is None  # else it may have stopped just now
+        ):
             self.abort(MOVES_ON)
             self.concluded = True
 

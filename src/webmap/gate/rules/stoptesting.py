@@ -5,7 +5,7 @@ from webmap.gate.events import Key
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.sight import Sight
-from webmap.gate.rules.standstill import STILL_V, speed_of
+from webmap.gate.rules.standstill import moves
 from webmap.gate.rules.stoptest import StopTest
 from webmap.geometry import Twist
 
@@ -50,9 +50,22 @@ class StopTesting:
         measured = self._sight.measured
         if measured is None:
             raise Refusal("without odometry nothing can be measured")
-        if speed_of(measured) >= STILL_V:
+        if moves(measured):
             raise Refusal("it moves already")
         self.last = StopTest(now)
+
+    def wrote(self, twist: Twist) -> None:
+        """Note what was written to the machine."""
+        if self.running is not None:
+            self.running.wrote(twist)
+
+    def heard(self, twist: Twist, now: float) -> None:
+        """Take in a velocity that came back on the topic, ours or another's."""
+        test = self.running
+        if test is not None:
+            test.heard(twist)
+            if not test.running:
+                self._after(test, now)
 
     def saw(self, measured: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
