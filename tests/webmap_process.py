@@ -1,0 +1,38 @@
+"""WebMap and its simulator as processes of their own, as a person starts them."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
+    """Run the command ``webmap``; give the address that it says it is ready at."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "webmap", *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **environment},
+    ) as process:
+        try:
+            line = process.stdout.readline()
+            found = re.search(r"ready at (\S+)", line)
+            assert found, line
+            yield found[1]
+        finally:
+            process.terminate()
+            process.wait(15)
+
+
+def page_of(file: str | Path, **environment: str) -> AbstractContextManager[str]:
+    """Show what a page function or a fleet file says; give the address."""
+    return webmap("run", file, "--port", "0", "--no-browser", **environment)
+
+
+def simulator(*options: str) -> AbstractContextManager[str]:
+    """Run simulated robots; give the address of their rosbridge."""
+    return webmap("sim", "--port", "0", *options)
