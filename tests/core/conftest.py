@@ -51,6 +51,12 @@ class Channel:
     def error(self, text):
         self.calls.append(("error", text))
 
+    def problem(self, number, text):
+        self.calls.append(("error", text, number))
+
+    def mended(self, number):
+        self.calls.append(("mended", number))
+
     @property
     def errors(self) -> list[str]:
         return [call[1] for call in self.calls if call[0] == "error"]

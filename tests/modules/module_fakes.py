@@ -69,6 +69,7 @@ class Channel:
     mounted: dict[int, Any] = field(default_factory=dict)
     orders: dict[int, float] = field(default_factory=dict)
     errors: list[str] = field(default_factory=list)
+    problems: dict[int, str] = field(default_factory=dict)
     numbers: Any = field(default_factory=lambda: itertools.count(1))
 
     def mount(self, fragment, *, under, order=0, within=None):
@@ -81,6 +82,13 @@ class Channel:
 
     def error(self, text):
         self.errors.append(text)
+
+    def problem(self, number, text):
+        self.errors.append(text)
+        self.problems[number] = text
+
+    def mended(self, number):
+        self.problems.pop(number, None)
 
     def __getattr__(self, name):
         return lambda *args, **options: None

@@ -26,6 +26,8 @@ async (frames) => {
     send() {},
     notice: (text) => said.push(text),
     error: (text) => said.push(text),
+    problem: (number, text) => said.push(text),
+    doubtProblems() {},
     hear() {},
     drive() {},
     halves: { detachFrom() {} },

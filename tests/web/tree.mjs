@@ -201,6 +201,10 @@ export class Tree {
   error(text) {
     this.said.push({ error: text });
   }
+
+  problem(number, text) {
+    this.said.push({ problem: number, text });
+  }
 }
 
 function forget(nodes, node) {

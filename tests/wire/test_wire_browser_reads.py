@@ -117,6 +117,7 @@ def a_page_with_a_map():
     session.attach(root.id, 7, "modules/teleop.js", {"speed": 1}, "teleop.css")
     session.send(7, {"text": "ü"})
     session.error("Something is wrong.")
+    session.problem(300, "Something is wrong for now.")
     return session
 
 

@@ -317,6 +317,43 @@ def test_messages_for_a_page_that_looks_away_are_bounded():
     assert b"number 4999" in frame
 
 
+def test_a_page_is_told_how_each_problem_is_now():
+    session = SceneSession()
+    session.problem(7, "it is 1 m off")
+    session.problem(8, "it is hot")
+    session.mended(8)
+    session.problem(7, "it is lost")
+    frame = session.frame(0.0)
+    assert frame[15:] == b"\x0e\x07\x0ait is lost" + b"\x0e\x08\x00"
+    session.mended(7)
+    assert session.frame(0.0)[15:] == b"\x0e\x07\x00"
+
+
+def test_a_page_that_was_loaded_again_is_told_what_is_not_mended():
+    session = SceneSession()
+    for number in range(200):
+        session.problem(number, f"number {number}.")
+    session.mended(199)
+    session.frame(0.0)
+    session.restart()
+    again = session.frame(0.0)
+    told = [number for number in range(200) if b"number %d." % number in again]
+    assert len(told) == Unsaid.PROBLEMS_KEPT - 1
+    assert told == list(range(100, 199))
+
+
+def test_problems_for_a_page_that_looks_away_are_bounded_and_none_is_lost():
+    session = SceneSession()
+    for number in range(5000):
+        session.problem(number, f"number {number}.")
+        if number != 4321:
+            session.mended(number)
+    frame = session.frame(0.0)
+    assert frame[2] == RESET
+    assert b"number 4321." in frame
+    assert len(frame) < 100_000
+
+
 def test_a_page_opened_a_thousand_times_leaves_nothing():
     session = SceneSession()
     fragment = Fragment(svg.g())

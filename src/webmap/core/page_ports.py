@@ -55,6 +55,12 @@ class PageChannel(Protocol):
     def error(self, text: str) -> None:
         """Show a notice."""
 
+    def problem(self, number: int, text: str) -> None:
+        """Show what fails until :meth:`mended`; a new text takes its place."""
+
+    def mended(self, number: int) -> None:
+        """Take back what was said under that number; it may be unknown."""
+
 
 class Publisher(Protocol):
     """Where files get URLs by which a page can load them."""

@@ -1,15 +1,25 @@
 /** How long a failure that was dismissed is not shown again, in milliseconds. */
 const SILENCE = 60_000;
+/** How long what was mended is still shown: it can be read, and does not flicker. */
+const LINGER = 2000;
+/** How many failures are shown; the others are counted. */
+const SHOWN = 3;
+/** How many failures are kept at all. */
+const KEPT = 50;
 
 /** Sentences for the viewer, in a corner of the page; text, whatever is in it. */
 export class Notices {
   constructor() {
     /** @type {HTMLElement | null} */
     this._box = null;
+    this._others = document.createElement("div");
+    this._others.className = "webmap-notice others";
     /** @type {Map<string, HTMLElement>} */
     this._shown = new Map();
     /** When each failure was dismissed. @type {Map<string, number>} */
     this._dismissed = new Map();
+    /** What was mended and goes soon. @type {Map<string, number>} */
+    this._leaving = new Map();
   }
 
   /**
@@ -23,6 +33,29 @@ export class Notices {
     if (since < SILENCE) return;
     this._dismissed.delete(text);
     this.show(text, text, "alert");
+  }
+
+  /**
+   * Show what fails until it is mended, in place of what was said of it before; never
+   * again once it was dismissed. The server gives it another number when it fails anew
+   * long after it was mended.
+   *
+   * @param {number} number
+   * @param {string} text Empty if it is mended.
+   */
+  problem(number, text) {
+    const key = problemKey(number);
+    if (!text) {
+      this._leave(key);
+      return;
+    }
+    this._stay(key);
+    if (!this._dismissed.has(key)) this.show(key, text, "alert");
+  }
+
+  /** Take back every problem that is not told again soon. */
+  doubtProblems() {
+    for (const key of this._shown.keys()) if (isProblem(key)) this._leave(key);
   }
 
   /**
@@ -53,8 +86,21 @@ export class Notices {
 
   /** @param {string} key */
   hide(key) {
+    this._stay(key);
     this._shown.get(key)?.remove();
-    this._shown.delete(key);
+    if (this._shown.delete(key)) this._limit();
+  }
+
+  /** @param {string} key */
+  _leave(key) {
+    if (!this._shown.has(key) || this._leaving.has(key)) return;
+    this._leaving.set(key, setTimeout(() => this.hide(key), LINGER));
+  }
+
+  /** @param {string} key */
+  _stay(key) {
+    clearTimeout(this._leaving.get(key));
+    this._leaving.delete(key);
   }
 
   /** @param {string} key */
@@ -79,11 +125,31 @@ export class Notices {
     return this._box;
   }
 
-  /** A page full of failures tells no more than its newest. */
+  /** A page full of failures tells no more than its newest, and how many there are. */
   _limit() {
     const failures = [...this._shown].filter(([, notice]) =>
       notice.classList.contains("alert"),
     );
-    for (const [key] of failures.slice(0, -5)) this.hide(key);
+    for (const [key] of failures.splice(0, failures.length - KEPT)) {
+      this._shown.get(key)?.remove();
+      this._shown.delete(key);
+    }
+    const others = Math.max(0, failures.length - SHOWN);
+    failures.forEach(([, notice], index) => (notice.hidden = index < others));
+    if (others > 0) this._open().append(this._others);
+    else this._others.remove();
+    this._others.textContent = `and ${others} more`;
   }
+}
+
+const PROBLEM = "problem ";
+
+/** @param {number} number */
+function problemKey(number) {
+  return PROBLEM + number;
+}
+
+/** @param {string} key */
+function isProblem(key) {
+  return key.startsWith(PROBLEM);
 }

@@ -1,7 +1,7 @@
 // Made by tools/make_opcodes.py from webmap/wire/opcodes.py: do not edit.
 
 /** Changes with the tables, so that a page of another version notices. */
-export const VERSION = 31947;
+export const VERSION = 26537;
 
 /** The first byte of each record. */
 export const OP = Object.freeze({
@@ -18,6 +18,7 @@ export const OP = Object.freeze({
   DETACH: 11,
   MESSAGE: 12,
   ERROR: 13,
+  PROBLEM: 14,
   CREATE: 32,
   TEXT: 33,
   DOCUMENT: 34,

@@ -34,6 +34,8 @@ export class Page {
       send: (message) => this.send(message),
       notice: (text) => this.trouble(text),
       error: (text) => this.notices.error(text),
+      problem: (number, text) => this.notices.problem(number, text),
+      doubtProblems: () => this.notices.doubtProblems(),
       hear: (mount, item, kind, event) => this._reports.hear(mount, item, kind, event),
       drive: () => this.drive,
       halves: this.halves,

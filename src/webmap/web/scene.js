@@ -20,6 +20,9 @@ import { readFrame } from "./wire.js";
  * @property {(message: object) => void} send Tells the server.
  * @property {(text: string) => void} notice Tells the viewer and the server.
  * @property {(text: string) => void} error Shows what the server says.
+ * @property {(number: number, text: string) => void} problem Shows what fails until it
+ *     is mended, which no text says.
+ * @property {() => void} doubtProblems Everything that still fails is told again now.
  * @property {(mount: number, item: Item, kind: string, event: Event) => void} hear
  *     Takes an event.
  * @property {() => import('./drive.js').Drive} drive The page's one line to the gate.
@@ -81,6 +84,7 @@ export class Scene {
     for (const mount of [...this._mounts.values()].reverse()) this.unmount(mount.id);
     this._targets = [];
     this._clock.reset();
+    this._page.doubtProblems();
   }
 
   /** Sizes that styles give may be others now. */
@@ -244,6 +248,14 @@ export class Scene {
   /** @param {string} text */
   error(text) {
     this._page.error(text);
+  }
+
+  /**
+   * @param {number} number
+   * @param {string} text
+   */
+  problem(number, text) {
+    this._page.problem(number, text);
   }
 
   // Records about maps and modules ---------------------------------------------

@@ -30,6 +30,7 @@ import {
  * @property {(instance: number) => void} detach
  * @property {(instance: number, message: unknown) => void} message
  * @property {(text: string) => void} error
+ * @property {(number: number, text: string) => void} problem
  * @property {(id: number, parent: number, place: number, tag: string,
  *     svg: boolean) => void} create
  * @property {(id: number, parent: number, place: number, data: string) => void} text
@@ -235,6 +236,7 @@ const RECORDS = {
   [OP.DETACH]: (r, sink) => sink.detach(r.varint()),
   [OP.MESSAGE]: (r, sink) => sink.message(r.varint(), r.json()),
   [OP.ERROR]: (r, sink) => sink.error(r.string()),
+  [OP.PROBLEM]: (r, sink) => sink.problem(r.varint(), r.string()),
   [OP.CREATE]: (r, sink) => sink.create(r.varint(), r.varint(), r.varint(), ...tag(r)),
   [OP.TEXT]: (r, sink) => sink.text(r.varint(), r.varint(), r.varint(), r.string()),
   [OP.DOCUMENT]: (r, sink) => sink.document(r.varint()),

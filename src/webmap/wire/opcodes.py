@@ -56,6 +56,7 @@ class Op(IntEnum):
     DETACH = 11  # v instance
     MESSAGE = 12  # v instance, s message (JSON)
     ERROR = 13  # s text
+    PROBLEM = 14  # v number, s text (empty: mended)
 
     # About elements; a place is LAST, FIRST or AFTER and the id of a sibling.
     CREATE = 32  # v id, v parent (0: the root), v place, u8 tag

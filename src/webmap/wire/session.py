@@ -247,6 +247,20 @@ class SceneSession:
         """Show a notice on the page, and again after it was loaded again."""
         self._unsaid.notice(text)
 
+    def problem(self, number: int, text: str) -> None:
+        """Show what fails until :meth:`mended`; a new text takes its place.
+
+        Args:
+            number: Of the caller's choice; one thing's own, on every page.
+            text: A sentence for people, not empty.
+
+        """
+        self._unsaid.problem(number, text)
+
+    def mended(self, number: int) -> None:
+        """Take a problem back; an unknown one is gone already, which is all right."""
+        self._unsaid.problem(number, "")
+
     # The socket -----------------------------------------------------------------
 
     def restart(self) -> None:
@@ -327,7 +341,9 @@ class SceneSession:
                 parts.append(changes)
                 fragments[fragment] = revision
         parts += [self._place(self._mounts[number]) for number in self._unsaid.new]
-        return b"".join((*parts, self._unsaid.records, *self._unsaid.messages))
+        unsaid = self._unsaid
+        parts += (unsaid.records, *unsaid.messages, *unsaid.problems.values())
+        return b"".join(parts)
 
     def _place(self, mount: Mount) -> bytes:
         self._fragments[mount.fragment] = mount.fragment.revision
@@ -340,4 +356,5 @@ class SceneSession:
             parts += (canvas.state(self._key), canvas.unreported)
         parts += [record for _, record in self._attached.values()]
         parts += self._unsaid.notices_again()
+        parts += self._unsaid.standing.values()
         return b"".join((*parts, *self._unsaid.messages))

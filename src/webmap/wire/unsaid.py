@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import ClassVar
 
-from webmap.wire.encode import string
+from webmap.wire.encode import string, varint
 from webmap.wire.opcodes import Op
 
 
@@ -17,6 +17,7 @@ class Unsaid:
     MESSAGES_KEPT: ClassVar = 1000
     BYTES_KEPT: ClassVar = 256 * 1024
     NOTICES_KEPT: ClassVar = 5
+    PROBLEMS_KEPT: ClassVar = 100
 
     def __init__(self) -> None:
         self.tell_all = False
@@ -26,6 +27,10 @@ class Unsaid:
         """The numbers of mounts that the page has not yet."""
         self.records = bytearray()
         self.messages: list[bytes] = []
+        self.standing: dict[int, bytes] = {}
+        """What says each problem that is not mended, the newest of too many."""
+        self.problems: dict[int, bytes] = {}
+        """What says, of problems that changed, how each is now."""
         self._notices: dict[bytes, None] = {}
 
     def record(self, record: bytes | bytearray) -> None:
@@ -52,6 +57,20 @@ class Unsaid:
             del self._notices[next(iter(self._notices))]
         self.message(record)
 
+    def problem(self, number: int, text: str) -> None:
+        """Say a problem until it is mended, which no text says; the newest counts."""
+        record = bytes((Op.PROBLEM, *varint(number))) + string(text)
+        self.standing.pop(number, None)
+        if text:
+            self.standing[number] = record
+        if len(self.standing) > self.PROBLEMS_KEPT:
+            del self.standing[next(iter(self.standing))]
+        self.problems[number] = record
+        if len(self.problems) > self.MESSAGES_KEPT:
+            # All of it can be made again from what stands, and that is less.
+            self.problems.clear()
+            self.tell_all = True
+
     def notices_again(self) -> Iterable[bytes]:
         """Return the newest notices that are not about to be said anyway."""
         return [record for record in self._notices if record not in self.messages]
@@ -60,4 +79,4 @@ class Unsaid:
         """Note that the frame with all of it was made."""
         self.tell_all = False
         self.gone, self.records = bytearray(), bytearray()
-        self.new, self.messages = [], []
+        self.new, self.messages, self.problems = [], [], {}

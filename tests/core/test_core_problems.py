@@ -1,0 +1,208 @@
+"""What fails of a thing that maps show: told once, numbers aside, and taken back."""
+
+import logging
+
+import pytest
+
+from webmap import Map, Robot
+from webmap.core.problems import Problems
+from webmap.core.recurring import wording
+
+log = logging.getLogger("webmap.test")
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def problems(clock, container) -> Problems:
+    problems = Problems(log, lambda text: f"Bob: {text}", clock)
+    problems.join(Map(container, 100, 100))
+    return problems
+
+
+@pytest.fixture
+def lines(caplog) -> "Lines":
+    caplog.set_level(logging.WARNING)
+    return Lines(caplog)
+
+
+class Lines:
+    """What the log has."""
+
+    def __init__(self, caplog) -> None:
+        self._caplog = caplog
+
+    @property
+    def all(self) -> list[str]:
+        return [record.getMessage() for record in self._caplog.records]
+
+
+def told(channel) -> list[tuple]:
+    return [call for call in channel.calls if call[0] in ("error", "mended")]
+
+
+def nan_at(number: int) -> str:
+    at = f"({number * 0.37 - 2:.3f}, nan)"
+    return f"/plan: got {at} as point {number} of {number + 20}"
+
+
+def test_a_text_whose_numbers_change_is_said_once_and_its_newest_stands(
+    problems, channel, lines, clock
+):
+    for number in range(100):
+        clock.now += 0.1
+        problems.set("plan", nan_at(number))
+    assert lines.all == ["Bob: " + nan_at(0)]
+    assert [call[:2] for call in told(channel)] == [("error", "Bob: " + nan_at(0))]
+    assert problems.standing == {"plan": nan_at(99)}
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("it is 1 m off", "it is -3.25e-7 m off"),
+        ("got nan", "got -inf"),
+        ("got 3", "got NaN"),
+        ("got Infinity", "got 1e300"),
+        ("of [1, 2.5]", "of [1, 2.5, nan, -7]"),
+        ("at (0.1, nan)", "at (nan, 12)"),
+        ("of 0x7f3a12ff", "of 0x1b"),
+        ("robot_1/odom", "robot_12/odom"),
+    ],
+)
+def test_words_are_the_same_whatever_their_numbers(one, other):
+    assert wording(one) == wording(other)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("got 3 metres", "got 3 seconds"),
+        ("there is no frame 'laser'", "there is no frame 'map'"),
+        ("information", "formation"),
+    ],
+)
+def test_other_words_are_other_words(one, other):
+    assert wording(one) != wording(other)
+
+
+def test_other_words_take_the_place_of_those_before(problems, channel, lines):
+    problems.set("tf", "no frame 'map'")
+    problems.set("tf", "two trees")
+    assert lines.all == ["Bob: no frame 'map'", "Bob: two trees"]
+    (_, first, number), (_, second, again) = told(channel)
+    assert (first, second) == ("Bob: no frame 'map'", "Bob: two trees")
+    assert number == again
+
+
+def test_what_is_mended_is_taken_back_once(problems, channel):
+    problems.set("plan", nan_at(1))
+    number = told(channel)[0][2]
+    problems.clear("plan")
+    problems.clear("plan")
+    problems.clear("never said")
+    assert told(channel)[1:] == [("mended", number)]
+    assert problems.standing == {}
+
+
+def test_what_comes_and_goes_is_logged_once_a_minute(problems, channel, lines, clock):
+    for number in range(1250):
+        problems.set("plan", nan_at(number))
+        clock.now += 0.1
+        problems.clear("plan")
+    assert len(lines.all) == 3, "at 0, 60 and 120 seconds"
+    assert len(told(channel)) == 2500, "but the page knows how it is"
+    assert len({call[-1] for call in told(channel)}) == 1
+
+
+def test_two_wordings_in_turns_are_logged_once_a_minute_each(problems, lines, clock):
+    for _ in range(290):
+        for text in ("no frame 'map'", "two trees"):
+            problems.set("tf", text)
+            clock.now += 0.1
+    assert len(lines.all) == 2
+
+
+def test_words_that_are_never_the_same_do_not_flood_the_log(problems, lines, clock):
+    for number in range(500):
+        problems.set("tf", "no frame " + "ab"[number % 2] * (number + 1))
+        clock.now += 0.1
+    assert len(lines.all) == 10
+    clock.now += 60
+    problems.set("tf", "no frame c")
+    assert len(lines.all) == 11
+
+
+@pytest.mark.parametrize(("good_for", "same"), [(59.0, True), (61.0, False)])
+def test_what_fails_again_is_the_same_trouble_unless_it_was_good_for_a_minute(
+    problems, channel, clock, good_for, same
+):
+    problems.set("plan", nan_at(1))
+    clock.now += 300
+    problems.clear("plan")
+    clock.now += good_for
+    problems.set("plan", nan_at(1))
+    first, _, second = told(channel)
+    assert (first[2] == second[2]) is same
+
+
+def test_what_was_mended_long_ago_is_forgotten(problems, clock):
+    for number in range(1000):
+        problems.set(object(), "it broke")
+        about = next(iter(problems.standing))
+        problems.clear(about)
+        clock.now += 1.0 + number % 2
+    assert len(problems._recurring) <= 61
+
+
+def test_a_map_that_comes_later_shows_the_newest_text(problems, channel, page):
+    problems.set("plan", nan_at(1))
+    problems.set("plan", nan_at(2))
+    number = told(channel)[0][2]
+    problems.join(Map(page.element("other"), 100, 100))
+    assert told(channel)[1:] == [("error", "Bob: " + nan_at(2), number)]
+
+
+def test_what_stands_is_told_once_to_a_page_with_two_maps_and_leaves_with_the_last(
+    problems, channel, page
+):
+    problems.join(Map(page.element("other"), 100, 100))
+    problems.set("plan", nan_at(1))
+    number = told(channel)[0][2]
+    assert len(told(channel)) == 1
+    one, other = problems.maps
+    problems.leave(one)
+    assert len(told(channel)) == 1
+    problems.leave(other)
+    assert told(channel)[1:] == [("mended", number)]
+
+
+def test_a_robot_that_leaves_its_map_takes_its_problems_along(container, channel):
+    robot, map = Robot("Bob"), Map(container, 100, 100)
+    map.add_robot(robot)
+    robot.set_problem("odometry", "no pose")
+    map.remove_robot(robot)
+    number = told(channel)[0][2]
+    assert told(channel)[1:] == [("mended", number)]
+    robot.destroy()
+
+
+def test_a_page_that_is_closed_is_told_nothing(problems, channel, page):
+    problems.set("plan", nan_at(1))
+    page.closed = True
+    problems.set("tf", "two trees")
+    problems.clear("plan")
+    problems.leave(problems.maps[0])
+    assert len(told(channel)) == 1
+    page.closed = False
