@@ -682,6 +682,30 @@ def test_topics_are_told_from_captured_answers(folder):
     run(scenario)
 
 
+@pytest.mark.parametrize(
+    "answer",
+    ["no such service", {"action_servers": 5}, {"action_servers": ["/go/follow_path"]}],
+)
+def test_of_hidden_topics_only_those_of_known_actions_are_told(answer):
+    """ROS 2's rosapi lists none of an action's topics, but it names the servers."""
+    listed = {"topics": ["/a"], "types": ["std_msgs/msg/Bool"]}
+
+    async def scenario():
+        async with bridged(topics=listed) as (server, bridge):
+            server.answer["/rosapi/action_servers"] = answer
+            assert await bridge.topics() == {"/a": "std_msgs/msg/Bool"}
+            servers = ["/bob/navigate_to_pose", "/bob/spin"]
+            server.answer["/rosapi/action_servers"] = {"action_servers": servers}
+            assert await bridge.topics() == {
+                "/a": "std_msgs/msg/Bool",
+                "/bob/navigate_to_pose/_action/feedback": (
+                    "nav2_msgs/action/NavigateToPose_FeedbackMessage"
+                ),
+            }
+
+    run(scenario)
+
+
 def test_a_call_from_the_bridge_is_declined():
     async def scenario():
         async with bridged() as (server, _):

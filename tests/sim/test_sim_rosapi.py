@@ -35,6 +35,14 @@ def test_topics_come_with_their_types(client, ros2):
         assert "/map" in types
 
 
+def test_hidden_names_are_not_listed_as_in_the_real_one(ros2):
+    hidden = "/robot_0/navigate_to_pose/_action/feedback"
+    type = "nav2_msgs/action/NavigateToPose_FeedbackMessage"
+    assert not any("/_" in name for name in values(ros2, "topics")["topics"])
+    assert values(ros2, "topic_type", {"topic": hidden}) == {"type": ""}
+    assert values(ros2, "topics_for_type", {"type": type}) == {"topics": []}
+
+
 def test_a_topic_has_a_type_and_an_unknown_one_an_empty_text(client):
     assert values(client, "topic_type", {"topic": "/map"}) == {
         "type": "nav_msgs/OccupancyGrid"

@@ -9,6 +9,10 @@ from webmap.errors import BridgeError, ProtocolError, ServiceError
 from webmap.ros.decoding import convert
 
 
+ACTIONS = {"navigate_to_pose": "nav2_msgs/action/NavigateToPose"}
+"""Actions by the name that their servers have everywhere: rosapi tells no types."""
+
+
 class Graph:
     """Questions to a bridge's rosapi; what it knows is remembered for one link.
 
@@ -57,6 +61,9 @@ class Graph:
     async def topics(self) -> dict[str, str]:
         """Return the type of every topic.
 
+        Of ROS 2 that is without hidden names, such as those of an action's topics. What
+        a known action says of its goals is added, since rosapi does name its server.
+
         Raises:
             BridgeError: If rosapi does not answer, or answers something else.
 
@@ -67,8 +74,28 @@ class Graph:
             found = dict(zip(names.topics, names.types, strict=True))
         except (ProtocolError, ValueError) as error:
             raise ServiceError(f"/rosapi/topics made no sense: {error}") from None
+        if any("/msg/" in type for type in found.values()):
+            found = {**await self._feedbacks(), **found}
         self._types.update({name: type for name, type in found.items() if type})
         return found
+
+    async def _feedbacks(self) -> dict[str, str]:
+        """Return the hidden topics on which known actions say how goals go."""
+        try:
+            answer = await self._call("/rosapi/action_servers")
+            servers = convert(answer, _ActionServers).action_servers
+        except (BridgeError, ProtocolError):
+            return {}
+        known = {name: ACTIONS.get(name.rpartition("/")[2]) for name in servers}
+        return {
+            f"{server}/_action/feedback": f"{type}_FeedbackMessage"
+            for server, type in known.items()
+            if type is not None
+        }
+
+
+class _ActionServers(msgspec.Struct):
+    action_servers: list[str]
 
 
 class _Publishers(msgspec.Struct):

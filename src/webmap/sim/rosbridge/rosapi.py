@@ -7,7 +7,7 @@ from typing import Any
 from webmap.sim.rosbridge.definitions import MESSAGES
 from webmap.sim.rosbridge.details import definition_text, type_definitions
 from webmap.sim.rosbridge.dialect import canonical, resolve
-from webmap.sim.rosbridge.graph import Graph, Respond, ServiceFailed
+from webmap.sim.rosbridge.graph import Graph, Respond, ServiceFailed, Topic
 from webmap.sim.rosbridge.quirks import Quirks
 from webmap.sim.rosbridge.schema import UnknownType
 
@@ -78,8 +78,17 @@ class Rosapi:
     def _spell(self, type_name: str) -> str:
         return self.graph.schema.dialect.spell(type_name)
 
+    def _listed(self) -> list[Topic]:
+        """Return the topics that rosapi tells of: in ROS 2, those with a plain name."""
+        hides = self.graph.schema.dialect.is_ros2
+        return [
+            topic
+            for topic in self.graph.topics.values()
+            if not (hides and "/_" in topic.name)
+        ]
+
     def _topics(self, _: Args) -> Any:
-        topics = self.graph.topics.values()
+        topics = self._listed()
         return {
             "topics": [topic.name for topic in topics],
             "types": [self._spell(topic.type) for topic in topics],
@@ -87,20 +96,18 @@ class Rosapi:
 
     def _raw_types(self, _: Args) -> Any:
         texts = [
-            definition_text(self.graph.schema, topic.type)
-            for topic in self.graph.topics.values()
+            definition_text(self.graph.schema, topic.type) for topic in self._listed()
         ]
         return {**self._topics({}), "typedefs_full_text": texts}
 
     def _topics_for_type(self, request: Args) -> Any:
         wanted = canonical(request["type"])
-        return {
-            "topics": [t.name for t in self.graph.topics.values() if t.type == wanted]
-        }
+        return {"topics": [t.name for t in self._listed() if t.type == wanted]}
 
     def _topic_type(self, request: Args) -> Any:
-        topic = self.graph.topics.get(resolve(request["topic"]))
-        return {"type": self._spell(topic.type) if topic else ""}
+        name = resolve(request["topic"])
+        found = [topic for topic in self._listed() if topic.name == name]
+        return {"type": self._spell(found[0].type) if found else ""}
 
     def _services(self, _: Args) -> Any:
         return {"services": list(self.graph.services)}
