@@ -8,7 +8,6 @@ import msgspec
 from webmap.errors import BridgeError, ProtocolError, ServiceError
 from webmap.ros.decoding import convert
 
-
 ACTIONS = {"navigate_to_pose": "nav2_msgs/action/NavigateToPose"}
 """Actions by the name that their servers have everywhere: rosapi tells no types."""
 
