@@ -252,6 +252,24 @@ def test_a_depth_camera_has_colours_too():
     assert cameras(topics) == ["/depth_camera/image_raw"]
 
 
+def test_pictures_with_other_names_come_last_by_their_type_alone():
+    assert cameras(
+        {
+            "/color/video": RAW,
+            "/unity/image_compressed": PACKED,
+            "/thermal/jpeg": PACKED,
+            "/webcam/image_raw": RAW,
+            "/front/image_raw/compressed": PACKED,
+        }
+    ) == [
+        "/front/image_raw/compressed",
+        "/webcam/image_raw",
+        "/thermal/jpeg",
+        "/unity/image_compressed",
+        "/color/video",
+    ]
+
+
 def test_two_robots_of_one_last_name_have_their_whole_namespaces_for_names():
     topics = {"/hall/bob/odom": ODOM, "/yard/bob/odom": ODOM}
     assert names(topics) == ["hall/bob", "yard/bob"]

@@ -11,7 +11,7 @@ from module_fakes import header
 from PIL import Image
 
 from webmap.core.pictures import pictures
-from webmap.errors import ProtocolError
+from webmap.errors import ConfigError, ProtocolError
 from webmap.modules.robot.camera import Camera
 from webmap.ros.messages_image import CompressedImageMsg, ImageMsg
 
@@ -61,6 +61,40 @@ def test_a_compressed_picture_is_shown_as_it_is(link, robot, cbor):
     assert link.options[TOPIC]["throttle"] == 200
 
 
+@pytest.mark.parametrize(
+    ("topic", "asked"),
+    [
+        ("/camera/image_raw/compressed", "sensor_msgs/CompressedImage"),
+        ("/camera/image_raw", "sensor_msgs/Image"),
+        ("/camera/image_rect_color", "sensor_msgs/Image"),
+        ("/unity/image_compressed", None),
+        ("/thermal/jpeg", None),
+        ("/color/video", None),
+    ],
+)
+def test_a_type_that_the_name_does_not_tell_is_left_to_the_bridge(
+    link, robot, topic, asked
+):
+    robot.add_module(Camera, link, topic).watch(lambda: None)
+    assert link.types[topic] == asked
+
+
+@pytest.mark.parametrize("type", [None, "sensor_msgs/msg/CompressedImage"])
+def test_a_compressed_picture_is_shown_whatever_its_topic_is_called(link, robot, type):
+    camera = robot.add_module(Camera, link, "/thermal/jpeg", type=type)
+    camera.watch(lambda: None)
+    link.say("/thermal/jpeg", compressed(a_jpeg()))
+    assert shown(camera).getpixel((4, 4))[0] > 180
+    assert not robot.problems
+
+
+def test_a_type_without_pictures_is_refused(link, robot):
+    with pytest.raises(ValueError, match="type: expected"):
+        robot.add_module("Camera", link, TOPIC, type="sensor_msgs/LaserScan")
+    with pytest.raises(ConfigError, match="is sensor_msgs/CompressedImage or"):
+        Camera(robot, link, TOPIC, type="sensor_msgs/LaserScan")
+
+
 def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
     link, robot
 ):
@@ -107,6 +141,44 @@ def test_colours_are_in_their_places_and_padding_is_left_out():
     assert (raw("rgba8", with_alpha).pixels() == red).all()
 
 
+# White, black, red and blue as BT.601 has them: Y, U and V.
+YUV = [(235, 128, 128), (16, 128, 128), (81, 90, 240), (41, 240, 110)]
+RGB = [(255, 255, 255), (0, 0, 0), (255, 0, 0), (0, 0, 255)]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "order"),
+    [("yuv422_yuy2", "yuyv"), ("yuyv", "yuyv"), ("yuv422", "uyvy"), ("uyvy", "uyvy")],
+)
+def test_colours_that_two_pixels_share_are_told_apart_in_light(encoding, order):
+    row = []
+    for y, u, v in YUV:
+        row += [y, u, y, v] if order == "yuyv" else [u, y, v, y]
+    row[2 if order == "yuyv" else 3] = 126  # the second pixel is darker
+    pixels = raw(encoding, np.array([row, row], np.uint8), pad=3)
+    pixels.width = 8
+    seen = pixels.pixels()
+    assert seen.shape == (2, 8, 3)
+    assert seen[1, 1].tolist() == [128, 128, 128]
+    for number, colour in enumerate(RGB):
+        assert np.allclose(seen[1, 2 * number], colour, atol=3), number
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("filters", ["rggb", "bggr", "gbrg", "grbg"])
+def test_a_mosaic_becomes_colours_of_half_its_size(filters, bits):
+    values = {"r": [200], "g": [90, 110], "b": [0]}
+    square = [values[letter].pop() for letter in filters]
+    mosaic = np.tile(np.array(square).reshape(2, 2), (2, 3))
+    mosaic = np.pad(mosaic, ((0, 1), (0, 1)))  # half a square is left out
+    kind = np.uint8 if bits == 8 else np.uint16
+    seen = raw(f"bayer_{filters}{bits}", mosaic.astype(kind)).pixels()
+    stretched = 1.0 if bits == 8 else 255 / 200
+    assert seen.shape == (2, 3, 3)
+    wanted = np.array([200, 100, 0]) * stretched
+    assert np.allclose(seen, wanted, atol=1)
+
+
 def test_depth_is_stretched_and_what_is_not_finite_is_dark():
     depth = np.array([[0.0, 1.0], [2.0, np.nan]], np.float32)
     assert raw("32FC1", depth).pixels().tolist() == [[0, 127], [255, 0]]
@@ -126,7 +198,9 @@ def test_the_order_of_bytes_is_minded():
         (ImageMsg(10, 10, "rgb8", 29, b"\0" * 300), "too few"),
         (ImageMsg(100000, 100000, "rgb8", 300000, b""), "at most"),
         (ImageMsg(0, 10, "rgb8", 30, b""), "at most"),
-        (ImageMsg(1, 1, "yuv422", 2, b"\0\0"), "known are"),
+        (ImageMsg(1, 1, "nv21", 2, b"\0\0"), "known are"),
+        (ImageMsg(1, 1, "yuv422", 2, b"\0\0"), "width must be even, got 1"),
+        (ImageMsg(1, 9, "bayer_rggb8", 9, b"\0" * 9), "9 x 1, 2 x 2 at least"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_words(image, said):
@@ -139,9 +213,9 @@ def test_a_picture_that_is_too_large_is_refused():
         _ = CompressedImageMsg(b"\xff\xd8\xff" + b"\0" * (5 << 20)).media_type
 
 
-def test_a_raw_picture_is_made_a_jpeg_and_the_newest_wins(link, robot):
+@pytest.mark.parametrize("topic", ["/camera/image_raw", "/color/video"])
+def test_a_raw_picture_is_made_a_jpeg_and_the_newest_wins(link, robot, topic):
     async def scenario():
-        topic = "/camera/image_raw"
         camera = robot.add_module(Camera, link, topic)
         camera.watch(lambda: None)
         for value in (10, 100, 200):

@@ -141,6 +141,8 @@ RULES: tuple[Rule, ...] = (
     Rule("map", GRID, r"[^/]+", "its type alone"),
     Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", DEPTH),
     Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not packed", DEPTH),
+    Rule("camera", CAMERA[:1], r"[^/]+", "its type alone", DEPTH),
+    Rule("camera", CAMERA[1:], r"[^/]+", "its type alone", DEPTH),
     Rule("cloud", ("sensor_msgs/PointCloud2",), r"[^/]+", "its type alone"),
     Rule("tf", ("tf2_msgs/TFMessage",), r"tf", "the frames of the robot"),
 )

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from webmap.errors import ProtocolError
+from webmap.ros.image_encodings import BAYER, YUV, from_bayer, from_yuv
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,7 +71,8 @@ class ImageMsg(msgspec.Struct):
     def pixels(self) -> "NDArray[np.uint8]":
         """Return the picture, of shape (height, width, 3) or, if grey, (height, width).
 
-        What has more than 8 bits is stretched from its least to its greatest value.
+        What has more than 8 bits is stretched from its least to its greatest value. A
+        mosaic of a sensor (``bayer_...``) becomes a picture of half its size.
 
         Raises:
             ProtocolError: If the encoding is not known or the size does not fit.
@@ -88,7 +90,14 @@ class ImageMsg(msgspec.Struct):
         if self.encoding in _GREY:
             grey = self._rows(_GREY[self.encoding], 1)
             return grey if grey.dtype.itemsize == 1 else _stretched(grey)
-        known = ", ".join(sorted({*_CHANNELS, *_GREY}))
+        if self.encoding in YUV:
+            return from_yuv(self._rows("u1", 2), YUV[self.encoding])
+        if self.encoding in BAYER:
+            mosaic = self._rows(f"u{BAYER[self.encoding].octets}", 1)
+            if mosaic.dtype.itemsize > 1:
+                mosaic = _stretched(mosaic)
+            return from_bayer(mosaic, BAYER[self.encoding])
+        known = ", ".join(sorted({*_CHANNELS, *_GREY, *YUV, *BAYER}))
         raise ProtocolError(f"the encoding {self.encoding!r}; known are {known}")
 
     def _rows(self, kind: str, channels: int) -> "NDArray[np.uint8]":
@@ -104,6 +113,37 @@ class ImageMsg(msgspec.Struct):
         rows = np.frombuffer(self.data, np.uint8, self.height * self.step)
         rows = rows.reshape(self.height, self.step)[:, :used]
         return np.ascontiguousarray(rows).view(item)
+
+
+class AnyImageMsg(msgspec.Struct):
+    """A picture of a topic whose type nobody knows: either of both."""
+
+    data: bytes
+    format: str = ""
+    height: int = 0
+    width: int = 0
+    encoding: str = ""
+    step: int = 0
+    is_bigendian: int = 0
+
+    @property
+    def packed(self) -> CompressedImageMsg:
+        """It as ``sensor_msgs/CompressedImage``."""
+        return CompressedImageMsg(self.data, self.format)
+
+    @property
+    def raw(self) -> ImageMsg | None:
+        """It as ``sensor_msgs/Image``; None if it has no encoding, which that has."""
+        if not self.encoding:
+            return None
+        return ImageMsg(
+            self.height,
+            self.width,
+            self.encoding,
+            self.step,
+            self.data,
+            self.is_bigendian,
+        )
 
 
 def _stretched(values: "NDArray[np.uint8]") -> "NDArray[np.uint8]":

@@ -2,18 +2,42 @@
 
 import asyncio
 import io
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import msgspec
 
 from webmap.core.camera_feed import CameraFeed
 from webmap.core.refusals import refusing
 from webmap.core.tasks import spawn
-from webmap.errors import ProtocolError
+from webmap.errors import ConfigError, ProtocolError
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages_image import CompressedImageMsg, ImageMsg
+from webmap.ros.messages_image import AnyImageMsg, CompressedImageMsg, ImageMsg
+from webmap.ros.names import split_type
 from webmap.scope import Scope, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+
+
+CameraType: TypeAlias = Literal[
+    "sensor_msgs/CompressedImage",
+    "sensor_msgs/Image",
+    "sensor_msgs/msg/CompressedImage",
+    "sensor_msgs/msg/Image",
+]
+"""The types that have pictures, in either dialect."""
+
+PACKED, RAW = "sensor_msgs/CompressedImage", "sensor_msgs/Image"
+
+VIEWS: dict[str | None, type[msgspec.Struct]] = {
+    PACKED: CompressedImageMsg,
+    RAW: ImageMsg,
+    None: AnyImageMsg,
+}
+
+PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
+"""Names of raw pictures, by the convention of image_transport."""
 
 
 class Camera(CameraFeed):
@@ -25,10 +49,16 @@ class Camera(CameraFeed):
     Args:
         robot: The robot that carries the camera.
         bridge: The link to the ROS system that has the topic.
-        topic: Of ``sensor_msgs/CompressedImage`` (JPEG, PNG or WebP) if it ends in
-            ``/compressed``, else of ``sensor_msgs/Image``.
+        topic: Of ``sensor_msgs/CompressedImage`` (JPEG, PNG or WebP) or of
+            ``sensor_msgs/Image``.
         name: What people call the camera.
         throttle: The least time between two pictures, in milliseconds.
+        type: Which of the two it is. If not given, the name tells: ``.../compressed``
+            is compressed and ``.../image_raw`` and the like are not; of any other the
+            bridge knows the type once somebody publishes it.
+
+    Raises:
+        ConfigError: If the type has no pictures.
 
     """
 
@@ -39,8 +69,14 @@ class Camera(CameraFeed):
         topic: str,
         name: str = "Camera",
         throttle: int = 200,
+        *,
+        type: CameraType | None = None,
     ) -> None:
         super().__init__(robot, name)
+        self.type = type_by_name(topic) if type is None else str(split_type(type))
+        """The type, without a dialect; None if only the bridge knows it."""
+        if self.type not in VIEWS:
+            raise ConfigError(f"type is {PACKED} or {RAW}, got {type!r}")
         self.topic = topic
         self._bridge = bridge
         self._throttle = throttle
@@ -51,18 +87,13 @@ class Camera(CameraFeed):
     def begin(self) -> None:
         """Subscribe to the pictures."""
         self._scope = Scope(f"camera {self.topic}", self._report)
-        compressed = self.topic.endswith("/compressed")
         with no_scope(), self._scope.active():
             self._bridge.subscribe(
                 self.topic,
-                refusing(
-                    self.robot,
-                    self.topic,
-                    self.on_compressed if compressed else self.on_image,
-                ),
-                f"sensor_msgs/{'CompressedImage' if compressed else 'Image'}",
+                refusing(self.robot, self.topic, self.on_picture),
+                self.type,
                 throttle=self._throttle,
-                decode=CompressedImageMsg if compressed else ImageMsg,
+                decode=VIEWS[self.type],
                 compression="cbor",
             )
 
@@ -78,6 +109,20 @@ class Camera(CameraFeed):
             self.robot.set_problem(self, text)
         else:
             self.robot.report_error(text)
+
+    def on_picture(self, image: CompressedImageMsg | ImageMsg | AnyImageMsg) -> None:
+        """Show a picture, whichever it is.
+
+        Raises:
+            ProtocolError: If it cannot be shown.
+
+        """
+        if isinstance(image, AnyImageMsg):
+            image = image.raw or image.packed
+        if isinstance(image, ImageMsg):
+            self.on_image(image)
+        else:
+            self.on_compressed(image)
 
     def on_compressed(self, image: CompressedImageMsg) -> None:
         """Show a picture as it is.
@@ -113,6 +158,13 @@ class Camera(CameraFeed):
                     self.show(data, "image/jpeg")
         finally:
             self._drawing = None
+
+
+def type_by_name(topic: str) -> str | None:
+    """Return the type of pictures that a topic's name promises, None if it does not."""
+    if topic.endswith("/compressed"):
+        return PACKED
+    return RAW if PLAIN.search(topic) else None
 
 
 def jpeg(image: ImageMsg) -> bytes:
