@@ -77,6 +77,26 @@ def test_amcl_is_noted_and_odometry_used():
     assert any("amcl_pose says where it is on the map" in n for n in robot.notes)
 
 
+@pytest.mark.parametrize(
+    ("topic", "type"),
+    [
+        ("/tb/robot_pose", "geometry_msgs/Pose"),
+        ("/tb/pose", "geometry_msgs/msg/Pose"),
+        ("/mav/pose2d", "geometry_msgs/Pose2D"),
+        ("/mav/pose2D", "geometry_msgs/msg/Pose2D"),
+    ],
+)
+def test_a_pose_without_a_header_says_where_a_robot_is(topic, type):
+    robot = only({topic: type})
+    assert robot.namespace == topic.rpartition("/")[0]
+    assert (robot.first("pose").topic, robot.first("pose").type) == (topic, type)
+
+
+def test_a_pose_that_says_its_frame_comes_before_one_that_does_not():
+    bare = {"/robot_pose": "geometry_msgs/Pose", "/pose2D": "geometry_msgs/Pose2D"}
+    assert only({**bare, "/amcl_pose": POSE}).topic("pose") == "/amcl_pose"
+
+
 def test_a_controller_is_a_part_and_no_robot():
     robot = only(
         {

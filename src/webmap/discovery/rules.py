@@ -26,6 +26,7 @@ PARTS = (
 
 ODOMETRY = ("nav_msgs/Odometry",)
 POSES = ("geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped")
+BARE_POSES = ("geometry_msgs/Pose", "geometry_msgs/Pose2D")
 VELOCITY = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 GRID = ("nav_msgs/OccupancyGrid",)
 PATH = ("nav_msgs/Path",)
@@ -76,6 +77,8 @@ RULES: tuple[Rule, ...] = (
     Rule("pose", POSES[:1], r"amcl_pose", "where AMCL thinks that it is on the map"),
     Rule("pose", POSES, r"(?:robot_pose|localization_pose)", "a localiser's pose"),
     Rule("pose", POSES, r"pose", "the usual name of a localiser's pose"),
+    Rule("pose", BARE_POSES, r"robot_pose", "a robot's pose, without its frame"),
+    Rule("pose", BARE_POSES, r"pose|pose2[dD]", "a pose, without its frame"),
     Rule(
         "velocity",
         VELOCITY,
