@@ -36,6 +36,13 @@ def kinds(found) -> dict[str, str]:
     return {layer.topic.removeprefix("/tb"): layer.kind for layer in found}
 
 
+@pytest.mark.parametrize("first", ["/diagnostics", "/diagnostics_agg"])
+def test_what_an_aggregator_says_is_shown_where_nobody_else_does(first):
+    topics = {"/diagnostics_agg": "diagnostic_msgs/DiagnosticArray"}
+    topics[first] = "diagnostic_msgs/DiagnosticArray"
+    assert [layer.topic for layer in find_layers(topics, [""])[""]] == [first]
+
+
 def test_what_nav2_publishes_is_drawn_once_each():
     found = find_layers(NAV2, ["/tb"])["/tb"]
     assert kinds(found) == {

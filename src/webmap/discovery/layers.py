@@ -141,6 +141,7 @@ RULES: tuple[LayerRule, ...] = (
     LayerRule("fix", FIX, r"/fix\Z", 1, "the usual name"),
     LayerRule("fix", FIX, r"", 1, "its type alone"),
     LayerRule("health", HEALTH, r"/diagnostics\Z", 1, "the usual name"),
+    LayerRule("health", HEALTH, r"/diagnostics_agg\Z", 1, "what an aggregator says"),
 )
 
 
