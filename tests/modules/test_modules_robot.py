@@ -114,8 +114,41 @@ def test_a_number_of_dots_that_is_none_is_refused():
         Robot("Bob").add_module("LaserScanner", Link(), "/scan", max_dots=0)
 
 
+def say_percentages(link, *percentages):
+    """Let battery states come in."""
+    callback, _, _ = link.listeners["/battery"]
+    for percentage in percentages:
+        callback(convert({"percentage": percentage, "voltage": 24.0}, BatteryStateMsg))
+
+
+def test_a_battery_that_counts_to_a_hundred_is_understood_also_when_it_is_low():
+    link, robot = Link(), Robot("Bob")
+    battery = robot.add_module("Battery", link, "/battery")
+    say_percentages(link, 1.04)  # a gauge that is not calibrated
+    assert battery.charge == 1.0
+    say_percentages(link, 80.0)
+    assert battery.charge == 0.8
+    say_percentages(link, 1.0)
+    assert battery.charge == 0.01
+    assert not robot.problems
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 101.0, 1e300])
+def test_a_percentage_that_none_can_be_is_said_until_one_comes_that_can(wrong):
+    link, robot = Link(), Robot("Bob")
+    battery = robot.add_module("Battery", link, "/battery")
+    say_percentages(link, 0.5, wrong)
+    assert battery.charge is None
+    (said,) = robot.problems.values()
+    assert said.startswith("/battery: a battery has a percentage of 0 to 1, or of 0 to")
+    assert f"got {wrong:g}" in said
+    say_percentages(link, 0.5)
+    assert battery.charge == 0.5
+    assert not robot.problems
+
+
 @pytest.mark.parametrize(
-    ("percentage", "charge"), [(0.5, 0.5), (None, None), (80.0, None), (-1.0, None)]
+    ("percentage", "charge"), [(0.5, 0.5), (None, None), (80.0, 0.8), (-1.0, None)]
 )
 def test_a_battery_that_does_not_know_its_charge_says_so(percentage, charge):
     heard = []
@@ -130,8 +163,7 @@ def test_a_battery_that_does_not_know_its_charge_says_so(percentage, charge):
     link, robot = Link(), Robot("Bob")
     robot.add_module(Listener)
     robot.add_module("Battery", link, "/battery")
-    callback, _, _ = link.listeners["/battery"]
-    callback(convert({"percentage": percentage, "voltage": 24.0}, BatteryStateMsg))
+    say_percentages(link, percentage)
     assert heard == [charge]
 
 
