@@ -4,6 +4,7 @@ import math
 
 import pytest
 from module_fakes import header, pose, to_root
+from test_modules_frames import tell, transform
 
 DATUM = (50.0, 14.0)
 # By the ellipsoid of WGS 84, at 50 degrees north.
@@ -51,6 +52,59 @@ def test_without_a_datum_the_first_fix_is_where_the_robot_is_then(link, robot):
     link.say("/odom", {"header": header(), "pose": pose(9, 9, 2.0)})
     link.say("/fix", fix(50.0001, 14.0))
     assert at(module) == pytest.approx((7, -3 + 11.1229), abs=0.01)
+
+
+def test_a_fix_before_the_first_pose_is_no_anchor(link, robot):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    module = robot.add_module("NavSatFix", link)
+    link.say("/fix", fix(50.0, 14.0))
+    assert module.cross.get("visibility") == "hidden"
+    assert module.datum is module.position is None
+    link.say("/odom", {"header": header(), "pose": pose(7, -3)})
+    link.say("/fix", fix(50.001, 14.0))
+    assert at(module) == pytest.approx((7, -3))
+
+
+@pytest.fixture
+def in_odometry(link, robot):
+    """Let a robot be where its odometry has it, at (1, 0)."""
+
+    def at_one(*, quiet):
+        robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+        robot.set_tf(link, quiet=quiet)
+        link.say("/odom", {"header": header("odom"), "pose": pose(1, 0)})
+        return robot.add_module("NavSatFix", link)
+
+    return at_one
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_fix_waits_until_frames_have_the_robot_on_the_map(link, in_odometry, quiet):
+    module = in_odometry(quiet=quiet)
+    link.say("/fix", fix(50.0, 14.0))
+    assert module.position is None
+    tell(link, transform("map", "odom", 30, 20, 0))
+    link.say("/odom", {"header": header("odom"), "pose": pose(2, 0)})
+    link.say("/fix", fix(50.001, 14.0))
+    assert at(module) == pytest.approx((32, 20))
+    assert module.datum == (50.001, 14.0)
+
+
+def test_a_robot_without_a_map_has_its_fix_by_odometry_until_there_is_one(
+    link, in_odometry, monkeypatch
+):
+    module = in_odometry(quiet=True)
+    monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
+    link.say("/fix", fix(50.0, 14.0))
+    assert at(module) == pytest.approx((1, 0))
+    link.say("/fix", fix(50.001, 14.0))
+    assert at(module) == pytest.approx((1, 111.229), abs=0.01)
+    tell(link, transform("map", "odom", 30, 20, 0))
+    link.say("/odom", {"header": header("odom"), "pose": pose(2, 0)})
+    link.say("/fix", fix(50.002, 14.0))
+    assert at(module) == pytest.approx((32, 20))
+    link.say("/fix", fix(50.003, 14.0))
+    assert at(module) == pytest.approx((32, 131.229), abs=0.01)
 
 
 def test_the_circle_is_as_wide_as_the_doubt(link, robot):

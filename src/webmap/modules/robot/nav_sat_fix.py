@@ -1,7 +1,9 @@
 """Where satellites have a robot."""
 
+import time
 from typing import TYPE_CHECKING
 
+from webmap.core.frames import frames_of
 from webmap.core.local_plane import LocalPlane
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
@@ -30,7 +32,8 @@ class NavSatFix:
         bridge: The link to the ROS system that has the topic.
         topic: The topic.
         datum: Latitude and longitude of the map's origin, in degrees. If not given,
-            the first fix is taken to be where the robot is on the map then.
+            the first fix is taken to be where the robot is on the map then; fixes
+            before it has a place there are not drawn.
         east: How far the map's x is turned from east, in degrees, counter-clockwise
             from above.
         throttle: The least time between two fixes, in milliseconds.
@@ -65,6 +68,7 @@ class NavSatFix:
         self.position: tuple[float, float] | None = None
         """The last fix on the map, in metres."""
         self._origin = (0.0, 0.0)
+        self._waiting = datum is None
         self.doubt = svg.circle(class_="doubt", fill="#3b82c4", fill_opacity=0.2, r=0)
         self.cross = svg.path(
             class_="cross",
@@ -102,10 +106,10 @@ class NavSatFix:
 
     def _go(self, fix: NavSatFixMsg) -> None:
         place = fix.place
+        if self._waiting:
+            self._anchor(place)
         if self.datum is None:
-            at = self.robot.position
-            self.datum, self._origin = place, (at.x, at.y)
-            self._plane = LocalPlane(*place, self._east)
+            return
         x, y = self._plane.from_globe(*place)
         x, y = x + self._origin[0], y + self._origin[1]
         self.position = (x, y)
@@ -114,3 +118,28 @@ class NavSatFix:
         self.doubt.set(r=fix.deviation or 0.0)
         self.cross.unset("visibility")
         self.svg.set_age(0.0, limit=self.age_limit)
+
+    def _anchor(self, place: tuple[float, float]) -> None:
+        """Take a place on the globe for the robot's, as soon as that has one."""
+        if not self.robot.valid:
+            return
+        on_map = self._is_on_map()
+        if on_map is None:
+            return
+        # Where it is by odometry alone is good until it is known on the map.
+        if on_map or self.datum is None:
+            at = self.robot.position
+            self.datum, self._origin = place, (at.x, at.y)
+            self._plane = LocalPlane(*place, self._east)
+        self._waiting = not on_map
+
+    def _is_on_map(self) -> bool | None:
+        """Return whether the robot's pose is one of the map; None if it may yet be."""
+        tf, pose = self.robot.tf, self.robot.whereabouts.newest
+        if tf is None or pose is None or pose.frame_id in ("", tf["map_frame"]):
+            return True
+        # Many robots have frames and no map, and that is no mistake if it is quiet.
+        missing = (
+            time.monotonic() >= frames_of(tf["bridge"], tf["namespace"]).complete_from
+        )
+        return False if tf["quiet"] and missing else None
