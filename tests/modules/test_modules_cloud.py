@@ -68,6 +68,16 @@ def test_every_point_is_a_dot_in_its_place(link, robot, layout, ros2):
     assert "pointcloud" in module.svg.classes
 
 
+def test_a_single_row_needs_no_row_step(link, robot):
+    module = robot.add_module("PointCloud", link, "/points")
+    link.say("/points", cloud(POINTS, pad=5, row_step=0))
+    (path,) = module.dots
+    assert on_map(path) == near(FLAT)
+    link.say("/points", cloud(POINTS, rows=2, row_step=0))
+    (problem,) = robot.problems.values()
+    assert "does not fit into rows of 0 bytes" in problem
+
+
 def test_bytes_come_as_bytes_in_cbor_and_as_numbers_from_some_bridges(link, robot):
     module = robot.add_module("PointCloud", link, "/points")
     message = cloud(POINTS)

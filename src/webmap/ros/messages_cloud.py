@@ -83,7 +83,8 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
         """
         import numpy as np
 
-        self._check_sizes()
+        row_step = self._row_step
+        self._check_sizes(row_step)
         order = ">" if self.is_bigendian else "<"
         formats, offsets = [], []
         for name in names:
@@ -105,8 +106,8 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
                 f"{self.point_step} bytes: {error}"
             ) from None
         used = self.width * self.point_step
-        rows = self.data.array()[: self.height * self.row_step]
-        rows = rows.reshape(self.height, self.row_step)[:, :used]
+        rows = self.data.array()[: self.height * row_step]
+        rows = rows.reshape(self.height, row_step)[:, :used]
         points = np.ascontiguousarray(rows).reshape(-1).view(layout)
         return [points[name].astype(np.float64) for name in names]
 
@@ -126,19 +127,26 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
         known = ", ".join(repr(field.name) for field in self.fields) or "none"
         raise ProtocolError(f"points have no field {name!r}; they have {known}")
 
-    def _check_sizes(self) -> None:
+    @property
+    def _row_step(self) -> int:
+        """Bytes a row; some drivers leave that out of a cloud of a single row."""
+        if self.row_step == 0 and self.height == 1:
+            return self.width * self.point_step
+        return self.row_step
+
+    def _check_sizes(self, row_step: int) -> None:
         size = f"a cloud of {self.width} x {self.height} points"
         if self.width < 0 or self.height < 0:
             raise ProtocolError(f"{size} has less than none")
         if self.width * self.height > MAX_POINTS:
             raise ProtocolError(f"{size} is too large: {MAX_POINTS} are the limit")
-        if self.point_step < 1 or self.row_step < self.width * self.point_step:
+        if self.point_step < 1 or row_step < self.width * self.point_step:
             raise ProtocolError(
                 f"{size} of {self.point_step} bytes does not fit into rows of "
-                f"{self.row_step} bytes"
+                f"{row_step} bytes"
             )
-        if len(self.data) < self.row_step * self.height:
+        if len(self.data) < row_step * self.height:
             raise ProtocolError(
-                f"{size} has rows of {self.row_step} bytes, but came with "
+                f"{size} has rows of {row_step} bytes, but came with "
                 f"{len(self.data)} bytes in all"
             )
