@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from webmap.errors import ConfigError
 from webmap.geometry import Pose
+from webmap.geometry.reach import FARTHEST
 from webmap.lined_yaml import LinedYaml
 
 if TYPE_CHECKING:
@@ -17,6 +18,10 @@ MAX_YAML = 1 << 14
 """Bytes of the YAML; a map's own has 200, and reading much of it takes long."""
 
 MAX_PIXELS = 1 << 26
+
+FINEST = 1e-4
+"""The least side of a cell, in metres: less is a number in another unit."""
+
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 """What map_server reads, by its magic bytes; PPM includes PGM."""
 
@@ -67,6 +72,12 @@ def read_map(file: Path) -> MapImage:
     light = _read_image(file, settings)
     # An image has its first row at the top, a grid at the bottom.
     cells = _cells(light, settings)[::-1]
+    side = max(cells.shape) * settings.resolution
+    if side > FARTHEST:
+        raise ConfigError(
+            f"{file}: a map has sides of {FARTHEST:g} m at the most, got {side:g} m: "
+            f"{max(cells.shape)} cells of {settings.resolution:g} m"
+        )
     return MapImage(cells, settings.resolution, settings.origin, settings.image)
 
 
@@ -85,12 +96,22 @@ def _settings(file: Path) -> _Settings:
         raise said.wrong(
             ("resolution",), f"resolution must be above 0, got {resolution}"
         )
+    if resolution < FINEST:
+        raise said.wrong(
+            ("resolution",),
+            f"resolution must be {FINEST:g} m a cell at the least, got {resolution:g}",
+        )
     origin = table.get("origin")
     if not isinstance(origin, list) or len(origin) != 3:
         raise said.wrong(("origin",), f"origin must be [x, y, yaw], got {origin!r}")
     x, y, yaw = (
         _number(said, part, ("origin", place)) for place, part in enumerate(origin)
     )
+    if max(abs(x), abs(y)) > FARTHEST:
+        raise said.wrong(
+            ("origin",),
+            f"origin must be within {FARTHEST:g} m, got ({x:g}, {y:g})",
+        )
     negate = TRUTH.get(str(table.get("negate", "0")).lower())
     if negate is None:
         raise said.wrong(("negate",), f"negate must be 0 or 1, got {table['negate']!r}")

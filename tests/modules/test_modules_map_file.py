@@ -177,6 +177,11 @@ def test_maps_share_what_was_read_and_what_is_wrong_is_said(map, tmp_path, chann
 WRONG = {
     "resolution must be above 0, got 0.0": {"resolution": "0"},
     "resolution must be above 0, got -0.05": {"resolution": "-0.05"},
+    "resolution must be 0.0001 m a cell at the least, got 1e-05": {
+        "resolution": "1e-5"
+    },
+    "sides of 1e+07 m at the most, got 3e+300 m": {"resolution": "1e300"},
+    "origin must be within 1e+07 m, got (1e+300, 2)": {"origin": "[1e300, 2, 0]"},
     "resolution must be a finite number, got 'nan'": {"resolution": "nan"},
     "resolution must be a finite number, got '.inf'": {"resolution": ".inf"},
     "resolution must be a finite number, got None": {"resolution": None},

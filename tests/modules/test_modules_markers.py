@@ -248,6 +248,21 @@ def test_a_marker_that_makes_no_sense_is_left_out_by_itself(link, layer, channel
     assert layer.problems == {}
 
 
+@pytest.mark.parametrize("type", [SPHERE, SPHERES, POINTS])
+def test_what_no_turn_changes_needs_no_quaternion_and_that_is_logged_once(
+    link, layer, channel, caplog, type
+):
+    nowhere = {**pose(3, -2), "orientation": ZEROS["orientation"]}
+    turned = marker(type, [(1, 0)], pose=nowhere)
+    say(link, turned, {**turned, "id": 2})
+    say(link, turned)
+    assert len(layer.svg.children) == 2
+    assert to_root(layer.svg.children[0]).apply(1, 0) == pytest.approx((4, -2))
+    assert channel.errors == []
+    (said,) = (r.getMessage() for r in caplog.records if "zeros" in r.getMessage())
+    assert "marker 1 of 'test' has a quaternion of zeros and is drawn unturned" in said
+
+
 def test_there_is_an_end_to_the_number_of_markers(link, layer, channel, monkeypatch):
     monkeypatch.setattr("webmap.modules.map.markers.MAX_MARKERS", 10)
     say(link, *(marker(CUBE, id=i) for i in range(12)))

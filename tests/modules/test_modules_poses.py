@@ -82,7 +82,7 @@ ZEROS = {"x": 0, "y": 0, "z": 0, "w": 0}
     ("wrong", "why"),
     [
         (pose(math.nan, 0), "finite"),
-        ({**pose(1, 2), "orientation": ZEROS}, "quaternion of zeros"),
+        ({**pose(math.inf, 2), "orientation": {**ZEROS, "z": math.nan}}, "finite"),
     ],
 )
 def test_a_pose_that_is_none_is_refused_and_the_others_stay(link, robot, wrong, why):

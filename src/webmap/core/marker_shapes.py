@@ -23,6 +23,15 @@ AS_IT_COMES = Transform()
 """The frame of a marker that is drawn with its own numbers."""
 
 
+ROUND = (kinds.SPHERE, kinds.SPHERE_LIST, kinds.POINTS)
+"""Types that are often sent without an orientation, since they look alike with any."""
+
+
+def lies_unturned(marker: MarkerMsg) -> bool:
+    """Return whether a marker has no orientation and needs none: it has that of 1."""
+    return marker.type in ROUND and marker.pose.turns_nowhere
+
+
 def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
     """Return a marker as a group in its place, seen from above.
 
@@ -98,10 +107,14 @@ def _split(marker: MarkerMsg, frame: Transform) -> tuple[Pose, Transform]:
         check_finite([(at.x, at.y)], "the place of a text")
         (found,) = flat(in_space([at]), frame)
         return Pose(*found), Transform()
-    _ = marker.pose.usable
     (place,) = in_space([marker.pose.position])
-    q = marker.pose.orientation.quaternion
-    n = q.norm
-    turn = Quaternion(q.x / n, q.y / n, q.z / n, q.w / n)
+    if lies_unturned(marker):
+        check_finite([(place.x, place.y)], "the place of a marker")
+        turn = Quaternion()
+    else:
+        _ = marker.pose.usable
+        q = marker.pose.orientation.quaternion
+        n = q.norm
+        turn = Quaternion(q.x / n, q.y / n, q.z / n, q.w / n)
     pose, tilt = (frame @ Transform(place, turn)).heading_and_tilt
     return pose, Transform(rotation=tilt.rotation)

@@ -11,6 +11,7 @@ from webmap.core.sighting import Sighting, Sightings
 from webmap.core.whereabouts import affine
 from webmap.errors import ConfigError, ProtocolError
 from webmap.geometry import Affine, Pose, Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.scene import svg
 from webmap.scene.element import Child, Element
 from webmap.scope import Removal, keep
@@ -217,7 +218,8 @@ def check_finite(points: list[tuple[float, float]], what: str) -> None:
     """Let points pass that can be drawn.
 
     Raises:
-        ProtocolError: If one is not finite; it is named by its number.
+        ProtocolError: If one is not finite, or farther away than anything can be; it
+            is named by its number.
 
     """
     for number, (x, y) in enumerate(points):
@@ -225,6 +227,11 @@ def check_finite(points: list[tuple[float, float]], what: str) -> None:
             raise ProtocolError(
                 f"{what} must be of finite numbers, got ({x}, {y}) as point {number} "
                 f"of {len(points)}"
+            )
+        if max(abs(x), abs(y)) > FARTHEST:
+            raise ProtocolError(
+                f"{what} must be within {FARTHEST:g} m of the origin, got ({x:g}, "
+                f"{y:g}) as point {number} of {len(points)}"
             )
 
 

@@ -12,6 +12,7 @@ import msgspec
 
 from webmap.errors import ProtocolError
 from webmap.geometry import Pose, Quaternion, Twist, Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.arrays import Floats, Int8s
 
 if TYPE_CHECKING:
@@ -97,7 +98,8 @@ class PoseMsg(Unstamped, frozen=True):
         """Place and heading in the plane, of a pose that has them.
 
         Raises:
-            ProtocolError: If a number is NaN or infinite, or the quaternion is zero.
+            ProtocolError: If a number is NaN or infinite, the quaternion is zero, or it
+                is farther away than anything can be.
 
         """
         p, q = self.position, self.orientation
@@ -106,9 +108,19 @@ class PoseMsg(Unstamped, frozen=True):
                 f"a pose must be of finite numbers, got ({p.x}, {p.y}) with the "
                 f"quaternion ({q.x}, {q.y}, {q.z}, {q.w})"
             )
-        if q.quaternion.norm <= 1e-6:
+        if max(abs(p.x), abs(p.y)) > FARTHEST:
+            raise ProtocolError(
+                f"a pose must be within {FARTHEST:g} m of the origin, got "
+                f"({p.x:g}, {p.y:g})"
+            )
+        if self.turns_nowhere:
             raise ProtocolError("a pose has a quaternion of zeros, which turns nowhere")
         return self.planar
+
+    @property
+    def turns_nowhere(self) -> bool:
+        """Whether the quaternion is zero, as a message has it that nobody filled."""
+        return self.orientation.quaternion.norm <= 1e-6
 
     @property
     def place(self) -> "PoseMsg":

@@ -1,6 +1,7 @@
 """Markers: what ROS programs draw to show what they think."""
 
 import asyncio
+import logging
 import time
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -8,7 +9,7 @@ import msgspec
 
 from webmap.core.layer import Layer
 from webmap.core.marker_frames import MarkerFrames
-from webmap.core.marker_shapes import look_of, place, shape_of
+from webmap.core.marker_shapes import lies_unturned, look_of, place, shape_of
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError, WebMapError
 from webmap.ros.bridge import Bridge
@@ -26,6 +27,8 @@ from webmap.tf import Transform
 if TYPE_CHECKING:
     from webmap.core.map import Map
     from webmap.core.robot import Robot
+
+log = logging.getLogger("webmap.modules")
 
 MAX_MARKERS = 5000
 """The most markers that one topic may show."""
@@ -67,7 +70,8 @@ class Markers:
 
     Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and
     texts are drawn, with their colours; meshes are not. A marker that makes no sense
-    is left out by itself, and said.
+    is left out by itself, and said. A sphere, a list of them or points with a
+    quaternion of zeros are drawn unturned, and that is logged once.
 
     Each is drawn where its own frame was at its stamp, and one that is ``frame_locked``
     goes on moving with the frame. One whose frame nobody tells of is drawn as it comes,
@@ -144,6 +148,7 @@ class MarkerLayer(Layer):
         self._looks: dict[Key, tuple[object, ...]] = {}
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
+        self._said_unturned = False
         self.svg.classes.add("markers")
         self.svg.set(pointer_events="none")
 
@@ -211,9 +216,26 @@ class MarkerLayer(Layer):
         except WebMapError:
             self.frames.forget(key)
             raise
+        self._say_unturned(marker)
         self._ends.pop(key, None)
         if marker.lifetime.seconds > 0:
             self._ends[key] = time.monotonic() + marker.lifetime.seconds
+
+    def _say_unturned(self, marker: MarkerMsg) -> None:
+        """Say once that somebody leaves orientations out; they are drawn as RViz does.
+
+        It stays no problem: nothing looks otherwise for it.
+        """
+        if not self._said_unturned and lies_unturned(marker):
+            self._said_unturned = True
+            log.warning(
+                "%s: %s: marker %d of %r has a quaternion of zeros and is drawn "
+                "unturned, as all such spheres and points are",
+                self.bridge.url,
+                self.topic,
+                marker.id,
+                marker.ns,
+            )
 
     def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
         """Put a marker where it is, drawn anew if it looks otherwise from above."""

@@ -11,6 +11,7 @@ from webmap.core.pictures import Picture
 from webmap.core.refusals import refusing
 from webmap.core.tasks import spawn
 from webmap.errors import ProtocolError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import MapMetaDataMsg, OccupancyGridMsg
 from webmap.ros.messages_grid import OccupancyGridUpdateMsg
@@ -154,6 +155,12 @@ class Grid(Layer):
         if not (math.isfinite(resolution) and resolution > 0):
             raise ProtocolError(
                 f"a cell must be a number of metres above 0, got {resolution}"
+            )
+        side = resolution * max(grid.info.width, grid.info.height)
+        if side > FARTHEST:
+            raise ProtocolError(
+                f"a grid has sides of {FARTHEST:g} m at the most, got "
+                f"{grid.info.width} x {grid.info.height} cells of {resolution:g} m"
             )
         _ = grid.info.origin.usable
         cells = grid.cells

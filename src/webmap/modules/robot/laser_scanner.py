@@ -11,6 +11,7 @@ from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.core.scan_doubts import scan_doubt
 from webmap.errors import ProtocolError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg
@@ -211,7 +212,8 @@ def scan_points(
         rays = (np.arange(max_dots) * (len(ranges) / max_dots)).astype(int)
         ranges = ranges[rays]
     low = scan.range_min if math.isfinite(scan.range_min) else 0.0
-    high = scan.range_max if scan.range_max > 0 else math.inf
+    high = min(scan.range_max, FARTHEST) if scan.range_max > 0 else FARTHEST
+    low = max(-FARTHEST, min(low, FARTHEST))  # ranges are of single precision
     hit = np.isfinite(ranges) & (ranges >= low) & (ranges <= high)
     rays = rays[hit]
     bearings = scan.angle_min + scan.angle_increment * rays

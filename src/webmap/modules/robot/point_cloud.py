@@ -10,6 +10,7 @@ from webmap.core.layer_names import label
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_cloud import PointCloud2Msg
 from webmap.scene import svg
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
 MANY = 100_000
 """Points of which no more are looked at one by one."""
-
-FARTHEST = 1e7
-"""Metres; what a sensor of depth puts farther than a planet is no point."""
 
 COLOURS = (
     "#30318f", "#2f6fde", "#1aa5c8", "#1fbf7a", "#8fcf2f", "#e8c51c", "#f08a1d",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from webmap.core.layer_names import label
 from webmap.core.placed import Placed, thinned
 from webmap.core.refusals import refusing
-from webmap.errors import ConfigError
+from webmap.errors import ConfigError, ProtocolError
 from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import ParticleCloudMsg, PoseArrayMsg
@@ -87,15 +87,22 @@ class PoseArray:
         """Draw poses in place of those before; none draw nothing.
 
         Raises:
-            ProtocolError: If one of them is not finite or turns nowhere.
+            ProtocolError: If one of them is not finite; or if one turns nowhere, but
+                the others are drawn then.
 
         """
-        self.poses = [pose.usable for pose in message.poses]
+        self.poses = [pose.usable for pose in message.poses if not pose.turns_nowhere]
         self._placed.stand_in(message.frame_id, message.stamp)
         kept = thinned(len(self.poses), self.max_poses)
         arrows = [arrow(self.poses[index], self.length) for index in kept]
         self.arrows.set(d="".join(arrows) or None)
         self.svg.set_age(0.0, limit=self.age_limit)
+        missing = len(message.poses) - len(self.poses)
+        if missing:
+            raise ProtocolError(
+                f"{missing} of {len(message.poses)} poses have a quaternion of zeros, "
+                "which turns nowhere, and are left out"
+            )
 
     def on_odometry_update(self) -> None:
         """Keep them where they are while the robot goes along."""
