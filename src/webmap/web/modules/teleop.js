@@ -6,6 +6,7 @@ import { lay, overlayOf } from "./overlay.js";
 import { Requests } from "./requests.js";
 import { StickPad } from "./stick_pad.js";
 import { Panel } from "./teleop_panel.js";
+import { withoutKeys } from "./touch_words.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
@@ -147,13 +148,10 @@ class Teleop {
     this._requests.show(requests);
     const useful = report !== null && ofUse(report);
     this._stick.show(useful, status.pressed && status.dead);
-    const inputs = inputsOf({
-      touch: this._touch.matches,
-      stick: this._stick.wanted,
-      gamepad: this._desk.gamepad,
-    });
+    const hands = { touch: this._touch.matches, stick: this._stick.wanted };
+    const inputs = inputsOf({ ...hands, gamepad: this._desk.gamepad });
     const words = describe(status, robot, report, active, { verdict, request, inputs });
-    this._panel.showState(words, report, status.delay);
+    this._panel.showState(withoutKeys(words, hands, inputs), report, status.delay);
     const asking = request?.by === status.connection;
     this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);
     const moving = robot === null ? null : this._drive.motionDelay(robot);
