@@ -58,6 +58,9 @@ class Overlay {
       host.style.position = "relative";
     }
     svg.after(this.element);
+    this._frame.addEventListener("toggle", ({ target }) => this._makeRoom(target), {
+      capture: true,
+    });
     this._observer = new ResizeObserver(() => this._place());
     this._observer.observe(svg);
     if (host) this._observer.observe(host);
@@ -87,6 +90,20 @@ class Overlay {
     this.element.remove();
   }
 
+  /**
+   * Fold what a panel that was unfolded lies over, where the style has panels lie over
+   * one another as there is little room.
+   *
+   * @param {EventTarget | null} opened
+   */
+  _makeRoom(opened) {
+    if (!(opened instanceof HTMLDetailsElement) || !opened.open || !isLoose(opened)) return;
+    for (const other of opened.parentElement?.children ?? []) {
+      if (other === opened || !(other instanceof HTMLDetailsElement)) continue;
+      if (other.open && isLoose(other)) other.open = false;
+    }
+  }
+
   _place() {
     const { style } = this.element;
     const map = this._svg.getBoundingClientRect();
@@ -96,4 +113,11 @@ class Overlay {
     style.width = `${map.width}px`;
     style.height = `${map.height}px`;
   }
+}
+
+/** @param {Element} element */
+function isLoose(element) {
+  return [null, "::details-content"].some((part) =>
+    ["absolute", "fixed"].includes(getComputedStyle(element, part).position),
+  );
 }

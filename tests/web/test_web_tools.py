@@ -1,0 +1,58 @@
+"""The tools over a map and what they unfold, in a real Chromium."""
+
+from collections.abc import Callable
+
+import pytest
+from hands_bench import Bench
+
+pytestmark = pytest.mark.browser
+
+LAY = """async () => {
+  const { lay } = await import("/_webmap/modules/overlay.js");
+  for (const name of ["One", "Two", "Three"]) {
+    const tool = document.createElement("details");
+    tool.className = "webmap-panel tool";
+    const [summary, much] = ["summary", "p"].map((tag) => document.createElement(tag));
+    summary.textContent = name;
+    much.style.height = "2000px";
+    tool.append(summary, much);
+    lay(bench.maps[0], tool, "top-left");
+  }
+}"""
+
+PLACES = """() => [...document.querySelectorAll(".tool > summary")].map((e) => {
+  const { x, y, width, height } = e.getBoundingClientRect();
+  return [x, y, width, height];
+})"""
+
+OPEN = "[...document.querySelectorAll('.tool')].map((e) => e.open)"
+
+
+def test_what_unfolds_moves_no_tool_and_folds_what_it_would_lie_over(
+    open_bench: Callable[..., Bench],
+) -> None:
+    bench = open_bench("?modules=stop")
+    bench.page.evaluate(LAY)
+    bench.page.wait_for_function("document.styleSheets.length > 1")
+    tools = bench.page.locator(".tool > summary")
+    before = bench.page.evaluate(PLACES)
+    stop = bench.page.locator(".webmap-stop-all").bounding_box()
+    for index in (0, 2, 1):
+        tools.nth(index).click()
+        alone = [each == index for each in range(3)]
+        bench.until(lambda alone=alone: bench.page.evaluate(OPEN) == alone)
+        assert bench.page.evaluate(PLACES) == before
+        assert bench.page.locator(".webmap-stop-all").bounding_box() == stop
+    tools.nth(1).click()
+    bench.until(lambda: bench.page.evaluate(OPEN) == [False] * 3)
+
+
+def test_who_drives_with_a_finger_is_told_of_no_key(
+    open_bench: Callable[..., Bench],
+) -> None:
+    bench = open_bench(has_touch=True, is_mobile=True)
+    bench.select("r1")
+    bench.page.locator(".webmap-teleop-lease").tap()
+    bench.until(lambda: bench.shown() == "ready")
+    words = bench.page.locator(".webmap-teleop-detail")
+    assert words.inner_text() == "Hold the stick to drive, let go to stop."
