@@ -59,6 +59,18 @@ def test_a_goal_goes_when_the_robot_gets_there(link, robot):
     assert module.svg.get("data-pose") != first, "the page can tell it from the last"
 
 
+@pytest.mark.parametrize(("frame", "seen"), [("odom", "hidden"), ("map", None)])
+def test_a_goal_is_reached_in_the_frame_that_the_robot_is_drawn_in(
+    link, robot, frame, seen
+):
+    robot.set_tf(link, map_frame="odom", namespace="/bob", quiet=True)
+    module = robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
+    link.say("/goal_pose", {"header": header(frame), "pose": pose(8, 8, 0.0)})
+    assert module.svg.get("visibility") is None
+    link.say("/odom", {"header": header("odom"), "pose": pose(8, 8, 0.0)})
+    assert module.svg.get("visibility") == seen
+
+
 def test_a_pose_that_is_none_is_refused_and_the_last_one_stays(link, robot):
     module = robot.add_module("PoseStamped", link, "/target")
     link.say("/target", {"header": header(), "pose": pose(1, 2)})

@@ -3,6 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.frames import frames_of
 from webmap.core.layer_names import label
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
@@ -115,9 +116,12 @@ class PoseStamped:
         return math.dist((x, y), (at.x, at.y)) < self.reached
 
     def _in_map(self, frame_id: str) -> bool:
-        frames = self.robot.tf
-        known = "map" if frames is None else frames["map_frame"]
-        return frame_id.strip("/") in ("", "map", known)
+        """Tell whether a frame is that of the robot's poses, so that both compare."""
+        tf = self.robot.tf
+        if tf is None:
+            return frame_id.strip("/") in ("", "map")
+        buffer = frames_of(tf["bridge"], tf["namespace"]).buffer
+        return buffer.name(frame_id, tf["namespace"]) in ("", tf["map_frame"])
 
 
 def arrow(length: float) -> str:
