@@ -85,6 +85,25 @@ def test_a_robot_with_odometry_keeps_it_and_learns_the_name_of_its_base():
     }
 
 
+def test_maps_of_one_world_are_drawn_where_they_are_in_it():
+    """As with several robots of ROS 1, each with a map of its own."""
+    trees = shared(
+        "world bob/map bob/odom bob/base_link", "world ann/map ann/odom ann/base_link"
+    )
+    topics = {"/tf": TF, "/bob/odom": ODOM, "/ann/odom": ODOM}
+    for robot in discover(topics, "host", trees).robots:
+        assert robot.tf_options["map_frame"] == "world"
+        assert robot.map_frame == "world"
+
+
+def test_the_map_is_the_one_of_that_name_whatever_it_hangs_from():
+    topics = {"/tf": TF, "/odom": ODOM}
+    trees = shared("earth map odom base_link")
+    (robot,) = discover(topics, "host", trees).robots
+    assert "map_frame" not in robot.tf_options
+    assert robot.map_frame == "map"
+
+
 def test_without_a_map_a_robot_is_drawn_from_where_its_odometry_began():
     (robot,) = discover({"/tf": TF}, "bob", shared("odom base_link")).robots
     assert robot.tf_options["map_frame"] == "odom"
@@ -157,7 +176,7 @@ def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
             for option in ([], ["--toml"])
         )
     assert "bob (in /bob)" in shown
-    assert "frames    bob/base_link in map" in shown
+    assert "frames      bob/base_link in map" in shown
     assert "it is drawn where its frames have bob/base_link in map" in shown
     assert 'tf.base_frame = "bob/base_link"' in kept
     assert "tf.quiet = false # drawn where its frames have it" in kept

@@ -33,6 +33,7 @@ def describe(
         battery=robot.topic("battery"),
         cameras=tuple(guess.topic for guess in cameras[:MOST_CAMERAS]),
         goal=robot.topic("goal"),
+        goal_frame=robot.map_frame,
         cancel=robot.topic("cancel"),
         action=robot.action,
         initial_pose=robot.topic("initialpose"),

@@ -130,7 +130,7 @@ class DrawnLayers(Looking):
             return
         if robot.tf is None:
             options = {**found.tf_options, "quiet": True}
-            options.pop("map_frame", None)
+            options["map_frame"] = found.map_frame
             with no_scope():
                 robot.set_tf(self.bridge, **options)
 

@@ -46,7 +46,12 @@ def grow(
 
     def use_goals() -> None:
         set_goals(
-            robot, bridge, found.topic("goal"), found.topic("cancel"), found.action
+            robot,
+            bridge,
+            found.topic("goal"),
+            found.topic("cancel"),
+            found.action,
+            frame=found.map_frame,
         )
 
     def use_plan() -> None:

@@ -74,7 +74,8 @@ def _frames(robot: FoundRobot) -> list[str]:
     if robot.tf_alone:
         lines = ["tf.quiet = false # drawn where its frames have it"]
     else:
-        lines = ["tf.quiet = true # drawn in the frame map, if frames lead there"]
+        frame = robot.map_frame
+        lines = [f"tf.quiet = true # drawn in the frame {frame}, if frames lead there"]
     return lines + [
         f"tf.{key} = {_text(options[key])}"
         for key in ("namespace", "base_frame", "map_frame")
@@ -167,6 +168,8 @@ def _motion(robot: FoundRobot) -> list[str]:
         cancel = robot.first("cancel")
         if cancel is not None:
             lines.append(f"move.cancel_topic = {_text(cancel.topic)} # {cancel.rule}")
+    if (goal is not None or robot.action is not None) and robot.map_frame != "map":
+        lines.append(f"move.frame = {_text(robot.map_frame)}")
     pose = robot.first("initialpose")
     if pose is not None:
         lines.append(f"initial_pose = {_text(pose.topic)} # {pose.rule}")

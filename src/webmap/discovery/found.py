@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from webmap.discovery.tf_robots import MAP, WORLD
+
 if TYPE_CHECKING:
     from webmap.discovery.layers import FoundLayer
 
@@ -128,7 +130,14 @@ class FoundRobot:
             options["base_frame"] = self.base_frame
         if self.tf_alone and self.root_frame:
             options["map_frame"] = self.root_frame
+        elif self.map_frame != MAP:
+            options["map_frame"] = self.map_frame
         return options
+
+    @property
+    def map_frame(self) -> str:
+        """The frame of the map that it moves in, as its frames have it."""
+        return self.root_frame if WORLD.match(self.root_frame) else MAP
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,9 @@ BASE = re.compile(
 """What the frame of a robot's base is called, after a prefix of its own."""
 
 WORLD = re.compile(r"(?:.*[/_])?(?:map|world|earth)\Z")
+MAP = "map"
+"""The frame of the map, unless the tree has none of that name (REP 105)."""
+
 ODOM = re.compile(r"(?:.*[/_])?odom(?:_[^/]*|etry)?\Z")
 
 MOST = 200
@@ -79,7 +82,7 @@ def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
         worlds = [other for other in chain if WORLD.match(other)]
         odometry = [other for other in chain if ODOM.match(other)]
         if worlds or odometry:
-            root = (worlds or odometry)[-1]
+            root = MAP if MAP in worlds else (worlds or odometry)[-1]
             prefix = (found["prefix"] or found["space"] or "").rstrip("/_")
             yield Base(frame, root, namespace, prefix)
 
