@@ -24,7 +24,7 @@ class CostmapNames:
         """Name those that came since."""
         for module in self.map.modules:
             layer = getattr(module, "layer", None)
-            if getattr(layer, "palette", None) != "costmap":
+            if layer is None or getattr(layer, "palette", None) != "costmap":
                 continue
             if "data-layer" not in layer.svg.attributes:
                 layer.svg.set("data-layer", ending(layer.topic))

@@ -112,6 +112,8 @@ def make_robot(about: RobotDescription) -> "Robot":
     picture = about.picture
     model = robot_model() if picture is None else picture_model(picture)
     robot = webmap.Robot(about.name, model)
+    if picture is not None:  # the name lies below it
+        robot.svg.set_style("--reach", picture.reach)
     if about.odometry:
         robot.set_odometry_topic(bridge, about.odometry)
     if about.twist:

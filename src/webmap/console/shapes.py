@@ -50,6 +50,12 @@ class Picture:
     angle: float = 0.0
     """How far it is turned about its middle, in degrees, counter-clockwise."""
 
+    @property
+    def reach(self) -> float:
+        """How far from the base it reaches at the most, in metres."""
+        half = math.hypot(self.width, self.height) / 2
+        return half + math.hypot(self.x, self.y)
+
 
 def picture_model(picture: Picture) -> "Element":
     """Return a model that is a picture, with the same marks as any other robot."""
