@@ -1,5 +1,5 @@
 import { NewestPicture } from "./camera_picture.js";
-import { keep, listenToDrags, nextCorner, readKept, roomFor } from "./camera_place.js";
+import { FOUND, keep, listenToDrags, nextCorner, readKept, roomFor } from "./camera_place.js";
 import { CameraView } from "./camera_view.js";
 import { closeSheet } from "./sheet.js";
 
@@ -9,12 +9,16 @@ import { closeSheet } from "./sheet.js";
  * @typedef {object} MapCanvas
  * @property {SVGSVGElement} svg
  * @property {number | null} clock
+ * @property {{add: (name: "camera", part: {
+ *   read: () => Place, write: (place: Place) => void, reset: () => void,
+ * }) => () => void}} layout
  * @property {{
  *   robots: ReadonlyMap<string, {mine: boolean}>,
  *   goBy: (robot: string, age: () => number) => () => void,
  * }} drive
  */
 
+/** @typedef {{dock: Dock, x: number, y: number}} Place */
 /** @typedef {{id: number, name: string}} Camera */
 /** @typedef {{op: 'cameras', robot: string, name: string, cameras: Camera[]}} Cameras */
 /** @typedef {{op: 'picture', camera: number, url: string, stamp: number}} Picture */
@@ -77,11 +81,18 @@ class CameraPanel {
       signal,
     );
     this._timer = setInterval(() => this._look(), PERIOD);
+    // Whether it is open is no part of it: who drives with it open goes by it.
+    this._leave = map.layout.add("camera", {
+      read: () => ({ dock: this._kept.dock, x: this._kept.x, y: this._kept.y }),
+      write: (place) => this._move(place),
+      reset: () => this._move(FOUND),
+    });
     this._show();
   }
 
   destroy() {
     this._ending.abort();
+    this._leave();
     clearInterval(this._timer);
     this._goesBy();
     this._view.element.remove();
@@ -151,7 +162,12 @@ class CameraPanel {
       // Without a pointer it goes from corner to corner.
       Object.assign(this._kept, nextCorner(x, y));
     }
-    this._kept.dock = dock;
+    this._move({ ...this._kept, dock });
+  }
+
+  /** @param {Place} place */
+  _move({ dock, x, y }) {
+    Object.assign(this._kept, { dock, x, y });
     keep(this._kept);
     this._show();
   }

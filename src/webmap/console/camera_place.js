@@ -13,6 +13,9 @@
 
 export const DOCKS = /** @type {const} */ (["side", "below", "float"]);
 
+/** Where it is until somebody puts it elsewhere. */
+export const FOUND = { dock: /** @type {const} */ ("side"), x: 0, y: 0 };
+
 const KEY = "webmap.camera";
 
 /** @returns {Kept} What was kept, or what is meant without it. */

@@ -70,6 +70,15 @@ class Frame:
             self._placed = True
             self.map.fit(*bounds)
 
+    def on_own_view(self) -> None:
+        """Leave the view to a page that begins with the one it was left with."""
+        self._placed = True
+
+    def on_view_found(self) -> None:
+        """Show what the page begins with, when nobody left it with another view."""
+        self._placed = False
+        self.place()
+
     def on_view(self) -> None:
         """Keep the dots of scans as large on the screen, whatever the zoom."""
         scale = math.sqrt(abs(self.map.world.tf.determinant))

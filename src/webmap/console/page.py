@@ -19,6 +19,7 @@ from webmap.console.fleet import RobotDescription, make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.frame import Frame
 from webmap.console.health import RobotHealth
+from webmap.console.layout import Layout
 from webmap.console.opened import Console
 from webmap.console.refused import RefusedList
 from webmap.console.robot_buttons import RobotButtons
@@ -101,7 +102,9 @@ def build(
     map.add_module("AlignTool")
     map.add_module("RouteTool", title)
     map.add_module("RosoutPanel", bridges)
-    map.add_module("ExportTool", place=".map-tools", classes="button square")
+    saving = {"place": ".map-tools", "classes": "button square"}
+    map.add_module("ExportTool", **saving)
+    map.add_module(Layout, of=place_of(bridges), **saving)
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
     frame = map.add_module(Frame, title, floor)

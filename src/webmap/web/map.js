@@ -1,5 +1,6 @@
 import { DragEnd } from "./drag_end.js";
 import { Following } from "./following.js";
+import { LayoutParts } from "./layout_parts.js";
 import { Operations, operated } from "./operations.js";
 import {
   apply,
@@ -63,6 +64,12 @@ export class MapCanvas {
     this._reports = new ViewReports(() => this._report());
     this._dragEnd = new DragEnd();
     this._session = 0;
+    /** What modules add to the viewer's layout of the page. */
+    this.layout = new LayoutParts();
+    /** Whether hands chose the view, rather than programs. */
+    this.byHand = false;
+    /** Whether the view is that of this page before its link broke, or a reload. */
+    this.restored = false;
     this._matrix = svg.createSVGMatrix();
 
     this._setSize(size);
@@ -137,6 +144,7 @@ export class MapCanvas {
   setView(view) {
     if (!isView(view) || isSame(view, this._view)) return;
     if (isShifted(view, this._view)) this._following.start(0);
+    this.byHand = true;
     this._program(view);
     this.reportSoon();
   }
@@ -230,6 +238,7 @@ export class MapCanvas {
       kept && kept.applied >= state.applied ? kept : state;
     this._operations.reach(applied);
     if (!matrix) return;
+    this.restored = true;
     this._operations.whenSized(this._sized, () => {
       if (isView(matrix)) this._change(matrix);
       this.follow(follow);

@@ -71,7 +71,8 @@ class LayerSwitches {
   constructor(map, { layers = [], off = [] }) {
     this._map = map;
     this._layers = layers;
-    this._shown = { ...Object.fromEntries(off.map((name) => [name, false])), ...kept() };
+    this._found = Object.fromEntries(off.map((name) => [name, false]));
+    this._shown = { ...this._found, ...kept() };
     this._number = `${++maps}`;
     map.svg.dataset.layers = this._number;
     this._sheet = new CSSStyleSheet();
@@ -92,11 +93,17 @@ class LayerSwitches {
     this._take = lay(map, this._details, "top-left");
     /** @type {Map<string, HTMLElement>} */
     this._rows = new Map();
+    this._leave = map.layout.add("layers", {
+      read: () => ({ open: this._details.open, shown: { ...this._shown } }),
+      write: ({ open, shown }) => this._lay(open, shown),
+      reset: () => this._lay(false, this._found),
+    });
     this._apply();
   }
 
   destroy() {
     clearInterval(this._timer);
+    this._leave();
     this._take();
     delete this._map.svg.dataset.layers;
     const sheets = document.adoptedStyleSheets;
@@ -142,6 +149,21 @@ class LayerSwitches {
     this._list.replaceChildren(...rows.map(([, element]) => element));
   }
 
+  /**
+   * @param {boolean} open Whether the list is unfolded.
+   * @param {Record<string, boolean>} shown
+   */
+  _lay(open, shown) {
+    this._shown = { ...shown };
+    keep(this._shown);
+    for (const [key, row] of this._rows) {
+      const box = row.querySelector("input");
+      if (box) box.checked = this._shown[key] !== false;
+    }
+    this._details.open = open;
+    this._apply();
+  }
+
   _apply() {
     const scope = `[data-layers="${this._number}"]`;
     this._sheet.replaceSync(hiding(this._layers, this._shown, scope));
@@ -152,7 +174,8 @@ class LayerSwitches {
 function kept() {
   try {
     const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return typeof value === "object" && value !== null ? value : {};
+    const choices = Object.entries(value).filter(([, on]) => typeof on === "boolean");
+    return Object.fromEntries(choices);
   } catch {
     return {}; // storage may be forbidden, or hold what is not ours
   }

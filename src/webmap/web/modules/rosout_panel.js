@@ -78,6 +78,11 @@ class RosoutPanel {
       this._choice.append(html("option", "", { value: each }, words));
     }
     this._choice.value = levels.includes(least) ? least : level;
+    this._leave = map.layout.add("log", {
+      read: () => ({ open: this._details.open, least: this._choice.value }),
+      write: (log) => this._lay(log.open, log.least),
+      reset: () => this._lay(false, level),
+    });
     this._choice.addEventListener("change", () => this._filter());
     this._count = html("p", "webmap-rosout-count", { role: "status" });
     this._badge = html("span", "webmap-rosout-badge");
@@ -100,6 +105,7 @@ class RosoutPanel {
 
   destroy() {
     clearInterval(this._timer);
+    this._leave();
     this._take();
   }
 
@@ -110,6 +116,16 @@ class RosoutPanel {
     book.take(said, total, state, this._most);
     this._filter();
     this._age();
+  }
+
+  /**
+   * @param {boolean} unfolded
+   * @param {string} least
+   */
+  _lay(unfolded, least) {
+    if (this._levels.includes(least)) this._choice.value = least;
+    this._details.open = unfolded;
+    this._filter();
   }
 
   _toggled() {

@@ -1,0 +1,191 @@
+import { deskOf } from "../inputs/desk.js";
+import { html, say, svg } from "./elements.js";
+import { lay } from "./overlay.js";
+
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+
+/**
+ * Where the button is: `place`, a selector of the page's own element, and `classes` that
+ * the button gets there; without a place it lies over the map.
+ *
+ * @typedef {{place?: string, classes?: string}} Where
+ */
+
+/**
+ * @typedef {object} Group
+ * @property {number} order Groups stand in the order of this.
+ * @property {string} title What the button says that it is for.
+ * @property {string} heading
+ * @property {HTMLElement} content
+ */
+
+const ICON = "M12 3.5v11M7.5 10.5l4.5 4.5 4.5-4.5M4.5 20h15";
+
+/** Pixels that the menu stays away from the map's foot, which a sheet may lie over. */
+const GAP = 24;
+
+/** @type {WeakMap<MapCanvas, Map<string, SaveMenu>>} */
+const menus = new WeakMap();
+
+/**
+ * Add to what can be saved: one button for all of it, as there is little room.
+ *
+ * @param {MapCanvas} map
+ * @param {Where} where Modules that say the same place share a button.
+ * @param {Group} group
+ * @returns {{menu: SaveMenu, leave: () => void}}
+ */
+export function joinSaveMenu(map, where, group) {
+  const { place = "" } = where;
+  const there = menus.get(map) ?? new Map();
+  menus.set(map, there);
+  const menu = there.get(place) ?? new SaveMenu(map, where);
+  there.set(place, menu);
+  const remove = menu.add(group);
+  const leave = () => {
+    remove();
+    if (!menu.empty) return;
+    there.delete(place);
+    menu.destroy();
+  };
+  return { menu, leave };
+}
+
+/** A button that opens a choice of what to save. */
+export class SaveMenu {
+  /**
+   * @param {MapCanvas} map
+   * @param {Where} where
+   */
+  constructor(map, { place = "", classes = "" }) {
+    this._map = map;
+    /** @type {Map<Group, HTMLElement>} */
+    this._groups = new Map();
+    const icon = svg("path", { d: ICON });
+    this._go = html(
+      "button",
+      `webmap-export-go ${classes || "webmap-button"}`,
+      { type: "button", "aria-expanded": "false", "aria-haspopup": "true" },
+      svg("svg", { viewBox: "0 0 24 24", class: "icon", "aria-hidden": "true" }, icon),
+    );
+    this._go.addEventListener("click", () => this._open(Boolean(this._menu.hidden)));
+    this._menu = html("div", "webmap-panel webmap-export-menu");
+    this._word = html("span", "webmap-export-word", { role: "status" });
+    this._element = html("div", "webmap-export", {}, this._go, this._menu, this._word);
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    const outside = (/** @type {Event} */ event) => {
+      if (event.target instanceof Node && !this._element.contains(event.target)) {
+        this._open(false);
+      }
+    };
+    addEventListener("pointerdown", outside, { signal, capture: true });
+    addEventListener("focusin", outside, { signal });
+    // For pages on which nobody drives, and so nobody else hears of Escape.
+    const escape = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === "Escape") this._leave();
+    };
+    this._element.addEventListener("keydown", escape, { signal });
+    this._offs = [
+      this._lay(place),
+      deskOf(map.drive).claimEscape(() => this._leave()),
+    ];
+    this._open(false);
+  }
+
+  destroy() {
+    this._ending.abort();
+    for (const off of this._offs) off();
+  }
+
+  get empty() {
+    return this._groups.size === 0;
+  }
+
+  /**
+   * @param {Group} group
+   * @returns {() => void} Takes it out again.
+   */
+  add(group) {
+    const head = html("p", "webmap-export-head", { "aria-hidden": "true" }, group.heading);
+    const element = html("div", "webmap-export-group", {}, head, group.content);
+    this._groups.set(group, element);
+    this._list();
+    return () => {
+      this._groups.delete(group);
+      this._list();
+    };
+  }
+
+  _list() {
+    const groups = [...this._groups].sort(([one], [other]) => one.order - other.order);
+    const title = groups.map(([group]) => group.title).join("; ");
+    this._go.setAttribute("aria-label", title);
+    this._go.title = title;
+    this._menu.replaceChildren(...groups.map(([, element]) => element));
+  }
+
+  /** Close it and give the focus back to the button. */
+  close() {
+    this._open(false);
+    this._go.focus();
+  }
+
+  /** @param {string} text What stands beside the button while something is saved. */
+  say(text) {
+    say(this._word, text);
+  }
+
+  /**
+   * @param {string} place
+   * @returns {() => void}
+   */
+  _lay(place) {
+    const own = place === "" ? null : document.querySelector(place);
+    if (!own) {
+      this._element.classList.add("webmap-panel");
+      return lay(this._map, this._element, "top-left");
+    }
+    own.append(this._element);
+    return () => this._element.remove();
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  _leave() {
+    if (this._menu.hidden) return false;
+    this.close();
+    return true;
+  }
+
+  /** @param {boolean} open */
+  _open(open) {
+    this._menu.hidden = !open;
+    this._go.setAttribute("aria-expanded", String(open));
+    if (!open) return;
+    const room = document.documentElement.clientWidth;
+    this._element.classList.remove("leftward");
+    const { top, right } = this._menu.getBoundingClientRect();
+    this._element.classList.toggle("leftward", right > room);
+    // What lies below the map, such as STOP, stays in sight.
+    const end = this._map.svg.getBoundingClientRect().bottom - GAP;
+    this._menu.style.maxHeight = end > top ? `${end - top}px` : "";
+    this._menu.querySelector("button")?.focus({ preventScroll: true });
+  }
+}
+
+/** Milliseconds for which the browser may still read a file that was offered to it. */
+const READ_WITHIN = 60_000;
+
+/**
+ * Have the browser save a file on the viewer's own machine.
+ *
+ * @param {Blob} file
+ * @param {string} name
+ */
+export function offer(file, name) {
+  const link = html("a", "");
+  link.href = URL.createObjectURL(file);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), READ_WITHIN);
+}

@@ -1,0 +1,112 @@
+"""The layout of the console: saved, loaded, as it was found, and there again."""
+
+import json
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+pytestmark = pytest.mark.browser
+
+FILE = "webmap-layout.json"
+
+
+def view_of(page: Page) -> list[float]:
+    """Return what carries metres to pixels of the map."""
+    return page.locator("g.world").evaluate(
+        "g => (({a, b, c, d, e, f}) => [a, b, c, d, e, f])(g.getCTM())"
+    )
+
+
+def expect_view(page: Page, view: list[float]) -> None:
+    page.wait_for_function(
+        """(view) => {
+          const now = document.querySelector("g.world").getCTM();
+          return [..."abcdef"].every((key, i) => Math.abs(now[key] - view[i]) < 0.01);
+        }""",
+        arg=view,
+    )
+
+
+def menu(page: Page) -> None:
+    """Open the menu by the keyboard."""
+    page.wait_for_selector(".webmap-layout-save", state="attached")
+    page.locator(".webmap-export-go").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator(".webmap-layout-save")).to_be_visible()
+
+
+def load(page: Page, file: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Load", exact=True).press("Enter")
+    chooser.value.set_files(file)
+
+
+def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(
+    open_console, tmp_path
+):
+    page = open_console()
+    found = view_of(page)
+    row = page.locator("#robots .row", has_text="Robot 2").locator("button").first
+    row.click()
+    page.get_by_role("button", name="Take Robot 2").click()
+    expect(page.locator("#card .state .you")).to_have_text("You hold it")
+    page.locator(".webmap-layers > summary").click()
+    page.get_by_label("Scans", exact=True).uncheck()
+    page.locator("svg.webmap").focus()
+    for key in ("+", "+", "]"):
+        page.keyboard.press(key)
+    log = page.locator(".webmap-rosout")
+    log.evaluate("e => { e.open = true; }")
+    left = view_of(page)
+    assert left != found
+
+    menu(page)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save", exact=True).press("Enter")
+    assert download.value.suggested_filename == FILE
+    download.value.save_as(tmp_path / FILE)
+    saved = json.loads((tmp_path / FILE).read_text())
+    assert set(saved) == {"version", "view", "layers", "log", "camera"}
+    assert saved["layers"]["shown"]["Scans"] is False
+
+    # As another viewer left it, or the same one an hour later.
+    word = page.locator(".webmap-layout-word")
+    page.get_by_role("button", name="As it was found").press("Enter")
+    expect(word).to_have_text("The page is as it was found.")
+    expect_view(page, found)
+    expect(page.locator(".webmap-layers")).not_to_have_attribute("open", "")
+    expect(log).not_to_have_attribute("open", "")
+    expect(page.locator(".laserscan").first).to_be_visible()
+
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(json.dumps({**saved, "log": {"open": True, "least": "loud"}}))
+    load(page, wrong)
+    expect(word).to_contain_text('log.least: expected "debug", ')
+    expect(word).to_contain_text('got "loud". Nothing was changed.')
+    wrong.write_text(" " * 66_000)
+    load(page, wrong)
+    expect(word).to_contain_text("expected at most 64 kB, got 65 kB")
+    expect_view(page, found)
+    expect(page.locator(".laserscan").first).to_be_visible()
+
+    load(page, tmp_path / FILE)
+    expect(word).to_have_text(f"Loaded {FILE}. No robot was told anything.")
+    expect_view(page, left)
+    expect(page.locator(".laserscan").first).to_be_hidden()
+    expect(log).to_have_attribute("open", "")
+    page.locator(".webmap-layers").evaluate("e => { e.open = true; }")
+    expect(page.get_by_label("Scans", exact=True)).not_to_be_checked()
+    # Through all of it the robot is this viewer's.
+    expect(page.locator(".robot.selected")).to_have_attribute("data-name", "Robot 2")
+    expect(page.locator("#card .state .you")).to_have_text("You hold it")
+
+    context, url = page.context, page.url
+    page.close()
+    again = context.new_page()
+    again.goto(url)
+    expect_view(again, left)
+    expect(again.locator(".robot.selected")).to_have_count(0)
+    again.goto(f"{url}?layout=found")
+    again.wait_for_selector(".webmap-layout-save", state="attached")
+    expect_view(again, found)

@@ -1,0 +1,81 @@
+"""Who says which view a page of the console begins with."""
+
+from pathlib import Path
+
+import pytest
+
+from webmap import Map, Robot
+from webmap.console.frame import Frame
+from webmap.console.layout import Layout
+from webmap.core.page import Page, PageEntry
+from webmap.server.viewer import Viewer
+from webmap.wire.session import SceneSession
+
+
+class Publisher:
+    """Takes the files of the page; nobody loads them here."""
+
+    def publish_file(self, file: Path) -> str:
+        assert Path(file).is_file(), file
+        return f"/_webmap/{Path(file).name}"
+
+
+@pytest.fixture
+def map():
+    entry = PageEntry("/", lambda page: None, None, Path(), "test")
+    sizes = {"map": (800.0, 600.0)}
+    page = Page(entry, SceneSession(), Viewer("v1", "Ann"), Publisher(), sizes)
+    with page.scope.active():
+        yield Map(page.element("map"))
+    page.close()
+
+
+@pytest.fixture
+def robot(map: Map) -> Robot:
+    robot = Robot("Bob")
+    robot.valid = True
+    map.add_robot(robot)
+    return robot
+
+
+@pytest.fixture
+def frame(map: Map, robot: Robot) -> Frame:
+    return map.add_module(Frame, "test", None)
+
+
+@pytest.fixture
+def layout(map: Map, frame: Frame) -> Layout:
+    return map.add_module(Layout, of="hall")
+
+
+def test_a_page_that_knows_its_last_view_is_not_shown_another(map, frame, layout):
+    before = map.world.tf
+    layout.on_message({"own": True})
+    frame.place()
+    assert map.world.tf == before
+
+
+def test_the_page_hears_back_behind_what_was_said_of_the_view(map, frame, layout):
+    frame.place()
+    heard = []
+    layout.half.send = heard.append
+    layout.on_message({"own": True})
+    assert heard == [{"own": True}]
+
+
+def test_as_it_was_found_the_page_shows_the_robots_again(map, frame, layout):
+    layout.on_message({"own": True})
+    before = map.world.tf
+    layout.on_message({"found": True})
+    assert map.world.tf != before
+
+
+@pytest.mark.parametrize(
+    "message", [{}, {"own": 1}, {"found": "yes"}, {"goal": [1, 2]}, {"select": "Bob"}]
+)
+def test_a_layout_says_nothing_else_to_the_display(map, robot, frame, layout, message):
+    before = map.world.tf
+    heard = []
+    layout.half.send = heard.append
+    layout.on_message(message)
+    assert (heard, map.world.tf, map.selected) == ([], before, None)
