@@ -156,14 +156,14 @@ class Grid(Layer):
             raise ProtocolError(
                 f"a cell must be a number of metres above 0, got {resolution}"
             )
+        _ = grid.info.origin.usable
+        cells = grid.cells
         side = resolution * max(grid.info.width, grid.info.height)
         if side > FARTHEST:
             raise ProtocolError(
                 f"a grid has sides of {FARTHEST:g} m at the most, got "
                 f"{grid.info.width} x {grid.info.height} cells of {resolution:g} m"
             )
-        _ = grid.info.origin.usable
-        cells = grid.cells
         check_values(cells, self.palette)
         self.info, self.cells = grid.info, cells
         self.anchor.stand_in(grid.frame_id, grid.stamp)
