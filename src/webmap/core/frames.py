@@ -21,8 +21,8 @@ QUEUE = 100
 """Messages that a bridge may hold back: many nodes share the topic, and each counts."""
 
 GRACE = 3.0
-"""Seconds since the link opened within which nobody misses a frame: who tells of it is
-still being found, and static ones come late."""
+"""Seconds since the link first opened in which nobody misses a frame: who tells of it
+is still being found, and static ones come late."""
 
 _heard: dict[tuple[Bridge, str], "Frames"] = {}
 

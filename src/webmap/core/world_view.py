@@ -91,6 +91,8 @@ class WorldView(Extendable):
     ) -> Element:
         """Place an image in the world, under everything else.
 
+        A file that does not exist is said on the page, and the rest goes on.
+
         Args:
             iri: A file of the page's folder, or an absolute path of a file.
             x: The left edge, in metres.
@@ -100,8 +102,6 @@ class WorldView(Extendable):
 
         Returns:
             The image, to keep for :meth:`remove_image`.
-
-        A file that does not exist is said on the page, and the rest goes on.
 
         """
         try:
