@@ -214,7 +214,54 @@ def changed(old, new):
         (changed('title = "Two halls"', 'floor = "none.yaml"'), "FILE:1: floor: "),
         ("", "FILE: the file is empty; expected TOML with a table [bridges]"),
         ("# nothing\n", "FILE:1: bridges: got nothing"),
-        ("title = \n", "FILE: this is not TOML: Invalid value (at line 1, column 9)"),
+        ("title = \n", "FILE:1: this is not TOML: got title =, no value that TOML"),
+        (changed("w_max = 1", "w_max = .inf"), "FILE:23: this is not TOML: got w_max"),
+        (changed('"Ann"', '"Ann'), "expected the quote that ends a text on the same l"),
+        (
+            changed("w_max = 1", "v_max = 1"),
+            "FILE:23: this is not TOML: got v_max = 1, this key stands there already",
+        ),
+        (
+            changed("[robots.move]", "[robots.twist]"),
+            "FILE:25: this is not TOML: got [robots.twist], a table [robots.twist] sta",
+        ),
+        ("bridges:\n", "FILE:1: this is not TOML: got bridges:, expected a key, an eq"),
+        ("x = [1,\n\n", "FILE:2: this is not TOML: no value"),
+        (changed("v_max = 0.5", 'v_max = "0.5"'), "; write 0.5 without quotes"),
+        (changed('"Bob"', "7"), '; a text stands in quotes: "7"'),
+        (changed('"Bob"', r'"B\nob"'), "expected a text of one line with 100 charac"),
+        (
+            changed("w_max = 1", 'holonomic = "yes"'),
+            "expected true or false; write true without quotes",
+        ),
+        (
+            changed("w_max = 1", 'floor = "hall.yaml"'),
+            'there is no key "floor" here; it is the file\'s own, and stands before',
+        ),
+        (
+            changed('title = "Two halls"', "").replace(
+                "[bridges]", '[bridges]\ntitle = "Two halls"'
+            ),
+            'FILE:4: bridges.title: got the text "Two halls" for a bridge; the file\'s',
+        ),
+        (
+            changed('"/cmd_vel"', '"bob/cmd_vel"').replace('"south"\nb', '"north"\nb'),
+            'FILE:36: robots[1].twist.topic: got the text "/bob/cmd_vel", which drives '
+            '"Bob" (robots[0]) already',
+        ),
+        (changed('"Ann"', '"Bob"'), 'differs from "Bob" (robots[0]) by more than case'),
+        (
+            changed('title = "Two halls"', 'floor = "a.png"'),
+            "expected the YAML file be",
+        ),
+        (
+            '[bridges]\na = "ws://a"\n[robots]\nname = "Bob"\n',
+            "expected a table [[robots]] in two brackets for each",
+        ),
+        (
+            '[bridges]\na = "ws://a"\n[[robots]]\nname = "B"\n[robots.modules]\n',
+            "expected an array of tables: [[robots.modules]] in two brackets for each",
+        ),
         (
             b"\xef\xbb\xbf" + GOOD.encode(),
             "FILE: the file begins with a byte order mark",
@@ -222,7 +269,10 @@ def changed(old, new):
         (GOOD.encode("utf-16"), "byte order mark"),
         (b'title = "ok"\nfloor = "\xff"\n', "FILE:2: this is not UTF-8"),
         ("x = " + "[" * 5000, "FILE: values are nested too deep"),
-        ("x = " + "9" * 5000, "FILE: this is not TOML: Exceeds the limit"),
+        (
+            "x = " + "9" * 5000,
+            "FILE:1: this is not TOML: a whole number of far too many digits",
+        ),
         ("#" * (2 << 20), "FILE: the file is larger than 1 MiB"),
     ],
 )
@@ -241,3 +291,11 @@ def test_every_mistake_is_named_at_once(write):
 def test_control_characters_of_a_file_do_not_reach_the_terminal(write):
     for odd in (changed('"north"', r'"\u001b[2J"'), changed("title", r'"\u001b[2J"')):
         assert "\x1b" not in refused(write, odd)
+
+
+def test_where_there_is_no_bridge_robots_are_not_asked_for_theirs(write):
+    said = refused(write, '[[robots]]\nname = "Bob"\n').splitlines()
+    assert len(said) == 1
+    assert said[0].startswith(
+        "FILE:1: bridges: got nothing, expected a table [bridges]"
+    )

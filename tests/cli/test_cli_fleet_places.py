@@ -70,7 +70,11 @@ def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
         ('labels = "no.yaml"\n', "no.yaml: No such file or directory"),
         (
             '[[labels]]\nname = "A"\nx = 1\ny = "2"\n',
-            "fleet.toml:1: labels[0]: y: expected a number of metres, got '2'",
+            "fleet.toml:4: labels[0].y: expected a number of metres, got '2'",
+        ),
+        (
+            '[[labels]]\nname = "A"\nx = 1\n',
+            'fleet.toml:1: labels[0]: the key "y" is missing',
         ),
         (
             TILES.replace("50", "91"),

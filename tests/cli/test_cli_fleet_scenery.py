@@ -50,6 +50,10 @@ options = { order = 4.0 }
 @pytest.fixture
 def write(tmp_path):
     Image.new("RGB", (4, 2)).save(tmp_path / "hall.png")
+    plan = "image: hall.png\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n"
+    thresholds = "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    (tmp_path / "second.yaml").write_text(plan + thresholds)
+    (tmp_path / "none.yaml").write_text("image: hall.png\n")
 
     def write_(text):
         file = tmp_path / "fleet.toml"
@@ -82,6 +86,7 @@ def test_several_maps_pictures_and_modules_of_the_map_are_shown(ready, tmp_path)
     assert console.images == [(str(tmp_path / "hall.png"), -2.0, 1.5, 40.0, 20.0)]
     assert [module.name for module in ready.others] == ["Markers", "MapFile"]
     assert ready.others[0].args == (south, "/zones")
+    assert ready.others[1].args == (str(tmp_path / "second.yaml"),)
 
 
 def test_a_page_gets_all_of_it(ready):
@@ -147,6 +152,8 @@ class FakeMap:
             'name = "Marker"',
             "modules[0].name: there is no map modu",
         ),
+        ("second.yaml", "no.yaml", "modules[1].args[0]: "),
+        ("second.yaml", "none.yaml", "none.yaml:1: "),
         ('"/zones"]', "7]", "modules[0].args[1]: got the whole number 7, expected"),
         (
             "order = 4.0",

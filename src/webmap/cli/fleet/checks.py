@@ -4,6 +4,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import date
 from typing import Any, TypeAlias
 
 from webmap.cli.fleet.lines import Path
@@ -22,6 +23,11 @@ _KINDS: tuple[tuple[type, str], ...] = (
     (dict, "the table"),
 )
 _LONGEST = 60
+
+HEAD = ("title", "floor")
+"""Keys that are texts, of the file itself and of no table in it."""
+
+LONGEST_NAME = 100
 
 LARGEST = 1e6
 """No speed, time or length in a file is larger."""
@@ -57,6 +63,16 @@ def text(value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
         raise ConfigError("a text that is not empty")
     return value
+
+
+def name(value: Any) -> str:
+    """Take what people call something: a text of one line that is not too long."""
+    plain = text(value)
+    if not plain.isprintable() or len(plain) > LONGEST_NAME:
+        raise ConfigError(
+            f"a text of one line with {LONGEST_NAME} characters at the most"
+        )
+    return plain
 
 
 def topic(value: Any) -> str:
@@ -157,8 +173,32 @@ def one(check: Check, value: Any, path: Path, mistakes: Mistakes) -> Any:
     try:
         return check(value)
     except ConfigError as error:
-        mistakes.add(path, f"got {show(value)}, expected {error}")
+        hint = _otherwise(check, value)
+        mistakes.add(path, f"got {show(value)}, expected {error}{hint}")
         return None
+
+
+def _otherwise(check: Check, value: Any) -> str:
+    """Return a hint if quotes, or their absence, are all that is wrong."""
+    try:
+        if isinstance(value, str):
+            plain = value.strip().lower()
+            named = {"true": True, "yes": True, "false": False, "no": False}
+            check(named[plain] if plain in named else _number_of(plain))
+            word = str(named[plain]).lower() if plain in named else value.strip()
+            return f"; write {word} without quotes"
+        if isinstance(value, int | float | date) and not isinstance(value, bool):
+            check(str(value))
+            return f'; a text stands in quotes: "{value}"'
+    except (ConfigError, ValueError):
+        pass
+    return ""
+
+
+def _number_of(text: str) -> int | float:
+    if len(text) > _LONGEST:
+        raise ValueError
+    return int(text) if text.lstrip("+-").isdigit() else float(text)
 
 
 def table(
@@ -188,6 +228,7 @@ def table(
 def unknown(key: str, known: Iterable[str], path: Path, mistakes: Mistakes) -> None:
     """Note a key that means nothing."""
     listed = ", ".join(known)
-    mistakes.add(
-        path, f'there is no key "{key}" here{near(key, known)}; there are {listed}'
-    )
+    hint = near(key, known)
+    if key in HEAD and len(path) > 1:
+        hint = f"; it is the file's own, and stands before the first [table]{hint}"
+    mistakes.add(path, f'there is no key "{key}" here{hint}; there are {listed}')

@@ -5,9 +5,10 @@ from pathlib import Path
 
 from webmap.cli.fleet.checks import Mistakes
 from webmap.cli.fleet.fleet_table import read_table
-from webmap.cli.fleet.lines import Lines
+from webmap.cli.fleet.lines import Lines, way_in_words
 from webmap.cli.fleet.lines import Path as Way
 from webmap.cli.fleet.schema import Fleet
+from webmap.cli.fleet.syntax import not_toml
 from webmap.errors import ConfigError
 from webmap.plain_files import read_file
 
@@ -36,7 +37,7 @@ class FleetText:
         try:
             self.data = tomllib.loads(text)
         except ValueError as error:  # also whole numbers of thousands of digits
-            raise ConfigError(f"{name}: this is not TOML: {error}") from None
+            raise ConfigError(not_toml(name, text, error)) from None
         except RecursionError:
             raise ConfigError(
                 f"{name}: values are nested too deep; {EXPECTED}"
@@ -98,12 +99,3 @@ def read_fleet(file: Path) -> tuple[Fleet, FleetText]:
     fleet = read_table(text.data, mistakes)
     text.refuse(mistakes)
     return fleet, text
-
-
-def way_in_words(way: Way) -> str:
-    """Return the way to a value as TOML writes it: ``robots[0].twist.v_max``."""
-    words = ""
-    for part in way:
-        dot = "." if words else ""
-        words += f"[{part}]" if isinstance(part, int) else f"{dot}{part}"
-    return words or "the file"

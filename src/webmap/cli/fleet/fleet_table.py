@@ -5,8 +5,8 @@ from typing import Any
 
 from webmap.cli.fleet import checks
 from webmap.cli.fleet.alignments import Alignment, bridge_table
-from webmap.cli.fleet.checks import Mistakes
-from webmap.cli.fleet.lines import Path
+from webmap.cli.fleet.checks import HEAD, Mistakes
+from webmap.cli.fleet.lines import Path, way_in_words
 from webmap.cli.fleet.places import read_places, read_tiles
 from webmap.cli.fleet.robot_table import known_bridge, read_modules, read_robot
 from webmap.cli.fleet.scenery import read_images, read_maps
@@ -30,7 +30,8 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
     fleet = Fleet()
     for key in ("title", "floor"):
         if key in data:
-            setattr(fleet, key, checks.one(checks.text, data[key], (key,), mistakes))
+            check = checks.name if key == "title" else checks.text
+            setattr(fleet, key, checks.one(check, data[key], (key,), mistakes))
     fleet.bridges, fleet.alignments = _bridges(data.get("bridges"), mistakes)
     if "map" in data:
         only = next(iter(fleet.bridges)) if len(fleet.bridges) == 1 else None
@@ -48,13 +49,16 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
     robots = data.get("robots")
     if not isinstance(robots, list) or not robots:
         got = "nothing" if robots is None else checks.show(robots)
-        mistakes.add(("robots",), f"got {got}, expected a table [[robots]] for each")
+        more = " in two brackets" if isinstance(robots, dict) else ""
+        words = f"got {got}, expected a table [[robots]]{more} for each"
+        mistakes.add(("robots",), words)
         return fleet
     for index, value in enumerate(robots):
         fleet.robots.append(
             read_robot(value, ("robots", index), fleet.bridges, mistakes)
         )
     _no_name_twice(fleet.robots, mistakes)
+    _no_base_twice(fleet, mistakes)
     return fleet
 
 
@@ -73,6 +77,9 @@ def _bridges(
             urls[name], stated = bridge_table(bridge, _address, path, mistakes)
             if stated is not None:
                 alignments[name] = stated
+        elif name in HEAD and not _is_address(bridge):
+            words = f"the file's own {name} stands before the first [table]"
+            mistakes.add(path, f"got {checks.show(bridge)} for a bridge; {words}")
         else:
             urls[name] = checks.one(_address, bridge, path, mistakes) or ""
     return urls, alignments
@@ -87,6 +94,31 @@ def _address(value: Any) -> str:
         ) from None
 
 
+def _is_address(value: Any) -> bool:
+    try:
+        _address(value)
+    except ConfigError:
+        return False
+    return True
+
+
+def _no_base_twice(fleet: Fleet, mistakes: Mistakes) -> None:
+    """Refuse two robots with one base: who drives the one would move the other."""
+    first: dict[tuple[str, str], RobotLine] = {}
+    for robot in fleet.robots:
+        topic = (robot.twist or {}).get("topic")
+        url = fleet.bridges.get(robot.bridge)
+        if not topic or not url:
+            continue
+        other = first.setdefault((url, topic), robot)
+        if other is not robot:
+            mistakes.add(
+                (*robot.path, "twist", "topic"),
+                f'got the text "{topic}", which drives "{other.name}" '
+                f"({way_in_words(other.path)}) already, expected a topic of its own",
+            )
+
+
 def _no_name_twice(robots: list[RobotLine], mistakes: Mistakes) -> None:
     first: dict[str, RobotLine] = {}
     for robot in robots:
@@ -95,5 +127,6 @@ def _no_name_twice(robots: list[RobotLine], mistakes: Mistakes) -> None:
             mistakes.add(
                 (*robot.path, "name"),
                 f'got the text "{robot.name}", expected a name that differs from '
-                f'"{other.name}" by more than case and Unicode form',
+                f'"{other.name}" ({way_in_words(other.path)}) by more than case and '
+                f"Unicode form",
             )

@@ -143,3 +143,12 @@ class Lines:
         line += self._text.count("\n", at, self._at)
         self._seen_to = (self._at, line)
         return line
+
+
+def way_in_words(way: Path) -> str:
+    """Return the way to a value as TOML writes it: ``robots[0].twist.v_max``."""
+    words = ""
+    for part in way:
+        dot = "." if words else ""
+        words += f"[{part}]" if isinstance(part, int) else f"{dot}{part}"
+    return words or "the file"

@@ -47,6 +47,10 @@ TILES: dict[str, Check] = {
 }
 
 
+NEEDED = ("name", "x", "y")
+"""What every label says."""
+
+
 def read_places(value: Any, path: Path, mistakes: Mistakes) -> Places:
     """Take tables ``[[labels]]``, or the name of a file with labels."""
     if isinstance(value, str):
@@ -56,10 +60,20 @@ def read_places(value: Any, path: Path, mistakes: Mistakes) -> Places:
         mistakes.add(path, f"got {checks.show(value)}, {words}")
         return []
     for index, each in enumerate(value):
+        there = each if isinstance(each, dict) else NEEDED
+        missing = [key for key in NEEDED if key not in there]
+        for key in missing:
+            mistakes.add((*path, index), f'the key "{key}" is missing')
+        if missing:
+            continue
         try:
             read_labels([each], "")
         except ConfigError as error:
-            mistakes.add((*path, index), str(error).removeprefix("[0]").lstrip(".: "))
+            words = str(error).removeprefix("[0]").lstrip(".: ")
+            _, *inner = getattr(error, "way", (0,))
+            key = inner[0] if inner else ""
+            words = words.removeprefix(f"{key}: ") if key else words
+            mistakes.add((*path, index, *inner), words)
     return value
 
 

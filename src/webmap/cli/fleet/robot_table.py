@@ -37,9 +37,9 @@ def read_robot(
     if "name" not in value:
         mistakes.add(path, 'the key "name" is missing')
     robot.bridge = _bridge(value, path, bridges, mistakes)
-    for key in ("name", "base_link"):
+    for key, check in (("name", checks.name), ("base_link", checks.text)):
         if key in value:
-            got = checks.one(checks.text, value[key], (*path, key), mistakes)
+            got = checks.one(check, value[key], (*path, key), mistakes)
             setattr(robot, key, got or "")
     known = {
         "odometry": ODOMETRY,
@@ -87,6 +87,8 @@ def _bridge(
     if "bridge" not in value:
         if len(bridges) == 1:
             return next(iter(bridges))
+        if not bridges:  # which is a mistake of its own
+            return ""
         mistakes.add(path, 'the key "bridge" is missing: there are several bridges')
         return ""
     name = value["bridge"]
@@ -135,7 +137,12 @@ def read_modules(
 ) -> list[ModuleLine]:
     """Return what an array of modules means; mistakes are noted."""
     if not isinstance(value, list):
-        mistakes.add(path, f"got {checks.show(value)}, expected an array of tables")
+        way = ".".join(str(part) for part in path if isinstance(part, str))
+        mistakes.add(
+            path,
+            f"got {checks.show(value)}, expected an array of tables: [[{way}]] in two "
+            "brackets for each",
+        )
         return []
     return [
         _module(each, (*path, index), bridges, mistakes)

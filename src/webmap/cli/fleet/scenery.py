@@ -14,6 +14,7 @@ from webmap.cli.fleet.schema import ModuleLine
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.registry import map_modules
 from webmap.errors import ConfigError, WebMapError
+from webmap.map_file import read_map
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -97,9 +98,20 @@ def check_images(
 
 
 def check_modules(
-    modules: list[ModuleLine], bridges: Mapping[str, "Bridge"], mistakes: Mistakes
+    modules: list[ModuleLine],
+    bridges: Mapping[str, "Bridge"],
+    folder: File,
+    mistakes: Mistakes,
 ) -> list[MapModule]:
-    """Return the modules of the map; what one does not take is noted."""
+    """Return the modules of the map; what one does not take is noted.
+
+    Args:
+        modules: What the file says.
+        bridges: Its bridges, by name.
+        folder: The file's own, in which the maps of ``MapFile`` are looked for.
+        mistakes: Where what is wrong goes.
+
+    """
     found = []
     for line in modules:
         args = tuple(meant(value, bridges) for value in line.args)
@@ -112,8 +124,25 @@ def check_modules(
         except WebMapError as error:
             mistakes.add((*line.path, "name"), str(error))
         else:
+            if line.name == "MapFile":
+                args, options = _map_file(line, folder, mistakes)
             found.append(MapModule(line.name, args, options))
     return found
+
+
+def _map_file(
+    line: ModuleLine, folder: File, mistakes: Mistakes
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Return the arguments of a map from disk, which is read to see that it is one."""
+    options = dict(line.options)
+    name, *others = [options.pop("file")] if "file" in options else line.args
+    way = ("options", "file") if "file" in line.options else ("args", 0)
+    file = (folder / name).absolute()
+    try:
+        read_map(file)
+    except (ConfigError, OSError) as error:
+        mistakes.add((*line.path, *way), str(error))
+    return (str(file), *others), options
 
 
 def show_scenery(

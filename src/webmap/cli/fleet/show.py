@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
 
+PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
+
+
 @dataclass(frozen=True, slots=True)
 class ReadyFleet:
     """A file that is right, with everything in it made."""
@@ -47,30 +50,38 @@ def prepare(file: Path) -> ReadyFleet:
         OSError: If it cannot be read.
 
     """
-    import tempfile
-
-    from webmap.console.floor import load_floor
-
     fleet, text = read_fleet(file)
     mistakes = Mistakes()
     bridges = make_bridges(fleet)
     robots = make_robots(fleet, bridges, file.parent, mistakes)
     floor = file.parent / fleet.floor if fleet.floor else None
     if floor is not None:
-        try:
-            with tempfile.TemporaryDirectory() as folder:
-                load_floor(floor, Path(folder))
-        except (ConfigError, OSError) as error:
-            mistakes.add(("floor",), str(error))
+        _check_floor(floor, mistakes)
     modules = {}
     if fleet.tiles is not None:
         modules["TileLayer"] = tile_options(fleet.tiles, file.parent, mistakes)
     if fleet.labels is not None:
         modules["Labels"] = label_options(fleet.labels, file.parent, mistakes)
     images = check_images(fleet.images, file.parent, mistakes)
-    others = check_modules(fleet.modules, bridges, mistakes)
+    others = check_modules(fleet.modules, bridges, file.parent, mistakes)
     text.refuse(mistakes)
     return ReadyFleet(fleet, bridges, robots, floor, modules, images, others)
+
+
+def _check_floor(floor: Path, mistakes: Mistakes) -> None:
+    import tempfile
+
+    from webmap.console.floor import load_floor
+
+    if floor.suffix.lower() in PICTURES:
+        words = f"got the picture {str(floor)!r}, expected the YAML file beside it"
+        mistakes.add(("floor",), f"{words}, which says where it lies")
+        return
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            load_floor(floor, Path(folder))
+    except (ConfigError, OSError) as error:
+        mistakes.add(("floor",), str(error))
 
 
 def open_fleet(ready: ReadyFleet) -> None:
