@@ -25,7 +25,7 @@ def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
             yield found[1]
         finally:
             process.terminate()
-            process.wait(15)
+            process.wait(60)  # the machine may be busy
 
 
 def page_of(file: str | Path, **environment: str) -> AbstractContextManager[str]:

@@ -2,10 +2,6 @@
 
 import contextlib
 import json
-import re
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -85,19 +81,3 @@ def robot_node(
             yield node
         finally:
             node.close()
-
-
-@contextlib.contextmanager
-def simulator(*options: str) -> Iterator[str]:
-    """Run ``webmap sim`` and return its address."""
-    command = [sys.executable, "-m", "webmap", "sim", "--port", "0", *options]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    ) as process:
-        try:
-            found = re.search(r"ready at (ws://\S+)", process.stdout.readline())
-            assert found
-            yield found[1]
-        finally:
-            process.send_signal(signal.SIGTERM)
-            process.wait(10)

@@ -2,10 +2,7 @@
 
 import json
 import math
-import os
 import re
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +13,7 @@ from playwright.sync_api import expect
 from websockets.sync.client import connect
 
 from real_browser import watched_tab
+from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
@@ -32,22 +30,6 @@ SCREEN = """([x, y]) => {
   const m = document.querySelector('svg.webmap .world').getScreenCTM();
   return [m.a * x + m.c * y + m.e, m.b * x + m.d * y + m.f];
 }"""
-
-
-@contextmanager
-def started(*arguments: str, ready: str, **environment: str) -> Iterator[str]:
-    with subprocess.Popen(
-        [sys.executable, "-m", "webmap", *arguments, "--port", "0"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        env={**os.environ, **environment},
-    ) as process:
-        try:
-            yield re.search(ready, process.stdout.readline())[1]
-        finally:
-            process.terminate()
-            process.wait(15)
 
 
 @contextmanager
@@ -115,11 +97,10 @@ def save(tab) -> str:
 
 def test_a_map_is_aligned_by_hand_kept_and_used_for_goals(chromium, tmp_path):
     state = {"WEBMAP_STATE_DIR": str(tmp_path)}
-    with started("sim", "-n", "2", ready=r"at (ws://\S+)") as sim:
+    with simulator("-n", "2") as sim:
         state["ALIGNING_URL"] = sim
-        run = ("run", str(PAGE), "--no-browser")
         with (
-            started(*run, ready=r"(http\S+)", **state) as url,
+            page_of(PAGE, **state) as url,
             watched_tab(chromium, 1000, 800) as tab,
             hearing_goals(sim) as goals,
         ):
@@ -193,7 +174,7 @@ def test_a_map_is_aligned_by_hand_kept_and_used_for_goals(chromium, tmp_path):
 
         # What was saved holds in the next process.
         with (
-            started(*run, ready=r"(http\S+)", **state) as url,
+            page_of(PAGE, **state) as url,
             watched_tab(chromium, 1000, 800) as tab,
         ):
             open_page(tab, url)

@@ -8,13 +8,14 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 
 import pytest
-from button_robot import robot_node, simulator
+from button_robot import robot_node
 
 from webmap import Bridge, Robot
 from webmap.core.button_spec import ButtonMistake, read_button
 from webmap.core.page import Page, PageEntry
 from webmap.errors import ConfigError
 from webmap.scene.events import Event
+from webmap_process import simulator
 
 DOCK = {"label": "Dock", "service": "/dock", "type": "std_srvs/Trigger"}
 HORN = {

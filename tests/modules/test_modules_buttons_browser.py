@@ -1,18 +1,16 @@
 """Buttons on a robot's card, pressed in a real browser, on a real rosbridge."""
 
 import re
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
-from button_robot import RobotNode, robot_node, simulator
+from button_robot import RobotNode, robot_node
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import watched_tab
+from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
@@ -72,18 +70,11 @@ def bench(tmp_path_factory) -> Iterator[Bench]:
         robot_node(bridge, services, {"/light": "std_msgs/ColorRGBA"}) as node,
     ):
         file.write_text(FLEET.format(url=bridge))
-        command = [sys.executable, "-m", "webmap", "run", str(file), "--port", "0"]
-        with subprocess.Popen(
-            [*command, "--no-browser"], stdout=subprocess.PIPE, text=True
-        ) as process:
+        with page_of(file) as url:
             try:
-                found = re.search(r"ready at (\S+)", process.stdout.readline())
-                assert found
-                yield Bench(found[1], node, waiting)
+                yield Bench(url, node, waiting)
             finally:
                 waiting.set()
-                process.send_signal(signal.SIGINT)
-                process.wait(15)
 
 
 @pytest.fixture

@@ -1,9 +1,5 @@
 """The tutorial of layers, as it stands in the documentation, in a real browser."""
 
-import os
-import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +7,7 @@ from playwright.sync_api import Browser
 from running_simulators import simulators
 
 from real_browser import watched_tab
+from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
@@ -38,22 +35,9 @@ def test_the_tutorial_draws_all_that_a_robot_says(chromium: Browser, tmp_path):
         assert text.count("ws://localhost:9090") == 1
         program = tmp_path / EXAMPLE.name
         program.write_text(text.replace("ws://localhost:9090", found["ros1"].url))
-        command = [sys.executable, "-m", "webmap", "run", str(program)]
-        process = subprocess.Popen(
-            [*command, "--port", "0", "--no-browser"],
-            stdout=subprocess.PIPE,
-            text=True,
-            env=os.environ,
-        )
-        try:
-            url = re.search(r"http\S+", process.stdout.readline())
-            with watched_tab(chromium, 1000, 700) as tab:
-                tab.set_default_timeout(15_000)
-                tab.goto(url.group(0))
-                for selector in DRAWN:
-                    tab.wait_for_selector(selector, state="attached")
-                assert tab.locator(".webmap-notice").count() == 0
-        finally:
-            process.terminate()
-            process.wait(10)
-            process.stdout.close()
+        with page_of(program) as url, watched_tab(chromium, 1000, 700) as tab:
+            tab.set_default_timeout(15_000)
+            tab.goto(url)
+            for selector in DRAWN:
+                tab.wait_for_selector(selector, state="attached")
+            assert tab.locator(".webmap-notice").count() == 0

@@ -1,22 +1,18 @@
 """The view saved as SVG and PNG: opened alone, it looks as it did on the page."""
 
 import io
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from button_robot import simulator
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import watched_tab
+from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
@@ -27,28 +23,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 SIZE = (900, 700)
 
 
-@contextmanager
-def served(file: Path) -> Iterator[str]:
-    command = [sys.executable, "-m", "webmap", "run", str(file)]
-    with subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(HERE)},
-    ) as process:
-        try:
-            found = re.search(r"http\S+", process.stdout.readline())
-            assert found
-            yield found[0]
-        finally:
-            process.terminate()
-            process.wait(10)
-
-
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    with served(HERE / "scene_of_export.py") as found:
+    with page_of(HERE / "scene_of_export.py", PYTHONPATH=str(HERE)) as found:
         yield found
 
 
@@ -237,7 +214,7 @@ def console(tmp_path_factory) -> Iterator[str]:
     file = tmp_path_factory.mktemp("fleet") / "fleet.toml"
     with simulator("--robots", "2") as bridge:
         file.write_text(FLEET.format(url=bridge))
-        with served(file) as found:
+        with page_of(file) as found:
             yield found
 
 

@@ -2,10 +2,6 @@
 
 import io
 import math
-import os
-import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +11,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import watched_tab
+from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
@@ -30,23 +27,9 @@ POINT = """([selector, x, y]) => {
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    command = [sys.executable, "-m", "webmap", "run", str(HERE / "scene_of_layers.py")]
-    process = subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(HERE)},
-    )
-    assert process.stdout is not None
-    try:
-        line = process.stdout.readline()
-        found = re.search(r"http\S+", line)
-        assert found, line
-        yield found.group(0)
-    finally:
-        process.terminate()
-        process.wait(10)
-        process.stdout.close()
+    file = HERE / "scene_of_layers.py"
+    with page_of(file, PYTHONPATH=str(HERE)) as found:
+        yield found
 
 
 @pytest.fixture

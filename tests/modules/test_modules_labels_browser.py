@@ -1,24 +1,21 @@
 """Labels in a real browser: upright, added, kept, and a place to send a robot to."""
 
 import math
-import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import pytest
-from button_robot import robot_node, simulator
+from button_robot import robot_node
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import watched_tab
+from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
 expect.set_options(timeout=15_000)
-
-COMMAND = ["-m", "webmap", "run", "--port", "0", "--no-browser"]
 
 FLEET = """\
 [bridges]
@@ -63,32 +60,16 @@ def serve(bridge, state, tmp_path_factory):
     """Start the console; another one has the same state."""
     file = tmp_path_factory.mktemp("fleet") / "fleet.toml"
     file.write_text(FLEET.format(url=bridge))
-    running = []
+    running = ExitStack()
 
     def serve_() -> str:
-        process = subprocess.Popen(
-            [sys.executable, *COMMAND, str(file)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            env={**os.environ, "WEBMAP_STATE_DIR": str(state)},
-        )
-        running.append(process)
-        found = re.search(r"ready at (\S+)", process.stdout.readline())
-        assert found
-        serve_.url = found[1]  # with the token
+        shown = page_of(file, WEBMAP_STATE_DIR=str(state))
+        serve_.url = running.enter_context(shown)  # with the token
         return serve_.url
 
-    def end() -> None:
-        while running:
-            process = running.pop()
-            process.terminate()
-            process.wait(15)
-            process.stdout.close()
-
-    serve_.end, serve_.url = end, ""
-    yield serve_
-    end()
+    serve_.end, serve_.url = running.close, ""
+    with running:
+        yield serve_
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,6 @@ import asyncio
 import io
 import json
 import math
-import os
-import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -27,6 +23,7 @@ from playwright.sync_api import Browser, Page
 
 from real_browser import watched_tab
 from webmap.geometry import Affine
+from webmap_process import page_of
 
 HERE = Path(__file__).parent
 
@@ -244,21 +241,8 @@ def address(tmp_path_factory) -> Iterator[str]:
         low, high = np.min(corners, axis=0), np.max(corners, axis=0)
         bounds[name] = [*low.tolist(), *(high - low).tolist()]
     (folder / "bounds.json").write_text(json.dumps(bounds))
-    command = [sys.executable, "-m", "webmap", "run", str(HERE / "page_of_maps.py")]
-    process = subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "MAPS": str(folder)},
-    )
-    try:
-        found = re.search(r"http\S+", process.stdout.readline())
-        assert found
-        yield found.group(0)
-    finally:
-        process.terminate()
-        process.wait(10)
-        process.stdout.close()
+    with page_of(HERE / "page_of_maps.py", MAPS=str(folder)) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,6 @@
 """Tiles in a real browser: where they are, beside the fixes of satellites."""
 
 import io
-import os
-import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +13,7 @@ from scene_of_tiles import DATUM, EAST, FIXES, colour, made_tiles, missing, numb
 from real_browser import watched_tab
 from webmap.core.local_plane import LocalPlane
 from webmap.geometry import Affine
+from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
@@ -39,20 +36,9 @@ def tiles(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def url(tiles: Path) -> Iterator[str]:
-    command = [sys.executable, "-m", "webmap", "run", str(HERE / "scene_of_tiles.py")]
-    with subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(HERE), "TILES": str(tiles)},
-    ) as process:
-        try:
-            found = re.search(r"http\S+", process.stdout.readline())
-            assert found
-            yield found[0]
-        finally:
-            process.terminate()
-            process.wait(10)
+    told = {"PYTHONPATH": str(HERE), "TILES": str(tiles)}
+    with page_of(HERE / "scene_of_tiles.py", **told) as found:
+        yield found
 
 
 @pytest.fixture

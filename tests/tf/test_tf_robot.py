@@ -2,8 +2,6 @@
 
 import asyncio
 import math
-import subprocess
-import sys
 import time
 
 import msgspec
@@ -13,6 +11,7 @@ from webmap import Bridge, Robot
 from webmap.core.frames import frames_of
 from webmap.errors import ConfigError
 from webmap.scope import Removal
+from webmap_process import simulator
 
 
 class Link:
@@ -204,20 +203,9 @@ def test_frames_are_plain_data_and_back():
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_a_simulated_robot_is_drawn_where_its_frames_have_it(dialect):
-    command = [sys.executable, "-m", "webmap", "sim", "--port", "0", "--wander"]
-    options = ["--drift", "0.3", "--dialect", dialect]
-    with subprocess.Popen(
-        [*command, *options],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    ) as process:
-        try:
-            url = process.stdout.readline().rpartition(" ")[2].strip()
-            asyncio.run(follow(url))
-        finally:
-            process.terminate()
-            process.wait(10)
+    options = ("--wander", "--drift", "0.3", "--dialect", dialect)
+    with simulator(*options) as url:
+        asyncio.run(follow(url))
 
 
 async def follow(url):
