@@ -517,6 +517,13 @@ class TestWhereItIs:
             checked(spec(**{"pose_topic": "/initialpose", **changes}))
 
 
+def test_an_action_that_drives_by_itself_on_a_dead_link_is_refused():
+    """AssistedTeleop repeats the last velocity, however old it is."""
+    for type in ("nav2_msgs/AssistedTeleop", "nav2_msgs/action/AssistedTeleop"):
+        with pytest.raises(ConfigError, match="AssistedTeleop"):
+            checked(spec(action="/assisted_teleop", action_type=type))
+
+
 class TestGoalsOnly:
     @pytest.fixture
     def bench(self):

@@ -7,8 +7,8 @@
 3. No velocity of an old epoch comes after one of a newer epoch.
 4. No velocity exceeds the limit in force.
 5. After half a second of zeros there is silence, unless STOP stands.
-6. After a STOP nothing but zero is written, and nobody has the robot, until a reset;
-   not even when the gate is killed and started anew meanwhile.
+6. After a STOP nothing but zero is written, no goal is sent, and nobody has the robot,
+   until a reset; not even when the gate is killed and started anew meanwhile.
 7. A reset writes nothing.
 8. While a robot changes hands and its odometry shows motion, nobody has it.
 
@@ -215,8 +215,12 @@ class Motion(RuleBasedStateMachine):
     @rule(who=st.sampled_from(PEOPLE))
     def goal(self, who):
         before = len(self.bench.did(actions.SendGoal))
+        holder = self.bench.report().holder
         self.bench.goal(who)
         if len(self.bench.did(actions.SendGoal)) > before:
+            assert not self.stands, "no goal starts while STOP stands"
+            assert holder is not None
+            assert holder.connection == who, "only who has it sends it somewhere"
             self.last_seq[who] = self.bench.seq
             self._doubt()
 
