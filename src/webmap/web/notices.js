@@ -1,3 +1,5 @@
+import { freePlace } from "./notice_place.js";
+
 /** How long a failure that was dismissed is not shown again, in milliseconds. */
 const SILENCE = 60_000;
 /** How long what was mended is still shown: it can be read, and does not flicker. */
@@ -6,6 +8,10 @@ const LINGER = 2000;
 const SHOWN = 3;
 /** How many failures are kept at all. */
 const KEPT = 50;
+/** How often it is looked whether they cover something by now, in milliseconds. */
+const LOOK_PERIOD = 1000;
+/** What is to be pressed, and what is to be read beside it. */
+const TOOLS = "button, summary, input, select, textarea, a[href], .webmap-panel";
 
 /** Sentences for the viewer, in a corner of the page; text, whatever is in it. */
 export class Notices {
@@ -20,6 +26,10 @@ export class Notices {
     this._dismissed = new Map();
     /** What was mended and goes soon. @type {Map<string, number>} */
     this._leaving = new Map();
+    /** What it was when they were placed. */
+    this._seen = "";
+    addEventListener("resize", () => this._place());
+    setInterval(() => this._place(), LOOK_PERIOD);
   }
 
   /**
@@ -70,6 +80,7 @@ export class Notices {
     if (known) {
       const words = known.firstElementChild;
       if (words && words.textContent !== text) words.textContent = text;
+      this._place();
       return;
     }
     const notice = document.createElement("div");
@@ -127,19 +138,95 @@ export class Notices {
 
   /** A page full of failures tells no more than its newest, and how many there are. */
   _limit() {
-    const failures = [...this._shown].filter(([, notice]) =>
-      notice.classList.contains("alert"),
-    );
-    for (const [key] of failures.splice(0, failures.length - KEPT)) {
+    const failures = [...this._shown].filter(([, notice]) => isFailure(notice));
+    for (const [key] of failures.slice(0, -KEPT)) {
       this._shown.get(key)?.remove();
       this._shown.delete(key);
     }
-    const others = Math.max(0, failures.length - SHOWN);
-    failures.forEach(([, notice], index) => (notice.hidden = index < others));
+    this._place();
+  }
+
+  /** Lie over the map and over none of its tools, fewer of them where there is no room. */
+  _place() {
+    const area = this._shown.size > 0 && this._box ? mapOnScreen() : null;
+    const tools = area && this._box ? toolsBeside(this._box) : [];
+    const seen = JSON.stringify([area, tools, [...this._shown.keys()], this._texts()]);
+    if (seen === this._seen) return;
+    this._seen = seen;
+    for (let count = SHOWN; count > 0; count -= 1) {
+      this._show(count);
+      if (this._lay(area, tools)) return;
+    }
+  }
+
+  /**
+   * @param {import('./notice_place.js').Box | null} area
+   * @param {import('./notice_place.js').Box[]} tools
+   * @returns {boolean} Whether there was room, or nothing to go by.
+   */
+  _lay(area, tools) {
+    const box = this._box;
+    if (!box) return true;
+    box.style.cssText = "";
+    if (!area) return true;
+    const place = freePlace(area, tools, (width) => {
+      box.style.cssText = `left: 0; right: auto; width: ${width}px`;
+      return box.offsetHeight;
+    });
+    box.style.cssText = place
+      ? `inset: ${place.top}px auto auto ${place.left}px; width: ${place.width}px`
+      : "";
+    return place !== null;
+  }
+
+  /** @param {number} count Of how many failures more than the number is shown. */
+  _show(count) {
+    const failures = [...this._shown.values()].filter(isFailure);
+    const others = Math.max(0, failures.length - count);
+    failures.forEach((notice, index) => (notice.hidden = index < others));
+    this._others.textContent = `and ${others} more`;
     if (others > 0) this._open().append(this._others);
     else this._others.remove();
-    this._others.textContent = `and ${others} more`;
   }
+
+  _texts() {
+    return [...this._shown.values()].map(({ textContent }) => textContent);
+  }
+}
+
+/** @param {HTMLElement} notice */
+function isFailure(notice) {
+  return notice.classList.contains("alert");
+}
+
+/**
+ * @param {HTMLElement} box
+ * @returns {DOMRect[]} Where everything is that notices must not cover.
+ */
+function toolsBeside(box) {
+  return [...document.querySelectorAll(TOOLS)]
+    .filter((tool) => !box.contains(tool) && isVisible(tool))
+    .map((tool) => tool.getBoundingClientRect());
+}
+
+/** @returns {DOMRect | null} The part of the largest map that is in the window. */
+function mapOnScreen() {
+  const maps = [...document.querySelectorAll("svg.webmap")].map((map) => {
+    const { left, top, right, bottom } = map.getBoundingClientRect();
+    const [x, y] = [Math.max(0, left), Math.max(0, top)];
+    const width = Math.max(0, Math.min(innerWidth, right) - x);
+    return new DOMRect(x, y, width, Math.max(0, Math.min(innerHeight, bottom) - y));
+  });
+  const [largest] = maps.sort((a, b) => b.width * b.height - a.width * a.height);
+  return largest ?? null;
+}
+
+/** @param {Element} element */
+function isVisible(element) {
+  const { width, height } = element.getBoundingClientRect();
+  // What is folded away has a size too.
+  const shown = element.checkVisibility?.({ visibilityProperty: true }) ?? true;
+  return shown && width > 0 && height > 0;
 }
 
 const PROBLEM = "problem ";

@@ -1,0 +1,78 @@
+"""What fails at every message, each time with other numbers, as a page shows it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from real_browser import watched_tab
+from webmap_process import page_of
+
+pytestmark = pytest.mark.browser
+
+HERE = Path(__file__).parent
+
+COUNT = """
+window.most = 0;
+window.words = new Set();
+new MutationObserver(() => {
+  const boxes = document.querySelectorAll(".webmap-notice");
+  window.most = Math.max(window.most, boxes.length);
+  for (const { textContent } of boxes) window.words.add(textContent);
+}).observe(document, { subtree: true, childList: true, characterData: true });
+"""
+
+CLEAR = """() => {
+  const tool = document.querySelector(".webmap-measure-go")?.getBoundingClientRect();
+  const covers = (box) => box.left < tool.right && tool.left < box.right
+    && box.top < tool.bottom && tool.top < box.bottom;
+  const boxes = [...document.querySelectorAll(".webmap-notice")];
+  return tool && !boxes.some((box) => covers(box.getBoundingClientRect()));
+}"""
+"""Whether the notices leave the tool at the top of the map alone."""
+
+
+@pytest.fixture
+def tab(chromium: Browser) -> Iterator[Page]:
+    scene = HERE / "scene_of_mended.py"
+    with (
+        page_of(scene, PYTHONPATH=str(HERE)) as url,
+        watched_tab(chromium, 700, 500) as tab,
+    ):
+        tab.add_init_script(COUNT)
+        tab.goto(url)
+        tab.locator("svg.webmap").focus()
+        yield tab
+
+
+def test_a_nan_at_every_message_is_one_box_and_then_none(tab):
+    said = tab.locator(".webmap-notice")
+    expect(said).to_contain_text("Ann: /plan: a path must be of finite numbers, got")
+    path = tab.locator(".path > polyline[points]")
+    expect(path).to_have_count(1)
+    drawn = path.get_attribute("points")
+    tab.wait_for_function(
+        "d => document.querySelector('.path > polyline[points]')"
+        ".getAttribute('points') !== d",
+        arg=drawn,
+    )
+    expect(said).to_have_count(1)
+    assert tab.evaluate("[window.most, window.words.size]") == [1, 1]
+    tab.keyboard.press("m")
+    expect(said).to_have_count(0)
+    expect(path).to_have_count(2)
+
+    tab.keyboard.press("m")
+    expect(said).to_have_count(1)
+    said.get_by_role("button", name="Dismiss").click()
+    tab.locator("svg.webmap").focus()
+    tab.keyboard.press("m")
+    expect(path).to_have_count(2)
+    tab.keyboard.press("m")
+    tab.keyboard.press("b")
+    expect(said).to_contain_text("Ann: /plan_of_ann: ")
+    expect(said).to_have_count(1)
+    tab.reload()
+    expect(said).to_have_count(2)
+    tab.wait_for_function(CLEAR)
