@@ -7,6 +7,7 @@ topics go on, and so does the topic itself as soon as it makes sense again.
 
 import asyncio
 import json
+import logging
 import math
 import time
 from contextlib import AsyncExitStack
@@ -315,6 +316,48 @@ def test_what_makes_no_sense_is_said_once_and_disturbs_nothing(map, channel, nam
         assert "Ann" not in line
 
     with_scene(map, channel, scenario)
+
+
+AILING = {
+    "/amcl_pose": lambda n: amcl(3, pose=pose(n * 0.013, math.nan)),
+    "/plan": lambda n: plan(3, pose=pose(n * 0.37, math.nan)),
+    "/map": lambda n: grid(1, origin=pose(n * 0.05, math.nan)),
+}
+
+
+def test_a_robot_that_moves_and_sends_nan_is_said_once_and_taken_back(
+    map, channel, caplog
+):
+    """The words have other numbers in them each time."""
+
+    async def scenario(scene: Scene) -> None:
+        await scene.say_good(0, 1.0)
+        robot, layer = scene.robots[0], scene.grids[0]
+        standing = lambda: [*robot.problems.values(), *layer.problems.values()]  # noqa: E731
+        caplog.clear()
+        for number in range(60):
+            for topic, make in AILING.items():
+                await scene.servers[0].send(publish(topic, make(number)))
+        newest = {"0.767", "21.83", "2.95"}
+        await until(lambda: all(n in str(standing()) for n in newest))
+        assert len(standing()) == 3, "a card shows the newest"
+        assert len(scene.errors) == 3
+        assert sorted(channel.problems.values()) == sorted(scene.errors)
+        assert len(warnings(caplog)) == 3
+        await scene.say_good(0, 2.0)
+        assert standing() == []
+        assert channel.problems == {}, "no page shows any of them"
+        await scene.servers[0].send(publish("/plan", AILING["/plan"](7)))
+        await until(standing)
+        assert len(channel.problems) == 1
+        assert len(warnings(caplog)) == 3, "and the log has it already"
+
+    with_scene(map, channel, scenario)
+
+
+def warnings(caplog) -> list[str]:
+    found = [r for r in caplog.records if r.levelno >= logging.WARNING]
+    return [r.getMessage() for r in found if r.name.startswith("webmap")]
 
 
 @pytest.mark.parametrize("name", TAKEN)
