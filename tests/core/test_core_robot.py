@@ -164,7 +164,7 @@ def test_odometry_update_fires_only_when_something_changed():
     assert len(heard) == 2
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300])
 def test_a_pose_that_is_no_pose_is_ignored_and_said(bad):
     link = Link()
     robot = Robot("Bob")

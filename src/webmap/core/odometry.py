@@ -1,6 +1,5 @@
 """How a robot hears where it is: one topic, its type found out when not said."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -8,6 +7,7 @@ from typing import Any, Protocol
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError, ProtocolError
 from webmap.geometry import Quaternion, Twist, Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
 from webmap.ros.messages import OdometryMsg
@@ -48,11 +48,11 @@ class PoseReading:
         )
 
     @property
-    def is_finite(self) -> bool:
-        """Whether every number is finite and the orientation is one at all."""
+    def is_usable(self) -> bool:
+        """Whether it is somewhere that can be drawn, and the orientation is one."""
         p, q = self.position, self.orientation
         numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-        return all(map(math.isfinite, numbers)) and q.norm > 1e-6
+        return all(abs(number) < FARTHEST for number in numbers) and q.norm > 1e-6
 
 
 class PoseListener(Protocol):
@@ -151,13 +151,13 @@ class OdometryFeed:
 
     def _hear(self, message: OdometryView) -> None:
         reading = PoseReading.of(message)
-        if reading.is_finite:
+        if reading.is_usable:
             self._say(None)
             self._listener(reading)
         else:
             self._say(
-                f"topic {self.topic!r}: a pose with NaN, infinity or a quaternion of "
-                "zeros was ignored"
+                f"topic {self.topic!r}: a pose with NaN, infinity, a number beyond "
+                f"{FARTHEST:g} or a quaternion of zeros was ignored"
             )
 
     def _say(self, text: str | None) -> None:
