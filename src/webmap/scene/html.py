@@ -4,30 +4,13 @@ There is one for each HTML tag that a scene may hold. Children come first, then
 ``text`` and attributes by keyword.
 """
 
-from typing import Any
-
-from webmap.scene.element import Child, Element
+from webmap.scene.tag_maker import TagMaker
 
 
-class Maker:
+class Maker(TagMaker):
     """Makes HTML elements with one tag."""
 
-    def __init__(self, tag: str) -> None:
-        self.tag = tag
-
-    def __call__(
-        self, *children: Child, text: str | None = None, **attributes: Any
-    ) -> Element:
-        """Return a new element.
-
-        Raises:
-            SceneError: If an attribute is not allowed.
-
-        """
-        return Element(self.tag, *children, text=text, namespace="html", **attributes)
-
-    def __repr__(self) -> str:
-        return f"<maker of HTML {self.tag}>"
+    namespace = "html"
 
 
 a = Maker("a")

@@ -4,9 +4,7 @@ There is one for each SVG tag that a scene may hold. Children come first, then
 ``text`` and attributes by keyword.
 """
 
-from typing import Any
-
-from webmap.scene.element import Child, Element
+from webmap.scene.tag_maker import TagMaker
 
 namespace = "http://www.w3.org/2000/svg"
 """The XML namespace of SVG."""
@@ -15,25 +13,10 @@ xlink_namespace = "http://www.w3.org/1999/xlink"
 """The XML namespace of XLink, for documents that still use it."""
 
 
-class Maker:
+class Maker(TagMaker):
     """Makes SVG elements with one tag."""
 
-    def __init__(self, tag: str) -> None:
-        self.tag = tag
-
-    def __call__(
-        self, *children: Child, text: str | None = None, **attributes: Any
-    ) -> Element:
-        """Return a new element.
-
-        Raises:
-            SceneError: If an attribute is not allowed.
-
-        """
-        return Element(self.tag, *children, text=text, **attributes)
-
-    def __repr__(self) -> str:
-        return f"<maker of SVG {self.tag}>"
+    namespace = "svg"
 
 
 circle = Maker("circle")
