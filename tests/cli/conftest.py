@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 import pytest
-from cli_simulator import simulator
+
+from webmap_process import simulator
 
 
 @pytest.fixture(scope="session")

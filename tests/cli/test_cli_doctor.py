@@ -4,7 +4,7 @@ import re
 import subprocess
 import sys
 
-from cli_simulator import simulator
+from webmap_process import simulator
 
 
 def webmap(*arguments):

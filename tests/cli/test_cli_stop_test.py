@@ -9,13 +9,13 @@ import sys
 import time
 
 import pytest
-from cli_simulator import simulator
 
 from webmap.cli.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
 from webmap.gate.events import Key, StopRecord
 from webmap.gate.kept.records import Records
 from webmap.gate.rules.stoptest import MOVES_ON
 from webmap.testing import WitnessRobot
+from webmap_process import simulator
 
 TODAY = datetime.datetime.now().astimezone().date().isoformat()
 

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
-from cli_simulator import simulator
 
 from webmap import Bridge
 from webmap.cli.described import describe, overrules
@@ -24,6 +23,7 @@ from webmap.core.layer import Layer
 from webmap.discovery import discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
+from webmap_process import simulator
 
 COMMAND = [sys.executable, "-m", "webmap", "view"]
 READY = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"

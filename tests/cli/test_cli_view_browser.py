@@ -6,9 +6,10 @@ import sys
 
 import pytest
 from cli_shown import shown
-from cli_simulator import simulator
 from playwright.sync_api import expect
 from websockets.sync.client import connect
+
+from webmap_process import simulator
 
 pytestmark = pytest.mark.browser
 

@@ -1,14 +1,12 @@
 """The report of the readiness check, as an operator asks for it and reads it."""
 
 import re
-import signal
-import subprocess
-import sys
 
 import pytest
 from playwright.sync_api import expect
 
-from real_browser import Complaints
+from real_browser import watched_tab
+from webmap_process import webmap
 
 pytestmark = pytest.mark.browser
 
@@ -83,36 +81,16 @@ def test_where_the_page_may_not_copy_the_text_is_shown_and_chosen(open_console):
 
 def test_a_bridge_that_is_away_is_checked_too(chromium):
     robot = "Bob:/odom:/cmd_vel:"
-    command = [
-        sys.executable,
-        "-m",
-        "webmap",
-        "view",
-        "ws://127.0.0.1:1",
-        "--port",
-        "0",
-    ]
-    with subprocess.Popen(
-        [*command, "--robot", robot, "--no-browser"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    ) as process:
-        context, complaints = chromium.new_context(), Complaints()
-        try:
-            url = re.search(r"ready at (\S+)", process.stdout.readline())[1]
-            page = context.new_page()
-            complaints.listen(page)
-            page.goto(url)
-            report = open_report(page)
-            expect(report.locator(".status")).to_contain_text("1 wrong")
-            finding = report.locator('.finding[data-level="wrong"]')
-            expect(finding).to_contain_text("Wrong: The rosbridge cannot be reached")
-            expect(finding.locator(".advice")).to_contain_text("Start rosbridge_server")
-            report.get_by_role("button", name="Check again").click()
-            expect(report.locator(".status")).to_contain_text("1 wrong")
-        finally:
-            context.close()
-            process.send_signal(signal.SIGINT)
-            process.wait(15)
-    assert not complaints.unexpected, complaints.unexpected
+    view = ("view", "ws://127.0.0.1:1", "--robot", robot, "--port", "0")
+    with (
+        webmap(*view, "--no-browser") as url,
+        watched_tab(chromium, 1280, 720) as page,
+    ):
+        page.goto(url)
+        report = open_report(page)
+        expect(report.locator(".status")).to_contain_text("1 wrong")
+        finding = report.locator('.finding[data-level="wrong"]')
+        expect(finding).to_contain_text("Wrong: The rosbridge cannot be reached")
+        expect(finding.locator(".advice")).to_contain_text("Start rosbridge_server")
+        report.get_by_role("button", name="Check again").click()
+        expect(report.locator(".status")).to_contain_text("1 wrong")
