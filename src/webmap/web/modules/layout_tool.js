@@ -13,6 +13,9 @@ import { joinSaveMenu, offer } from "./save_menu.js";
 
 const FILE = "webmap-layout.json";
 
+/** @type {Place} */
+const ORIGIN = { x: 0, y: 0, pixels_per_metre: 1, turn_rad: 0 };
+
 /** Milliseconds after which a view that changed is kept, at the latest. */
 const KEEP_WITHIN = 500;
 
@@ -94,8 +97,13 @@ class LastView {
     this._map.setView(viewOf(place, this._map));
   }
 
-  /** Keep nothing until hands move the view again. */
+  /**
+   * Keep nothing until hands move the view again. The view is straight then, as a page
+   * begins with it; how large it is and where, the display says.
+   */
   forget() {
+    const seen = placeOf(this._map.view, this._map);
+    this._show({ ...(seen ?? ORIGIN), turn_rad: 0 });
     clearTimeout(this._timer);
     this._timer = undefined;
     this._map.byHand = false;
