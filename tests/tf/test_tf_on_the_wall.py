@@ -1,11 +1,7 @@
 """The dots of a scan stay on the wall while the robot turns, as a page shows it."""
 
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +13,7 @@ from websockets.sync.client import connect
 
 from real_browser import watched_tab
 from webmap.sim.maps import FLOOR, OCCUPIED, load_map
+from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
@@ -46,23 +43,6 @@ SAMPLE = """async (seconds) => {
 
 
 PAGE = Path(__file__).with_name("page_of_turning.py")
-
-
-@contextmanager
-def started(*arguments: str, ready: str, **environment: str) -> Iterator[str]:
-    command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        env={**os.environ, **environment},
-    ) as process:
-        try:
-            yield re.search(ready, process.stdout.readline())[1]
-        finally:
-            process.send_signal(signal.SIGTERM)
-            process.wait(15)
 
 
 @contextmanager
@@ -127,10 +107,8 @@ def to_wall(points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_dots_stay_on_the_wall_while_the_robot_turns(chromium, dialect):
     with (
-        started("sim", "-n", "1", "--dialect", dialect, ready=r"at (ws://\S+)") as sim,
-        started(
-            *("run", str(PAGE), "--no-browser"), ready=r"(http\S+)", TURNING_URL=sim
-        ) as url,
+        simulator("-n", "1", "--dialect", dialect) as sim,
+        page_of(PAGE, TURNING_URL=sim) as url,
         watched_tab(chromium, 800, 600) as page,
     ):
         page.goto(url)
