@@ -32,7 +32,8 @@ def expect_view(page: Page, view: list[float]) -> None:
     page.wait_for_function(
         """(view) => {
           const now = document.querySelector("g.world")?.getCTM();
-          return now && [..."abcdef"].every((key, i) => Math.abs(now[key] - view[i]) < 0.01);
+          const near = (key, i) => Math.abs(now[key] - view[i]) < 0.01;
+          return now && [..."abcdef"].every(near);
         }""",
         arg=view,
     )
@@ -131,6 +132,7 @@ def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(
     again.goto(url)
     expect_view(again, left)
     expect(again.locator(".robot.selected")).to_have_count(0)
-    again.goto(f"{url}?layout=found")
-    again.wait_for_selector(".webmap-layout-save", state="attached")
-    expect_view(again, found)
+    other = context.new_page()
+    other.goto(f"{url}?layout=found")
+    other.wait_for_selector(".webmap-layout-save", state="attached")
+    expect_view(other, found)
