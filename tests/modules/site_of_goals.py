@@ -47,4 +47,5 @@ def page(page):
         map.add_module(module)
     map.add_module("Teleop", 1.0, 1.5)
     map.add_module("StopButton")
-    map.fit(-16, -10, 32, 20)
+    # The hall of the test lies to the right of the tools, which unfold over the map.
+    map.fit(-20, -10, 32, 20)
