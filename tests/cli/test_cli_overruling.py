@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -45,6 +46,7 @@ def found():
         ("robot_1.scan=/a b", "'/a b' is no name of a topic"),
         ("robot_1.scan=/a,/b", "one topic of that role, got 2"),
         ("robot_1.name= ", "at least one character"),
+        ("robot_1.name=a\tb", "a name is one line of 100 characters at the most"),
     ],
 )
 def test_a_setting_that_makes_no_sense_says_what_was_expected(text, words):
@@ -102,6 +104,8 @@ def test_a_robot_that_was_told_gets_what_its_form_has_no_place_for():
     assert (told.battery, told.odometry) == ("/battery", "/odom2")
     with pytest.raises(ConfigError, match="write a fleet file"):
         overruling("Bob.plan=/plan").tell([bob])
+    with pytest.raises(ConfigError, match="two robots would be called 'BOB'"):
+        overruling("Al.name=BOB").tell([bob, replace(bob, name="Al")])
 
 
 def test_a_robot_that_is_not_there_is_refused_unless_it_may_still_come():
@@ -133,6 +137,9 @@ def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
     assert "/robot_1/points" in drawn
     assert "/robot_1/base_scan" not in drawn, "another one was said"
     assert "--set ROBOT.ROLE=TOPIC" in shown.stdout
+    refused = view(ros1, "--show", "--set", "robot_0.name=Robot_1")
+    assert refused.returncode == 2
+    assert "two robots would be called 'robot_1'" in refused.stderr
     refused = view(ros1, "--show", "--set", "robot_9.scan=/scan")
     assert refused.returncode == 2
     assert "there is no robot 'robot_9'" in refused.stderr

@@ -11,11 +11,12 @@ from webmap import Bridge
 from webmap.cli import found_layers
 from webmap.cli.found_layers import DrawnLayers
 from webmap.cli.overruling import Overruling
-from webmap.cli.told import namespace_of, offer, same_robot
+from webmap.cli.told import namespace_of, offer, same_robot, told_robots
 from webmap.cli.view import view
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
 from webmap.discovery import discover
+from webmap.errors import ConfigError
 from webmap.modules.robot.on_maps import OnMaps
 
 URL = "ws://bob:9090"
@@ -169,3 +170,34 @@ def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
     bridge, told, namespace
 ):
     assert namespace_of(described(bridge, **told)) == namespace
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (["Bob:/odom", "bob:/odom2"], "robot 'bob:/odom2': there is a robot 'Bob' alr"),
+        (["Bob:/a b"], "robot 'Bob:/a b': '/a b' is not the name of a topic: expected"),
+        (["B\nob:/a"], "a name is one line of 100 characters at the most"),
+        (["b" * 101 + ":/a"], "a name is one line of 100 characters at the most"),
+        (["Bob:/a:/c", "Al:/b:c/"], "c/ drives 'Bob' already; each robot has its own"),
+    ],
+)
+def test_robots_that_are_told_amiss_are_refused_with_what_was_said(bridge, texts, said):
+    with pytest.raises(ConfigError) as refused:
+        told_robots(texts, [bridge], None)
+    assert said in str(refused.value)
+
+
+def test_robots_of_one_topic_behind_two_bridges_are_two(bridge):
+    bridges = [bridge, Bridge("ws://al:9090")]
+    told = told_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges, 0.2)
+    assert [robot.name for robot in told] == ["Bob", "Al"]
+    assert told_robots(["Bob:/a", "Al:/b"], [bridge], None)[1].twist == ""
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-1", "x"])
+@pytest.mark.parametrize("option", ["--wait", "--stops-within"])
+def test_seconds_are_a_finite_number(option, number):
+    done = CliRunner().invoke(view, [URL, option, number])
+    assert done.exit_code == 2
+    assert f"Invalid value for '{option}'" in done.output

@@ -5,7 +5,7 @@ import sys
 
 import click
 
-from webmap.cli.options import verbose_option
+from webmap.cli.options import Finite, verbose_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
@@ -14,7 +14,7 @@ from webmap.cli.topic_list import one_bridge, topics_option
 @click.option("--toml", is_flag=True, help="Print a fleet file, to be kept.")
 @click.option(
     "--wait",
-    type=click.FloatRange(0.0),
+    type=Finite(0.0),
     default=5.0,
     show_default=True,
     help="Seconds to wait for a rosbridge that cannot be reached.",

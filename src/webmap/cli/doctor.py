@@ -5,7 +5,7 @@ import sys
 
 import click
 
-from webmap.cli.options import verbose_option
+from webmap.cli.options import Finite, verbose_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
@@ -13,14 +13,14 @@ from webmap.cli.topic_list import one_bridge, topics_option
 @click.argument("url", nargs=-1, required=True)
 @click.option(
     "--seconds",
-    type=click.FloatRange(0.5, 60.0),
+    type=Finite(0.5, 60.0),
     default=3.0,
     show_default=True,
     help="How long to listen to odometry and scans.",
 )
 @click.option(
     "--wait",
-    type=click.FloatRange(0.0),
+    type=Finite(0.0),
     default=5.0,
     show_default=True,
     help="Seconds to wait for a rosbridge that cannot be reached.",

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import click
@@ -15,8 +15,9 @@ from webmap.cli.told import offer
 from webmap.console import RobotDescription
 from webmap.discovery import FoundRobot
 from webmap.discovery.layers import FoundLayer
+from webmap.discovery.naming import same_name
 from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
-from webmap.errors import BridgeClosed
+from webmap.errors import BridgeClosed, ConfigError
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -130,6 +131,7 @@ def find_fleet(
     for sentence in overruling.check(names, all_known=not missing):
         click.echo(sentence, err=True)
     fleet = FoundFleet([*overruling.tell(told)], stops_within, overruling=overruling)
+    taken = {same_name(other.name): other.name for other in fleet.told}
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             click.echo(one.why, err=True)
@@ -137,10 +139,35 @@ def find_fleet(
             about = describe(robot, bridge, stops_within=stops_within)
             if any(overrules(other, about) for other in fleet.told):
                 continue
+            robot = _called_alone(robot, taken, overruling)
+            about = replace(about, name=robot.name)
             click.echo(f"Found {in_one_line(robot)}", err=True)
             fleet.robots.append((robot, about))
         fleet.behind[bridge] = one
     return fleet
+
+
+def _called_alone(
+    robot: FoundRobot, taken: dict[str, str], overruling: Overruling
+) -> FoundRobot:
+    """Return a robot with a name that nobody has, which is taken then.
+
+    Raises:
+        ConfigError: If a person gave it the name of another.
+
+    """
+    other = taken.get(same_name(robot.name))
+    if other is not None and overruling.names(robot.name):
+        raise ConfigError(
+            f"--set: two robots would be called {robot.name!r}; names differ by more "
+            "than case and Unicode form"
+        )
+    name, number = robot.name, 1
+    while same_name(name) in taken:
+        number += 1
+        name = f"{robot.name} {number}"
+    taken[same_name(name)] = name
+    return replace(robot, name=name)
 
 
 def told_fleet(

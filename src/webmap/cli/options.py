@@ -1,6 +1,7 @@
 """Options that several commands have."""
 
 import logging
+import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -9,6 +10,19 @@ import click
 F = TypeVar("F", bound=Callable[..., Any])
 
 PORT = click.IntRange(0, 65535)
+
+
+class Finite(click.FloatRange):
+    """Numbers of a range, and neither infinity nor what is no number."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        """Return the number that a text says."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
 
 
 def web_options(command: F) -> F:

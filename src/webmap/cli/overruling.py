@@ -5,8 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from webmap.cli.told import check_name
 from webmap.console import RobotDescription
 from webmap.discovery.found import ACTIONS, ROLES, Findings, FoundRobot, Guess, Role
+from webmap.discovery.naming import same_name
 from webmap.errors import ConfigError
 from webmap.ros.names import is_topic
 
@@ -75,6 +77,7 @@ def parse_setting(text: str) -> Setting:
     if key in WORDS:
         if not value.strip():
             raise ConfigError(f"--set {text!r}: a {key} has at least one character")
+        check_name(value.strip(), f"--set {text!r}")
         return Setting(text, robot, key, (value.strip(),))
     topics = tuple(part.strip() for part in value.split(",") if part.strip())
     if len(topics) > 1 and key != "camera":
@@ -109,12 +112,19 @@ class Overruling:
             ConfigError: If such a robot cannot have what was said.
 
         """
-        told = []
+        told: list[RobotDescription] = []
         for robot in robots:
             changes: dict[str, Any] = {}
             for setting in self._of(robot.name):
                 changes.update(_described(setting))
             told.append(replace(robot, **changes))
+            if any(
+                same_name(told[-1].name) == same_name(one.name) for one in told[:-1]
+            ):
+                raise ConfigError(
+                    f"--set: two robots would be called {told[-1].name!r}; names "
+                    "differ by more than case and Unicode form"
+                )
         return told
 
     def apply(
@@ -158,6 +168,13 @@ class Overruling:
         """Return the roles of a robot that no topic that comes later may have."""
         known = self._robots.get((url, robot.namespace), robot.name)
         return frozenset(setting.key for setting in self._of(known))
+
+    def names(self, name: str) -> bool:
+        """Tell whether a person said that a robot is called so."""
+        return any(
+            setting.key == "name" and same_name(setting.values[0]) == same_name(name)
+            for setting in self._settings
+        )
 
     def findings(self, url: str, findings: Findings) -> Findings:
         """Return what is behind a bridge with what was said of it."""

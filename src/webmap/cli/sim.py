@@ -8,7 +8,7 @@ from typing import Literal
 
 import click
 
-from webmap.cli.options import PORT, verbose_option
+from webmap.cli.options import PORT, Finite, verbose_option
 from webmap.cli.sim_options import simulator_options
 
 
@@ -40,14 +40,14 @@ from webmap.cli.sim_options import simulator_options
 )
 @click.option(
     "--robot-timeout",
-    type=click.FloatRange(0.0),
+    type=Finite(0.0),
     default=0.25,
     show_default=True,
     help="Seconds without cmd_vel after which a base stops by itself; 0: never.",
 )
 @click.option(
     "--drift",
-    type=click.FloatRange(0.0),
+    type=Finite(0.0),
     default=0.0,
     show_default=True,
     help="How much odometry drifts, as a share of the way.",

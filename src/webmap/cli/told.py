@@ -1,20 +1,82 @@
 """What else a robot that was told by hand has, by the topics behind its bridge."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from webmap.console import RobotDescription
+from webmap.console import RobotDescription, parse_robot
 from webmap.discovery import Findings, FoundRobot
 from webmap.discovery.found import Role
 from webmap.discovery.layers import FoundLayer, find_layers, left_out
+from webmap.discovery.naming import LONGEST, is_name, same_name
 from webmap.discovery.rules import PARTS
 from webmap.errors import ConfigError
 from webmap.ros.names import normalise_topic
 
+if TYPE_CHECKING:
+    from webmap import Bridge
+
 WHERE: tuple[Role, ...] = ("odometry", "pose")
 
 _PART = re.compile(PARTS)
+
+
+def told_robots(
+    texts: Iterable[str], bridges: Sequence["Bridge"], stops_within: float | None
+) -> list[RobotDescription]:
+    """Return the robots of ``--robot``.
+
+    Args:
+        texts: As they were written.
+        bridges: The bridges there are.
+        stops_within: Seconds within which every base stops by itself, if known.
+
+    Raises:
+        ConfigError: If one is not of the right form, or two are taken for one: by
+            their names, or by what they are driven with.
+
+    """
+    told: list[RobotDescription] = []
+    for text in texts:
+        robot = parse_robot(text, bridges, stops_within=stops_within)
+        check_name(robot.name, f"robot {text!r}")
+        for topic in filter(None, (robot.odometry, robot.twist, robot.scan)):
+            try:
+                normalise_topic(topic)
+            except ConfigError as error:
+                raise ConfigError(f"robot {text!r}: {error}") from None
+        for other in told:
+            _differ(robot, other, text)
+        told.append(robot)
+    return told
+
+
+def check_name(name: str, where: str) -> None:
+    """Refuse a name that cannot stand in a list.
+
+    Raises:
+        ConfigError: If it has more than a line, or is very long.
+
+    """
+    if not is_name(name):
+        raise ConfigError(
+            f"{where}: a name is one line of {LONGEST} characters at the most"
+        )
+
+
+def _differ(robot: RobotDescription, other: RobotDescription, text: str) -> None:
+    if same_name(robot.name) == same_name(other.name):
+        raise ConfigError(
+            f"robot {text!r}: there is a robot {other.name!r} already; names differ by "
+            "more than case and Unicode form"
+        )
+    same = robot.twist and _plain(robot.twist) == _plain(other.twist or "-")
+    if same and robot.bridge.url == other.bridge.url:
+        raise ConfigError(
+            f"robot {text!r}: {robot.twist} drives {other.name!r} already; each robot "
+            "has its own"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import click
 
-from webmap.cli.options import web_options
+from webmap.cli.options import Finite, web_options
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
@@ -41,7 +41,7 @@ from webmap.cli.topic_list import one_bridge, topics_option
 )
 @click.option(
     "--stops-within",
-    type=click.FloatRange(0.0, min_open=True),
+    type=Finite(0.0, min_open=True),
     help="Seconds within which every base stops by itself when cmd_vel ceases. "
     "Without it robots are driven at 0.3 m/s and 0.6 rad/s at the most.",
 )
@@ -58,7 +58,7 @@ from webmap.cli.topic_list import one_bridge, topics_option
 )
 @click.option(
     "--wait",
-    type=click.FloatRange(0.0),
+    type=Finite(0.0),
     default=10.0,
     show_default=True,
     help="Seconds to wait for a rosbridge that cannot be reached, before the page "
@@ -100,13 +100,12 @@ def view(
     from webmap.cli.found_fleet import FoundFleet, find_fleet, told_fleet
     from webmap.cli.found_layers import draw_layers
     from webmap.cli.overruling import Overruling, parse_setting
+    from webmap.cli.told import told_robots
 
     one_bridge(url, topics)
     overruling = Overruling([parse_setting(text) for text in settings])
     bridges = [webmap.Bridge(text) for text in url]
-    told = [
-        console.parse_robot(text, bridges, stops_within=stops_within) for text in robots
-    ]
+    told = told_robots(robots, bridges, stops_within)
     plan = Path(floor) if floor else None
     fleet = None
     if discover or topics is not None or not told:

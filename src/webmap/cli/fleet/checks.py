@@ -8,6 +8,7 @@ from datetime import date
 from typing import Any, TypeAlias
 
 from webmap.cli.fleet.lines import Path
+from webmap.discovery.naming import LONGEST, is_name
 from webmap.errors import ConfigError
 from webmap.ros.names import normalise_topic, split_type
 
@@ -26,8 +27,6 @@ _LONGEST = 60
 
 HEAD = ("title", "floor")
 """Keys that are texts, of the file itself and of no table in it."""
-
-LONGEST_NAME = 100
 
 LARGEST = 1e6
 """No speed, time or length in a file is larger."""
@@ -68,10 +67,8 @@ def text(value: Any) -> str:
 def name(value: Any) -> str:
     """Take what people call something: a text of one line that is not too long."""
     plain = text(value)
-    if not plain.isprintable() or len(plain) > LONGEST_NAME:
-        raise ConfigError(
-            f"a text of one line with {LONGEST_NAME} characters at the most"
-        )
+    if not is_name(plain):
+        raise ConfigError(f"a text of one line with {LONGEST} characters at the most")
     return plain
 
 
