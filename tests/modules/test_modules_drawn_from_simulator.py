@@ -6,10 +6,7 @@ the road of a real robot, and the page is asked where everything is on the map.
 
 import io
 import math
-import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +21,7 @@ from running_simulators import Running, simulators
 from real_browser import watched_tab
 from webmap.geometry import Pose
 from webmap.sim.navigator import Goal
+from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
@@ -101,23 +99,9 @@ def worlds() -> Iterator[dict[str, Running]]:
 
 @pytest.fixture(scope="module")
 def url(worlds) -> Iterator[str]:
-    command = [sys.executable, "-m", "webmap", "run", str(HERE / "page_of_layers.py")]
     where = {f"LAYERS_{name.upper()}": each.url for name, each in worlds.items()}
-    process = subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, **where},
-    )
-    try:
-        line = process.stdout.readline()
-        found = re.search(r"http\S+", line)
-        assert found, line
-        yield found.group(0)
-    finally:
-        process.terminate()
-        process.wait(10)
-        process.stdout.close()
+    with page_of(HERE / "page_of_layers.py", **where) as found:
+        yield found
 
 
 @pytest.fixture(scope="module", params=["ros1", "ros2"])

@@ -1,9 +1,6 @@
 """``webmap view`` draws all that simulated robots say, and nobody told it anything."""
 
 import math
-import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -13,10 +10,9 @@ from test_modules_drawn_from_simulator import HELPERS, until
 
 from real_browser import watched_tab
 from webmap.geometry import Pose
+from webmap_process import webmap
 
 pytestmark = pytest.mark.browser
-
-VIEW = [sys.executable, "-m", "webmap", "view"]
 
 # What each robot has; costmaps and markers are on the map.
 OF_A_ROBOT = (
@@ -59,41 +55,29 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
         world = found[dialect].world
         found[dialect].do(lambda: face_a_wall(world, 1))
         found[dialect].do(lambda: say_more(found[dialect].node))
-        process = subprocess.Popen(
-            [*VIEW, found[dialect].url, "--port", "0", "--no-browser"],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        try:
-            url = re.search(r"http\S+", process.stdout.readline())
-            with watched_tab(chromium, 1000, 700) as tab:
-                tab.set_default_timeout(20_000)
-                tab.add_init_script(HELPERS)
-                tab.goto(url.group(0))
-                for selector in OF_A_ROBOT:
-                    for name in ("robot_0", "robot_1"):
-                        inside = f'.robot[data-name="{name}"] {selector}'
-                        tab.wait_for_selector(inside, state="attached")
-                for selector in ODD:
-                    inside = f'.robot[data-name="robot_0"] {selector}'
+        view = webmap("view", found[dialect].url, "--port", "0", "--no-browser")
+        with view as url, watched_tab(chromium, 1000, 700) as tab:
+            tab.set_default_timeout(20_000)
+            tab.add_init_script(HELPERS)
+            tab.goto(url)
+            for selector in OF_A_ROBOT:
+                for name in ("robot_0", "robot_1"):
+                    inside = f'.robot[data-name="{name}"] {selector}'
                     tab.wait_for_selector(inside, state="attached")
-                for selector, count in ON_THE_MAP.items():
-                    tab.locator(selector).nth(count - 1).wait_for(state="attached")
-                    assert tab.locator(selector).count() == count
-                x, y = tab.evaluate(
-                    PLACE, '[data-name="robot_1"] .covariance > .ellipse'
-                )
-                pose = world.robots[1].pose
-                assert math.dist((x, y), (pose.x, pose.y)) < 0.05
-                dots_are_where_walls_are(tab, world, clouds=2 if tilted else 1)
-                x, y = tab.evaluate(PLACE, '[data-layer="dock"] > .arrow')
-                assert math.dist((x, y), (DOCK.x, DOCK.y)) < 0.05
-                switch_one_map(tab)
-                assert tab.locator(".webmap-notice").count() == 0
-        finally:
-            process.terminate()
-            process.wait(10)
-            process.stdout.close()
+            for selector in ODD:
+                inside = f'.robot[data-name="robot_0"] {selector}'
+                tab.wait_for_selector(inside, state="attached")
+            for selector, count in ON_THE_MAP.items():
+                tab.locator(selector).nth(count - 1).wait_for(state="attached")
+                assert tab.locator(selector).count() == count
+            x, y = tab.evaluate(PLACE, '[data-name="robot_1"] .covariance > .ellipse')
+            pose = world.robots[1].pose
+            assert math.dist((x, y), (pose.x, pose.y)) < 0.05
+            dots_are_where_walls_are(tab, world, clouds=2 if tilted else 1)
+            x, y = tab.evaluate(PLACE, '[data-layer="dock"] > .arrow')
+            assert math.dist((x, y), (DOCK.x, DOCK.y)) < 0.05
+            switch_one_map(tab)
+            assert tab.locator(".webmap-notice").count() == 0
 
 
 def face_a_wall(world, index: int) -> None:
