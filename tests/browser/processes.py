@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,15 +26,16 @@ class Process:
     def __init__(
         self, *command: object, cwd: Path | None = None, module: str = "webmap"
     ) -> None:
+        # No pipe: one that nobody reads for long fills up, and then nothing writes.
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed at its end
         self.popen = subprocess.Popen(
             [sys.executable, "-m", module, *map(str, command)],
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self._stderr,
             cwd=cwd,
             start_new_session=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
-        os.set_blocking(self.popen.stderr.fileno(), False)
         self._log = b""
 
     def ready(self, pattern: str, within: float = 30.0) -> str:
@@ -56,8 +58,10 @@ class Process:
     @property
     def log(self) -> str:
         """What it wrote to standard error so far."""
-        while not self.popen.stderr.closed and (chunk := self.popen.stderr.read()):
-            self._log += chunk
+        if not self._stderr.closed:
+            # Not by seeking: the process writes where this file stands.
+            size = os.fstat(self._stderr.fileno()).st_size
+            self._log = os.pread(self._stderr.fileno(), size, 0)
         return self._log.decode(errors="replace")
 
     def end(self, sig: int = signal.SIGINT) -> int:
@@ -73,7 +77,7 @@ class Process:
         finally:
             self.log  # noqa: B018 - what was left in the pipe
             self.popen.stdout.close()
-            self.popen.stderr.close()
+            self._stderr.close()
         return code
 
 
