@@ -125,6 +125,8 @@ def take_layers(browser: Browser, picture: Picture, url: str) -> None:
         )
     page.locator(".webmap-layers > summary").dispatch_event("click")
     page.get_by_label("Costmaps").dispatch_event("click")
+    # The one of the whole map would lie over everything.
+    page.get_by_label("global_costmap/costmap").dispatch_event("click")
     page.locator(".occupancy-grid.costmap > image[href]").nth(1).wait_for(
         state="attached"
     )
