@@ -45,6 +45,7 @@ def url(tiles: Path) -> Iterator[str]:
 def tab(chromium: Browser, url: str) -> Iterator[Page]:
     with watched_tab(chromium, 900, 700) as page:
         page.goto(url)
+        page.locator("svg.webmap-view-control").wait_for()  # hands move it from now on
         settled(page, 17)
         yield page
 
