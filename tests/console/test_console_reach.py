@@ -76,10 +76,14 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
 
 
 def reset(page: Page) -> None:
-    """End every STOP."""
-    page.evaluate("document.querySelector('.webmap-stop-list .webmap-reset').click()")
+    """End every STOP, wherever on the page the button lies."""
+    button = page.locator(".webmap-stop-list .webmap-reset")
+    # There is none to press before the gate has said that it stopped a robot.
+    expect(button).not_to_have_attribute("hidden", re.compile(""))
+    button.dispatch_event("click")
+    expect(button).to_have_class(re.compile("asking"))
     page.wait_for_timeout(450)
-    page.evaluate("document.querySelector('.webmap-stop-list .webmap-reset').click()")
+    button.dispatch_event("click")
     expect(page.locator("#card .state .holder")).to_have_text("Free")
 
 
