@@ -41,6 +41,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.serial  # beside others the simulator's clock lags, and so its timeout
 def test_a_base_with_a_timeout_of_its_own_stops_by_itself_and_that_is_kept(folder):
     with simulator("--port", "0", "--robot-timeout", "0.25") as url:
         said = run(url, "robot_1", "--yes")

@@ -331,6 +331,8 @@ def test_the_log_unfolds_into_what_robots_say_and_shows_the_level_that_is_chosen
     expect(log.locator(".webmap-rosout-count")).to_have_text("Nothing was said yet.")
     page.locator("#robots .row").first.click()
     page.get_by_role("button", name="Send to").click()
+    aiming = page.locator(".webmap-goal-go")
+    expect(aiming).to_have_attribute("aria-pressed", "true")
     robot = page.locator(".robot.selected .body").bounding_box()
     page.mouse.click(robot["x"] + 12, robot["y"] + 40)
     line = log.locator(".webmap-rosout-line").last
