@@ -10,6 +10,7 @@ import click
 from webmap.cli.described import describe, overrules
 from webmap.cli.draw_layer import meant, shared_map
 from webmap.cli.finding import Found, find
+from webmap.cli.names import free_name, set_twice
 from webmap.cli.overruling import TOLD, Overruling
 from webmap.cli.told import offer
 from webmap.console import RobotDescription
@@ -17,7 +18,7 @@ from webmap.discovery import FoundRobot
 from webmap.discovery.layers import FoundLayer
 from webmap.discovery.naming import same_name
 from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
-from webmap.errors import BridgeClosed, ConfigError
+from webmap.errors import BridgeClosed
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -118,7 +119,8 @@ def find_fleet(
         overruling: What was said of robots better than it is guessed.
 
     Raises:
-        ConfigError: If something was said of a robot that there is not.
+        ConfigError: If something was said of a robot that there is not, or a person
+            gave it the name of another.
 
     """
     overruling = overruling or Overruling()
@@ -131,7 +133,7 @@ def find_fleet(
     for sentence in overruling.check(names, all_known=not missing):
         click.echo(sentence, err=True)
     fleet = FoundFleet([*overruling.tell(told)], stops_within, overruling=overruling)
-    taken = {same_name(other.name): other.name for other in fleet.told}
+    taken = {same_name(other.name) for other in fleet.told}
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             click.echo(one.why, err=True)
@@ -139,35 +141,14 @@ def find_fleet(
             about = describe(robot, bridge, stops_within=stops_within)
             if any(overrules(other, about) for other in fleet.told):
                 continue
-            robot = _called_alone(robot, taken, overruling)
+            if same_name(robot.name) in taken and overruling.names(robot.name):
+                raise set_twice(robot.name)
+            robot = replace(robot, name=free_name(robot.name, taken))
             about = replace(about, name=robot.name)
             click.echo(f"Found {in_one_line(robot)}", err=True)
             fleet.robots.append((robot, about))
         fleet.behind[bridge] = one
     return fleet
-
-
-def _called_alone(
-    robot: FoundRobot, taken: dict[str, str], overruling: Overruling
-) -> FoundRobot:
-    """Return a robot with a name that nobody has, which is taken then.
-
-    Raises:
-        ConfigError: If a person gave it the name of another.
-
-    """
-    other = taken.get(same_name(robot.name))
-    if other is not None and overruling.names(robot.name):
-        raise ConfigError(
-            f"--set: two robots would be called {robot.name!r}; names differ by more "
-            "than case and Unicode form"
-        )
-    name, number = robot.name, 1
-    while same_name(name) in taken:
-        number += 1
-        name = f"{robot.name} {number}"
-    taken[same_name(name)] = name
-    return replace(robot, name=name)
 
 
 def told_fleet(

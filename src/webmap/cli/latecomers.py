@@ -8,6 +8,7 @@ import click
 
 from webmap.cli.draw_layer import shared_map
 from webmap.cli.looking import Looking
+from webmap.cli.names import free_name
 from webmap.cli.overruling import Overruling
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
@@ -144,19 +145,9 @@ def greet(
             if used:
                 click.echo(f"{shown.name} has more now: {', '.join(used)}", err=True)
             return
-        robot = replace(robot, name=_free(robot.name, names))
+        robot = replace(robot, name=free_name(robot.name, names))
         said = in_one_line(robot)
         click.echo(f"A robot appeared behind {bridge.url}: {said}", err=True)
         late.add(robot, describe(robot, bridge, stops_within=stops_within))
 
     return came
-
-
-def _free(wanted: str, names: set[str]) -> str:
-    """Return a name that nobody has, and take it."""
-    name, number = wanted, 1
-    while same_name(name) in names:
-        number += 1
-        name = f"{wanted} {number}"
-    names.add(same_name(name))
-    return name

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from webmap.cli.told import check_name
+from webmap.cli.names import check_name, set_twice
 from webmap.console import RobotDescription
 from webmap.discovery.found import ACTIONS, ROLES, Findings, FoundRobot, Guess, Role
 from webmap.discovery.naming import same_name
@@ -117,14 +117,10 @@ class Overruling:
             changes: dict[str, Any] = {}
             for setting in self._of(robot.name):
                 changes.update(_described(setting))
-            told.append(replace(robot, **changes))
-            if any(
-                same_name(told[-1].name) == same_name(one.name) for one in told[:-1]
-            ):
-                raise ConfigError(
-                    f"--set: two robots would be called {told[-1].name!r}; names "
-                    "differ by more than case and Unicode form"
-                )
+            named = replace(robot, **changes)
+            if any(same_name(named.name) == same_name(one.name) for one in told):
+                raise set_twice(named.name)
+            told.append(named)
         return told
 
     def apply(

@@ -5,11 +5,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from webmap.cli.names import APART, check_name
 from webmap.console import RobotDescription, parse_robot
 from webmap.discovery import Findings, FoundRobot
 from webmap.discovery.found import Role
 from webmap.discovery.layers import FoundLayer, find_layers, left_out
-from webmap.discovery.naming import LONGEST, is_name, same_name
+from webmap.discovery.naming import same_name
 from webmap.discovery.rules import PARTS
 from webmap.errors import ConfigError
 from webmap.ros.names import normalise_topic
@@ -52,24 +53,10 @@ def told_robots(
     return told
 
 
-def check_name(name: str, where: str) -> None:
-    """Refuse a name that cannot stand in a list.
-
-    Raises:
-        ConfigError: If it has more than a line, or is very long.
-
-    """
-    if not is_name(name):
-        raise ConfigError(
-            f"{where}: a name is one line of {LONGEST} characters at the most"
-        )
-
-
 def _differ(robot: RobotDescription, other: RobotDescription, text: str) -> None:
     if same_name(robot.name) == same_name(other.name):
         raise ConfigError(
-            f"robot {text!r}: there is a robot {other.name!r} already; names differ by "
-            "more than case and Unicode form"
+            f"robot {text!r}: there is a robot {other.name!r} already; {APART}"
         )
     same = robot.twist and _plain(robot.twist) == _plain(other.twist or "-")
     if same and robot.bridge.url == other.bridge.url:
