@@ -9,6 +9,8 @@ import webmap
 import webmap.console
 from webmap import Bridge
 from webmap.cli import found_layers
+from webmap.cli.finding import Found
+from webmap.cli.found_fleet import FoundFleet
 from webmap.cli.found_layers import DrawnLayers
 from webmap.cli.overruling import Overruling
 from webmap.cli.told import namespace_of, offer, same_robot, told_robots
@@ -126,6 +128,11 @@ def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge)
     second = described(bridge, name="Bo", odometry="/a/ekf/odometry/filtered")
     console = drawn(bridge, TOPICS, first, second)
     assert [len(what_of(robot)) for robot in console.told] == [4, 0]
+    made = [[type(module).__name__ for module in r.modules] for r in console.told]
+    assert [names.count("Trail") for names in made] == [1, 1], "each goes its own way"
+    behind = {bridge: Found(URL, "bob", discover(TOPICS), topics=TOPICS)}
+    fleet = FoundFleet([first, second], behind=behind)
+    assert fleet.table(grid=True, as_told=False).count("/a/points") == 1
     for robot in console.told:
         robot.destroy()
 

@@ -50,12 +50,16 @@ class FoundFleet:
             as_told: Whether of robots that were told no more is drawn than that.
 
         """
-        lines = []
+        lines: list[str] = []
+        taken: set[tuple[Bridge, str]] = set()
         for about in self.told:
             lines += ["", f"{about.name} (told with --robot)", *_told_table(about)]
             found = self.behind.get(about.bridge)
-            if found is not None and not as_told:
-                there = offer(about, found.topics, found.findings)
+            if found is None or as_told:
+                continue
+            there = offer(about, found.topics, found.findings)
+            if (about.bridge, there.namespace) not in taken:  # it is drawn once
+                taken.add((about.bridge, there.namespace))
                 layers = _on_page(there.layers, grid)
                 lines += drawn_table(there.namespace, layers, there.left_out)
         for robot, about in self.robots:

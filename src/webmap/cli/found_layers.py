@@ -117,6 +117,7 @@ class DrawnLayers(Looking):
         for about, robot in self._told:
             offered = offer(about, topics, behind)
             if offered.namespace in taken:  # what is in it is drawn once
+                self._draw(robot, (), offered.namespace)
                 continue
             taken.add(offered.namespace)
             self._place(about, robot, offered)
