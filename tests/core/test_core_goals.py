@@ -15,10 +15,10 @@ class Link:
 
     def __init__(self, url="ws://test:9090"):
         self.url = url
-        self.protected = set()
+        self.protected = {}
 
-    def protect(self, topic):
-        self.protected.add(topic)
+    def protect(self, topic, carries):
+        self.protected[topic] = carries
 
 
 def spec_of(set_up):
@@ -73,10 +73,10 @@ def test_what_the_gate_writes_is_protected_on_the_bridge():
     link = Link()
     spec_of(set_up)
     assert link.protected == {
-        "/goal",
-        "/move_base/goal",
-        "/move_base/cancel",
-        "/initialpose",
+        "/goal": "a goal",
+        "/move_base/goal": "a goal",
+        "/move_base/cancel": "the end of a goal",
+        "/initialpose": "an initial pose",
     }
 
 

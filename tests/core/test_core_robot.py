@@ -22,7 +22,7 @@ class Link:
     def __init__(self, **types: str) -> None:
         self.types = {f"/{topic}": type for topic, type in types.items()}
         self.subscribed: list[tuple] = []
-        self.protected: set[str] = set()
+        self.protected: dict[str, str] = {}
 
     def on_open(self, fn):
         with contextlib.suppress(RuntimeError):
@@ -37,8 +37,8 @@ class Link:
         self.subscribed.append(entry)
         return Removal(lambda: self.subscribed.remove(entry))
 
-    def protect(self, topic):
-        self.protected.add(topic)
+    def protect(self, topic, carries):
+        self.protected[topic] = carries
 
     def say(self, topic, message):
         for name, callback, _, _, decode in tuple(self.subscribed):
@@ -216,7 +216,7 @@ def test_velocity_and_goal_topics_are_protected_on_the_bridge():
         robot.set_move_topic(link, "/goal", cancel_topic="/cancel")
 
     asyncio.run(scenario())
-    assert link.protected == {"/cmd_vel", "/goal", "/cancel"}
+    assert set(link.protected) == {"/cmd_vel", "/goal", "/cancel"}
 
 
 def test_a_velocity_topic_of_another_type_is_refused():

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from webmap import Robot
+from webmap import Bridge, Robot
 from webmap.core.motion import MotionRoad
-from webmap.errors import ConfigError, MotionError
+from webmap.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
 from webmap.lifecycle import lifecycle
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
@@ -16,7 +16,7 @@ E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}
 class Link:
     url = "ws://robot:9090"
 
-    def protect(self, topic):
+    def protect(self, topic, carries):
         pass
 
 
@@ -64,6 +64,20 @@ def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
     robot.stop()
     robot.reset_stop()
     assert gate.asked == [("stop", robot.motion.id), ("reset", robot.motion.id)]
+
+
+def test_what_stop_says_is_the_gates_alone_to_write(robot):
+    bridge = Bridge("ws://robot:9090")
+    robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=[LOCK, E_STOP])
+    for said in (True, False):
+        with pytest.raises(MotionRefused) as refused:
+            bridge.publish("lock/", {"data": said}, "std_msgs/Bool")
+    assert str(refused.value) == (
+        "/lock carries what STOP says of a robot, which the gate alone writes: use "
+        "Robot.stop() and Robot.reset_stop()"
+    )
+    with pytest.raises(BridgeClosed):
+        bridge.publish("/lock/other", {"data": True}, "std_msgs/Bool")
 
 
 @pytest.mark.parametrize("ask", [Robot.stop, Robot.reset_stop])

@@ -164,7 +164,7 @@ def test_layers_let_a_robot_go_that_is_gone(map, link, bob):
 
 
 def test_the_gate_is_told_where_a_robots_own_map_lies(link, bob):
-    link.protect = lambda topic: None
+    link.protect = lambda topic, carries: None
     bob.set_move_topic(link, "/goal")
     assert bob.motion.spec().own_map == (0.0, 0.0, 0.0)
     bob.set_alignment(1.0, 2.0, 90.0)

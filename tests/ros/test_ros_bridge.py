@@ -436,6 +436,36 @@ def test_a_protected_topic_is_refused_and_taken_back():
     run(scenario)
 
 
+def test_a_topic_is_refused_with_what_it_carries_and_what_to_use_instead():
+    async def scenario():
+        async with bridged() as (_, bridge):
+            for topic, carries, instead in (
+                ("/goal", "a goal", r"Robot\.move\(\)"),
+                ("/lock", "what STOP says", r"Robot\.stop\(\) and Robot\.reset_stop"),
+            ):
+                bridge.protect(topic, carries)
+                with pytest.raises(MotionRefused, match=f"{carries}.*use {instead}"):
+                    bridge.publish(topic, {"data": False}, "std_msgs/Bool")
+            bridge.protect("/goal", "what STOP says")
+            with pytest.raises(MotionRefused, match="goals go through the gate"):
+                await bridge.call_service("/goal")
+            with pytest.raises(ServiceError, match="no such service"):
+                await bridge.call_service("/lock")
+
+    run(scenario)
+
+
+def test_a_topic_is_protected_on_every_bridge_of_the_address():
+    one, other = Bridge("ws://one.test:9"), Bridge("ws://ONE.test:9/")
+    elsewhere = Bridge("ws://other.test:9")
+    one.protect("/goal")
+    for bridge in (other, Bridge("ws://one.test:9")):
+        with pytest.raises(MotionRefused, match="/goal carries a goal"):
+            bridge.publish("/goal", {}, "geometry_msgs/PoseStamped")
+    with pytest.raises(BridgeClosed):
+        elsewhere.publish("/goal", {}, "geometry_msgs/PoseStamped")
+
+
 def test_publishing_while_closed_raises_and_nothing_is_sent_later(fast):
     async def scenario():
         async with bridged() as (server, bridge):

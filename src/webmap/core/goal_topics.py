@@ -47,8 +47,8 @@ class MoveTopic:
 
     def protect(self) -> None:
         """Have the bridge refuse to publish where the gate writes."""
-        for name in self.writes():
-            self.bridge.protect(name)
+        for name, carried in self.writes().items():
+            self.bridge.protect(name, carried)
 
     def spelled(self, name: str) -> str:
         """Return a type of ``geometry_msgs`` as the dialect of the action has it."""

@@ -17,6 +17,7 @@ from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import normalise_topic, same_type
+from webmap.ros.publications import STOP
 from webmap.scope import Removable
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class TwistTopic:
     def writes(self) -> dict[str, str]:
         """Return what the gate alone writes: topics, and what each carries."""
         hooks = [hook["topic"] for hook in self.stop_hooks if "topic" in hook]
-        said = {normalise_topic(topic): "what STOP says" for topic in hooks}
+        said = {normalise_topic(topic): STOP for topic in hooks}
         return {**said, normalise_topic(self.topic): "a velocity"}
 
 
@@ -100,7 +101,8 @@ class MotionRoad:
                 _check_twist_type(twist.topic, twist.type)
             hooks = checked_hooks(self._name, twist.stop_hooks, twist.topic)
             twist = replace(twist, stop_hooks=hooks)
-            twist.bridge.protect(twist.topic)
+            for topic, carried in twist.writes().items():
+                twist.bridge.protect(topic, carried)
         if self._opening is not None:
             self._opening.remove()
             self._opening = None
@@ -132,7 +134,8 @@ class MotionRoad:
         """
         if pose is not None:
             pose.fields(self._move)
-            pose.bridge.protect(pose.topic)
+            for topic, carried in pose.writes().items():
+                pose.bridge.protect(topic, carried)
         self._pose = pose
         self.declare()
 

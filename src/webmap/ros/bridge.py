@@ -22,7 +22,7 @@ from webmap.ros.link_trouble import LinkTrouble
 from webmap.ros.names import normalise_topic, normalise_url, split_type
 from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
-from webmap.ros.publications import Publications
+from webmap.ros.publications import Publications, written_behind
 from webmap.ros.renewal import Renewals
 from webmap.ros.subscriptions import Subscription, Topic, Wish, checked
 from webmap.scope import Removal
@@ -67,7 +67,7 @@ class Bridge:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._lane: Lane | None = None
         self._topics: dict[str, Topic] = {}
-        self._publications = Publications()
+        self._publications = Publications(written_behind(self.url))
         self._calls = Calls(self.url)
         self._graph = Graph(self.call_service)
         self._fan_out = FanOut()
@@ -203,12 +203,18 @@ class Bridge:
         for frame in self._publications.forget(topic):
             self._send(frame)
 
-    def protect(self, topic: str) -> None:
+    def protect(self, topic: str, carries: str = "a goal") -> None:
         """Refuse to publish on ``topic`` from now on: the gate writes it.
 
-        A topic that was declared as velocity, goal or cancel of a robot is one.
+        A topic that was declared as velocity, goal, cancel, initial pose or stop hook
+        of a robot is one. It holds for every bridge of this address.
+
+        Args:
+            topic: Name of the topic.
+            carries: What it carries, for whoever is refused.
+
         """
-        for frame in self._publications.protect(topic):
+        for frame in self._publications.protect(topic, carries):
             self._send(frame)
 
     async def call_service(

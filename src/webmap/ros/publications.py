@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
 
 from webmap.errors import BridgeError, MotionRefused
 from webmap.identifiers import generate_id
@@ -10,6 +11,30 @@ from webmap.ros.names import is_type, normalise_topic, same_type, split_type
 
 _VELOCITY = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 _GOALS = "/_action/send_goal"
+
+STOP = "what STOP says"
+"""What a topic carries that is a robot's stop hook."""
+
+INSTEAD = {
+    "a velocity": "Robot.twist()",
+    "a goal": "Robot.move()",
+    "the end of a goal": "Robot.cancel()",
+    "an initial pose": "Robot.locate()",
+    STOP: "Robot.stop() and Robot.reset_stop()",
+}
+"""Where that is said, by what a topic carries."""
+
+
+class Written(dict[str, str]):
+    """What the gate alone writes behind one address: what each topic carries."""
+
+
+_written: WeakValueDictionary[str, Written] = WeakValueDictionary()
+
+
+def written_behind(url: str) -> Written:
+    """Return what the gate writes behind an address; the same for all its bridges."""
+    return _written.setdefault(url, Written())
 
 
 class _Advertised(NamedTuple):
@@ -20,17 +45,29 @@ class _Advertised(NamedTuple):
 class Publications:
     """The topics that one link has advertised; decisions and frames, no I/O.
 
-    Velocity, goals and cancel are refused: they are written by the gate alone.
+    Velocity, goals, cancel and what STOP says are refused: they are written by the
+    gate alone.
+
+    Args:
+        protected: What is refused from the beginning, and is added to.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(self, protected: Written) -> None:
         self._advertised: dict[str, _Advertised] = {}
-        self._protected: set[str] = set()
+        self._protected = protected
 
-    def protect(self, topic: str) -> list[bytes]:
-        """Refuse ``topic`` from now on; return what to send if it was advertised."""
+    def protect(self, topic: str, carries: str = "a goal") -> list[bytes]:
+        """Refuse ``topic`` from now on; return what to send if it was advertised.
+
+        Args:
+            topic: Its name.
+            carries: What it carries, in the words of :data:`INSTEAD`.
+
+        """
         name = normalise_topic(topic)
-        self._protected.add(name)
+        if self._protected.get(name, STOP) == STOP:  # a goal stays one
+            self._protected[name] = carries
         return self.forget(name)
 
     def frames(
@@ -91,14 +128,18 @@ class Publications:
 
         """
         name = normalise_topic(service)
-        if name.endswith(_GOALS) or name in self._protected:
+        # A topic that is a stop hook may well have a service of its name beside it.
+        moves = self._protected.get(name, STOP) != STOP
+        if name.endswith(_GOALS) or moves:
             raise MotionRefused(f"{name}: goals go through the gate: use Robot.move()")
 
     def _refuse_motion(self, name: str, *types: str | None) -> None:
-        if name in self._protected:
+        carried = self._protected.get(name)
+        if carried is not None:
+            instead = INSTEAD.get(carried, "Robot.twist() or Robot.move()")
             raise MotionRefused(
-                f"{name} moves a robot: use Robot.twist() or Robot.move(), "
-                f"which go through the gate"
+                f"{name} carries {carried} of a robot, which the gate alone writes: "
+                f"use {instead}"
             )
         for type in types:
             if type is not None and is_type(type, *_VELOCITY):
