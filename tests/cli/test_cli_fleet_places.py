@@ -73,6 +73,10 @@ def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
             "fleet.toml:4: labels[0].y: expected a number of metres, got '2'",
         ),
         (
+            '[[labels]]\nname = "A"\nx = 1\ny = 2\niocn = "pin"\n',
+            'fleet.toml:5: labels[0].iocn: no such key; did you mean "icon"?',
+        ),
+        (
             '[[labels]]\nname = "A"\nx = 1\n',
             'fleet.toml:1: labels[0]: the key "y" is missing',
         ),

@@ -66,21 +66,17 @@ def picture_file(file: File) -> tuple[bytes, str]:
         ConfigError: If there is no such file, or it is no picture.
 
     """
-    from webmap.server.files import MEDIA_TYPES, NoSuchFile, media_type_of, read_file
-    from webmap.server.published import Published
+    from webmap.server.files import MEDIA_TYPES
+    from webmap.server.published import IMAGES, Published
 
     known = [end for end, type in MEDIA_TYPES.items() if type.startswith("image/")]
     if file.is_file() and file.suffix.lower() not in known:
         raise ConfigError(
             f"{str(file)!r} is no picture: its name must end in {' '.join(known)}"
         )
-    Published().publish_image(file)  # says what is wrong with the file as a file
-    path = file.resolve()
-    try:
-        found = read_file(path)
-    except NoSuchFile:
-        raise ConfigError(f"{str(file)!r} cannot be read") from None
-    if (media_type_of(path) or "").startswith("image/svg"):
+    published = Published()  # says what is wrong with the file as a file
+    found = published.image(published.publish_image(file).removeprefix(IMAGES))
+    if found.media_type.startswith("image/svg"):
         _check_svg(file, found.data)
     else:
         _check_pixels(file, found.data)

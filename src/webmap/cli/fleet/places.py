@@ -46,7 +46,6 @@ TILES: dict[str, Check] = {
     "opacity": _number(0, 1, "full opacity"),
 }
 
-
 NEEDED = ("name", "x", "y")
 """What every label says."""
 
@@ -69,11 +68,9 @@ def read_places(value: Any, path: Path, mistakes: Mistakes) -> Places:
         try:
             read_labels([each], "")
         except ConfigError as error:
-            words = str(error).removeprefix("[0]").lstrip(".: ")
+            # It was read as the first of a list; the file may have it elsewhere.
             _, *inner = getattr(error, "way", (0,))
-            key = inner[0] if inner else ""
-            words = words.removeprefix(f"{key}: ") if key else words
-            mistakes.add((*path, index, *inner), words)
+            mistakes.add((*path, index, *inner), getattr(error, "words", str(error)))
     return value
 
 
