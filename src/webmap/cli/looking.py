@@ -23,15 +23,15 @@ class Looking(ABC):
 
     Args:
         bridge: The bridge.
-        known: Types by topic, where the bridge cannot be asked for them.
+        topics: Types by topic, where the bridge cannot be asked for them.
 
     """
 
     def __init__(
-        self, bridge: "Bridge", known: Mapping[str, str] | None = None
+        self, bridge: "Bridge", topics: Mapping[str, str] | None = None
     ) -> None:
         self.bridge = bridge
-        self._given = known
+        self._told_topics = topics
         self._task: asyncio.Task[None] | None = None
         lifecycle.add(self)
 
@@ -69,6 +69,6 @@ class Looking(ABC):
             await asyncio.sleep(pause)
 
     async def _topics(self) -> dict[str, str]:
-        if self._given is not None:
-            return dict(self._given)
+        if self._told_topics is not None:
+            return dict(self._told_topics)
         return await self.bridge.topics()

@@ -28,7 +28,7 @@ def read_table(data: dict[str, Any], mistakes: Mistakes) -> Fleet:
         if key not in TOP:
             checks.unknown(key, TOP, (key,), mistakes)
     fleet = Fleet()
-    for key in ("title", "floor"):
+    for key in HEAD:
         if key in data:
             check = checks.name if key == "title" else checks.text
             setattr(fleet, key, checks.one(check, data[key], (key,), mistakes))
