@@ -8,7 +8,6 @@ from PIL import Image
 MOST_SIDE = 4096
 """Pixels of the longest side that a picture is made or read with."""
 
-
 _TOO_LARGE = (Image.DecompressionBombError, Image.DecompressionBombWarning)
 
 

@@ -1,4 +1,4 @@
-"""The shell around it: HTTP connections, none of which holds another up."""
+"""The HTTP connections of those who watch, none of which holds another up."""
 
 import asyncio
 import contextlib
@@ -82,8 +82,7 @@ class WebVideoServer:
                 async with asyncio.timeout(PATIENCE):
                     writer.write_eof()
                     # Closed with something unread, its end would lose the answer.
-                    while await reader.read(MOST_HEAD):
-                        pass
+                    await _end_of(reader)
         except asyncio.CancelledError:
             pass  # by ``stop``; the server would take it for a failure
         finally:
