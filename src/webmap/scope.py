@@ -45,16 +45,21 @@ class Scope:
 
     Args:
         name: The owner's name, for the log.
-        report: Shows people that something made here failed: a sentence, and whether
-            it goes on failing until the owner ends.
+        report: Shows people that something made here failed: a sentence, and what
+            that is about if it goes on failing, else None.
+        mended: Is told what goes on failing no more: what it was about.
 
     """
 
     def __init__(
-        self, name: str = "", report: Callable[[str, bool], object] | None = None
+        self,
+        name: str = "",
+        report: Callable[[str, object], object] | None = None,
+        mended: Callable[[object], object] | None = None,
     ) -> None:
         self.name = name
         self.report = report
+        self.mended = mended
         self._things: dict[int, Removable] = {}
         self.closed = False
 

@@ -107,18 +107,24 @@ def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
     assert reported == ["Bad.on_ring failed: RuntimeError: flat battery"]
 
 
-def test_what_a_module_made_reports_to_its_owner_until_the_module_goes(namespace):
+def test_what_a_module_made_reports_to_its_owner_until_it_is_mended(namespace):
     class Sensor:
         def __init__(self, robot) -> None:
-            self.report = current_scope().report
+            self.scope = current_scope()
 
     robot = Robot("Bob")
-    sensor = robot.add_module(Sensor)
-    sensor.report("/scan: a callback raised", False)
+    scope = robot.add_module(Sensor).scope
+    scope.report("/scan: a callback raised", None)
     assert not robot.problems
-    sensor.report("/scan: expected a scan, got a map", True)
-    assert list(robot.problems.values()) == ["/scan: expected a scan, got a map"]
-    robot.remove_module(sensor)
+    scope.report("/scan: expected a scan, got a map", "scan")
+    scope.report("/map: expected a map, got a scan", "map")
+    assert list(robot.problems.values()) == [
+        "/scan: expected a scan, got a map",
+        "/map: expected a map, got a scan",
+    ]
+    scope.mended("scan")
+    assert list(robot.problems.values()) == ["/map: expected a map, got a scan"]
+    scope.mended("map")
     assert not robot.problems
 
 

@@ -22,7 +22,7 @@ from webmap.scope import Removal, current_scope, keep, no_scope
 class Link:
     """A bridge that decodes as a real one does."""
 
-    url = "ws://test:9090"
+    url = name = "ws://test:9090"
 
     def __init__(self) -> None:
         self.listeners: dict[str, list[tuple]] = {}
@@ -58,8 +58,11 @@ class Link:
             try:
                 value = event.decode(decode)
             except ProtocolError as error:
-                scope.report(str(error), True)
+                if scope is not None and scope.report is not None:
+                    scope.report(str(error), callback)
                 continue
+            if scope is not None and scope.mended is not None:
+                scope.mended(callback)
             with scope.active() if scope else no_scope():
                 callback(value)
 

@@ -177,6 +177,16 @@ SAID = {
     "ten million beams": ("/scan", TEN_MILLION, "10000000 rays"),
     "ranges of text": ("/scan", scan(1, ranges=["far"]), "no whole sensor_msgs/Laser"),
     "another type": ("/scan", {"data": "hello"}, "angle_min"),
+    "odometry of another type": (
+        "/odom",
+        {"data": "hello"},
+        "no whole nav_msgs/Odometry",
+    ),
+    "odometry that was cut": (
+        "/odom",
+        publish("/odom", odometry(3))[:-40],
+        "got a frame that was cut",
+    ),
 }
 """What is refused: its topic, the frame or the message, and what is said."""
 
@@ -314,6 +324,7 @@ def test_what_makes_no_sense_is_said_once_and_disturbs_nothing(map, channel, nam
         (line,) = scene.errors
         assert (topic or "sent ") in line, "people read where it came from"
         assert "Ann" not in line
+        assert channel.problems == {}, "and it is taken back"
 
     with_scene(map, channel, scenario)
 

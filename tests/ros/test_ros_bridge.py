@@ -302,6 +302,96 @@ def test_a_message_of_another_type_is_told_once_with_both_types():
     run(scenario)
 
 
+class Shown:
+    """What people are shown of one module, and what is taken back."""
+
+    def __init__(self):
+        self.said, self.standing = [], {}
+        self.scope = Scope("module", self.report, self.standing.pop)
+
+    def report(self, text, about):
+        self.said.append(text)
+        self.standing[about] = text
+
+
+def test_messages_that_make_no_sense_are_said_until_they_make_sense_again():
+    async def scenario():
+        errors, got, plain, shown = [], [], [], Shown()
+        async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
+            bridge.on_error(errors.append)
+            with shown.scope.active():
+                bridge.subscribe("/a", got.append, "std_msgs/String", decode=Text)
+            bridge.subscribe("/a", plain.append)
+            for count in (1, 2, 3):
+                await server.publish("/a", {"data": True})
+                await until(lambda: shown.standing)
+                await server.publish("/a", {"data": False})
+                await until(lambda c=count: len(plain) == 3 * c - 1)
+                assert shown.standing, "one who takes all sorts takes nothing back"
+                await server.publish("/a", {"data": "good"})
+                await until(lambda c=count: len(got) == c)
+                assert shown.standing == {}
+            assert len(shown.said) == 3
+            assert {*shown.said} == {str(error) for error in errors}
+            assert len(errors) == 1, "why is found out once"
+            await server.send('{"op": "publish", "topic": "/a", "msg": {"data": "x"')
+            await until(lambda: shown.standing)
+            shown.scope.close()
+            assert shown.standing == {}, "and it ends with who was told"
+
+    run(scenario)
+
+
+def test_what_nobody_who_listens_wants_any_more_is_taken_back():
+    async def scenario():
+        got, shown, other = [], Shown(), Scope("other")
+        async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
+            with shown.scope.active():
+                bridge.subscribe("/a", got.append)
+            with other.active():
+                bridge.subscribe("/a", print, decode=Text)
+            await server.publish("/a", {"data": True})
+            await until(lambda: shown.standing)
+            other.close()
+            assert shown.standing == {}
+
+    run(scenario)
+
+
+def test_what_was_wrong_on_a_link_is_taken_back_on_the_next(fast):
+    async def scenario():
+        shown = Shown()
+        async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
+            with shown.scope.active():
+                bridge.subscribe("/a", print, "std_msgs/String", decode=Text)
+            await server.publish("/a", {"data": True})
+            await until(lambda: shown.standing)
+            server.drop()
+            await until(lambda: not shown.standing)
+            await server.heard("subscribe", 2)
+            await server.publish("/a", {"data": True})
+            await until(lambda: shown.standing)
+
+    run(scenario)
+
+
+def test_silence_that_was_explained_is_taken_back_by_what_comes(monkeypatch):
+    monkeypatch.setattr("webmap.ros.doubts.SILENCE", 0.02)
+
+    async def scenario():
+        got, shown = [], Shown()
+        async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
+            with shown.scope.active():
+                bridge.subscribe("/a", got.append, "std_msgs/String", decode=Text)
+            await until(lambda: shown.standing)
+            assert "nothing will come" in shown.said[0]
+            await server.publish("/a", {"data": "good"})
+            await until(lambda: got)
+            assert shown.standing == {}
+
+    run(scenario)
+
+
 def test_silence_under_a_wrong_type_is_explained(monkeypatch):
     monkeypatch.setattr("webmap.ros.doubts.SILENCE", 0.02)
 

@@ -46,8 +46,7 @@ class Extendable:
         """
         factory = self.namespace[name] if isinstance(name, str) else name
         check_arguments(factory, args, kwargs)
-        scope = Scope(f"{factory}")
-        scope.report = lambda text, lasting: self._failed(scope, text, lasting)
+        scope = Scope(f"{factory}", self._failed, self.clear_problem)
         try:
             with scope.active():
                 module = factory(self, *args, **kwargs)
@@ -79,7 +78,6 @@ class Extendable:
         else:
             raise ValueError(f"{module!r} is not a module of {self!r}")
         scope = self._scopes.pop(id(module))
-        self.clear_problem(scope)
         self._made.pop(id(module), None)
         try:
             self._call(module, "destroy", ())
@@ -109,11 +107,11 @@ class Extendable:
     def clear_problem(self, about: object) -> None:
         """Note that what was said of ``about`` is true no more."""
 
-    def _failed(self, scope: Scope, text: str, lasting: bool) -> None:
-        if lasting:
-            self.set_problem(scope, text)
-        else:
+    def _failed(self, text: str, about: object) -> None:
+        if about is None:
             self.report_error(text)
+        else:
+            self.set_problem(about, text)
 
     def _call(self, module: Any, name: str, args: tuple[Any, ...]) -> None:
         method = getattr(module, name, None)

@@ -33,7 +33,7 @@ class Layer:
         self.svg: Element = svg.g(class_="layer")
         self.fragment = Fragment(self.svg)
         self.users = 0
-        self.scope = Scope(type(self).__name__, self._failed)
+        self.scope = Scope(type(self).__name__, self._failed, self.clear_problem)
         self._told: Problems[Map] = Problems(log)
         self.maps = self._told.maps
         """Those that hear what fails: see :meth:`show_on`."""
@@ -110,8 +110,8 @@ class Layer:
             self._shared.pop(self._key, None)
             self.scope.close()
 
-    def _failed(self, text: str, lasting: bool) -> None:
-        if lasting:
-            self.set_problem(self.scope, text)
-        else:
+    def _failed(self, text: str, about: object) -> None:
+        if about is None:
             self._told.report(text)
+        else:
+            self.set_problem(about, text)

@@ -17,7 +17,7 @@ from webmap.ros.views import (
     odometry_view,
     odometry_view_by_shape,
 )
-from webmap.scope import Removable
+from webmap.scope import Removable, Scope, no_scope
 
 _NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
 
@@ -74,6 +74,7 @@ class OdometryFeed:
         listener: Called with each pose, in the model's thread.
         complain: Called with a sentence for people when the topic cannot be used,
             and with None when it can be used again.
+        scope: Is told of messages that cannot be decoded.
 
     Raises:
         ConfigError: If ``type`` is given and has no pose in it.
@@ -88,6 +89,7 @@ class OdometryFeed:
         type: str | None,
         listener: PoseListener,
         complain: Callable[[str | None], None],
+        scope: Scope,
     ) -> None:
         self.bridge = bridge
         self.topic = topic
@@ -95,7 +97,7 @@ class OdometryFeed:
         self.type: str | None = None
         self._listener = listener
         self._complain = complain
-        self._complaint: str | None = None
+        self._scope = scope
         self._opening: Removable | None = None
         self._subscription: Removable | None = None
         if type is None:
@@ -119,21 +121,22 @@ class OdometryFeed:
         if self._subscription is not None or self._opening is None:
             return
         if found is None:
-            self._subscription = self.bridge.subscribe(
-                self.topic, self._on_first, throttle=self.throttle
-            )
+            with self._scope.active():
+                self._subscription = self.bridge.subscribe(
+                    self.topic, self._on_first, throttle=self.throttle
+                )
             return
         try:
             self._subscribe(odometry_view(found))
         except ConfigError as error:
-            self._say(f"topic {self.topic!r}: {error}")
+            self._complain(f"topic {self.topic!r}: {error}")
 
     def _on_first(self, message: Any) -> None:
         try:
             view = odometry_view_by_shape(message)
             first = convert(message, view)
         except ProtocolError as error:
-            self._say(f"topic {self.topic!r}: {error}; say type=... if one does")
+            self._complain(f"topic {self.topic!r}: {error}; say type=... if one does")
             return
         untyped = self._subscription
         self._subscribe(view)
@@ -145,22 +148,23 @@ class OdometryFeed:
         self.type = next(
             name for name, known in ODOMETRY_VIEWS.items() if known is view
         )
-        self._subscription = self.bridge.subscribe(
-            self.topic, self._hear, self.type, throttle=self.throttle, decode=view
-        )
+        with self._scope.active():
+            self._subscription = self.bridge.subscribe(
+                self.topic, self._hear, self.type, throttle=self.throttle, decode=view
+            )
 
     def _hear(self, message: OdometryView) -> None:
-        reading = PoseReading.of(message)
+        try:
+            reading = PoseReading.of(message)
+        except ProtocolError as error:
+            self._complain(f"topic {self.topic!r}: {error}")
+            return
         if reading.is_usable:
-            self._say(None)
-            self._listener(reading)
+            self._complain(None)
+            with no_scope():  # what others make of it is not this topic's
+                self._listener(reading)
         else:
-            self._say(
+            self._complain(
                 f"topic {self.topic!r}: a pose with NaN, infinity, a number beyond "
                 f"{FARTHEST:g} or a quaternion of zeros was ignored"
             )
-
-    def _say(self, text: str | None) -> None:
-        if text != self._complaint:
-            self._complaint = text
-            self._complain(text)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from webmap.core.frames import Frames, frames_of
 from webmap.core.motion import MotionRoad
@@ -13,10 +13,17 @@ from webmap.core.refusals import Owner
 from webmap.core.whereabouts import Whereabouts
 from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
-from webmap.scope import Removal, no_scope
+from webmap.scope import Removal, Scope, no_scope
 
 TF_PERIOD = 0.05
 """Least seconds between two poses that are taken from frames alone."""
+
+
+class PoseOwner(Owner, Protocol):
+    """Who is told what is wrong with its poses: a robot."""
+
+    def report_error(self, text: str) -> None:
+        """Show people what failed and is over."""
 
 
 class PoseSource:
@@ -32,7 +39,7 @@ class PoseSource:
 
     def __init__(
         self,
-        owner: Owner,
+        owner: PoseOwner,
         motion: MotionRoad,
         heard: Callable[[], object],
         show: Callable[[PoseReading], object],
@@ -57,9 +64,11 @@ class PoseSource:
     ) -> None:
         """Take poses from a topic; see :meth:`Robot.set_odometry_topic`."""
         self.unfollow()
+        say = self._on_feed_problem
+        scope = Scope(f"poses of {topic}", self._failed, lambda _: say(None))
         with no_scope():
             self.feed = OdometryFeed(
-                bridge, topic, throttle, type, self._on_pose, self._on_feed_problem
+                bridge, topic, throttle, type, self._on_pose, say, scope
             )
         self._find_bridge()
 
@@ -152,6 +161,12 @@ class PoseSource:
             self._owner.clear_problem("odometry")
         else:
             self._owner.set_problem("odometry", text)
+
+    def _failed(self, text: str, about: object) -> None:
+        if about is None:
+            self._owner.report_error(text)
+        else:
+            self._on_feed_problem(text)
 
     def _find_bridge(self) -> None:
         """Note where poses come from now: the alignment of that bridge holds."""

@@ -59,7 +59,7 @@ class Callback:
         self._report(error)
         if self._scope is not None and self._scope.report is not None:
             what = f"{self.what}: {type(error).__name__}: {error}"
-            self._scope.report(what, False)
+            self._scope.report(what, None)
 
 
 class Callbacks:

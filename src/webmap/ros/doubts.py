@@ -45,7 +45,7 @@ class Doubts:
         if isinstance(error, Unreadable):
             # No type would make sense of it, so none is asked for or named.
             words = "got a frame that was cut off, or is not one message"
-            self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"))
+            self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"), error)
             return
         self._ask(self._explain(topic, expected, error))
 
@@ -72,12 +72,12 @@ class Doubts:
         words = f"expected {expected}, {said}"
         if got and is_type(got, expected):
             words = f"got what is no whole {got}, though the bridge says it is"
-        self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"))
+        self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"), error)
 
-    def _told(self, topic: Topic, full: ProtocolError) -> None:
+    def _told(self, topic: Topic, full: ProtocolError, error: ProtocolError) -> None:
         log.warning("%s: %s", self._name, full)
         self._report(full)
-        topic.failed(full)
+        topic.failed(full, error)
 
     async def _explain_silence(self, topic: Topic) -> None:
         await asyncio.sleep(SILENCE)
@@ -87,7 +87,7 @@ class Doubts:
         wanted = topic.message_type
         if got is None or wanted is None or topic.count or same_type(got, wanted):
             return
-        topic.complain(ProtocolError("nothing will come"), None)
+        topic.silent()
 
     def _ask(self, question: Coroutine[Any, Any, None]) -> None:
         with no_scope():

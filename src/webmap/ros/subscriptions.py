@@ -21,6 +21,10 @@ _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
 
 
+class _Silence(ProtocolError):
+    """Nothing comes at all."""
+
+
 class Wish(NamedTuple):
     """What is asked of the bridge for one topic."""
 
@@ -52,6 +56,7 @@ class Subscription:
         self._of = topic
         self._callback = callback
         self._timer: TimerHandle | None = None
+        self._reported = False
         self._scope: Scope | None = current_scope()
         if self._scope is not None:
             self._scope.add(self)
@@ -62,6 +67,7 @@ class Subscription:
             return
         self.removed = True
         self.hush()
+        self.take_back()
         if self._scope is not None:
             self._scope.discard(self)
         self._of.remove(self)
@@ -75,18 +81,28 @@ class Subscription:
         except ProtocolError as error:
             self._of.complain(error, self.decode)
             return
+        if self._of.failing:
+            self._of.understood(self.decode)
         self._callback(value)
 
     def report(self, fault: ProtocolError) -> None:
         """Show whoever subscribed that the messages cannot be used."""
         if self._scope is not None and self._scope.report is not None:
-            self._scope.report(str(fault), True)
+            self._reported = True
+            self._scope.report(str(fault), self)
+
+    def take_back(self) -> None:
+        """Take back what :meth:`report` showed, if it did."""
+        if self._reported and self._scope is not None:
+            self._reported = False
+            if self._scope.mended is not None:
+                self._scope.mended(self)
 
     def mention(self, fault: ProtocolError) -> bool:
         """Tell whoever subscribed of what passes; False if nobody is to be told."""
         if self._scope is None or self._scope.report is None:
             return False
-        self._scope.report(str(fault), False)
+        self._scope.report(str(fault), None)
         return True
 
     def hold(self, loop: AbstractEventLoop, release: Callable[[], None]) -> None:
@@ -113,7 +129,8 @@ class Topic:
     Args:
         name: The resolved name.
         send: Sends a frame if the link is open, else does nothing.
-        complain: Is told, once, of a message that does not decode.
+        complain: Is told of a message that does not decode, once for each link and
+            each kind of error.
         emptied: Called when the last listener has gone.
 
     """
@@ -133,8 +150,11 @@ class Topic:
         self._send = send
         self._complain = complain
         self._emptied = emptied
-        self._complained = False
+        self.failing: set[object] = set()
+        """As what the newest messages could not be decoded."""
         self._fault: ProtocolError | None = None
+        self._found: dict[type[ProtocolError], ProtocolError | None] = {}
+        """What was found out of each kind of error; None while it is looked for."""
         self._latest: Publish | None = None
         self._asked: Wish | None = None
         self._id = ""
@@ -171,6 +191,9 @@ class Topic:
         """Let ``listener`` go, and ask the bridge for less if the others want less."""
         self.listeners.pop(listener, None)
         if self.listeners:
+            alone = all(o.decode is not listener.decode for o in self.listeners)
+            if self.failing and alone:
+                self._succeeds(listener.decode)
             self.update()
             return
         if self._asked is not None:
@@ -208,7 +231,8 @@ class Topic:
     def again(self) -> None:
         """Ask the bridge on a new link, which knows nothing of the old one."""
         self.count = 0
-        self._complained, self._fault = False, None
+        self._found.clear()
+        self._mend()
         self._ask(self.wish())
 
     def renew(self) -> None:
@@ -258,17 +282,64 @@ class Topic:
     def complain(
         self, error: ProtocolError, decode: type[msgspec.Struct] | None
     ) -> None:
-        """Report a message that does not decode, once for each link."""
-        if not self._complained:
-            self._complained = True
+        """Report a message that does not decode.
+
+        Why that is so is found out once for each link and each kind of error. If one
+        was understood meanwhile, the same is said again.
+        """
+        self.failing.add(decode)
+        self._find_out(error, decode)
+
+    def silent(self) -> None:
+        """Report that nothing comes, as of a topic of another type."""
+        self.failing.add(_Silence)
+        self._find_out(_Silence("nothing will come"), None)
+
+    def _find_out(
+        self, error: ProtocolError, decode: type[msgspec.Struct] | None
+    ) -> None:
+        kind = type(error)
+        if kind not in self._found:
+            self._found[kind] = None
             expected = self.message_type or (decode.__name__ if decode else "a message")
             self._complain(self, expected, error)
+            return
+        found = self._found[kind]
+        if found is not None and self._fault is None:
+            self._show(found)
 
-    def failed(self, fault: ProtocolError) -> None:
-        """Show everybody who listens why the messages cannot be used."""
+    def failed(self, fault: ProtocolError, error: ProtocolError) -> None:
+        """Show everybody who listens why the messages cannot be used, if they cannot.
+
+        Args:
+            fault: What was found out.
+            error: What was complained of.
+
+        """
+        self._found[type(error)] = fault
+        if self.failing:
+            self._show(fault)
+
+    def understood(self, decode: type[msgspec.Struct] | None) -> None:
+        """Note that messages decode so, and take back what is true no more."""
+        self.failing.discard(_Silence)
+        self._succeeds(decode)
+
+    def _succeeds(self, decode: type[msgspec.Struct] | None) -> None:
+        self.failing.discard(decode)
+        if not self.failing:
+            self._mend()
+
+    def _show(self, fault: ProtocolError) -> None:
         self._fault = fault
         for listener in tuple(self.listeners):
             listener.report(fault)
+
+    def _mend(self) -> None:
+        self._fault = None
+        self.failing.clear()
+        for listener in tuple(self.listeners):
+            listener.take_back()
 
 
 def checked(

@@ -83,7 +83,7 @@ class Buttons:
                 ButtonView(button, holder)
         return keep(Removal(scope.close))
 
-    def _failed(self, text: str, lasting: bool) -> None:
+    def _failed(self, text: str, about: object) -> None:
         self.robot.report_error(text)
 
     def on_report(self, report: object) -> None:

@@ -86,7 +86,9 @@ class Camera(CameraFeed):
 
     def begin(self) -> None:
         """Subscribe to the pictures."""
-        self._scope = Scope(f"camera {self.topic}", self._report)
+        self._scope = Scope(
+            f"camera {self.topic}", self._report, self.robot.clear_problem
+        )
         with no_scope(), self._scope.active():
             self._bridge.subscribe(
                 self.topic,
@@ -104,11 +106,11 @@ class Camera(CameraFeed):
             scope.close()
         self._undrawn = None
 
-    def _report(self, text: str, lasting: bool) -> None:
-        if lasting:
-            self.robot.set_problem(self, text)
-        else:
+    def _report(self, text: str, about: object) -> None:
+        if about is None:
             self.robot.report_error(text)
+        else:
+            self.robot.set_problem(about, text)
 
     def on_picture(self, image: CompressedImageMsg | ImageMsg | AnyImageMsg) -> None:
         """Show a picture, whichever it is.
@@ -151,7 +153,7 @@ class Camera(CameraFeed):
                 try:
                     data = await asyncio.to_thread(jpeg, image)
                 except ProtocolError as error:
-                    self._report(f"{self.topic}: {error}", True)
+                    self.robot.set_problem(self, f"{self.topic}: {error}")
                     continue
                 self.robot.clear_problem(self)
                 if self._scope is not None:
