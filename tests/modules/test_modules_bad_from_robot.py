@@ -187,6 +187,16 @@ SAID = {
         publish("/odom", odometry(3))[:-40],
         "got a frame that was cut",
     ),
+    "odometry of an endless time": (
+        "/odom",
+        odometry(3, header=header("odom") | {"stamp": {"secs": 10**400}}),
+        "seconds of hundreds of digits",
+    ),
+    "a scan of an endless time": (
+        "/scan",
+        scan(1, header=header("laser") | {"stamp": {"secs": 10**400}}),
+        "seconds of hundreds of digits",
+    ),
 }
 """What is refused: its topic, the frame or the message, and what is said."""
 

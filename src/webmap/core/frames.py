@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from webmap.core.frame_faults import FrameFaults
+from webmap.errors import ProtocolError
 from webmap.geometry import Quaternion, Vector3
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
@@ -131,7 +132,7 @@ class Frames:
                     each.stamp,
                     static=static,
                 )
-            except TransformError as error:
+            except (TransformError, ProtocolError) as error:
                 note = f"a transform was left out: {error}"
             if note and self.faults.note(parent, child, note, now):
                 log.warning("%s: %s", self.bridge.name, note)

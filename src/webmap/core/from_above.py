@@ -4,7 +4,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
+from webmap.errors import ProtocolError
 from webmap.geometry import Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.tf import Transform
 
 if TYPE_CHECKING:
@@ -27,8 +29,20 @@ class _Numbers(Protocol):
 
 
 def in_space(points: Iterable[_Numbers]) -> list[Vector3]:
-    """Return points with a height; one whose height is no number lies in the plane."""
-    return [Vector3(p.x, p.y, p.z if math.isfinite(p.z) else 0.0) for p in points]
+    """Return points with a height; one whose height is no number lies in the plane.
+
+    Raises:
+        ProtocolError: If one is higher or lower than anything can be.
+
+    """
+    found = [Vector3(p.x, p.y, p.z if math.isfinite(p.z) else 0.0) for p in points]
+    for point in found:
+        if abs(point.z) > FARTHEST:
+            raise ProtocolError(
+                f"points must be within {FARTHEST:g} m of the plane, got a height of "
+                f"{point.z:g}"
+            )
+    return found
 
 
 def flat(points: Iterable[Vector3], tilt: Transform) -> list[Point]:

@@ -16,6 +16,7 @@ from webmap.core.marker_colours import by_colour, colours, drawn, filled
 from webmap.core.placed import check_finite, rounded
 from webmap.errors import ProtocolError
 from webmap.geometry import Affine, Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.ros import messages_marker as kinds
 from webmap.ros.messages_marker import MarkerMsg
 from webmap.scene import svg
@@ -62,14 +63,22 @@ def sizes(marker: MarkerMsg, *axes: str) -> list[float]:
     """Return sizes of a marker along axes, in metres.
 
     Raises:
-        ProtocolError: If one of them is not above 0.
+        ProtocolError: If one of them is not above 0, or larger than anything.
 
     """
     found = [getattr(marker.scale, axis) for axis in axes]
     for axis, size in zip(axes, found, strict=True):
         if not (math.isfinite(size) and size > 0):
             raise ProtocolError(f"scale.{axis} must be metres above 0, got {size}")
+        _check_size(axis, size)
     return found
+
+
+def _check_size(axis: str, size: float) -> None:
+    if size > FARTHEST:
+        raise ProtocolError(
+            f"scale.{axis} must be {FARTHEST:g} m at the most, got {size:g}"
+        )
 
 
 def _text(marker: MarkerMsg, _: Transform) -> Iterable[Element]:
@@ -234,7 +243,10 @@ def _repeated(
 def _height(marker: MarkerMsg) -> float:
     """Return how high a marker is; it only matters where it is tilted."""
     height = marker.scale.z
-    return height if math.isfinite(height) and height > 0 else 0.0
+    if not (math.isfinite(height) and height > 0):
+        return 0.0
+    _check_size("z", height)
+    return height
 
 
 def _check(marker: MarkerMsg) -> None:

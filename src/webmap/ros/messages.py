@@ -30,8 +30,19 @@ class Time(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def seconds(self) -> float:
-        """Seconds since the epoch of that clock; 0 if nobody set it."""
-        return (self.secs or self.sec) + 1e-9 * (self.nsecs or self.nanosec)
+        """Seconds since the epoch of that clock; 0 if nobody set it.
+
+        Raises:
+            ProtocolError: If they are more than a number can hold.
+
+        """
+        try:
+            return (self.secs or self.sec) + 1e-9 * (self.nsecs or self.nanosec)
+        except OverflowError:
+            raise ProtocolError(
+                "a time has seconds of hundreds of digits; expected up to 4294967295, "
+                "as ROS has them"
+            ) from None
 
 
 class Header(msgspec.Struct, frozen=True):
@@ -112,6 +123,11 @@ class PoseMsg(Unstamped, frozen=True):
             raise ProtocolError(
                 f"a pose must be within {FARTHEST:g} m of the origin, got "
                 f"({p.x:g}, {p.y:g})"
+            )
+        if FARTHEST < abs(p.z) < math.inf:
+            raise ProtocolError(
+                f"a pose must be within {FARTHEST:g} m of the plane, got a height of "
+                f"{p.z:g}"
             )
         if self.turns_nowhere:
             raise ProtocolError("a pose has a quaternion of zeros, which turns nowhere")

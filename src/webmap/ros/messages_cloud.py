@@ -100,7 +100,7 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
                     "itemsize": self.point_step,
                 }
             )
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise ProtocolError(
                 f"the fields {', '.join(names)} do not fit into points of "
                 f"{self.point_step} bytes: {error}"

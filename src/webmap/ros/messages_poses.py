@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from webmap.errors import ProtocolError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.messages import PointMsg, PoseMsg, Stamped
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
 
         Raises:
             ProtocolError: If the covariance has not 36 finite numbers, or its part in
-                the plane is that of no spread at all.
+                the plane is that of no spread at all, or of one that nothing can have.
 
         """
         c = self._covariance()
@@ -92,6 +93,11 @@ class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
             raise ProtocolError(
                 f"the covariance ({xx}, {xy}; {xy}, {yy}) in the plane has a spread "
                 "below 0"
+            )
+        if not high <= FARTHEST**2:
+            raise ProtocolError(
+                f"the covariance ({xx:g}, {xy:g}; {xy:g}, {yy:g}) in the plane has a "
+                f"spread of more than {FARTHEST:g} m"
             )
         yaw = 0.5 * math.atan2(2 * xy, xx - yy)
         return Ellipse(math.sqrt(max(0.0, high)), math.sqrt(max(0.0, low)), yaw)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from webmap.geometry import Affine, Pose, Quaternion, Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.tf.errors import TransformError
 
 NEARLY = 0.1
@@ -108,13 +109,19 @@ class Transform:
         """Return the same with a rotation of norm 1.
 
         Raises:
-            TransformError: If a number is not finite, or the rotation is none.
+            TransformError: If a number is not finite, the rotation is none, or the
+                frame is farther away than anything can be.
 
         """
         t, q = self.translation, self.rotation
         numbers = (t.x, t.y, t.z, q.x, q.y, q.z, q.w)
         if not all(map(math.isfinite, numbers)):
             raise TransformError(f"a number is not finite: {t}, {q}")
+        if max(abs(t.x), abs(t.y), abs(t.z)) > FARTHEST:
+            raise TransformError(
+                f"a frame must be within {FARTHEST:g} m, got ({t.x:g}, {t.y:g}, "
+                f"{t.z:g})"
+            )
         norm = q.norm
         if abs(norm - 1.0) > NEARLY:
             raise TransformError(f"the rotation has a norm of {norm:g}, expected 1")

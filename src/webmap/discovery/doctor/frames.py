@@ -42,7 +42,7 @@ class FrameListening:
                     static=name == "tf_static",
                     namespace=namespace,
                 )
-            except TransformError as error:
+            except (TransformError, ProtocolError) as error:
                 refused.append(str(error))
 
     def oddities(self, namespace: str) -> tuple[str, ...]:

@@ -204,6 +204,7 @@ class MarkerLayer(Layer):
     def _put(self, key: Key, marker: FramedMarkerMsg) -> None:
         if key not in self.shapes and len(self.shapes) >= MAX_MARKERS:
             raise ProtocolError(f"{MAX_MARKERS} markers are the limit")
+        lifetime = marker.lifetime.seconds
         frame = self.frames.place(
             key,
             marker.frame_id,
@@ -218,8 +219,8 @@ class MarkerLayer(Layer):
             raise
         self._say_unturned(marker)
         self._ends.pop(key, None)
-        if marker.lifetime.seconds > 0:
-            self._ends[key] = time.monotonic() + marker.lifetime.seconds
+        if lifetime > 0:
+            self._ends[key] = time.monotonic() + lifetime
 
     def _say_unturned(self, marker: MarkerMsg) -> None:
         """Say once that somebody leaves orientations out; they are drawn as RViz does.

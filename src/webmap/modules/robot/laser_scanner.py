@@ -31,6 +31,9 @@ AGE_LIMIT = 1.0
 MAX_RAYS = 1 << 18
 """The most rays that a scan may have."""
 
+MOST_TURN = 1000.0
+"""Radians at which a ray may be, which is more than a hundred turns."""
+
 LONGEST_SWEEP = 0.5
 """Seconds; a scan that claims to have taken longer is taken to be of one moment."""
 
@@ -145,8 +148,8 @@ def check_rays(scan: LaserScanMsg) -> None:
     """Let a scan pass whose rays go somewhere.
 
     Raises:
-        ProtocolError: If an angle is not finite, several rays have one direction, or
-            there are more rays than any scanner has.
+        ProtocolError: If an angle is not finite or beyond all turns, several rays have
+            one direction, or there are more rays than any scanner has.
 
     """
     for name in ("angle_min", "angle_increment"):
@@ -160,6 +163,13 @@ def check_rays(scan: LaserScanMsg) -> None:
         raise ProtocolError(
             f"angle_increment must not be 0 for a scan of {count} rays, which would "
             "all go one way"
+        )
+    last = scan.angle_min + scan.angle_increment * max(0, count - 1)
+    if not max(abs(scan.angle_min), abs(last)) <= MOST_TURN:
+        raise ProtocolError(
+            f"rays must be within {MOST_TURN:g} radians, got an angle_min of "
+            f"{scan.angle_min:g} and an angle_increment of {scan.angle_increment:g} "
+            f"for {count} rays"
         )
 
 

@@ -7,7 +7,8 @@ from webmap.core.frames import frames_of
 from webmap.core.local_plane import LocalPlane
 from webmap.core.placed import Placed
 from webmap.core.refusals import refusing
-from webmap.errors import ConfigError
+from webmap.errors import ConfigError, ProtocolError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_fix import NavSatFixMsg
 from webmap.scene import svg
@@ -92,13 +93,16 @@ class NavSatFix:
         """Draw a fix in place of the one before.
 
         Raises:
-            ProtocolError: If it claims to be one and is on no globe.
+            ProtocolError: If it claims to be one and is on no globe; or if its doubt
+                is larger than that, but the fix is drawn then.
 
         """
         lost = fix.status.status < 0
         if not lost:
-            self._go(fix)
+            _ = fix.place
         self.svg.classes.toggle("lost", lost)
+        if not lost:
+            self._go(fix)
 
     def on_odometry_update(self) -> None:
         """Keep the fix where it is while the robot goes along."""
@@ -115,9 +119,15 @@ class NavSatFix:
         self.position = (x, y)
         for element in (self.doubt, self.cross):
             element.set_pose(x, y, 0.0)
-        self.doubt.set(r=fix.deviation or 0.0)
+        doubt = fix.deviation or 0.0
+        self.doubt.set(r=doubt if doubt <= FARTHEST else 0.0)
         self.cross.unset("visibility")
         self.svg.set_age(0.0, limit=self.age_limit)
+        if doubt > FARTHEST:
+            raise ProtocolError(
+                f"a fix has a doubt of {FARTHEST:g} m at the most, got {doubt:g} m, "
+                "which is not drawn"
+            )
 
     def _anchor(self, place: tuple[float, float]) -> None:
         """Take a place on the globe for the robot's, as soon as that has one."""

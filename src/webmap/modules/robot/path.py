@@ -89,15 +89,16 @@ class Path:
         """Draw a path in place of the one before.
 
         Raises:
-            ProtocolError: If a position is not finite.
+            ProtocolError: If a position is not finite, or farther away than anything
+                can be.
 
         """
         points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
         check_finite(points, "a path")
-        self.points = points
         kept = thinned(len(points), self.max_points)
         drawn = in_space(path.poses[index].pose.position for index in kept)
         self._placed.stand_in(path.frame_id, path.stamp, partial(self._draw, drawn))
+        self.points = points
         self.svg.set_age(0.0, limit=self.age_limit)
         self.robot.notify_modules("on_path_update", self)
 

@@ -227,10 +227,13 @@ class PointCloud:
             low = float(known.min()) if len(known) else 0.0
         if high is None:
             high = float(known.max()) if len(known) else 1.0
-        width = high - low if high > low else 1.0
-        share = np.nan_to_num((values - low) / width, nan=0.0, posinf=1.0, neginf=0.0)
+        # Differences of numbers that are finite and absurd may be infinite.
+        with np.errstate(over="ignore", invalid="ignore"):
+            width = np.subtract(high, low) if high > low else 1.0
+            share = (values - low) / width
+        share = np.nan_to_num(share, nan=0.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
         last = len(COLOURS) - 1
-        return np.clip((share * len(COLOURS)).astype(np.int64), 0, last)
+        return np.minimum((share * len(COLOURS)).astype(np.int64), last)
 
 
 def one_a_cell(points: "NDArray[np.float64]", cell: float) -> "NDArray[np.int64]":

@@ -81,7 +81,8 @@ class Polygon:
         """Draw a polygon in place of the one before.
 
         Raises:
-            ProtocolError: If a point is not finite, or there are too many.
+            ProtocolError: If a point is not finite or farther away than anything can
+                be, or there are too many.
 
         """
         points = [(point.x, point.y) for point in message.polygon.points]
@@ -90,9 +91,9 @@ class Polygon:
                 f"a polygon of {len(points)} points; {MAX_POINTS} are the limit"
             )
         check_finite(points, "a polygon")
-        self.points = points
         draw = partial(self._draw, in_space(message.polygon.points))
         self._placed.stand_in(message.frame_id, message.stamp, draw)
+        self.points = points
         self.svg.set_age(0.0, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 from webmap.core.placed import Placed, sector
 from webmap.core.refusals import refusing
-from webmap.errors import ConfigError
+from webmap.errors import ConfigError, ProtocolError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import DoubtfulPoseStampedMsg
 from webmap.ros.names import split_type
@@ -84,6 +85,11 @@ class PoseWithCovariance:
         place, ellipse = message.place, message.ellipse
         turn = self.deviations * message.heading_deviation
         n = self.deviations
+        if n * ellipse.major > FARTHEST:
+            raise ProtocolError(
+                f"an ellipse must be within {FARTHEST:g} m, got a half axis of "
+                f"{n * ellipse.major:g} m"
+            )
         self._placed.stand_in(message.frame_id, message.stamp)
         self.ellipse.set(rx=n * ellipse.major, ry=n * ellipse.minor)
         self.ellipse.set_pose(place.x, place.y, ellipse.yaw)

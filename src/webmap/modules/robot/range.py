@@ -8,6 +8,7 @@ from webmap.core.from_above import cone
 from webmap.core.placed import Placed, sector
 from webmap.core.refusals import refusing
 from webmap.errors import ProtocolError
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_poses import RangeMsg
 from webmap.scene import svg
@@ -100,6 +101,11 @@ class Range:
         else:
             self.distance = math.inf if measured > reach else None
         drawn = 0.0 if self.distance is None else min(self.distance, reach)
+        if drawn > FARTHEST:
+            raise ProtocolError(
+                f"a cone is {FARTHEST:g} m long at the most, got a max_range of "
+                f"{reach:g} m with nothing nearer"
+            )
         draw = partial(self._draw, drawn, view / 2)
         self._placed.stand_in(message.frame_id, message.stamp, draw)
         self.cone.classes.toggle("clear", self.distance == math.inf)
