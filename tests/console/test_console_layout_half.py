@@ -1,11 +1,12 @@
 """Who says which view a page of the console begins with."""
 
+import struct
 from pathlib import Path
 
 import pytest
 
 from webmap import Map, Robot
-from webmap.console.frame import Frame
+from webmap.console.frame import MARGIN, Frame
 from webmap.console.layout import Layout
 from webmap.core.page import Page, PageEntry
 from webmap.server.viewer import Viewer
@@ -56,11 +57,11 @@ def test_a_page_that_knows_its_last_view_is_not_shown_another(map, frame, layout
 
 
 def test_the_page_hears_back_behind_what_was_said_of_the_view(map, frame, layout):
+    map.page.channel.frame(0.0)
     frame.place()
-    heard = []
-    layout.half.send = heard.append
     layout.on_message({"own": True})
-    assert heard == [{"own": True}]
+    said = map.page.channel.frame(1.0)
+    assert said.index(struct.pack("<d", -MARGIN)) < said.index(b'{"own":true}')
 
 
 def test_as_it_was_found_the_page_shows_the_robots_again(map, frame, layout):
