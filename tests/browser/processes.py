@@ -75,7 +75,7 @@ class Process:
             self.popen.wait()
             raise
         finally:
-            self.log  # noqa: B018 - what was left in the pipe
+            self.log  # noqa: B018 - keeps what it wrote last
             self.popen.stdout.close()
             self._stderr.close()
         return code

@@ -125,7 +125,7 @@ def build(
 
 
 def place_of(bridges: Sequence["Bridge"]) -> str:
-    """Return what labels of places are kept under: the same robots, the same place."""
+    """Return what labels and views are kept under: the same robots, the same place."""
     urls = "\n".join(sorted(bridge.url for bridge in bridges))
     return f"console-{hashlib.sha256(urls.encode()).hexdigest()[:16]}"
 
