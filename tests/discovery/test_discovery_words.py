@@ -1,9 +1,10 @@
 """What was found, for people and as a file."""
 
+import re
 import tomllib
 from pathlib import Path
 
-from webmap.discovery import discover
+from webmap.discovery import discover, rules
 from webmap.discovery.drawing import drawing
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.layers import RULES, FoundLayer
@@ -70,13 +71,32 @@ def test_of_several_topics_of_a_role_the_report_says_which_is_used():
     assert not any("/cmd_vel" in line and line.endswith("used") for line in lines)
 
 
+PAGE = Path(__file__).parents[2] / "docs/howto/connect-a-robot.md"
+
+
+def rows_of_the_documentation() -> list[str]:
+    return [line for line in PAGE.read_text().splitlines() if line.startswith("|")]
+
+
+def test_every_rule_of_what_a_robot_is_driven_by_is_in_the_documentation():
+    rows = {row.split("|")[1].strip(): row for row in rows_of_the_documentation()}
+    for rule in rules.RULES:
+        for type in rule.types:
+            assert type.partition("/")[2] in rows[rule.role], rule
+        if re.fullmatch(r"[\w/]+", rule.tail):
+            assert f"`{rule.tail}`" in rows[rule.role], rule
+
+
 def test_every_layer_rule_is_in_the_documentation():
-    page = Path(__file__).parents[2] / "docs/howto/connect-a-robot.md"
-    rows = [line for line in page.read_text().splitlines() if line.startswith("|")]
+    rows = rows_of_the_documentation()
     for rule in RULES:
         type = rule.types[0].partition("/")[2]
         module = drawing(FoundLayer(rule.kind, "/a/x", ""), "/a", None).module
-        assert any(f"`{type}`" in row and f"`{module}`" in row for row in rows), rule
+        found = [row for row in rows if f"`{type}`" in row and f"`{module}`" in row]
+        assert found, rule
+        plain = re.fullmatch(r"/([\w/]+)\\Z", rule.name)
+        if plain:
+            assert any(plain[1] in row for row in found), rule
 
 
 def test_the_file_is_toml_with_every_topic_that_is_used():
