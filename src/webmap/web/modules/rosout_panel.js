@@ -83,7 +83,10 @@ class RosoutPanel {
       write: (log) => this._lay(log.open, log.least),
       reset: () => this._lay(false, level),
     });
-    this._choice.addEventListener("change", () => this._filter());
+    this._choice.addEventListener("change", () => {
+      this._filter();
+      this._keep();
+    });
     this._count = html("p", "webmap-rosout-count", { role: "status" });
     this._badge = html("span", "webmap-rosout-badge");
     this._details = html(
@@ -126,6 +129,7 @@ class RosoutPanel {
     if (this._levels.includes(least)) this._choice.value = least;
     this._details.open = unfolded;
     this._filter();
+    this._keep();
   }
 
   _toggled() {
@@ -153,7 +157,6 @@ class RosoutPanel {
       this._count,
       total === 0 ? "Nothing was said yet." : `${lines(shown)} shown of ${lines(total)} heard.`,
     );
-    this._keep();
   }
 
   _age() {
