@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import msgspec
 
 from webmap.core.layer import Layer
+from webmap.core.layer_names import short
 from webmap.core.marker_frames import MarkerFrames
 from webmap.core.marker_shapes import lies_unturned, look_of, place, shape_of
 from webmap.core.refusals import refusing
@@ -150,6 +151,7 @@ class MarkerLayer(Layer):
         self._timer: asyncio.TimerHandle | None = None
         self._said_unturned = False
         self.svg.classes.add("markers")
+        self.svg.set("data-layer", short(topic, "" if robot is None else robot.name))
         self.svg.set(pointer_events="none")
 
     def start(self) -> None:

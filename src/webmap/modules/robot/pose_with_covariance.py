@@ -3,6 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed, sector
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError
@@ -67,6 +68,7 @@ class PoseWithCovariance:
         )
         self._placed = Placed(robot, self.ellipse, self.heading, class_="covariance")
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_pose),

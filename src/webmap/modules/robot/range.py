@@ -5,6 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from webmap.core.from_above import cone
+from webmap.core.layer_names import label
 from webmap.core.placed import Placed, sector
 from webmap.core.refusals import refusing
 from webmap.errors import ProtocolError
@@ -68,6 +69,7 @@ class Range:
             robot, self.cone, class_="range", frame="robot", x=x, y=y, angle=angle
         )
         self.svg = self._placed.svg
+        label(self.svg, topic, robot)
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_range),
