@@ -7,12 +7,12 @@ import json
 import math
 import re
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 from real_browser import watched_tab
 from webmap.cli.demo import simulator
@@ -220,7 +220,26 @@ def test_a_plain_topic_says_that_it_says_nothing_and_is_drawn_once(tab, bridges)
     expect(published).to_be_visible()
 
 
-def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab):
+WORLD = """([x, y]) => {
+  const m = document.querySelector("svg.webmap .world").getScreenCTM().inverse();
+  return [m.a * x + m.c * y + m.e, m.b * x + m.d * y + m.f];
+}"""
+
+
+@contextmanager
+def hearing(bridge: str, topic: str) -> Iterator[ClientConnection]:
+    """Hear what a robot is told on a topic, as the robot does."""
+    with connect(bridge, compression=None) as link:
+        link.send(json.dumps({"op": "subscribe", "topic": topic}))
+        yield link
+
+
+def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab, bridges):
+    with hearing(bridges["ROS1"], "/robot_0/initialpose") as robot:
+        told_and_refused(tab, robot)
+
+
+def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     word = tab.locator(".webmap-locate-word")
     pick(tab, "Old 0")
     tab.keyboard.press("i")
@@ -239,13 +258,25 @@ def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab):
     tab.mouse.up()
     expect(ellipse).to_be_hidden()
 
+    pressed = [(x, y)]
+
     def again():
         if SLOW.search(word.inner_text()):
+            pressed.append(beside(tab, "Old 0", 5))
             tab.keyboard.press("i")
-            press(tab, *beside(tab, "Old 0", 5), drag=30)
+            press(tab, *pressed[-1], drag=30)
 
     taken(tab, again, word)
     expect(word).to_have_text("Told.")
+    told = json.loads(robot.recv(timeout=10))["msg"]
+    at, turn = (told["pose"]["pose"][part] for part in ("position", "orientation"))
+    assert told["header"]["frame_id"] == "map"
+    assert [at["x"], at["y"]] == pytest.approx(
+        tab.evaluate(WORLD, pressed[-1]), abs=0.02
+    )
+    assert 2 * math.atan2(turn["z"], turn["w"]) == pytest.approx(0.0, abs=0.01)
+    sure = told["pose"]["covariance"]
+    assert (sure[0], sure[7], sure[35]) == (0.25, 0.25, 0.068)
     send(tab, "Old 0", "Plain 1")
     expect(label(tab)).to_contain_text("Under way")
     tab.keyboard.press("i")
