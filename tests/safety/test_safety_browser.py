@@ -2,9 +2,10 @@
 
 import os
 import signal
+import time
 
 import pytest
-from safety_bench import pass_time, send_only
+from safety_bench import NEUTRAL, pass_time, send_only
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
@@ -163,3 +164,30 @@ def test_stop_on_the_keyboard_stops_the_robot_and_the_reset_moves_nothing(bench)
         within=0.1,
         back=back,
     )
+
+
+FRENCH = [("z", "KeyW"), ("ArrowUp", "ArrowUp")]
+
+
+@pytest.mark.parametrize(("letter", "place"), FRENCH)
+def test_keys_drive_by_their_place_whatever_letter_is_on_them(bench, letter, place):
+    """As on a French keyboard, which has Z where others have W, and W where Z is."""
+
+    def say(kind, key, code):
+        bench.tab.call("Input.dispatchKeyEvent", type=kind, key=key, code=code)
+
+    begun = time.monotonic()
+    bench.heal()
+    say("keyDown", "w", "KeyZ")
+    pass_time(1.0)
+    say("keyUp", "w", "KeyZ")
+    assert bench.robot.log.moving_since(begun) == [], "the letter alone drives"
+    for _ in range(5):
+        pass_time(NEUTRAL)
+        say("keyDown", letter, place)
+        pass_time(1.5)
+        driven = bench.steady()
+        say("keyUp", letter, place)
+        if driven:
+            break
+    assert driven, bench.tab.evaluate("document.body.innerText")

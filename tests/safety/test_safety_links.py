@@ -15,6 +15,9 @@ PROMISED = 0.3
 
 LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
+GATE_OF_LATENCY = 0.55
+"""The same where a link is not gone but becomes too slow by and by."""
+
 LATE = 6
 """Velocities that a stalled link may have taken (S11)."""
 
@@ -84,6 +87,31 @@ def test_latency_between_browser_and_display_stops_the_robot(bench):
     )
 
 
+SPOILT = {
+    "becomes narrow, 1.5 kB/s": Shape(bandwidth=1500),
+    "comes in slices of 40 bytes": Shape(slice_size=40, slice_gap=0.1),
+    "comes by fits and starts": Shape(latency=0.16, jitter=0.3),
+}
+"""What else networks do to a link; none of them is cut, and nobody can drive by any."""
+
+HOW = [pytest.param(how, marks=[] if "starts" in how else LONG) for how in SPOILT]
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_a_spoilt_link_between_browser_and_display_stops_the_robot(bench, how):
+    def back():
+        bench.linger(1.0)
+        bench.web_hop.shape(Shape())
+
+    # What is late by less than the limit may still count, and then the dead-man does.
+    bench.prove(
+        f"the browser's link {how}",
+        lambda: bench.web_hop.shape(SPOILT[how]),
+        within=GATE_OF_LATENCY,
+        back=back,
+    )
+
+
 @pytest.mark.parametrize("seconds", [0.7, 1.5, 3.0])
 def test_a_stall_between_gate_and_robot_ends_with_few_late_words_and_a_zero(
     bench, seconds
@@ -138,6 +166,24 @@ def test_latency_between_gate_and_robot_stops_the_robot(bench):
         within=0.3 + SLOW.latency + 0.1,
         back=back,
         watch=1.0,
+    )
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_a_spoilt_link_between_gate_and_robot_stops_the_robot(bench, how):
+    def back():
+        bench.linger(1.0)
+        bench.robot_hop.shape(Shape())
+
+    # The doubt comes after 300 ms; what was written before it is still on its way.
+    bench.prove(
+        f"the robot's link {how}",
+        lambda: bench.robot_hop.shape(SPOILT[how]),
+        within=0.3 + 0.5 + 0.1,
+        back=back,
+        few_late=LATE,
+        watch=1.0,
+        new_link=True,
     )
 
 
