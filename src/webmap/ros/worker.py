@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 import msgspec
 
 from webmap.errors import ProtocolError
+from webmap.memory import return_large_pieces
 from webmap.ros.arrays import Numbers
 from webmap.ros.events import Publish
 
@@ -98,6 +99,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if os.name == "posix":
         os.nice(BACKGROUND)
+    return_large_pieces()
     decoder = msgspec.msgpack.Decoder(Request)
     encoder = msgspec.msgpack.Encoder()
     while (body := read(sys.stdin.buffer)) is not None:

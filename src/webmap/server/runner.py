@@ -10,6 +10,7 @@ import uvicorn
 from starlette.types import Receive, Scope, Send
 
 from webmap.errors import WebMapError
+from webmap.memory import return_large_pieces
 from webmap.server.listening import check_exposure, listen, url_of
 from webmap.server.settings import Settings
 
@@ -63,6 +64,7 @@ def serve(
 
     """
     check_exposure(host, insecure_lan=insecure_lan)
+    return_large_pieces()
     listener = listener or listen(host, port)
     url = url_of(listener, host)
     if not app.settings.authenticate:
