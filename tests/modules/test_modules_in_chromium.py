@@ -25,6 +25,22 @@ POINT = """([selector, x, y]) => {
 }"""
 
 
+TOGETHER = """(robot) => {
+  const on = (selector, x, y) => {
+    const m = document.querySelector(selector).getScreenCTM();
+    return [m.a * x + m.c * y + m.e, m.b * x + m.d * y + m.f];
+  };
+  const box = document.querySelector(".pointcloud > .dot").getBoundingClientRect();
+  return {
+    dot: [box.x + box.width / 2, box.y + box.height / 2],
+    ahead: on(robot, 1, 0),
+    corner: on(".polygon > polygon", 0.3, 0.2),
+    left: on(robot, 0.3, 0.2),
+  };
+}"""
+"""What goes along with a robot and where that is, at one time: it moves meanwhile."""
+
+
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
     file = HERE / "scene_of_layers.py"
@@ -96,12 +112,9 @@ def test_a_path_stays_and_a_cloud_and_a_footprint_go_along_with_the_robot(tab):
         for at in [(1, -1), (2, 1)]:
             drawn = on_screen(tab, *at, of=".path > polyline")
             assert drawn == pytest.approx(on_screen(tab, *at), abs=0.5)
-        dot = tab.locator(".pointcloud > .dot").bounding_box()
-        x, y = on_screen(tab, 1, 0, robot)
-        assert abs(dot["x"] + dot["width"] / 2 - x) < 2
-        assert abs(dot["y"] + dot["height"] / 2 - y) < 2
-        corner = on_screen(tab, 0.3, 0.2, ".polygon > polygon")
-        assert corner == pytest.approx(on_screen(tab, 0.3, 0.2, robot), abs=0.5)
+        found = tab.evaluate(TOGETHER, robot)
+        assert found["dot"] == pytest.approx(found["ahead"], abs=2)
+        assert found["corner"] == pytest.approx(found["left"], abs=0.5)
         tab.wait_for_function(
             "([selector, before]) => {"
             " const m = document.querySelector(selector).getScreenCTM();"
