@@ -138,6 +138,27 @@ describe("a STOP", () => {
     const [verdict] = session.verdicts(810);
     assert.deepEqual([verdict.robot, verdict.state], ["r1", "stopping"]);
   });
+
+  test("for all, said before any robot was known, is answered by a stopped robot only", () => {
+    const again = (/** @type {object[]} */ ...said) => {
+      session = new Session(0, {});
+      session.receive(HELLO, 0);
+      session.stopped("*", true, 10);
+      for (const message of said) session.receive(message, 20);
+      session.lost(30);
+      return session.receive({ ...HELLO, connection: "c2" }, 40).say;
+    };
+    const stop = [{ op: "stop", robot: "*" }];
+    const latched = { ...REPORT, state: "stopped", latched: true };
+    assert.deepEqual(again(), stop);
+    assert.deepEqual(again(REPORT), stop, "it may have been told before the STOP came");
+    assert.deepEqual(again(REPORT, { ...latched, robot: "r2" }), stop, "r1 moves yet");
+    assert.deepEqual(again({ op: "gone", robot: "r9" }), stop, "of none that is known");
+    assert.deepEqual(again(latched), []);
+    assert.deepEqual(again(REPORT, latched), []);
+    assert.deepEqual(again(REPORT, { op: "gone", robot: "r1" }), []);
+    assert.deepEqual(again(latched, REPORT), [], "it was reset since");
+  });
 });
 
 describe("what the gate says", () => {

@@ -17,6 +17,8 @@ export class Unanswered {
      * @type {Map<string, Set<string>>}
      */
     this._said = new Map();
+    /** Whether the STOP for all met no robot known, and none stopped was reported since. */
+    this._metNone = false;
   }
 
   /**
@@ -28,8 +30,10 @@ export class Unanswered {
   said(robot, known) {
     const meant = robot === "*" ? [...known.keys()] : [robot];
     const standing = [...known.values()].filter(isLatched).map((each) => each.robot);
-    this._said.set(robot, new Set(meant.filter((id) => !standing.includes(id))));
-    this._forgetAnswered(known.size > 0);
+    const waiting = new Set(meant.filter((id) => !standing.includes(id)));
+    if (robot === "*") this._metNone = known.size === 0;
+    if (waiting.size > 0 || known.size === 0) this._said.set(robot, waiting);
+    else this._said.delete(robot);
   }
 
   /**
@@ -38,8 +42,14 @@ export class Unanswered {
    * @param {RobotReport} report
    */
   report(report) {
-    if (isLatched(report)) this.gone(report.robot);
-    else this._forgetAnswered(true);
+    if (!isLatched(report)) {
+      // It may have been told before the STOP arrived, which may never arrive: no answer.
+      if (this._metNone) this._said.get("*")?.add(report.robot);
+      return;
+    }
+    this.gone(report.robot);
+    if (this._metNone && this._said.get("*")?.size === 0) this._said.delete("*");
+    this._metNone = false;
   }
 
   /**
@@ -48,8 +58,9 @@ export class Unanswered {
    * @param {string} robot
    */
   gone(robot) {
-    for (const waiting of this._said.values()) waiting.delete(robot);
-    this._forgetAnswered(true);
+    for (const [said, waiting] of this._said) {
+      if (waiting.delete(robot) && waiting.size === 0) this._said.delete(said);
+    }
   }
 
   /**
@@ -60,14 +71,7 @@ export class Unanswered {
   take() {
     const again = [...this._said.keys()];
     this._said.clear();
+    this._metNone = false;
     return again;
-  }
-
-  /** @param {boolean} robotsKnown A STOP for all that met none known is not answered. */
-  _forgetAnswered(robotsKnown) {
-    if (!robotsKnown) return;
-    for (const [robot, waiting] of this._said) {
-      if (waiting.size === 0) this._said.delete(robot);
-    }
   }
 }
