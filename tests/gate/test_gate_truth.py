@@ -33,7 +33,9 @@ class TestAlarm:
         assert bench.report().alarm is None
         self.run(bench, 0.2, 0.31, x=0.0)
         assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
-        self.run(bench, 0.1, 0.01, x=0.0)
+        self.run(bench, 0.2, 0.05, x=0.0)
+        assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
+        self.run(bench, 0.25, 0.05, x=0.0)
         assert bench.report().alarm is None
 
     def test_a_robot_that_spins_on_is_said_as_well(self, bench):
@@ -41,14 +43,14 @@ class TestAlarm:
         assert bench.report().alarm is None
         self.run(bench, 0.2, 0.0, x=0.0, turn=-0.8)
         assert bench.report().alarm == "zero sent, still turning at 0.80 rad/s"
-        self.run(bench, 0.1, 0.0, x=0.0, turn=-0.1)
+        self.run(bench, 0.45, 0.0, x=0.0, turn=-0.1)
         assert bench.report().alarm is None
 
     def test_also_when_its_driver_has_gone(self, bench):
         bench.say("a", op="release", robot="r1")
         self.run(bench, 1.1, 0.31)
         assert bench.report().alarm
-        self.run(bench, 0.2, 0.0)
+        self.run(bench, 0.5, 0.0)
         assert bench.report().alarm is None
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
 
@@ -58,7 +60,7 @@ class TestAlarm:
         assert bench.report().alarm
 
     def test_a_robot_that_stood_and_is_moved_by_others_is_no_alarm(self, bench):
-        self.run(bench, 0.3, 0.0, x=0.0)
+        self.run(bench, 0.45, 0.0, x=0.0)
         self.run(bench, 3.0, 0.4, x=0.0)
         assert bench.report().alarm is None
 
@@ -95,6 +97,39 @@ class TestAlarm:
         obedience.saw(Twist(0.2), 0.9)
         assert obedience.alarm(0.95) is None
         assert obedience.alarm(1.0) == "zero sent, still moving at 0.20 m/s"
+
+    def test_one_message_that_says_it_stands_in_every_six_excuses_nobody(self):
+        obedience = Obedience()
+        obedience.wrote(ZERO, Twist(0.5), 0.0)
+        for n in range(1, 200):
+            now = n * 0.02
+            obedience.saw(ZERO if n % 6 == 0 else Twist(0.5), now)
+            expected = "zero sent, still moving at 0.50 m/s" if now >= 1.0 else None
+            assert obedience.alarm(now) == expected, now
+
+    def test_it_ends_when_the_robot_has_stood_for_a_while(self):
+        obedience = Obedience()
+        obedience.wrote(ZERO, Twist(0.5), 0.0)
+        obedience.saw(Twist(0.5), 0.9)
+        obedience.saw(Twist(0.0, 0.0, 0.4), 1.4)
+        assert obedience.alarm(1.4) == "zero sent, still turning at 0.40 rad/s"
+        obedience.saw(Twist(0.04), 1.5)
+        assert obedience.alarm(1.6) == "zero sent, still turning at 0.40 rad/s"
+        obedience.saw(Twist(0.04), 1.85)
+        assert obedience.alarm(1.85) is None
+        obedience.saw(Twist(0.5), 1.9)
+        assert obedience.alarm(2.0) is None, "it is somebody else's business"
+
+    def test_one_that_braked_in_time_raises_none_while_it_is_looked_at(self):
+        obedience = Obedience()
+        obedience.wrote(ZERO, Twist(0.5), 0.0)
+        obedience.saw(Twist(0.3), 0.9)
+        obedience.saw(ZERO, 0.98)
+        assert obedience.alarm(1.1) is None
+        obedience.saw(ZERO, 1.1)
+        assert obedience.alarm(1.1) is None
+        obedience.saw(Twist(0.3), 1.2)
+        assert obedience.alarm(1.2) == "zero sent, still moving at 0.30 m/s"
 
 
 class TestLoopAge:

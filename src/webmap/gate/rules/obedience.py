@@ -1,6 +1,8 @@
 """Whether a machine does what it is told when it is told zero (S19). No I/O."""
 
-from webmap.gate.rules.standstill import speed_of
+import math
+
+from webmap.gate.rules.standstill import Standstill, speed_of
 from webmap.geometry import Twist
 
 GRACE = 1.0
@@ -14,15 +16,18 @@ TURNS = 0.1
 
 
 class Obedience:
-    """Watches a machine from the zero that stops it until it was seen to slow down.
+    """Watches a machine from the zero that stops it until it has stood for a while.
 
-    Once it has, what moves it afterwards is somebody else's business.
+    Once it has, what moves it afterwards is somebody else's business. One message that
+    says it stands proves nothing: coarse encoders send those while it goes on.
     """
 
     def __init__(self) -> None:
         self._zero_at: float | None = None
-        self._seen: Twist | None = None
-        self._seen_at = float("-inf")
+        # Only above these it moves on, and a standstill ends at its own.
+        self._calm = Standstill(math.nextafter(MOVES, 1), math.nextafter(TURNS, 1))
+        self._moving: Twist | None = None
+        self._moving_at = self._seen_at = float("-inf")
 
     def wrote(self, twist: Twist, last: Twist, now: float) -> None:
         """Note that ``twist`` went out after ``last``."""
@@ -34,22 +39,28 @@ class Obedience:
     def expect(self, now: float) -> None:
         """Expect standstill from here on, unless that is expected already."""
         if self._zero_at is None:
-            self._zero_at, self._seen = now, None
+            self._zero_at, self._moving = now, None
+            self._calm.begin()
 
     def excuse(self) -> None:
         """Note that it may move: somebody drives it, or it has a goal."""
-        self._zero_at = self._seen = None
+        self._zero_at = self._moving = None
 
     def saw(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
         if twist is None:
             return
-        if not self.watching(now):
+        if self._zero_at is None or not self.watching(now):
             self.excuse()  # nobody looked for a while: it may be driven by others
             return
-        self._seen, self._seen_at = twist, now
-        if speed_of(twist) <= MOVES and abs(twist.wz) <= TURNS:
+        self._seen_at = now
+        self._calm.saw(twist, now)
+        if self._calm.reached:
             self.excuse()
+        elif self._calm.since is None:
+            self._moving, self._moving_at = twist, now
+        elif self._moving_at < self._zero_at + GRACE:
+            self._moving = None  # it braked in time, unless it moves again
 
     def watching(self, now: float) -> bool:
         """Return whether odometry could still tell something."""
@@ -59,11 +70,11 @@ class Obedience:
 
     def alarm(self, now: float) -> str | None:
         """Return what is wrong at ``now``, in words."""
-        if self._zero_at is None or self._seen is None:
+        if self._zero_at is None or self._moving is None:
             return None
         if now - self._zero_at < GRACE or not self.watching(now):
             return None
-        speed = speed_of(self._seen)
+        speed = speed_of(self._moving)
         if speed > MOVES:
             return f"zero sent, still moving at {speed:.2f} m/s"
-        return f"zero sent, still turning at {abs(self._seen.wz):.2f} rad/s"
+        return f"zero sent, still turning at {abs(self._moving.wz):.2f} rad/s"

@@ -22,15 +22,29 @@ def speed_of(twist: Twist) -> float:
     return math.hypot(twist.vx, twist.vy)
 
 
-def moves(twist: Twist) -> bool:
-    """Return whether a machine of that velocity does not stand."""
-    return speed_of(twist) >= STILL_V or abs(twist.wz) >= STILL_W
+def moves(twist: Twist, still_v: float = STILL_V, still_w: float = STILL_W) -> bool:
+    """Return whether a machine of that velocity does not stand.
+
+    Args:
+        twist: What its odometry tells.
+        still_v: Metres per second from which on it moves.
+        still_w: Radians per second from which on it turns.
+
+    """
+    return speed_of(twist) >= still_v or abs(twist.wz) >= still_w
 
 
 class Standstill:
-    """Listens to odometry from a moment on, until the machine has stood for long."""
+    """Listens to odometry from a moment on, until the machine has stood for long.
 
-    def __init__(self) -> None:
+    Args:
+        still_v: Metres per second from which on it moves.
+        still_w: Radians per second from which on it turns.
+
+    """
+
+    def __init__(self, still_v: float = STILL_V, still_w: float = STILL_W) -> None:
+        self._still_v, self._still_w = still_v, still_w
         self.speed: float | None = None
         """The newest speed in m/s; ``None`` before the first."""
         self.turn = 0.0
@@ -51,7 +65,7 @@ class Standstill:
         if now - self.heard_at > GAP:
             self.since = None
         self.speed, self.turn, self.heard_at = speed_of(twist), abs(twist.wz), now
-        if moves(twist):
+        if moves(twist, self._still_v, self._still_w):
             self.since = None
         elif self.since is None:
             self.since = now
