@@ -13,6 +13,7 @@ from webmap.gate.events import Key
 from webmap.gate.kept.disk import Disk
 from webmap.gate.kept.locks import Locks
 from webmap.gate.kept.records import UNKNOWN, Records, path_of
+from webmap.gate.lanes.control import ControlLane
 from webmap.gate.shell import Shell
 
 
@@ -178,6 +179,38 @@ async def test_a_gate_that_fails_sends_zero_and_ends(
         await until(lambda: not bridge.links, "the end of the links")
         assert 0.0 in speeds(bridge)[moves:]
         gate._hand.cancel()
+
+
+@in_loop
+async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
+    tmp_path, monkeypatch, caplog
+):
+    """The first machine's link is broken; the second and the end do not wait for it."""
+    write, broken = ControlLane.write, []
+
+    def break_on_the_first(lane, topic, twist):
+        if topic == "/cmd_vel":
+            broken.append(topic)
+            raise BufferError("a slip of the link's own")
+        return write(lane, topic, twist)
+
+    async with driving(tmp_path) as (bridge, gate):
+        gate.x = None
+        gate.shell.tell(robot(bridge, id="r2", twist_topic="/second"))
+        await gate.reported(lambda r: r.robot == "r2" and r.armable, "the second")
+        gate.say(op="take", robot="r2")
+        await until(lambda: len(gate.shell._watched) == 2, "both that are watched")
+        assert next(iter(gate.shell._links._watched)).topic == "/cmd_vel"
+        before = len(bridge.of("publish", "/second"))
+        monkeypatch.setattr(ControlLane, "write", break_on_the_first)
+        monkeypatch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
+        gate.shell.tell(messages.Heartbeat())
+        async with asyncio.timeout(5):
+            await gate.work
+        assert broken
+        assert "a link takes no zero" in caplog.text
+        zeros = await until(lambda: bridge.of("publish", "/second")[before:], "zero")
+        assert zeros[0].message["msg"]["linear"]["x"] == 0.0
 
 
 @in_loop

@@ -16,6 +16,7 @@ from webmap.gate.kept.locks import Locks
 from webmap.gate.lanes.links import Links
 from webmap.gate.outbox import Outbox
 from webmap.gate.rules.gate import Gate
+from webmap.gate.rules.motion import ZERO
 
 log = logging.getLogger("webmap.gate")
 
@@ -57,6 +58,8 @@ class Shell:
         self._ending = asyncio.Event()
         self._silent = asyncio.Event()
         self._waiting_for_lock: dict[events.Key, asyncio.TimerHandle] = {}
+        self._watched: set[events.Key] = set()
+        """The machines that may be driven."""
 
     def tell(self, event: messages.ToGate | events.Event) -> None:
         """Bring an event; called from within an action, it waits its turn.
@@ -92,7 +95,7 @@ class Shell:
         stepping.cancel()
         looking.cancel()
         if self.failed:
-            self._links.zero_all()  # again: the first may have met a broken link
+            self._zero_all()  # again: the first may have met a broken link
         self._links.close()
         await asyncio.sleep(0)  # the loop's chance to write what it still holds
 
@@ -138,6 +141,9 @@ class Shell:
                 self._locks.mark(key, driven)
             case actions.KeepLatch() | actions.KeepStopTest():
                 self._disk.keep(action, self.tell)
+            case actions.Watch(key, on):
+                self._watched = self._watched | {key} if on else self._watched - {key}
+                return self._links.perform(action)
             case _:
                 return self._links.perform(action)
         return None
@@ -156,6 +162,18 @@ class Shell:
         """An error of our own: stop everything and let the display start anew."""
         log.exception("the gate has failed; every driven robot is stopped")
         self.failed = True
-        self._links.zero_all()
-        self._ending.set()
-        self._silent.set()
+        try:
+            self._zero_all()
+        finally:
+            self._ending.set()
+            self._silent.set()
+
+    def _zero_all(self) -> None:
+        """Write zero to whatever may be driven, also if one of the links is broken."""
+        try:
+            self._links.zero_all()
+        except Exception:
+            log.exception("a link takes no zero; the others get theirs one by one")
+            for key in self._watched:
+                with contextlib.suppress(Exception):
+                    self._links.perform(actions.WriteTwist(key, ZERO, None, None))
