@@ -66,7 +66,15 @@ def test_every_command_is_understood(fields, command):
 
 def test_released_inputs_are_neutral_also_as_negative_zeros():
     assert parse(text(DRIVE, x=-0.0, turn=0)).neutral
-    assert not parse(text(DRIVE, x=5e-324, turn=0)).neutral
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "turn"])
+def test_an_axis_that_no_base_would_move_by_is_released(axis):
+    released = {"x": 0, "y": 0, "turn": 0}
+    for least in (5e-324, -5e-324, 0.0009, -0.0009):
+        assert parse(text(DRIVE, **{**released, axis: least})).neutral
+    for moves in (0.001, -0.001, 1.0):
+        assert not parse(text(DRIVE, **{**released, axis: moves})).neutral
 
 
 def test_axes_beyond_full_are_clamped_and_flagged():

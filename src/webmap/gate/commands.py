@@ -21,9 +21,10 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
 ``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
 when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
 left and ``turn`` counter-clockwise, as parts of the speed in force, each in
-``[-1, 1]``; what lies beyond is clamped. ``epoch`` is the lease's, ``tick`` the newest
-one that came, and ``seq`` grows with every ``drive``, ``goal`` and ``locate`` of the
-connection. ``goal`` is a pose in the robot's goal frame, in metres and radians, that it
+``[-1, 1]``; what lies beyond is clamped, and all below 0.001 are released inputs.
+``epoch`` is the lease's, ``tick`` the newest one that came, and ``seq`` grows with every
+``drive``, ``goal`` and ``locate`` of the connection.
+``goal`` is a pose in the robot's goal frame, in metres and radians, that it
 is to drive to, and ``locate`` one that it is at. ``reset`` ends a
 STOP that stands; it moves nothing and gives no lease. ``ask`` asks the holder of the
 lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
@@ -60,6 +61,12 @@ MAX_NAME = 64
 """The longest name of a robot, in characters."""
 
 
+RELEASED = 1e-3
+"""The part of full speed below which an axis asks for no motion: a millimetre per
+second of each metre per second is less than any base does, and no input that is held.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Take:
     """The page asks for the lease of a robot."""
@@ -93,7 +100,7 @@ class Drive:
     @property
     def neutral(self) -> bool:
         """Whether every input is released."""
-        return self.x == 0 and self.y == 0 and self.turn == 0
+        return all(abs(axis) < RELEASED for axis in (self.x, self.y, self.turn))
 
 
 @dataclass(frozen=True, slots=True)
