@@ -22,10 +22,10 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
 when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
 left and ``turn`` counter-clockwise, as parts of the speed in force, each in
 ``[-1, 1]``; what lies beyond is clamped, and all below 0.001 are released inputs.
-``epoch`` is the lease's, ``tick`` the newest one that came, and ``seq`` grows with every
-``drive``, ``goal`` and ``locate`` of the connection.
-``goal`` is a pose in the robot's goal frame, in metres and radians, that it
-is to drive to, and ``locate`` one that it is at. ``reset`` ends a
+``epoch`` is the lease's, ``tick`` the newest one that came, and ``seq`` grows with
+every ``drive``, ``goal`` and ``locate`` of the connection. ``goal`` is a pose in the
+robot's goal frame, in metres and radians, that it is to drive to, and ``locate`` one
+that it is at. ``reset`` ends a
 STOP that stands; it moves nothing and gives no lease. ``ask`` asks the holder of the
 lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
 10 s; ``release`` also takes the question back. ``stop-test`` creeps, stops sending and
