@@ -37,6 +37,20 @@ def test_a_machine_belongs_to_who_came_first(locks, folder):
     second.release(KEY)
 
 
+def test_a_machine_of_this_computer_is_had_once_however_that_is_spelled(locks):
+    one, two = (Key(f"ws://{h}:9090", "/cmd_vel") for h in ("127.0.0.1", "[::1]"))
+    locks.acquire(KEY)
+    assert locks.acquire(one).held
+    other = locks.acquire(two)
+    assert (other.held, other.elsewhere) == (False, True)
+    assert other.why == "it is driven as /cmd_vel of ws://127.0.0.1:9090 here"
+    locks.release(two)
+    assert not locks.acquire(two).held, "who does not have it lets nothing go"
+    locks.release(one)
+    assert locks.acquire(two).held
+    locks.release(two)
+
+
 def test_what_is_let_go_twice_or_never_was_had_is_no_matter(locks):
     locks.release(KEY)
     locks.mark(KEY, driven=True)

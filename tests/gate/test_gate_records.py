@@ -1,5 +1,6 @@
 """The files that outlive the gate: whatever befalls them, nothing moves by it."""
 
+import hashlib
 import os
 
 import pytest
@@ -9,6 +10,9 @@ from webmap.gate.kept.records import UNKNOWN, Records, path_of
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 OTHER = Key("ws://robot:9090", "/other")
+HERE = [
+    Key(f"ws://{host}:9090", "/cmd_vel") for host in ("localhost", "127.0.0.1", "[::1]")
+]
 
 
 @pytest.fixture
@@ -30,6 +34,30 @@ class TestLatch:
         assert records.keep_latch(KEY, None) is None
         assert Records(folder).latch_of(KEY) is None
         assert records.keep_latch(KEY, None) is None
+
+    @pytest.mark.parametrize("said", HERE)
+    @pytest.mark.parametrize("asked", HERE)
+    def test_of_this_computer_is_one_however_that_is_spelled(
+        self, records, said, asked
+    ):
+        records.keep_latch(said, "Ann")
+        assert records.latch_of(asked) == "Ann"
+        assert records.stamp_of(asked) == records.stamp_of(said) is not None
+        records.keep_latch(asked, None)
+        assert records.latch_of(said) is None
+
+    @pytest.mark.parametrize("old", HERE)
+    def test_that_was_kept_under_one_spelling_is_found_and_taken_away(
+        self, records, folder, old
+    ):
+        name = hashlib.sha256("\n".join(old).encode()).hexdigest()[:24]
+        folder.mkdir(parents=True)
+        (folder / f"{name}.stop").write_text('{"by": "Ann"}')
+        assert [records.latch_of(key) for key in HERE] == ["Ann"] * 3
+        assert records.stamp_of(HERE[0]) is not None
+        records.keep_latch(HERE[1], None)
+        assert [records.latch_of(key) for key in HERE] == [None] * 3
+        assert list(folder.iterdir()) == []
 
     def test_is_flushed_with_its_folder_before_it_counts(
         self, records, folder, monkeypatch

@@ -339,6 +339,25 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
 
 
 @in_loop
+async def test_a_robot_is_one_however_this_computer_is_spelled(tmp_path):
+    async with driving(tmp_path) as (bridge, gate):
+        url = bridge.url.replace("127.0.0.1", "localhost")
+        assert url != bridge.url
+        gate.shell.tell(spec(id="r2", bridge_url=url))
+        await gate.reported(
+            lambda r: r.robot == "r2" and r.reason, "why it is not to be had"
+        )
+        second = gate.report()
+        gate.x = None
+        gate.say(op="stop", robot="r2")
+        await gate.reported(
+            lambda r: r.robot == "r1" and r.latched and r.stop.by == "Ann", "its STOP"
+        )
+        assert not second.armable
+        assert second.reason == f"it is driven as /cmd_vel of {bridge.url} here"
+
+
+@in_loop
 async def test_a_gate_that_has_failed_decides_nothing_more(tmp_path):
     failed = Running(tmp_path).shell
     failed.failed = True

@@ -103,3 +103,22 @@ def test_any_text_is_a_name_or_refused(text):
 def test_an_address_without_its_scheme_is_told_what_it_may_have_meant(bare):
     with pytest.raises(ConfigError, match=re.escape(f"did you mean 'ws://{bare}'?")):
         names.normalise_url(bare)
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "[::1]"])
+@pytest.mark.parametrize("rest", ["", ":9090", ":9090/ros?a=1"])
+def test_this_computer_has_three_spellings_and_the_first_is_the_same_for_all(
+    host, rest
+):
+    assert names.spellings_of(f"ws://{host}{rest}") == [
+        f"ws://localhost{rest}",
+        f"ws://127.0.0.1{rest}",
+        f"ws://[::1]{rest}",
+    ]
+
+
+@pytest.mark.parametrize(
+    "url", ["ws://robot:9090", "wss://10.0.0.7", "ws://[fe80::1]:9"]
+)
+def test_another_computer_has_one_spelling(url):
+    assert names.spellings_of(url) == [url]

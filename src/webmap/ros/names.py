@@ -15,6 +15,7 @@ _TYPE = re.compile(
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
 _DEFAULT_PORT = {"ws": 80, "wss": 443}
 _MAX_NAME = 255
+_THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
 
 
 class TypeName(NamedTuple):
@@ -137,3 +138,18 @@ def normalise_url(url: str) -> str:
         place = f"{place}:{port}"
     path = parts.path.rstrip("/")
     return urlunsplit((parts.scheme, place, path, parts.query, ""))
+
+
+def spellings_of(url: str) -> list[str]:
+    """Return a normalised address in each spelling of this computer, the first first.
+
+    One that leads to another computer has no other spelling than its own.
+    """
+    parts = urlsplit(url)
+    host, port = parts.netloc, ""
+    if parts.port is not None:
+        host, _, port = host.rpartition(":")
+        port = f":{port}"
+    if host not in _THIS_COMPUTER:
+        return [url]
+    return [urlunsplit(parts._replace(netloc=h + port)) for h in _THIS_COMPUTER]

@@ -55,7 +55,7 @@ class Locks:
             return LockState(key, held=False, why=why)
         if not _try_lock(file):
             os.close(file)
-            why = "another WebMap on this computer has it"
+            why = self._why_not(key)
             return LockState(key, held=False, why=why, elsewhere=True)
         self._held[key] = file
         return LockState(key, held=True, driven=_was_driven(file, key))
@@ -76,6 +76,13 @@ class Locks:
             os.write(file, _DRIVEN if driven else _RESTS)
         except OSError as error:  # a full disk never stands in the way of a stop
             log.warning("%s: %s", self._path(key), error.strerror)
+
+    def _why_not(self, key: Key) -> str:
+        path = self._path(key)
+        for other in self._held:
+            if self._path(other) == path:
+                return f"it is driven as {other.topic} of {other.url} here"
+        return "another WebMap on this computer has it"
 
     def _path(self, key: Key) -> Path:
         return path_of(self._folder, key, "lock")

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from webmap.gate.events import Key, StopRecord
+from webmap.ros.names import spellings_of
 
 log = logging.getLogger("webmap.gate")
 
@@ -25,9 +26,24 @@ MAX_NAME = 80
 
 
 def path_of(folder: Path, key: Key, kind: str) -> Path:
-    """Return the file of one machine for one kind of thing."""
-    name = hashlib.sha256("\n".join(key).encode()).hexdigest()[:24]
-    return folder / f"{name}.{kind}"
+    """Return the file of one machine for one kind of thing.
+
+    However this computer is spelled, it is the same: nobody has a machine twice.
+    """
+    return _paths_of(folder, key, kind)[0]
+
+
+def _paths_of(folder: Path, key: Key, kind: str) -> list[Path]:
+    """Return the file, and where it was when each spelling had its own."""
+    keys = [key._replace(url=url) for url in spellings_of(key.url)]
+    names = [hashlib.sha256("\n".join(k).encode()).hexdigest()[:24] for k in keys]
+    return [folder / f"{name}.{kind}" for name in names]
+
+
+def _found(folder: Path, key: Key, kind: str) -> Path:
+    """Return the file that there is, or else where it would be."""
+    paths = _paths_of(folder, key, kind)
+    return next(filter(os.path.lexists, paths), paths[0])
 
 
 class Records:
@@ -43,7 +59,7 @@ class Records:
 
     def latch_of(self, key: Key) -> str | None:
         """Return who said the STOP that stands for a machine, if one does."""
-        path = path_of(self._folder, key, "stop")
+        path = _found(self._folder, key, "stop")
         try:
             by = json.loads(path.read_text("utf-8"))["by"]
         except FileNotFoundError:
@@ -57,7 +73,7 @@ class Records:
     def stamp_of(self, key: Key) -> tuple[int, int] | None:
         """Return what changes with the file of a STOP; ``None`` if there is none."""
         try:
-            found = path_of(self._folder, key, "stop").stat()
+            found = _found(self._folder, key, "stop").stat()
         except OSError:
             return None
         return found.st_mtime_ns, found.st_ino
@@ -70,7 +86,8 @@ class Records:
         path = path_of(self._folder, key, "stop")
         try:
             if by is None:
-                path.unlink(missing_ok=True)
+                for each in _paths_of(self._folder, key, "stop"):
+                    each.unlink(missing_ok=True)
                 _flush_folder(self._folder)
             else:
                 self._write(path, {"by": by, "bridge": key.url, "topic": key.topic})
@@ -81,7 +98,7 @@ class Records:
 
     def stop_test_of(self, key: Key) -> StopRecord | None:
         """Return what the last stop test of a machine found, if there was one."""
-        path = path_of(self._folder, key, "test")
+        path = _found(self._folder, key, "test")
         try:
             found = json.loads(path.read_text("utf-8"))
             seconds, date = found["seconds"], found["date"]
