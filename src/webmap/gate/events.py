@@ -19,6 +19,21 @@ class Key(NamedTuple):
     topic: str
 
 
+class Fold(msgspec.Struct, frozen=True):
+    """What a scan that was folded to fewer beams was before."""
+
+    each: int
+    """How many beams lie from one beam of the fold to the next."""
+    beams: int
+    """How many there were."""
+    behind: Sequence[Sequence[float]]
+    """For each beam of the fold the next things behind its nearest hit, in metres."""
+    said: Sequence[int]
+    """For each beam of the fold, how many of those folded into it say anything."""
+    asked: Sequence[int]
+    """For each beam of the fold, how many were folded into it."""
+
+
 class Sweep(msgspec.Struct, frozen=True):
     """The newest scan."""
 
@@ -30,6 +45,10 @@ class Sweep(msgspec.Struct, frozen=True):
     """In metres: inf is nothing there, -inf too near, NaN unknown (REP 117)."""
     arrived: float
     """When it came, on the gate's clock."""
+    fold: Fold | None = None
+    """What it was before it was folded, if it was."""
+    refused: str | None = None
+    """Why nobody looked at it, in words, if nobody did."""
 
 
 @dataclass(frozen=True, slots=True)

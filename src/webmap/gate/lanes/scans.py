@@ -2,10 +2,13 @@
 
 Over JSON a bridge writes ``null`` for "nothing there" and for "broken" alike, so scans
 are asked for in CBOR, and one that comes in JSON is no scan here: the robot is blind.
+One of many beams is folded to at most 720 here, once; one of far too many is refused
+before its numbers are read, and the socket takes no frame of more than a mebibyte.
 """
 
 from webmap.errors import ProtocolError
 from webmap.gate.events import Sweep
+from webmap.gate.rules.folding import folded, too_long
 from webmap.ros import ops
 
 THROTTLE = 100
@@ -29,7 +32,10 @@ def subscribe(topic: str, id: str) -> bytes:
 
 
 def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
-    """Return the topic and the scan of a frame; None if it is anything else."""
+    """Return the topic and the scan of a frame; None if it is anything else.
+
+    A scan of more than 720 beams comes folded; what is ``refused`` has no ranges.
+    """
     from webmap.ros import cbor
 
     if not cbor.looks_like_cbor(frame):
@@ -44,12 +50,14 @@ def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
     if not isinstance(message, dict):
         return None
     numbers = [message.get(field) for field in _FIELDS]
-    ranges = message.get("ranges")
+    ranges = message.get("ranges") or ()
     if not all(isinstance(number, float | int) for number in numbers):
         return None
     try:
-        values = [float(reach) for reach in ranges or ()]
-    except (TypeError, ValueError):
+        refused = too_long(len(ranges))
+        values = [] if refused else [float(reach) for reach in ranges]
+        about = [float(number) for number in numbers if number is not None]
+    except (TypeError, ValueError, OverflowError):
         return None
-    least, step, near, far = (float(number) for number in numbers if number is not None)
-    return topic, Sweep(least, step, near, far, values, now)
+    least, step, near, far = about
+    return topic, folded(Sweep(least, step, near, far, values, now, refused=refused))

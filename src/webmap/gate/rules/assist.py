@@ -7,6 +7,10 @@ The footprint is swept along the commanded motion, a straight line or an arc, un
 meets the first point of the scan. In the robot's own frame it is the points that move,
 each on a circle about the centre of the turn, so that where they meet the edges of the
 footprint is exact.
+
+All of it runs with every command, and all robots of the gate wait for it. So a scan has
+few beams when it comes here (see :mod:`webmap.gate.rules.folding`), and a point too far
+away to matter is passed over before anything is reckoned of it.
 """
 
 import math
@@ -16,7 +20,9 @@ import msgspec
 
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec, Point
+from webmap.gate.rules import folding
 from webmap.gate.rules.sweptway import Fan, looks_ahead
+from webmap.gate.rules.touching import time_straight, time_turning
 from webmap.geometry import Twist
 
 FRESH = 0.3
@@ -31,7 +37,7 @@ REACTION = 0.2
 _SECTOR = math.radians(60)
 _STRAIGHT = 1e-4
 _ON_THE_SPOT = 1e-6
-_TOUCHING = 1e-9
+_ROUNDING = 1e-9
 
 
 class Verdict(msgspec.Struct, frozen=True):
@@ -64,7 +70,8 @@ def assist(spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float) -> 
     if reason := _blindness(spec, sweep, wanted, now):
         return _blind(spec, speed, reason)
     assert sweep is not None
-    gap = free_way(spec.footprint, points_of(spec, sweep), wanted) * speed
+    points = points_of(spec, sweep, _horizon(spec, speed))
+    gap = free_way(spec.footprint, points, wanted) * speed
     room = gap - spec.stop_distance - REACTION * speed
     allowed = math.sqrt(2 * spec.brake * room) if room > 0 else 0.0
     if allowed >= speed:
@@ -72,21 +79,41 @@ def assist(spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float) -> 
     return Verdict(allowed / speed, f"scan assist: something {gap:.1f} m ahead")
 
 
-def points_of(spec: AssistSpec, sweep: Sweep) -> list[Point]:
-    """Return what the scan hit, in the robot's frame; hits of its own body left out."""
-    x0, y0, yaw0 = spec.sensor
+def points_of(spec: AssistSpec, sweep: Sweep, within: float = math.inf) -> list[Point]:
+    """Return what the scan hit, in the robot's frame; hits of its own body left out.
+
+    Args:
+        spec: The robot and its scanner.
+        sweep: The scan; of a fold there is one point for a beam at most.
+        within: How far from the robot's origin a point counts, in metres.
+
+    """
+    far = within + math.hypot(spec.sensor[0], spec.sensor[1])
     points = []
     for ray, reach in enumerate(sweep.ranges):
-        if reach == -math.inf:
-            reach = max(sweep.range_min, 0.0)
-        elif not (sweep.range_min <= reach < math.inf):
-            # What is beyond the stated reach counts: that may be wrong, or not stated.
+        if reach > far:
             continue
-        bearing = yaw0 + sweep.angle_min + ray * sweep.angle_increment
-        point = (x0 + reach * math.cos(bearing), y0 + reach * math.sin(bearing))
-        if not inside(spec.footprint, point):
+        point = _point(spec, sweep, ray, reach)
+        if point is None and sweep.fold is not None:
+            # The nearest may be the robot's own body: what is behind it?
+            behind = (_point(spec, sweep, ray, r) for r in sweep.fold.behind[ray])
+            point = next((there for there in behind if there is not None), None)
+        if point is not None and math.hypot(*point) <= within:
             points.append(point)
     return points
+
+
+def _point(spec: AssistSpec, sweep: Sweep, ray: int, reach: float) -> Point | None:
+    """Return what a ray hit; None if it is nothing, or the robot's own body."""
+    if reach == -math.inf:
+        reach = max(sweep.range_min, 0.0)
+    elif not (sweep.range_min <= reach < math.inf):
+        # What is beyond the stated reach counts: that may be wrong, or not stated.
+        return None
+    x0, y0, yaw0 = spec.sensor
+    bearing = yaw0 + sweep.angle_min + ray * sweep.angle_increment
+    point = (x0 + reach * math.cos(bearing), y0 + reach * math.sin(bearing))
+    return None if inside(spec.footprint, point) else point
 
 
 def free_way(
@@ -106,12 +133,12 @@ def free_way(
     edges = list(zip(footprint, (*footprint[1:], footprint[0]), strict=True))
     if abs(twist.wz) < _STRAIGHT:
         times = (
-            _time_straight(point, edge, twist) for point in points for edge in edges
+            time_straight(point, edge, twist) for point in points for edge in edges
         )
     else:
         center = (-twist.vy / twist.wz, twist.vx / twist.wz)
         times = (
-            _time_turning(point, edge, center, twist.wz)
+            time_turning(point, edge, center, twist.wz)
             for point in points
             for edge in edges
         )
@@ -146,8 +173,21 @@ def _turned_over(sweep: Sweep) -> Sweep:
 
 def _reach_speed(spec: AssistSpec, twist: Twist) -> float:
     """Return how fast the fastest corner may go, in metres per second."""
-    outer = max(math.hypot(x, y) for x, y in spec.footprint)
-    return math.hypot(twist.vx, twist.vy) + abs(twist.wz) * outer
+    return math.hypot(twist.vx, twist.vy) + abs(twist.wz) * _outer(spec)
+
+
+def _horizon(spec: AssistSpec, speed: float) -> float:
+    """Return how far from its origin a point can be and yet slow the robot down.
+
+    No part of the robot goes faster than ``speed``, so what is farther from its outline
+    than the way that it needs at that speed is not met before it could stand.
+    """
+    way = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
+    return (_outer(spec) + way) * (1 + _ROUNDING) + _ROUNDING
+
+
+def _outer(spec: AssistSpec) -> float:
+    return max(math.hypot(x, y) for x, y in spec.footprint)
 
 
 def _blindness(
@@ -158,14 +198,16 @@ def _blindness(
     age = now - sweep.arrived
     if not 0 <= age <= FRESH:
         return f"the scan is {age:.1f} s old"
+    if sweep.refused is not None:
+        return sweep.refused
     step = sweep.angle_increment
     if not (math.isfinite(sweep.angle_min) and math.isfinite(step) and step != 0.0):
         return "the scan has no angles"
     towards = _rays_towards(spec, sweep, wanted)
-    if not towards:
+    known, asked = folding.known(sweep, towards)
+    if not asked:
         return "the scan does not look where the robot goes"
-    known = sum(map(_says_something, towards, (sweep,) * len(towards)))
-    if known < KNOWN * len(towards):
+    if known < KNOWN * asked:
         return "most of the scan is unknown"
     if not _covers_the_way(spec, sweep, wanted):
         return "the scan covers a part of the way only"
@@ -174,7 +216,7 @@ def _blindness(
 
 def _covers_the_way(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> bool:
     """Return whether the scan looks where the robot is until it could stand."""
-    fan = Fan(sweep.angle_min, sweep.angle_increment, len(sweep.ranges))
+    fan = _fan(sweep)
     speed = math.hypot(wanted.vx, wanted.vy)
     if speed < _ON_THE_SPOT:
         return fan.share >= KNOWN
@@ -184,22 +226,25 @@ def _covers_the_way(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> bool:
     )
 
 
-def _rays_towards(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> list[float]:
-    """Return the ranges that look where the robot goes; all of them if it turns."""
+def _fan(sweep: Sweep) -> Fan:
+    """Return where the scanner has rays, be they folded or not."""
+    if (fold := sweep.fold) is not None:
+        return Fan(sweep.angle_min, sweep.angle_increment / fold.each, fold.beams)
+    return Fan(sweep.angle_min, sweep.angle_increment, len(sweep.ranges))
+
+
+def _rays_towards(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> Sequence[int]:
+    """Return the rays that look where the robot goes; all of them if it turns."""
+    rays = range(len(sweep.ranges))
     if math.hypot(wanted.vx, wanted.vy) < _ON_THE_SPOT:
-        return list(sweep.ranges)
+        return rays
     ahead = math.atan2(wanted.vy, wanted.vx) - spec.sensor[2]
-    chosen = []
-    for ray, reach in enumerate(sweep.ranges):
-        bearing = sweep.angle_min + ray * sweep.angle_increment
-        if abs(math.remainder(bearing - ahead, math.tau)) <= _SECTOR:
-            chosen.append(reach)
-    return chosen
-
-
-def _says_something(reach: float, sweep: Sweep) -> bool:
-    # Below the least range lies what a covered scanner says; -inf is a driver's word.
-    return math.isinf(reach) or reach >= max(sweep.range_min, 1e-6)
+    first, step = sweep.angle_min - ahead, sweep.angle_increment
+    return [
+        ray
+        for ray in rays
+        if abs(math.remainder(first + ray * step, math.tau)) <= _SECTOR
+    ]
 
 
 def _blind(spec: AssistSpec, speed: float, reason: str) -> Verdict:
@@ -207,45 +252,3 @@ def _blind(spec: AssistSpec, speed: float, reason: str) -> Verdict:
     if spec.blind == "stop":
         return Verdict(0.0, why)
     return FREE if speed <= spec.creep else Verdict(spec.creep / speed, why)
-
-
-def _time_straight(point: Point, edge: tuple[Point, Point], twist: Twist) -> float:
-    """Return when a point that comes by ``-twist`` crosses an edge."""
-    (ax, ay), (bx, by) = edge
-    dx, dy = -twist.vx, -twist.vy
-    ex, ey = bx - ax, by - ay
-    across = dx * ey - dy * ex
-    if across == 0.0:
-        return math.inf
-    px, py = ax - point[0], ay - point[1]
-    time = (px * ey - py * ex) / across
-    along = (px * dy - py * dx) / across
-    return time if time >= 0 and 0 <= along <= 1 else math.inf
-
-
-def _time_turning(
-    point: Point, edge: tuple[Point, Point], center: Point, turn: float
-) -> float:
-    """Return when a point that goes round ``center`` at ``-turn`` crosses an edge."""
-    cx, cy = center
-    (ax, ay), (bx, by) = edge
-    px, py = point[0] - cx, point[1] - cy
-    ax, ay, bx, by = ax - cx, ay - cy, bx - cx, by - cy
-    ex, ey = bx - ax, by - ay
-    length = ex * ex + ey * ey
-    middle = ax * ex + ay * ey
-    apart = ax * ax + ay * ay - (px * px + py * py)
-    root = middle * middle - length * apart
-    if length == 0.0 or root < 0:
-        return math.inf
-    start = math.atan2(py, px)
-    best = math.inf
-    for sign in (-1.0, 1.0):
-        along = (-middle + sign * math.sqrt(root)) / length
-        if 0 <= along <= 1:
-            at = math.atan2(ay + along * ey, ax + along * ex)
-            angle = (start - at if turn > 0 else at - start) % math.tau
-            if math.tau - angle < _TOUCHING:
-                angle = 0.0
-            best = min(best, angle / abs(turn))
-    return best
