@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap import Bridge
+from webmap import Bridge, Robot
 from webmap.console import RobotDescription, parse_robot
 from webmap.console.fleet import make_robot
 from webmap.errors import ConfigError
@@ -89,4 +89,13 @@ def test_a_name_stays_upright_wherever_the_robot_looks(bridges):
     robot.notify_modules("on_odometry_update")
     label = robot.modules[-1].svg
     assert label._transform == pytest.approx((0.0, 0.0, -1.0))
+    robot.destroy()
+
+
+def test_a_page_is_told_which_base_moves_sideways(bridges):
+    robot = Robot("Bob")
+    robot.set_twist_topic(bridges[0], "/cmd_vel", holonomic=True)
+    assert "data-holonomic" in robot.svg.attributes
+    robot.set_twist_topic(bridges[0], "/cmd_vel")
+    assert "data-holonomic" not in robot.svg.attributes
     robot.destroy()

@@ -208,6 +208,25 @@ def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
     assert not stick.is_visible()
 
 
+def test_q_moves_only_a_robot_whose_base_can_move_sideways(open_bench) -> None:
+    bench = open_bench("?holonomic=each")
+    keyboard = bench.page.keyboard
+    bench.select("r1")
+    keyboard.down("q")
+    bench.until(bench.gate.moves)
+    keyboard.up("q")
+    last = bench.gate.moves()[-1]
+    assert (last["robot"], last["x"], last["y"]) == ("r1", 0, 1)
+    bench.select("r2")
+    since = time.monotonic()
+    keyboard.down("q")
+    keyboard.down("w")
+    bench.until(lambda: [m for m in bench.gate.moves(since) if m["robot"] == "r2"])
+    keyboard.up("w")
+    keyboard.up("q")
+    assert not any(m["y"] for m in bench.gate.moves(since) if m["robot"] == "r2")
+
+
 def test_the_keys_and_the_stick_do_not_both_drive(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     since = time.monotonic()

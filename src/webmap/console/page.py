@@ -93,7 +93,7 @@ def build(
     for robot in robots:
         map.add_robot(robot)
     map.add_module("MouseViewControl")
-    map.add_module("Teleop", SPEED, ROTATION_SPEED)
+    map.add_module("Teleop", SPEED, ROTATION_SPEED, holonomic=None)
     goals = map.add_module("GoalTool")
     poses = map.add_module("InitialPoseTool")
     map.add_module("StopButton")

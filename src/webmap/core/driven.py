@@ -101,6 +101,10 @@ class Driven(Extendable):
                     stop_hooks,
                 )
             )
+        self._show_base(holonomic=holonomic)
+
+    def _show_base(self, *, holonomic: bool) -> None:
+        """Let pages know what the base can."""
 
     def set_scan_assist(
         self,

@@ -77,6 +77,9 @@ class Robot(Driven):
         robots[self.id] = self
         keep(Removal(self.destroy))
 
+    def _show_base(self, *, holonomic: bool) -> None:
+        self.svg.set("data-holonomic", "" if holonomic else None)
+
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}>"
 

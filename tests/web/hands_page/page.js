@@ -7,7 +7,9 @@ const SVG = "http://www.w3.org/2000/svg";
 const query = new URLSearchParams(location.search);
 const modules = (query.get("modules") ?? "teleop,mouse_view_control").split(",");
 
-const options = { holonomic: query.has("holonomic") };
+// "each": the robots' elements say so, and that of r1 does.
+const each = query.get("holonomic") === "each";
+const options = { holonomic: each ? null : query.has("holonomic") };
 
 const releaseAfter = Number(query.get("release") ?? 30_000);
 const drive = new Drive(new URL("/_webmap/", location.href), { id: "page1", releaseAfter });
@@ -60,6 +62,7 @@ async function makeMap(number) {
   svg.classList.add("webmap");
   svg.id = `map${number}`;
   world.append(robot("r1", 1, 1), robot("r2", -1, 1));
+  if (each) world.firstElementChild.setAttribute("data-holonomic", "");
   svg.append(world);
   document.querySelector(".place").append(svg);
   const size = { width: 800, height: 300 };

@@ -18,7 +18,8 @@ class Teleop:
         map: The map.
         speed: Metres per second at most, forward and back.
         rotation_speed: Radians per second at most.
-        holonomic: Whether Q and E move sideways, for a base that can.
+        holonomic: Whether Q and E move sideways, for bases that can; None if for
+            those of which :meth:`Robot.set_twist_topic` says so.
 
     Raises:
         ValueError: If a speed is not a number above 0.
@@ -31,7 +32,7 @@ class Teleop:
         speed: float,
         rotation_speed: float,
         *,
-        holonomic: bool = False,
+        holonomic: bool | None = False,
     ) -> None:
         for name, value in (("speed", speed), ("rotation_speed", rotation_speed)):
             if not (math.isfinite(value) and value > 0):

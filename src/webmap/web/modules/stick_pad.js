@@ -8,11 +8,8 @@ import { button, html } from "./elements.js";
  * it is asked for.
  */
 export class StickPad {
-  /**
-   * @param {Drive} drive
-   * @param {boolean} holonomic Whether the base moves sideways, too.
-   */
-  constructor(drive, holonomic) {
+  /** @param {Drive} drive */
+  constructor(drive) {
     this._sideways = false;
     /** Whether the operator wants it. */
     this.wanted = matchMedia("(pointer: coarse)").matches;
@@ -30,10 +27,18 @@ export class StickPad {
     });
     this._mode.title = "Left and right move the robot sideways and do not turn it";
     this._mode.setAttribute("aria-pressed", "false");
-    this._mode.hidden = !holonomic;
+    this._mode.hidden = true;
     this.element = html("div", "webmap-stick-place", {}, this._mode, this._pad);
-    this._stick = new Stick(drive, this._pad, () => this._sideways);
+    this._stick = new Stick(drive, this._pad, () => this._sideways && !this._mode.hidden);
     this.show(false, false);
+  }
+
+  /** Whether the base that it drives moves sideways, too. */
+  set holonomic(/** @type {boolean} */ holonomic) {
+    if (this._mode.hidden !== holonomic) return;
+    // What is held would mean something else from one moment to the next.
+    this._stick.release();
+    this._mode.hidden = !holonomic;
   }
 
   /** Let go. */

@@ -16,12 +16,12 @@ import { withoutKeys } from "./touch_words.js";
  * Drive the selected robot with keys, an on-screen stick or a gamepad, and show how that
  * stands.
  *
- * Options: `holonomic`, whether Q and E, and the sticks, move the base sideways. Speeds
- * are not known here: the gate scales. Sends `{active}` when the page's keys start or
- * stop to belong to this map.
+ * Options: `holonomic`, whether Q and E, and the sticks, move the base sideways; null if
+ * each robot's element says so (`data-holonomic`). Speeds are not known here: the gate
+ * scales. Sends `{active}` when the page's keys start or stop to belong to this map.
  *
  * @param {MapCanvas} map
- * @param {{holonomic?: boolean}} options
+ * @param {{holonomic?: boolean | null}} options
  * @param {Send} send
  * @returns {Half}
  */
@@ -30,10 +30,13 @@ export default function attach(map, options, send) {
   return { destroy: () => teleop.destroy() };
 }
 
+/** The selected robot, if its base can move sideways. */
+const SELECTED_HOLONOMIC = ".robot.selected[data-holonomic]";
+
 class Teleop {
   /**
    * @param {MapCanvas} map
-   * @param {{holonomic?: boolean}} options
+   * @param {{holonomic?: boolean | null}} options
    * @param {Send} send
    */
   constructor(map, { holonomic = false }, send) {
@@ -47,7 +50,7 @@ class Teleop {
       stick: () => this._toggleStick(),
       test: () => this._test(),
     });
-    this._stick = new StickPad(this._drive, holonomic);
+    this._stick = new StickPad(this._drive);
     this._halos = new Halos(map);
     this._requests = new Requests(this._drive);
     const takes = [
@@ -58,7 +61,9 @@ class Teleop {
     this._desk = deskOf(this._drive);
     this._seat = {
       map,
-      holonomic,
+      get holonomic() {
+        return holonomic ?? map.world.querySelector(SELECTED_HOLONOMIC) !== null;
+      },
       robot: () => map.selected,
       onActive: (/** @type {boolean} */ active) => {
         send({ active });
@@ -147,6 +152,7 @@ class Teleop {
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
     const useful = report !== null && ofUse(report);
+    this._stick.holonomic = this._seat.holonomic;
     this._stick.show(useful, status.pressed && status.dead);
     const hands = { touch: this._touch.matches, stick: this._stick.wanted };
     const inputs = inputsOf({ ...hands, gamepad: this._desk.gamepad });
