@@ -28,7 +28,7 @@ _FAR = 4096.0
 """Metres beyond which single precision is worse than half a millimetre."""
 
 
-@lru_cache(maxsize=1 << 16)
+@lru_cache(maxsize=1 << 12)  # for ids and lengths: ages never come twice
 def varint(number: int) -> bytes:
     """Return ``number``, which is not negative, with seven bits in each byte."""
     out = bytearray()
