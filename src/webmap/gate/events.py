@@ -166,6 +166,9 @@ class Measured:
 
     key: Key
     twist: Twist | None
+    said_after: float = float("inf")
+    """A moment after which the bridge said it, on the gate's clock; one that is yet to
+    come counts for the moment when it came."""
 
 
 @dataclass(frozen=True, slots=True)

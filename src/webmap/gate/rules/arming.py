@@ -4,7 +4,7 @@ from webmap.gate.events import Key, LockState
 from webmap.gate.rules.health import Health, Pulse
 from webmap.gate.rules.latch import Latch
 from webmap.gate.rules.robots import Robots
-from webmap.gate.rules.sight import BLIND_LIMIT, Sight
+from webmap.gate.rules.sight import Sight
 from webmap.gate.rules.video import Video
 
 
@@ -68,9 +68,6 @@ class Arming:
             return "it has no velocity topic"
         if not self._control.fresh(now):
             return f"{self._url} does not answer"
-        if self._robots.has_odometry:
-            if self._sight.seen_at is None:
-                return "no odometry yet"
-            if now - self._sight.seen_at > BLIND_LIMIT:
-                return f"no odometry for {BLIND_LIMIT:g} s"
+        if self._robots.has_odometry and (blind := self._sight.doubt(now)):
+            return blind
         return self.video.doubt(now)

@@ -239,15 +239,16 @@ class Base:
         self.sight.saw_echo(twist)
         self.tests.heard(twist, now)
 
-    def saw(self, measured: Twist | None, now: float) -> None:
-        """Note that odometry came."""
+    def saw(self, measured: Twist | None, said_after: float, now: float) -> None:
+        """Note that odometry came, which was said after a moment, maybe long ago."""
         if not self.sight.on:
             return
-        self.sight.saw(measured, now)
-        if self.latch.on:
-            self.standing.confirmation.saw(measured, now)
-        if self.hands.handover.heir is not None:
-            self.hands.handover.saw(measured, now)
+        self.sight.saw(measured, said_after, now)
+        seen, handover = self.standing.confirmation, self.hands.handover
+        if self.latch.on and self.sight.tells_since(seen.since):
+            seen.saw(measured, now)
+        if handover.heir is not None and self.sight.tells_since(handover.since):
+            handover.saw(measured, now)
         self.obedience.saw(measured, now)
         self.tests.saw(measured, now)
 

@@ -262,7 +262,7 @@ class Fleet:
     def _measured(self, event: events.Measured, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.saw(event.twist, now)
+            base.saw(event.twist, event.said_after, now)
 
     def _scanned(self, event: events.Scanned, now: float) -> None:
         base = self._of_key(event.key)

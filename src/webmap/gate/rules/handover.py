@@ -29,7 +29,8 @@ class HandOver:
         self.heir: Connection | None = None
         """Who gets it as soon as it stands."""
         self._asked_at = float("-inf")
-        self._since = float("-inf")
+        self.since = float("-inf")
+        """When zero was written to have it stand."""
         self._still = Standstill()
 
     @property
@@ -55,7 +56,7 @@ class HandOver:
 
     def begin(self, heir: Connection, now: float) -> None:
         """Wait for standstill, zero having been written at ``now``."""
-        self.asker, self.heir, self._since = None, heir, now
+        self.asker, self.heir, self.since = None, heir, now
         self._still.begin()
 
     def saw(self, twist: Twist | None, now: float) -> None:
@@ -66,7 +67,7 @@ class HandOver:
         """Return whether it is standing, as far as anybody can tell."""
         if self._still.reached:
             return True
-        heard = max(self._since, self._still.heard_at)
+        heard = max(self.since, self._still.heard_at)
         return now - heard >= WITHOUT_SIGHT
 
     def end(self) -> Connection | None:

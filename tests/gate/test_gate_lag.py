@@ -1,0 +1,149 @@
+"""What a link has kept back counts for as old as it may be (S16)."""
+
+import json
+import time
+
+import cbor2
+import pytest
+from gate_harness import KEY, Bench, spec
+from link_bench import in_loop, noting_bridge, until
+
+from webmap.gate.clock import now
+from webmap.gate.events import LinkUp, Measured, Scanned
+from webmap.gate.lanes.witness import WitnessLane
+from webmap.geometry import Twist
+from webmap.testing import FaultProxy, Shape
+
+STANDING, CREEPING = Twist(), Twist(0.1)
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin(spec(odometry_topic="/odom"))
+
+
+def lagging(bench, seconds, lag, twist=CREEPING, x=None):
+    """Have odometry come at 20 Hz that was said ``lag`` seconds before, or later."""
+
+    def each():
+        bench.tell(Measured(KEY, twist, bench.now - lag))
+        if x is not None:
+            bench.drive(x=x)
+
+    bench.run(seconds, each)
+
+
+def under_way(bench, lag):
+    bench.take()
+    lagging(bench, 0.4, lag, x=0.0)
+    at = bench.now
+    lagging(bench, 0.5, lag, x=1.0)
+    return bench.moving_since(at)
+
+
+class TestDriving:
+    def test_what_is_late_by_less_than_a_second_is_sight(self, bench):
+        assert under_way(bench, lag=0.9)
+
+    def test_what_is_later_than_that_is_none_and_is_said_so(self, bench):
+        assert not under_way(bench, lag=1.1)
+        assert bench.report().reason == "odometry comes more than 1 s late"
+
+    def test_a_robot_whose_odometry_lags_is_stopped_though_it_goes_on_coming(
+        self, bench
+    ):
+        assert under_way(bench, lag=0.0)
+        at = bench.now
+
+        def each():
+            bench.tell(Measured(KEY, CREEPING, at))
+            bench.drive(x=1.0)
+
+        bench.run(2.0, each)
+        assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
+
+    def test_a_moment_that_is_yet_to_come_makes_nothing_younger(self, bench):
+        assert under_way(bench, lag=-5.0)
+        at = bench.now
+        bench.hold(2.0, x=1.0)
+        assert bench.moving_since(at)[-1].at - at < 1.1
+
+
+class TestStandstill:
+    def test_what_was_said_before_stop_confirms_nothing(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        at = bench.now
+        bench.run(1.0, lambda: bench.tell(Measured(KEY, STANDING, at - 0.01)))
+        assert bench.report().stop.confirmed is None
+        lagging(bench, 0.5, 0.1, STANDING)
+        assert bench.report().stop.confirmed is True
+
+    def test_motion_takes_it_back_however_late_it_comes(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        lagging(bench, 0.6, 0.1, STANDING)
+        assert bench.report().stop.confirmed is True
+        lagging(bench, 0.2, 5.0, CREEPING)
+        assert bench.report().stop.confirmed is not True
+
+    def test_what_was_said_before_the_zero_hands_nothing_over(self, bench):
+        bench.take("a")
+        lagging(bench, 0.3, 0.0, STANDING)
+        bench.say("b", op="ask", robot="r1")
+        bench.say("a", op="grant", robot="r1")
+        at = bench.now
+        bench.run(0.6, lambda: bench.tell(Measured(KEY, STANDING, at - 0.01)))
+        assert bench.report().holder is None
+        lagging(bench, 0.4, 0.0, STANDING)
+        assert bench.report().holder.connection == "b"
+
+
+ODOMETRY = json.dumps(
+    {
+        "op": "publish",
+        "topic": "/odom",
+        "msg": {"twist": {"twist": {"linear": {"x": 0.1}, "angular": {"z": 0.0}}}},
+    }
+)
+SCAN = {
+    "angle_min": -0.1,
+    "angle_increment": 0.1,
+    "range_min": 0.05,
+    "range_max": 10.0,
+    "ranges": [1.0, 2.0, 3.0],
+}
+
+
+@in_loop
+async def test_behind_a_narrow_link_nothing_is_taken_for_younger_than_it_is():
+    events = []
+
+    def of(type):
+        return [event for event in events if isinstance(event, type)]
+
+    async with noting_bridge() as bridge:
+        with FaultProxy(bridge.port) as proxy:
+            witness = WitnessLane(f"ws://127.0.0.1:{proxy.port}", events.append)
+            try:
+                witness.watch("/odom", None, KEY)
+                witness.watch_scan("/scan", KEY)
+                await until(lambda: bridge.of("subscribe", "/scan"), "that it listens")
+                assert of(LinkUp)
+                watched = now()
+                await until(lambda: witness._said_after > watched, "an answer")
+                (link,) = bridge.links
+                await bridge.send(link, ODOMETRY)
+                await until(lambda: of(Measured), "odometry at once")
+                assert of(Measured)[-1].said_after > watched
+
+                proxy.shape(Shape(bandwidth=4000), "down")
+                frame = {"op": "publish", "topic": "/scan", "msg": SCAN}
+                for _ in range(60):
+                    await bridge.send(link, ODOMETRY)
+                await bridge.send(link, cbor2.dumps(frame))
+                said, at = now(), time.monotonic()
+                await until(lambda: of(Scanned), "a scan behind sixty of odometry")
+                assert time.monotonic() - at > 1.0, "the link was narrow"
+                assert all(one.said_after <= said for one in of(Measured))
+                assert of(Scanned)[0].sweep.arrived <= said + 0.05
+            finally:
+                witness.lane.close()
