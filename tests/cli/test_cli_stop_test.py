@@ -17,6 +17,9 @@ from webmap.gate.rules.stoptest import MOVES_ON
 from webmap.testing import WitnessRobot
 from webmap_process import simulator
 
+# Beside others the simulator's clock lags, and a driver falls silent.
+pytestmark = pytest.mark.serial
+
 TODAY = datetime.datetime.now().astimezone().date().isoformat()
 
 
@@ -41,7 +44,6 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.serial  # beside others the simulator's clock lags, and so its timeout
 def test_a_base_with_a_timeout_of_its_own_stops_by_itself_and_that_is_kept(folder):
     with simulator("--port", "0", "--robot-timeout", "0.25") as url:
         said = run(url, "robot_1", "--yes")

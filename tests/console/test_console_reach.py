@@ -87,6 +87,7 @@ def reset(page: Page) -> None:
     expect(page.locator("#card .state .holder")).to_have_text("Free")
 
 
+@pytest.mark.serial  # a late command ends the stop test
 def test_the_card_tests_whether_a_robot_of_which_that_is_stated_stops(open_console):
     page = open_console()
     page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()

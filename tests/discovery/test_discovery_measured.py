@@ -40,6 +40,7 @@ def said(findings, words):
     return found.level
 
 
+@pytest.mark.serial  # rates and ages are measured
 @DIALECTS
 def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
     progress = []

@@ -34,6 +34,12 @@ def view(tab):
     )
 
 
+def newest(host, name):
+    """What the newest report of the view says, if there was one."""
+    reports = host.events(ViewReport)
+    return getattr(reports[-1], name) if reports else None
+
+
 def drag(tab, x):
     tab.evaluate(
         """async (x) => {
@@ -81,14 +87,14 @@ def test_the_view_outlives_a_lost_link(host, tab, opened):
     assert view(tab) == before
     # What a program does is applied once, however often it is told.
     host.call(opened.session.view, opened.root.id, "translate", 0, 5)
-    host.until(lambda: host.events(ViewReport)[-1].applied == 2, tab=tab)
+    host.until(lambda: newest(host, "applied") == 2, tab=tab)
     assert view(tab)[5] == pytest.approx(before[5] + 5)
 
 
 def test_the_view_and_the_map_outlive_a_reload(host, tab, opened):
     drag(tab, 33)
     before = view(tab)
-    host.until(lambda: host.events(ViewReport)[-1].e == before[4], tab=tab)
+    host.until(lambda: newest(host, "e") == before[4], tab=tab)
     host.call(opened.session.set_class, opened.inner, "selected", True)
     tab.reload()
     tab.wait_for_selector(".robot.selected circle")
