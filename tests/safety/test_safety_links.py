@@ -75,15 +75,11 @@ def test_a_half_that_the_browser_closes_stops_the_robot(bench):
 
 
 def test_latency_between_browser_and_display_stops_the_robot(bench):
-    def back():
-        bench.linger(1.0)
-        bench.web_hop.shape(Shape())
-
     bench.prove(
         "the browser's link gets 400 ms of latency each way",
         lambda: bench.web_hop.shape(SLOW),
         within=PROMISED,
-        back=back,
+        back=lambda: smooth(bench, bench.web_hop),
     )
 
 
@@ -94,21 +90,24 @@ SPOILT = {
 }
 """What else networks do to a link; none of them is cut, and nobody can drive by any."""
 
+
+def smooth(bench, hop):
+    """Let a spoilt link be as it was, a second after the fault."""
+    bench.linger(1.0)
+    hop.shape(Shape())
+
+
 HOW = [pytest.param(how, marks=[] if "starts" in how else LONG) for how in SPOILT]
 
 
 @pytest.mark.parametrize("how", HOW)
 def test_a_spoilt_link_between_browser_and_display_stops_the_robot(bench, how):
-    def back():
-        bench.linger(1.0)
-        bench.web_hop.shape(Shape())
-
     # What is late by less than the limit may still count, and then the dead-man does.
     bench.prove(
         f"the browser's link {how}",
         lambda: bench.web_hop.shape(SPOILT[how]),
         within=GATE_OF_LATENCY,
-        back=back,
+        back=lambda: smooth(bench, bench.web_hop),
     )
 
 
@@ -155,32 +154,24 @@ def test_a_half_that_the_gate_closes_stops_the_robot(bench):
 
 
 def test_latency_between_gate_and_robot_stops_the_robot(bench):
-    def back():
-        bench.linger(1.0)
-        bench.robot_hop.shape(Shape())
-
     # What was written before the doubt, 300 ms, is still on its way for 400 ms.
     bench.prove(
         "the robot's link gets 400 ms of latency each way",
         lambda: bench.robot_hop.shape(SLOW),
         within=0.3 + SLOW.latency + 0.1,
-        back=back,
+        back=lambda: smooth(bench, bench.robot_hop),
         watch=1.0,
     )
 
 
 @pytest.mark.parametrize("how", HOW)
 def test_a_spoilt_link_between_gate_and_robot_stops_the_robot(bench, how):
-    def back():
-        bench.linger(1.0)
-        bench.robot_hop.shape(Shape())
-
     # The doubt comes after 300 ms; what was written before it is still on its way.
     bench.prove(
         f"the robot's link {how}",
         lambda: bench.robot_hop.shape(SPOILT[how]),
         within=0.3 + 0.5 + 0.1,
-        back=back,
+        back=lambda: smooth(bench, bench.robot_hop),
         few_late=LATE,
         watch=1.0,
         new_link=True,
