@@ -28,9 +28,45 @@ def test_a_ping_is_due_after_each_answer_and_only_then():
     assert liveness.wants_ping(0.5)
     liveness.pinged(0.5)
     assert not liveness.wants_ping(2.0)
+    liveness.ponged(0.6)
+    assert not liveness.wants_ping(1.0)
+    assert liveness.wants_ping(1.1)
+
+
+def test_after_an_answer_that_took_long_the_next_ping_is_due_at_once():
+    liveness = Liveness(0.0)
+    liveness.pinged(0.5)
+    assert not liveness.wants_ping(2.0)
     liveness.ponged(2.0)
-    assert not liveness.wants_ping(2.4)
-    assert liveness.wants_ping(2.5)
+    assert liveness.wants_ping(2.0)
+
+
+class TestLag:
+    def test_before_the_first_answer_nothing_is_said(self):
+        assert Liveness(0.0).lag(0.4) == 0.0
+
+    def test_it_is_what_the_last_answer_took_however_long_ago_that_was(self):
+        liveness = Liveness(0.0)
+        liveness.pinged(0.5)
+        liveness.ponged(0.7)
+        assert liveness.lag(0.7) == pytest.approx(0.2)
+        assert liveness.lag(1.2) == pytest.approx(0.2)
+
+    def test_it_grows_while_an_answer_is_waited_for(self):
+        liveness = Liveness(0.0)
+        liveness.pinged(0.5)
+        liveness.ponged(0.7)
+        liveness.pinged(1.2)
+        assert liveness.lag(1.3) == pytest.approx(0.2)
+        assert liveness.lag(2.2) == pytest.approx(1.0)
+
+    def test_a_link_that_is_quick_again_is_not_called_slow(self):
+        liveness = Liveness(0.0)
+        liveness.pinged(0.5)
+        liveness.ponged(2.5)
+        liveness.pinged(2.5)
+        liveness.ponged(2.51)
+        assert liveness.lag(2.6) == pytest.approx(0.01)
 
 
 def look(liveness, start, end):

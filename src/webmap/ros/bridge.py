@@ -98,6 +98,16 @@ class Bridge:
         """When the last bytes came from the bridge, on the monotonic clock."""
         return self._lane.last_heard if self._lane is not None else None
 
+    @property
+    def lag(self) -> float:
+        """How many seconds what comes from the bridge now was under way, about.
+
+        It is the time that the bridge takes to answer a ping, which waits behind all
+        that it has sent before; a link that becomes slow is seen within a second.
+        What a robot's own nodes keep back is not in it.
+        """
+        return self._lane.lag if self._lane is not None else 0.0
+
     def on_open(self, fn: Callable[[], Any]) -> Removal:
         """Call ``fn`` whenever the link opens; soon, if it is open already."""
         callback, removal = self._on_open.add(fn)

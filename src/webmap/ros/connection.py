@@ -57,6 +57,7 @@ class Lane:
         self.state: State = "new"
         self.last_heard: float | None = None
         """When the last bytes came, answers to pings too, on the monotonic clock."""
+        self._liveness: Liveness | None = None
         self._opened = opened
         self._received = received
         self._closed = closed
@@ -67,6 +68,13 @@ class Lane:
         self._unsent: deque[bytes] = deque()
         self._unsent_size = 0
         self._wake = asyncio.Event()
+
+    @property
+    def lag(self) -> float:
+        """How many seconds what comes now was under way, as answers to pings show."""
+        if self._liveness is None:
+            return 0.0
+        return self._liveness.lag(time.monotonic())
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begin to connect; a second call while it runs does nothing."""
@@ -166,7 +174,7 @@ class Lane:
 
     def _forget_link(self, socket: "ClientConnection") -> None:
         socket.transport.abort()
-        self._socket = None
+        self._socket = self._liveness = None
         self.state = "connecting" if self._again else "closed"
         self._unsent.clear()
         self._unsent_size = 0
@@ -187,7 +195,7 @@ class Lane:
 
     async def _keep_alive(self, socket: "ClientConnection") -> None:
         """Return when the link is dead, after having dropped it."""
-        liveness = Liveness(time.monotonic())
+        self._liveness = liveness = Liveness(time.monotonic())
         pinging: set[asyncio.Task[None]] = set()
         try:
             while not liveness.is_dead(time.monotonic()):

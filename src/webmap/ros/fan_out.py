@@ -58,6 +58,10 @@ class FanOut:
             self._hold(listener)
 
     def _give(self, message: Publish, listeners: list[Subscription]) -> None:
+        _deliver(message, [each for each in listeners if each.undecoded])
+        listeners = [each for each in listeners if not each.undecoded]
+        if not listeners:
+            return
         if self._offload.wants(message):
             types = frozenset(listener.decode for listener in listeners)
             self._offload.decode(message, types, lambda: _deliver(message, listeners))

@@ -14,17 +14,23 @@ class Liveness:
     PERIOD = 0.5
     """Time from one answer to the next ping, in seconds."""
 
+    SLOW = 0.25
+    """Round trip, in seconds, from which on the next ping follows at once."""
+
     LATE = 0.75
     """Time between two looks after which the looking itself was held up."""
 
     def __init__(self, now: float) -> None:
         self._pinged: float | None = None
+        self._took = 0.0
         self._ponged = now
         self._looked = now
 
     def wants_ping(self, now: float) -> bool:
         """Return whether the next ping is due."""
-        return self._pinged is None and now - self._ponged >= self.PERIOD
+        if self._pinged is not None:
+            return False
+        return self._took >= self.SLOW or now - self._ponged >= self.PERIOD
 
     def pinged(self, now: float) -> None:
         """Note that a ping was sent."""
@@ -32,8 +38,20 @@ class Liveness:
 
     def ponged(self, now: float) -> None:
         """Note that the ping was answered."""
+        if self._pinged is not None:
+            self._took = now - self._pinged
         self._pinged = None
         self._ponged = now
+
+    def lag(self, now: float) -> float:
+        """Return how many seconds what comes now was under way, about.
+
+        The answer to a ping comes after all that was sent before it. So a link that
+        has not answered yet may be as late as the ping is old. What became slow since
+        the newest ping is seen by the next one, three quarters of a second later.
+        """
+        waiting = 0.0 if self._pinged is None else now - self._pinged
+        return max(self._took, waiting)
 
     def is_dead(self, now: float) -> bool:
         """Return whether the last ping went unanswered for too long.

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+SECOND = 1_000_000_000
+"""Nanoseconds."""
+
+
 class Time(msgspec.Struct, frozen=True, gc=False):
     """A moment of the robot's clock, with the names of ROS 1 and of ROS 2."""
 
@@ -33,11 +37,19 @@ class Time(msgspec.Struct, frozen=True, gc=False):
         """Seconds since the epoch of that clock; 0 if nobody set it.
 
         Raises:
-            ProtocolError: If they are more than a number can hold.
+            ProtocolError: If the nanoseconds are below zero, or a second or more of
+                them; or if the seconds are more than a number can hold.
 
         """
+        part = self.nsecs or self.nanosec
+        if not 0 <= part < SECOND:
+            # Python refuses to write a number of thousands of digits.
+            got = str(part) if abs(part) < 1 << 64 else "far too many"
+            raise ProtocolError(
+                f"a time has {got} nanoseconds; expected 0 to {SECOND - 1}"
+            )
         try:
-            return (self.secs or self.sec) + 1e-9 * (self.nsecs or self.nanosec)
+            return (self.secs or self.sec) + 1e-9 * part
         except OverflowError:
             raise ProtocolError(
                 "a time has seconds of hundreds of digits; expected up to 4294967295, "

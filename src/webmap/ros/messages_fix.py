@@ -12,11 +12,11 @@ class NavSatStatusMsg(msgspec.Struct, frozen=True):
     """``sensor_msgs/NavSatStatus``."""
 
     status: int = -1
-    """-1 no fix, 0 a fix, 1 and 2 a fix with corrections."""
+    """-1 no fix, 0 a fix, above a fix with corrections."""
 
 
 class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
-    """``sensor_msgs/NavSatFix``."""
+    """``sensor_msgs/NavSatFix``, and what a ``GPSFix`` says of the same."""
 
     latitude: float
     """Degrees, north positive."""

@@ -52,6 +52,8 @@ class Subscription:
         self.wish = wish
         self.decode = decode
         self.removed = False
+        self.undecoded = False
+        """Whether it is handed each message as it came, at once and not decoded."""
         self.throttle: Throttle[Publish] = Throttle(wish.throttle / 1000)
         self._of = topic
         self._callback = callback
@@ -75,6 +77,9 @@ class Subscription:
     def deliver(self, message: Publish) -> None:
         """Decode the message as the listener wants it and hand it over."""
         if self.removed:
+            return
+        if self.undecoded:
+            self._callback(message)
             return
         try:
             value = message.decode(self.decode)
