@@ -65,6 +65,26 @@ def test_every_topic_has_a_type_of_its_dialect_and_speaks_when_heard(dialect):
         assert heard(bench, topic), topic
 
 
+@DIALECTS
+def test_what_a_robot_steers_to_is_told_from_its_base_while_it_follows_a_path(dialect):
+    bench = Bench(dialect, robots=1, plan=room(boxes=[(4.5, 0, 5.5, 4)]))
+    (robot,), (navigator,) = bench.world.robots, bench.world.navigators
+    robot.pose = Pose(2.0, 1.5, 0.4)
+    topic = "/robot_0/lookahead_point"
+    assert heard(bench, topic) == [], "it goes nowhere"
+    bench.world.send_goal(0, Goal(Pose(8.0, 1.5)))
+    said = heard(bench, topic)[-1]
+    assert said["header"]["frame_id"] == "robot_0/base_link"
+    at = robot.pose @ Pose(said["point"]["x"], said["point"]["y"])
+    here, corner = (robot.pose.x, robot.pose.y), navigator.path[1]
+    assert corner != (8.0, 1.5), "there is a box in between"
+    assert math.dist(here, (at.x, at.y)) == pytest.approx(1.5)
+    rest = math.dist(here, corner) - 1.5
+    assert math.dist((at.x, at.y), corner) == pytest.approx(rest), "on the way there"
+    bench.world.stop(0)
+    assert heard(bench, topic) == []
+
+
 def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
     bench = Bench()
     for name in ("window", "whole"):
@@ -352,10 +372,12 @@ def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
     bench.world.robots[0].charge = 0.2
     parts = heard(bench, "/diagnostics")[-1]["status"]
     levels = {part["name"]: part["level"] for part in parts}
+    # Updaters of ROS 2 leave the namespace of their node out.
+    space = "" if dialect == "ros2" else "robot_0/"
     assert levels == {
-        "robot_0/base: Motors": 0,
-        "robot_0/base: Battery": 1,
-        "robot_0/laser: Frequency": 0,
+        f"{space}base: Motors": 0,
+        f"{space}base: Battery": 1,
+        f"{space}laser: Frequency": 0,
     }
     bench.world.send_goal(0, Goal(Pose(2.0, 3.0)))
     bench.run(1)

@@ -105,9 +105,9 @@ def test_what_makes_no_map_is_said(tmp_path, change, message):
         load_map(write(tmp_path, **change))
 
 
-def test_a_file_that_is_no_image_is_said(tmp_path):
+def test_an_image_that_ends_too_soon_is_said(tmp_path):
     (tmp_path / "plan.pgm").write_bytes(b"P5\n999 99\n255\nshort")
-    with pytest.raises(ConfigError, match="the image must be PGM"):
+    with pytest.raises(ConfigError, match="the image cannot be read: image file"):
         load_map(write(tmp_path))
 
 

@@ -4,10 +4,12 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -26,6 +28,7 @@ from webmap.sim.rosbridge.schema import Schema
 from webmap.sim.rosbridge.server import RosbridgeServer
 
 CAPTURED = Path(__file__).parent / "captured"
+REFERENCE = (Path(__file__).parents[2] / "docs/reference/cli.md").read_text()
 
 
 async def subscribe(socket_, topic, **more):
@@ -76,7 +79,7 @@ def test_a_port_in_use_is_an_error():
         with socket.socket() as taken:
             taken.bind(("127.0.0.1", 0))
             taken.listen()
-            with pytest.raises(OSError, match="in use"):
+            with pytest.raises(ConfigError, match="in use: end what uses it"):
                 await run_simulator(port=taken.getsockname()[1])
 
     asyncio.run(scenario())
@@ -104,6 +107,15 @@ def test_quirks_are_named():
     assert parse_quirks("real", "ros2") == REAL["ros2"]
     assert parse_quirks("polite, bare_nan", "ros1") == Quirks(bare_nan=True)
     assert not parse_quirks("real,-silent", "ros1").silent
+
+
+def test_the_reference_lists_every_quirk_and_who_has_it():
+    rows = re.findall(r"^\| `(\w+)` \| .+? \| (yes)? ?\| (yes)? ?\|$", REFERENCE, re.M)
+    real = {
+        name: (getattr(REAL["ros1"], name), getattr(REAL["ros2"], name))
+        for name in (field.name for field in fields(Quirks))
+    }
+    assert {name: (bool(one), bool(two)) for name, one, two in rows} == real
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

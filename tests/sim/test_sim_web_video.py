@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 
 from webmap import Robot
 from webmap.core.pictures import pictures
+from webmap.errors import ConfigError
 from webmap.lifecycle import Lifecycle
 from webmap.modules.robot import http_camera
 from webmap.ros.image_answer import Answer
@@ -425,5 +426,5 @@ def test_a_port_of_the_cameras_that_is_in_use_is_an_error():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(OSError, match=f"{port}.*in use"):
+        with pytest.raises(ConfigError, match=f"{port}.*in use"):
             asyncio.run(run_simulator(http_camera=port))

@@ -22,6 +22,7 @@ _TURN_FIRST = 0.5
 _TURN_RATE = 1.8
 _GAP = 0.04
 _BRAKING = 0.4
+_LOOKAHEAD = 1.5
 
 Discs = Sequence[tuple[float, float, float]]
 
@@ -97,6 +98,20 @@ class Navigator:
             return 0.0
         points = [(self.robot.pose.x, self.robot.pose.y), *self.path[self._next :]]
         return sum(math.dist(a, b) for a, b in itertools.pairwise(points))
+
+    @property
+    def steers_to(self) -> Point | None:
+        """Where it steers to, in the map's frame; None without a path.
+
+        It is on the way to the next corner, and never farther ahead than what a
+        controller looks at.
+        """
+        if not self.path:
+            return None
+        x, y = self.robot.pose.x, self.robot.pose.y
+        corner = self.path[min(self._next, len(self.path) - 1)]
+        share = _LOOKAHEAD / max(math.dist((x, y), corner), _LOOKAHEAD)
+        return x + share * (corner[0] - x), y + share * (corner[1] - y)
 
     @property
     def must_plan(self) -> bool:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from webmap.errors import ConfigError
+from webmap.not_listening import why_not_listening
 
 if TYPE_CHECKING:
     from webmap.sim.node import RobotsNode
@@ -75,8 +76,8 @@ async def run_simulator(
         stop: Ends the run when it is set.
 
     Raises:
-        ConfigError: If the map or an option makes no sense.
-        OSError: If the port is in use or the address is not this machine's.
+        ConfigError: If the map or an option makes no sense, a port is in use, or the
+            address is not this machine's.
 
     """
     # Heavy, and needed by nobody who only imports the name.
@@ -119,15 +120,26 @@ async def run_simulator(
         if http_camera is not None:
             video = WebVideoServer(graph)
             running.push_async_callback(video.stop)
-            url = await video.start(host, http_camera)
+            with _said_in_words(host, http_camera):
+                url = await video.start(host, http_camera)
             if on_http_camera:
                 topic = f"{world.robots[0].topics}/{IMAGE}"
                 on_http_camera(f"{url}/stream?topic={topic}&type=mjpeg")
         running.push_async_callback(server.stop)
-        url = await server.start(host, port)
+        with _said_in_words(host, port):
+            url = await server.start(host, port)
         if on_ready:
             on_ready(url)
         await _turn_the_clock(node, stop)
+
+
+@contextlib.contextmanager
+def _said_in_words(host: str, port: int) -> Iterator[None]:
+    """Have a port that cannot be listened on be one sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise ConfigError(why_not_listening(host, port, error)) from error
 
 
 def _check(robots: int, dialect: str, twist: str, robot_timeout: float | None) -> None:

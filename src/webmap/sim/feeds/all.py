@@ -10,6 +10,7 @@ from webmap.sim.feeds.footprint import Footprints
 from webmap.sim.feeds.health import Health
 from webmap.sim.feeds.localization import Localizations
 from webmap.sim.feeds.logs import Logs
+from webmap.sim.feeds.lookahead import Lookaheads
 from webmap.sim.feeds.marks import Marks
 from webmap.sim.feeds.satellites import Satellites
 from webmap.sim.feeds.sonar import Sonars
@@ -38,6 +39,7 @@ class Feeds:
             *self.localizations.feeds,
             Clouds(node).feed,
             Footprints(node).feed,
+            Lookaheads(node).feed,
             Sonars(node).feed,
             Satellites(node).feed,
             Marks(node).feed,

@@ -29,20 +29,30 @@ class Health:
         graph = self._node.graph
         if not graph.is_wanted(TOPIC):
             return
+        dialect = self._node.messages.dialect
         for robot in self._node.world.robots:
-            header = self._node.messages.dialect.header(TOPIC, graph.clock(), "")
-            self._node.publish(TOPIC, {"header": header, "status": parts(robot)})
+            header = dialect.header(TOPIC, graph.clock(), "")
+            status = parts(robot, "" if dialect.is_ros2 else robot.frames)
+            self._node.publish(TOPIC, {"header": header, "status": status})
 
 
-def parts(robot: Robot) -> list[Message]:
-    """Return ``diagnostic_msgs/DiagnosticStatus`` of a robot's parts."""
+def parts(robot: Robot, space: str) -> list[Message]:
+    """Return ``diagnostic_msgs/DiagnosticStatus`` of a robot's parts.
+
+    Args:
+        robot: The robot.
+        space: What updaters put in front of the names of their nodes. In ROS 1 it is
+            the namespace: ``robot_0/``. In ROS 2 it is nothing, unless the parameter
+            ``diagnostic_updater.use_fqn`` is set.
+
+    """
     charge = robot.charge
     battery = ERROR if charge < EMPTY else WARN if charge < LOW else OK
     blocked = robot.bumped
     return [
         _part(
             robot,
-            "base: Motors",
+            f"{space}base: Motors",
             WARN if blocked else OK,
             "blocked" if blocked else "running" if robot.twist.vx else "standing",
             {
@@ -53,22 +63,21 @@ def parts(robot: Robot) -> list[Message]:
         ),
         _part(
             robot,
-            "base: Battery",
+            f"{space}base: Battery",
             battery,
             f"{100 * charge:.0f} %{'' if battery == OK else ', charge it'}",
             {"charge": f"{charge:.3f}"},
         ),
-        _part(robot, "laser: Frequency", OK, "10 Hz", {}),
+        _part(robot, f"{space}laser: Frequency", OK, "10 Hz", {}),
     ]
 
 
 def _part(
     robot: Robot, name: str, level: int, message: str, values: dict[str, str]
 ) -> Message:
-    # Updaters put the name of their node in front, and of its namespace.
     return {
         "level": level,
-        "name": f"{robot.frames}{name}",
+        "name": name,
         "message": message,
         "hardware_id": robot.name or "robot",
         "values": [{"key": key, "value": value} for key, value in values.items()],

@@ -22,6 +22,7 @@ MESSAGES = {
     "std_msgs/UInt8MultiArray": "std_msgs/MultiArrayLayout layout; uint8[] data",
     "geometry_msgs/Vector3": "float64 x; float64 y; float64 z",
     "geometry_msgs/Point": "float64 x; float64 y; float64 z",
+    "geometry_msgs/PointStamped": "std_msgs/Header header; geometry_msgs/Point point",
     "geometry_msgs/Point32": "float32 x; float32 y; float32 z",
     "geometry_msgs/Quaternion": "float64 x; float64 y; float64 z; float64 w",
     "geometry_msgs/Pose": (
@@ -67,6 +68,10 @@ MESSAGES = {
     ),
     "nav_msgs/OccupancyGrid": (
         "std_msgs/Header header; nav_msgs/MapMetaData info; int8[] data"
+    ),
+    "nav_msgs/GridCells": (
+        "std_msgs/Header header; float32 cell_width; float32 cell_height;"
+        " geometry_msgs/Point[] cells"
     ),
     "sensor_msgs/LaserScan": (
         "std_msgs/Header header; float32 angle_min; float32 angle_max;"

@@ -75,6 +75,18 @@ class Schema:
         if dialect.is_ros2:
             header = self._fields["std_msgs/Header"]
             self._fields["std_msgs/Header"] = header[1:]
+        self._messages = set(MESSAGES)
+
+    def define(self, type_name: str, shapes: Mapping[str, tuple[Field, ...]]) -> None:
+        """Take the fields of a message type from elsewhere.
+
+        Args:
+            type_name: The type, in either spelling.
+            shapes: Its fields and those of all types in it, by canonical names.
+
+        """
+        self._fields.update(shapes)
+        self._messages.add(canonical(type_name))
 
     def fields(self, type_name: str) -> tuple[Field, ...]:
         """Return the fields of a message type, in either spelling.
@@ -92,7 +104,7 @@ class Schema:
 
     def knows(self, type_name: str) -> bool:
         """Whether this is a message type of the graph."""
-        return canonical(type_name) in MESSAGES
+        return canonical(type_name) in self._messages
 
     def conform(
         self, type_name: str, value: Any, *, finite: bool = False
