@@ -53,6 +53,8 @@ class Bench:
     """Seconds that a ping and its answer are under way."""
     clear: bool = True
     """Whether nothing waits to be sent on the control link."""
+    held_up: float = 0.0
+    """Seconds for which the process stands still before what it decided is written."""
     losing_zeros: bool = False
     """Whether the control link drops every zero without saying so."""
     up: bool = True
@@ -126,15 +128,19 @@ class Bench:
                     self.losing_zeros and twist.is_zero
                 ):
                     pass
-                case actions.WriteTwist(key, twist, epoch, by):
-                    out = self.up and (self.clear or twist.is_zero)
+                case actions.WriteTwist(key, twist, epoch, by, until):
+                    self.now += self.held_up
+                    fresh = self.clear and self.now <= until
+                    out = self.up and (fresh or twist.is_zero)
                     log = self.written if out else self.dropped
                     write = Written(self.now, key, twist, epoch, by)
                     log.append(write)
                     self.attempts.append(write)
                     self.tell(events.Wrote(key, twist, epoch, by, out))
-                case actions.SendGoal(_, robot, id, x, y, yaw, by):
-                    self.tell(events.WroteGoal(robot, id, x, y, yaw, by, self.clear))
+                case actions.SendGoal(_, robot, id, x, y, yaw, by, _, until):
+                    self.now += self.held_up
+                    out = self.clear and self.now <= until
+                    self.tell(events.WroteGoal(robot, id, x, y, yaw, by, out))
                 case actions.CutLink(url):
                     self.up = False
                     self.tell(events.LinkDown(url, "control"))

@@ -251,6 +251,15 @@ class TestFreshness:
         driving.hold(0.1, x=1.0)
         assert driving.moving_since(self.at)
 
+    def test_a_process_that_is_stopped_says_zero_first_when_it_goes_on(self, driving):
+        driving.held_up = 1.5  # just between what it decides and what it writes
+        driving.drive(x=1.0)
+        driving.held_up = 0.0
+        driving.hold(1.0, x=1.0)
+        assert driving.dropped[-1].twist.vx > 0
+        assert driving.since(self.at)[0].twist == ZERO
+        assert driving.moving_since(self.at) == []
+
     @pytest.mark.parametrize("stale", [{}, {"tick": 1}])
     def test_no_stranger_stops_it_by_being_late(self, driving, stale):
         old = driving.report().epoch - 1

@@ -58,6 +58,13 @@ def made(monkeypatch):
     return FakeChild.made
 
 
+def test_what_cannot_be_said_to_a_gate_is_refused_and_not_kept_for_the_next():
+    client = GateClient()
+    with pytest.raises(ConfigError, match=r"robot 'Bob'.*object is unsupported"):
+        client.declare(spec(name="Bob", holonomic=object()))
+    assert client.introduction() == []
+
+
 @pytest.fixture
 def client(made):
     client = GateClient()

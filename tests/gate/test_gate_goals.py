@@ -155,6 +155,14 @@ def test_an_action_is_cancelled_without_the_link_too_and_again_with_it():
     assert cancels(bench) == 2
 
 
+def test_a_goal_is_not_written_after_a_pause_of_the_process(bench):
+    bench.take()
+    bench.held_up = 1.0
+    bench.goal()
+    assert "held up" in bench.refusals()[-1].why
+    assert bench.of(messages.SentGoal) == []
+
+
 def test_a_goal_that_could_not_be_written_is_told(bench):
     bench.take()
     bench.clear = False

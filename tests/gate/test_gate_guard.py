@@ -1,5 +1,6 @@
 """Scan assist within the gate: commands are slowed, and people are told why."""
 
+import itertools
 import math
 
 import msgspec
@@ -23,10 +24,10 @@ def bench():
     return Bench().begin(spec(assist=ASSIST))
 
 
-def scan(bench, reach):
+def scan(bench, reach, frame=""):
     step = math.tau / 72
     ranges = [reach] * 72
-    sweep = Sweep(-math.pi, step, 0.05, 8.0, ranges, bench.now)
+    sweep = Sweep(-math.pi, step, 0.05, 8.0, ranges, bench.now, frame=frame)
     bench.tell(events.Scanned(KEY, "/scan", sweep))
 
 
@@ -120,6 +121,53 @@ def test_a_scan_of_before_counts_for_nobody_after(bench):
     since = bench.now
     bench.hold(0.1, x=1.0)
     assert not bench.moving_since(since)
+
+
+def see_frames(bench, frames, seconds, x=1.0):
+    """Have scans come that name these frames, over and over, one with each command."""
+    start, names = bench.now, itertools.cycle(frames)
+
+    def each():
+        scan(bench, math.inf, next(names))
+        bench.drive(x=x)
+
+    bench.run(seconds, each)
+    return bench.moving_since(start + 0.1 * seconds)
+
+
+@pytest.mark.parametrize("frames", ["fr", "ffffffffffffffrrr"], ids=["turns", "runs"])
+def test_two_scanners_on_one_topic_stop_the_robot_as_neither_is_where_it_is_said(
+    bench, frames
+):
+    under_way(bench)
+    see_frames(bench, frames, 1.0)
+    assert see_frames(bench, frames, 4.0) == []
+    assert "scan assist: scans of two frames come" in bench.report().why
+
+
+def test_a_scanner_that_is_started_anew_in_another_frame_is_believed_after_2_s(bench):
+    under_way(bench)
+    assert see_frames(bench, ["rear"], 1.9) == []
+    see_frames(bench, ["rear"], 0.3, x=0.0)
+    assert see_frames(bench, ["rear"], 0.5) != []
+
+
+def test_a_scan_of_another_frame_than_was_asked_for_is_no_sight():
+    assist = msgspec.structs.replace(ASSIST, frame="laser")
+    bench = Bench().begin(spec(assist=assist))
+    bench.take()
+    bench.run(0.3, lambda: (scan(bench, math.inf, "laser"), bench.drive()))
+    start = bench.now
+    bench.run(0.3, lambda: (scan(bench, math.inf, "laser"), bench.drive(x=1.0)))
+    assert bench.moving_since(start)
+    start = bench.now
+    bench.run(0.3, lambda: (scan(bench, math.inf, "camera"), bench.drive(x=1.0)))
+    assert bench.moving_since(start + 0.05) == []
+    said = "scan assist: the scan names frame 'camera', expected 'laser'"
+    assert said in bench.report().why
+    bench.run(0.3, lambda: (scan(bench, math.inf, ""), bench.drive(x=1.0)))
+    said = "scan assist: the scan names no frame, expected 'laser'"
+    assert said in bench.report().why
 
 
 def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):

@@ -4,6 +4,7 @@ from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.gate import actions
+from webmap.gate.clock import now
 from webmap.gate.events import Echoed, Key, LinkDown, LinkUp, Measured, Wrote
 from webmap.gate.lanes.links import Links
 from webmap.gate.messages import AssistSpec
@@ -77,6 +78,34 @@ async def test_a_velocity_goes_out_now_or_is_said_to_be_dropped():
 
 
 @in_loop
+async def test_a_velocity_that_was_decided_before_a_pause_is_dropped_and_no_zero_is():
+    async with noting_bridge() as bridge, Noting() as noting:
+        key = Key(bridge.url, "/cmd_vel")
+        noting.attach(spec(bridge_url=bridge.url))
+        await noting.up("control", "tasks")
+        late = actions.WriteTwist(key, SLOW, 7, "a", now() - 0.001)
+        assert noting.do(late) == Wrote(key, SLOW, 7, "a", False)
+        zero = actions.WriteTwist(key, ZERO, 7, "a", now() - 0.001)
+        assert noting.do(zero) == Wrote(key, ZERO, 7, "a", True)
+        await until(lambda: bridge.of("publish", "/cmd_vel"), "the zero")
+        [told] = bridge.of("publish", "/cmd_vel")
+        assert told.message["msg"]["linear"]["x"] == 0.0
+
+
+@in_loop
+async def test_a_goal_that_was_decided_before_a_pause_is_dropped():
+    async with noting_bridge() as bridge, Noting() as noting:
+        key = noting.attach(spec(bridge_url=bridge.url, goal_topic="/goal"))
+        await noting.up("control", "tasks")
+        at = (key, "r1", "g1", 1.0, 2.0, 0.0, "a", "topic")
+        late = noting.do(actions.SendGoal(*at, now() - 0.001))
+        assert not late.done
+        assert noting.do(actions.SendGoal(*at, now() + 10.0)).done
+        await until(lambda: bridge.of("publish", "/goal"), "the goal in time")
+        assert len(bridge.of("publish", "/goal")) == 1
+
+
+@in_loop
 async def test_bridges_of_odometry_and_goals_may_be_others_than_that_of_velocity():
     async with (
         noting_bridge() as a,
@@ -100,7 +129,7 @@ async def test_bridges_of_odometry_and_goals_may_be_others_than_that_of_velocity
         await until(lambda: b.of("subscribe", "/odom"), "odometry")
         await until(lambda: len(c.of("advertise")) == 2, "goals")
         assert [t.topic for t in a.of("advertise", "/lock")] == ["/lock"]
-        noting.do(actions.RunHook(key, "r1", robot.stop_hooks[0], True))
+        noting.do(actions.RunHook(key, "r1", robot.stop_hooks[0], True, 1))
         await until(lambda: a.of("publish", "/lock"), "the hook")
         noting.do(actions.Watch(key, False))
         await until(lambda: a.of("unsubscribe", "/scan"), "no scans any more")

@@ -20,6 +20,7 @@ from webmap.geometry import Twist
 
 axis = st.floats(-1e308, 1e308)
 positive = st.floats(0, 1e6)
+near = st.floats(-10, 10)
 
 
 def issue(ticks, *times):
@@ -156,6 +157,17 @@ class TestLimits:
         twist = fit(Twist(3.0, -4.0, 0.0), Speed(1.0, 1.0, ()), holonomic=True)
         assert (twist.vx, twist.vy) == pytest.approx((0.6, -0.8))
         assert fit(Twist(-3.0), Speed(0.7, 1.0, ()), holonomic=False).vx == -0.7
+
+    @given(near, near, near, near, st.floats(0.01, 10.0), st.floats(0.001, 0.1))
+    def test_speeding_up_aslant_is_ramped_as_along_one_axis(self, x, y, vx, vy, a, dt):
+        found = ramp(Twist(x, y), Twist(vx, vy), a, dt)
+        speed = math.hypot(found.vx, found.vy)
+        assert speed <= math.hypot(x, y) + a * dt + 1e-9
+        assert abs(found.vx) <= abs(vx) + 1e-9
+        assert abs(found.vy) <= abs(vy) + 1e-9
+
+    def test_a_stop_aslant_is_not_ramped(self):
+        assert ramp(Twist(0.5, 0.5), Twist(), 1.0, 0.05) == Twist()
 
     @given(
         st.floats(-10, 10), st.floats(-10, 10), st.floats(0.01, 5), st.floats(0, 0.1)

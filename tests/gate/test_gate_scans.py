@@ -52,6 +52,29 @@ def test_a_scan_is_read():
 
 
 @pytest.mark.parametrize(
+    ("header", "frame"),
+    [
+        ({"frame_id": "laser"}, "laser"),
+        ({"frame_id": "/laser"}, "laser"),
+        ({"frame_id": "x" * 5000}, "x" * 80),
+        ({"frame_id": 7}, ""),
+        ({}, ""),
+        (7, ""),
+        (None, ""),
+    ],
+)
+def test_the_frame_of_a_scan_is_what_its_header_says(header, frame):
+    assert hear_scan(scan(header=header), 1.0)[1].frame == frame
+
+
+def test_a_dense_scan_keeps_its_frame():
+    numbers = cbor2.CBORTag(85, array("f", [1.0] * 2000).tobytes())
+    dense = scan(header={"frame_id": "laser"}, ranges=numbers, angle_increment=0.001)
+    sweep = hear_scan(dense, 1.0)[1]
+    assert (sweep.frame, len(sweep.ranges) <= 720) == ("laser", True)
+
+
+@pytest.mark.parametrize(
     "frame",
     [
         b'{"op":"publish","topic":"/scan","msg":{"ranges":[null]}}',

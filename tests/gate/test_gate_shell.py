@@ -188,11 +188,11 @@ async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
     """The first machine's link is broken; the second and the end do not wait for it."""
     write, broken = ControlLane.write, []
 
-    def break_on_the_first(lane, topic, twist):
+    def break_on_the_first(lane, topic, twist, *until):
         if topic == "/cmd_vel":
             broken.append(topic)
             raise BufferError("a slip of the link's own")
-        return write(lane, topic, twist)
+        return write(lane, topic, twist, *until)
 
     async with driving(tmp_path) as (bridge, gate):
         gate.x = None
@@ -222,7 +222,7 @@ async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
     async with driving(tmp_path, stop_hooks=(hook,)) as (bridge, gate):
         bridge.answers_services = False
         key = Key(bridge.url, "/cmd_vel")
-        gate.shell._links.perform(actions.RunHook(key, "r1", hook, True))
+        gate.shell._links.perform(actions.RunHook(key, "r1", hook, True, 1))
         await until(lambda: bridge.of("call_service"), "a call that hangs")
         with monkeypatch.context() as patch:
             patch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)

@@ -4,6 +4,7 @@ import asyncio
 import socket
 import ssl
 import subprocess
+import threading
 
 import pytest
 from link_bench import (
@@ -86,6 +87,23 @@ class TestOpen:
             assert answers[0][0] == 0x80 | PONG
             assert (heard.texts, heard.pongs) == ([], [])
             link.close()
+
+    @in_loop
+    async def test_the_loop_goes_on_while_the_authorities_are_read(self, monkeypatch):
+        reading, may_end, ended = threading.Event(), threading.Event(), []
+
+        def slow_disk():
+            reading.set()
+            ended.append(may_end.wait(2))
+            return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+
+        monkeypatch.setattr(ssl, "create_default_context", slow_disk)
+        asking = asyncio.create_task(opened("wss://127.0.0.1:1", Heard()))
+        await until(reading.is_set, "the reading")  # which another robot's loop sees
+        may_end.set()
+        with pytest.raises(BridgeClosed):
+            await asking
+        assert ended == [True], "the loop stood still while it was read"
 
     def test_a_bridge_behind_tls_is_spoken_to_if_its_name_is_vouched_for(
         self, tmp_path, monkeypatch

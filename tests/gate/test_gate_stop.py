@@ -318,13 +318,46 @@ class TestConfirmation:
         watch_it(seen, 0.4, 0.01)
         assert seen.report().stop.confirmed is True
 
+    def test_it_is_confirmed_only_as_long_as_there_is_a_link(self, seen):
+        stop(seen)
+        watch_it(seen, 0.4, 0.0)
+        assert seen.report().stop.confirmed is True
+        seen.break_links()
+        seen.run(0.2)
+        told = seen.report().stop
+        assert (told.confirmed, told.why) == (
+            False,
+            f"it stood, but since then no link to {URL}",
+        )
+        seen.connect_links()
+        watch_it(seen, 0.4, 0.0)
+        assert seen.report().stop.confirmed is True
+
+    def test_a_gap_in_odometry_that_says_it_stands_is_no_motion(self, seen):
+        stop(seen)
+        watch_it(seen, 0.4, 0.0)
+        seen.run(1.0)
+        assert seen.report().stop.confirmed is True
+        watch_it(seen, 0.05, 0.0)
+        assert seen.report().stop.confirmed is True
+
+    def test_odometry_that_comes_once_a_second_is_said_to_tell_too_little(self, seen):
+        stop(seen)
+        for _ in range(4):
+            watch_it(seen, 0.01, 0.0)
+            seen.run(0.99)
+        too_seldom = "odometry comes too seldom to tell"
+        assert seen.report().stop == StopReport("B", False, too_seldom)
+
     def test_one_that_moves_again_is_confirmed_no_longer_however_late(self, seen):
         """By a goal that begins late, by a ramp, or by another that publishes."""
         stop(seen)
         watch_it(seen, 0.4, 0.0)
         seen.run(60.0)
         assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, True)
-        watch_it(seen, 0.1, 0.4)
+        since = "it stood, but since then no odometry"
+        assert seen.report().stop == StopReport("B", False, since)
+        watch_it(seen, 0.2, 0.4)
         assert seen.report().stop == StopReport("B", False, "still moving at 0.40 m/s")
         watch_it(seen, 0.4, 0.0)
         assert seen.report().stop.confirmed is True

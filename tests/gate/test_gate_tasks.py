@@ -148,14 +148,16 @@ class TestTopicGoals:
     async def test_hooks_are_flags_and_calls(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             flag = {"topic": "/lock", "type": "std_msgs/Bool"}
-            noting.tasks.run_hook(flag, True)
-            noting.tasks.run_hook(flag, False)
+            ended = []
+            noting.tasks.run_hook(flag, True, ended.append)
+            noting.tasks.run_hook(flag, False, ended.append)
             trigger = {"service": "/e_stop", "type": "std_srvs/Trigger"}
-            noting.tasks.run_hook(trigger, True)
+            noting.tasks.run_hook(trigger, True, ended.append)
             await noting.tasks.settle()
             await until(lambda: len(bridge.of("publish", "/lock")) == 2, "both flags")
             flags = [t.message["msg"]["data"] for t in bridge.of("publish", "/lock")]
             assert flags == [True, False]
+            assert ended == [None] * 3
             assert bridge.of("call_service")[0].message["service"] == "/e_stop"
 
 

@@ -89,6 +89,46 @@ class TestAlarm:
         assert obedience.alarm(9.5) is None
         assert not obedience.watching(9.5)
 
+    def test_a_gap_in_odometry_ends_no_alarm(self, bench):
+        self.run(bench, 1.2, 0.31, x=0.0)
+        bench.hold(1.5)
+        assert bench.report().alarm == (
+            "zero sent, still moving at 0.31 m/s, and odometry has ceased since"
+        )
+        self.run(bench, 0.2, 0.3, x=0.0)
+        assert bench.report().alarm == "zero sent, still moving at 0.30 m/s"
+        self.run(bench, 0.6, 0.0, x=0.0)
+        assert bench.report().alarm is None
+
+    def test_after_a_minute_of_silence_it_ends_and_odometry_brings_it_back(self, bench):
+        self.run(bench, 1.2, 0.31, x=0.0)
+        bench.hold(59.0)
+        assert bench.report().alarm
+        bench.hold(3.0)
+        assert bench.report().alarm is None
+        self.run(bench, 0.2, 0.31, x=0.0)
+        assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
+
+    def test_under_a_stop_a_robot_that_is_seen_late_is_said_as_well(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        bench.run(9.0)
+        assert bench.report().alarm is None
+        self.run(bench, 0.2, 0.31)
+        assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
+
+    def test_a_gate_that_was_started_anew_looks_whether_its_zeros_are_obeyed(self):
+        bench = Bench(was_driven=True).begin(spec(odometry_topic="/odom"))
+        assert bench.written
+        self.run(bench, 1.2, 0.31)
+        assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
+
+    def test_what_odometry_said_is_shown_as_long_as_it_comes(self, bench):
+        assert bench.report().measured == (0.5, 0.0, 0.0)
+        bench.hold(0.9, x=0.5)
+        assert bench.report().measured == (0.5, 0.0, 0.0)
+        bench.hold(0.3)
+        assert bench.report().measured is None
+
     def test_the_second_counts_from_the_first_zero(self):
         obedience = Obedience()
         obedience.wrote(ZERO, Twist(0.5), 0.0)

@@ -7,6 +7,8 @@ from contextlib import suppress
 from fake_drive import FakeDrive
 from playwright.sync_api import Browser, Page
 
+from real_browser import Complaints
+
 DOUBTS = {
     "blur": "window.dispatchEvent(new Event('blur'))",
     "pagehide": "window.dispatchEvent(new PageTransitionEvent('pagehide'))",
@@ -32,19 +34,14 @@ class Bench:
 
     def __init__(self, browser: Browser, gate: FakeDrive, query: str, **kw) -> None:
         self.gate = gate
-        self.problems: list[str] = []
+        self.complaints = Complaints()
         self.context = browser.new_context(**kw)
+        self.complaints.listen(self.context)
         self.page: Page = self.context.new_page()
-        self.page.on("console", self._note)
-        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
         self.page.goto(gate.url + query)
         self.page.wait_for_selector("body[data-ready=yes]")
         self.until(lambda: self.state == "open")
         self.page.wait_for_timeout(250)  # the hands' own rest after loading
-
-    def _note(self, message) -> None:
-        if message.type in ("error", "warning") and "ERR_" not in message.text:
-            self.problems.append(message.text)
 
     @property
     def state(self) -> str:

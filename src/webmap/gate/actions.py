@@ -1,5 +1,6 @@
 """What the decisions ask of the shell."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -37,13 +38,16 @@ class WriteTwist:
     """Write a velocity now or drop it; answered by ``Wrote``.
 
     Zero is written whenever the link is open. Anything else is written only if
-    nothing is waiting to be sent before it.
+    nothing is waiting to be sent before it, and before it is too old.
     """
 
     key: Key
     twist: Twist
     epoch: int | None
     by: str | None
+    until: float = math.inf
+    """When it is too old, by the gate's clock: the process may have been held up
+    between what was decided and what is written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,8 @@ class SendGoal:
     yaw: float
     by: str
     way: Way
+    until: float = math.inf
+    """When it is too old, by the gate's clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +76,8 @@ class TellPose:
     y: float
     yaw: float
     by: str
+    until: float = math.inf
+    """When it is too old, by the gate's clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,12 +139,17 @@ class KeepStopTest:
 
 @dataclass(frozen=True, slots=True)
 class RunHook:
-    """Publish the robot's Bool (``stopped``), or call its service."""
+    """Publish the robot's Bool (``stopped``), or call its service.
+
+    Answered by ``HookEnded``, for a service when it has answered or did not in time;
+    nothing waits for that.
+    """
 
     key: Key
     robot: str
     hook: dict[str, str]
     stopped: bool
+    number: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,6 +82,14 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
+class Renew:
+    """The page needs its lease still, though it does nothing with it now."""
+
+    robot: str
+    epoch: int
+
+
+@dataclass(frozen=True, slots=True)
 class Drive:
     """How the page's inputs stand now."""
 
@@ -181,6 +189,7 @@ class StopTest:
 Command = (
     Take
     | Release
+    | Renew
     | Drive
     | Goal
     | Locate
@@ -326,6 +335,7 @@ def _one_or_all(fields: _Fields) -> str | None:
 _READERS: dict[str, Callable[[_Fields], Command]] = {
     "take": lambda fields: Take(fields.robot()),
     "release": lambda fields: Release(fields.robot()),
+    "renew": lambda fields: Renew(fields.robot(), fields.whole("epoch")),
     "drive": _drive,
     "goal": lambda fields: _pose(Goal, fields),
     "locate": lambda fields: _pose(Locate, fields),

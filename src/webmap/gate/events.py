@@ -49,6 +49,8 @@ class Sweep(msgspec.Struct, frozen=True):
     """What it was before it was folded, if it was."""
     refused: str | None = None
     """Why nobody looked at it, in words, if nobody did."""
+    frame: str = ""
+    """The frame that it says it is in; "" if it names none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +155,17 @@ class GoalLost:
 
 
 @dataclass(frozen=True, slots=True)
+class HookEnded:
+    """What became of a ``RunHook``."""
+
+    robot: str
+    hook: dict[str, str]
+    number: int
+    why: str | None
+    """Why the robot was not told, or did not do it, in words."""
+
+
+@dataclass(frozen=True, slots=True)
 class Echoed:
     """A velocity came back on the topic that the gate writes to."""
 
@@ -251,6 +264,7 @@ Event = (
     | GoalProgress
     | GoalEnded
     | GoalLost
+    | HookEnded
     | Echoed
     | Measured
     | Scanned

@@ -31,6 +31,12 @@ def checked_hooks(
     return tuple(_checked(name, hook, twist_topic) for hook in hooks)
 
 
+def place_of(hook: Mapping[str, str]) -> tuple[str, str]:
+    """Return whether a checked hook is a topic or a service, and its name."""
+    place = "topic" if "topic" in hook else "service"
+    return place, hook[place]
+
+
 def _checked(name: str, hook: Any, twist_topic: str | None) -> dict[str, str]:
     if not isinstance(hook, Mapping):
         raise ConfigError(

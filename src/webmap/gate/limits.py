@@ -139,16 +139,16 @@ def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
     Args:
         last: What was written last.
         wanted: What is wanted now.
-        a_max: Greatest growth of the speed along an axis, in m/s².
+        a_max: Greatest growth of the speed, in m/s², along each axis and in all.
         elapsed: Seconds since ``last`` was written.
 
     """
     step = a_max * elapsed
-    return Twist(
-        _towards(last.vx, wanted.vx, step),
-        _towards(last.vy, wanted.vy, step),
-        wanted.wz,
-    )
+    vx, vy = _towards(last.vx, wanted.vx, step), _towards(last.vy, wanted.vy, step)
+    allowed, length = math.hypot(last.vx, last.vy) + step, math.hypot(vx, vy)
+    if vx != 0 and vy != 0 and length > allowed:  # both axes at once, aslant
+        vx, vy = vx / length * allowed, vy / length * allowed
+    return Twist(vx, vy, wanted.wz)
 
 
 def _towards(last: float, wanted: float, step: float) -> float:

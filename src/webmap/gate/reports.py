@@ -14,7 +14,7 @@
      "armable": true, "reason": null, "way": "navigate_to_pose", "cancels": true,
      "locates": true, "goal": {"id": "g7", "x": 1.0, "y": 2.0, "yaw": 0.5, "by": "c5",
      "way": "navigate_to_pose", "state": "under way", "why": "", "left": 3.2,
-     "time": 4.5, "eta": 5.3, "recoveries": 0}}
+     "time": 4.5, "eta": 5.3, "recoveries": 0}, "hooks": []}
     {"op": "gone", "robot": "r1"}
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
 
@@ -45,7 +45,8 @@ is. ``goal`` is the newest one, by the connection ``by``, also when it has ended
 ``"sent"``, ``"accepted"``, ``"under way"``, ``"cancelling"``, ``"unknown"`` (what told
 of it was lost), ``"reached"``, ``"failed"`` or ``"cancelled"``, with the reason, the
 metres and seconds to go, the seconds under way and how often the robot had to free
-itself; null is what it does not say.
+itself; null is what it does not say. ``hooks`` says which stop hooks failed or are yet
+to be said, and why, one sentence each: ``"stop hook /e_stop: no answer within 2 s"``.
 ``refused`` names the ``op`` (``what``) that was refused, or ``"command"`` for words
 that made no sense (``robot`` is then null), or ``"lease"`` when a lease has ended. The
 same refusal is said once a second.

@@ -129,7 +129,16 @@ def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
             f"robot {name!r}: while it is blind a robot is to 'stop' or to 'creep', "
             f"got {assist.blind!r}"
         )
-    return msgspec.structs.replace(assist, topic=normalise_topic(assist.topic))
+    x, y, yaw = map(float, assist.sensor)
+    return msgspec.structs.replace(
+        assist,
+        topic=normalise_topic(assist.topic),
+        footprint=tuple((float(x), float(y)) for x, y in assist.footprint),
+        sensor=(x, y, yaw),
+        stop_distance=float(assist.stop_distance),
+        brake=float(assist.brake),
+        creep=float(assist.creep),
+    )
 
 
 def _topic(topic: str | None) -> str | None:

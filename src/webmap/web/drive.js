@@ -199,7 +199,7 @@ export class Drive {
 
   /** @param {string} robot Whose lease goes on being needed, if this page has it. */
   keep(robot) {
-    this._pilot.keep(robot, performance.now());
+    this._send(this._pilot.keep(robot, performance.now()));
   }
 
   // Goals ----------------------------------------------------------------------

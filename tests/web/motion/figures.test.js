@@ -74,6 +74,14 @@ test("times are the gate's own where it gives them", () => {
   assert.deepEqual(texts(standing, null, null), ["not known", "not known", "stands"]);
 });
 
+test("a robot is said to stand only where odometry says so", () => {
+  const stop = (fields) => timings(report(fields), null, null)[2].text;
+  const rest = { sent: [0, 0, 0], echoed: null };
+  assert.equal(stop({ ...rest, measured: [0, 0, 0] }), "stands");
+  assert.equal(stop({ ...rest, measured: null }), "not known");
+  assert.equal(stop({ ...rest, state: "free", measured: [0.4, 0, 0] }), "not known");
+});
+
 test("the test of its own stop is told while it goes on, and when it failed", () => {
   const said = (state) => testWords({ test: { state, text: "creeping" } });
   assert.equal(said("creeping"), "Stop test: creeping");

@@ -392,6 +392,22 @@ describe("leases", () => {
     assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);
   });
 
+  test("that serve a route are renewed now and then, as long as that goes on", () => {
+    bench = new Bench({ releaseAfter: 5000 });
+    const epoch = bench.grant("r1");
+    bench.pilot.place("goal", "r1", { x: 1, y: 2, yaw: 0 }, bench.now);
+    for (let t = 0; t < 25_000; t += 50) {
+      bench.keep(bench.pilot.keep("r1", bench.now));
+      bench.step();
+    }
+    const renew = { op: "renew", robot: "r1", epoch };
+    assert.deepEqual(bench.sent, [renew, renew, renew]);
+  });
+
+  test("that this page does not have are not renewed", () => {
+    assert.deepEqual(bench.pilot.keep("r1", bench.now), []);
+  });
+
   test("end with a STOP, at once and without a word", () => {
     const epoch = bench.drive();
     bench.pilot.stopped("r1", bench.now);

@@ -63,13 +63,41 @@ const cases = [
     { driven: "r1", settled: true },
     { ...REPORT, ...ME, state: "stopping" },
   ],
+  [
+    "stopping",
+    { driven: "r1", settled: true },
+    { ...REPORT, ...ME, measured: [0, 0.06, 0] },
+  ],
+  [
+    "ready",
+    { driven: "r1", settled: true },
+    { ...REPORT, ...ME, measured: [0.04, 0, 0.09] },
+  ],
+  [
+    "ready",
+    { driven: "r1", settled: true },
+    { ...REPORT, ...ME, measured: [0.4, 0, 0], goal: { state: "under way" } },
+  ],
+  [
+    "stopping",
+    { driven: "r1", settled: true },
+    {
+      ...REPORT,
+      ...ME,
+      measured: [0.4, 0, 0],
+      cancels: false,
+      goal: { state: "sent", way: "topic" },
+    },
+  ],
+  ["stopping", {}, { ...REPORT, measured: [0, 0, -0.2], goal: { state: "cancelled" } }],
   ["hands-off", { driven: "r1", pressed: true, dead: true }, { ...REPORT, ...ME }],
   ["fixed", { driven: "r1" }, { ...REPORT, ...ME, reason: "no odometry for 1 s" }],
   ["stopped", {}, { ...REPORT, state: "stopped" }],
 ];
 
 for (const [state, status, report] of cases) {
-  const told = JSON.stringify({ ...status, ...(report && { robot: report.state }) });
+  const { state: robot, measured } = report ?? {};
+  const told = JSON.stringify({ ...status, robot, measured });
   test(`${told} is shown as ${state}`, () => {
     const description = describe({ ...STATUS, ...status }, "r1", report, true);
     assert.equal(description.state, state);
@@ -92,4 +120,18 @@ test("the cap says why it is in force", () => {
     capOf({ ...REPORT, why }),
     "Up to 0.30 m/s, 0.60 rad/s: unverified stop",
   );
+});
+
+test("a stop hook that failed is said, whatever else there is to say", () => {
+  const hooks = ["stop hook /e_stop: refused", "stop hook /lock: no answer within 2 s"];
+  const words = "Stop hook /e_stop: refused. Stop hook /lock: no answer within 2 s.";
+  const detail = (more, status = {}) =>
+    describe({ ...STATUS, ...status }, "r1", { ...REPORT, hooks, ...more }, true).detail;
+  const stop = { by: "Ann", confirmed: true, why: "" };
+  const latched = { state: "stopped", latched: true, stop };
+  assert.equal(detail(latched), `By Ann, confirmed by odometry. ${words}`);
+  assert.equal(detail({}, { taking: true }), words);
+  const driving = detail({ ...ME, state: "driving" }, { driven: "r1" });
+  assert.equal(driving, `0.00 m/s, 0.00 rad/s. ${words}`);
+  assert.equal(detail({}, { link: "connecting" }), "");
 });

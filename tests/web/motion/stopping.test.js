@@ -139,6 +139,18 @@ describe("a STOP that latches", () => {
     assert.equal(text(null), "");
   });
 
+  test("that the disk does not have is said to be forgotten at a restart", () => {
+    const forgotten = "a restart would forget this STOP: the disk is full";
+    const text = (confirmed, why) =>
+      stopWords(latched({ stop: { by: "Ann", confirmed, why: `${why}; ${forgotten}` } }))
+        .text;
+    const said = "stopped, confirmed by odometry";
+    assert.equal(text(true, said), `By Ann, confirmed by odometry; ${forgotten}.`);
+    assert.equal(text(null, ""), `By Ann, looking whether it stands; ${forgotten}.`);
+    const stop = { by: "Ann", confirmed: true, why: `${said}; ${forgotten}` };
+    assert.equal(verdict(latched({ stop }), 100, 200).text, `${said}; ${forgotten}`);
+  });
+
   test("stands where STOP ALL is", () => {
     const one = latched({ stop: word(true) });
     const doubtful = latched({ stop: word(false, "no odometry") });
@@ -182,5 +194,21 @@ describe("a robot", () => {
   test("whose odometry is silent is not accused", () => {
     const watch = obedience([0, driven], [100, report({ measured: null })]);
     assert.deepEqual(watch.disobeying(5000), []);
+  });
+});
+
+describe("a stop hook that failed", () => {
+  const stop = { by: "Ann", confirmed: true, why: "" };
+  const hooks = ["stop hook /e_stop: refused"];
+  const failed = report({ state: "stopped", latched: true, stop, hooks });
+
+  test("is said of a STOP that odometry confirms", () => {
+    const text = "stopped, confirmed by odometry; stop hook /e_stop: refused";
+    assert.equal(verdict(failed, 100, 200).text, text);
+  });
+
+  test("is said where STOP ALL is", () => {
+    const words = "Bob stays stopped. Stop hooks failed: Bob.";
+    assert.equal(standingStops([failed, report()]), words);
   });
 });

@@ -13,7 +13,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from webmap.gate import commands, messages
+from webmap.errors import ConfigError
+from webmap.gate import commands, framing, messages
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramRoad
 from webmap.gate.display.supervisor import Supervisor
@@ -76,6 +77,10 @@ class GateClient:
 
         """
         spec = checked(spec)
+        try:
+            framing.pack(spec)
+        except TypeError as error:  # a gate that is started anew would not hear it
+            raise ConfigError(f"robot {spec.name!r}: {error}") from error
         with self._lock:
             self._specs[spec.id] = spec
             self.tell(spec)

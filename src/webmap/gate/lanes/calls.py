@@ -2,15 +2,22 @@
 
 import asyncio
 import logging
+from collections.abc import Callable
+
+from websockets.exceptions import WebSocketException
 
 from webmap.errors import BridgeClosed
-from webmap.gate.lanes import words
+from webmap.gate.lanes.answers import answer_to
+from webmap.gate.lanes.navigation import readable
 from webmap.gate.lanes.sockets import Ears, open_socket
 
 log = logging.getLogger("webmap.gate")
 
 CALL_TIMEOUT = 2.0
 """How long a service is given to answer, in seconds, the way there included."""
+
+Ended = Callable[[str | None], None]
+"""Takes why something failed, in words, or ``None`` if it did not."""
 
 
 class Calls:
@@ -25,16 +32,20 @@ class Calls:
         self._url = url
         self._calling: set[asyncio.Task[None]] = set()
 
-    def call(self, request: bytes, id: str, what: str) -> None:
+    def call(
+        self, request: bytes, id: str, what: str, ended: Ended = lambda why: None
+    ) -> None:
         """Call a service without waiting for its answer.
 
         Args:
             request: The operation that calls it.
             id: The name that the answer will bear.
             what: What is called, for people.
+            ended: Is told what came of it, unless it is given up by :meth:`close`.
 
         """
-        task = asyncio.get_running_loop().create_task(self._call(request, id, what))
+        call = self._call(request, id, what, ended)
+        task = asyncio.get_running_loop().create_task(call)
         self._calling.add(task)
         task.add_done_callback(self._calling.discard)
 
@@ -48,17 +59,24 @@ class Calls:
         for task in self._calling:
             task.cancel()
 
-    async def _call(self, request: bytes, id: str, what: str) -> None:
-        answered = asyncio.Event()
+    async def _call(self, request: bytes, id: str, what: str, ended: Ended) -> None:
+        why = await self._ask(request, id)
+        if why is not None:
+            log.warning("%s: %s", what, why)
+        ended(why)
+
+    async def _ask(self, request: bytes, id: str) -> str | None:
+        """Call a service and return why that failed, ``None`` if it did not."""
+        outcomes: asyncio.Queue[str | None] = asyncio.Queue()
 
         def hear(data: bytes) -> None:
-            heard = words.hear(data)
-            if heard is not None and heard.id == id:
-                answered.set()
+            answer = answer_to(data, id)
+            if answer is not None:
+                outcomes.put_nowait(answer.why)
 
         def lost(why: str) -> None:
-            log.warning("%s: no answer, for the link is lost: %s", what, why)
-            answered.set()
+            reason = readable(f"no answer, for the link is lost: {why}")
+            outcomes.put_nowait(reason)
 
         ears = Ears(text=hear, pong=lambda _: None, lost=lost)
         try:
@@ -66,10 +84,11 @@ class Calls:
                 link = await open_socket(self._url, ears)
                 try:
                     link.send(request)
-                    await answered.wait()
+                    return await outcomes.get()
                 finally:
                     link.close()
-        except BridgeClosed as error:
-            log.error("%s failed: %s", what, error)
+        # The latter of a bridge that closes the link in the breath that opens it.
+        except (BridgeClosed, WebSocketException) as error:
+            return readable(f"no link: {error}")
         except TimeoutError:
-            log.warning("%s: no answer", what)
+            return f"no answer within {CALL_TIMEOUT:g} s"

@@ -1,5 +1,6 @@
 """The control lane: velocity out, its echo back, and nothing else."""
 
+import math
 from collections.abc import Callable
 
 from webmap.gate.clock import now
@@ -72,16 +73,24 @@ class ControlLane:
         if not self._listened:
             self.lane.hurry(IDLE_PING)
 
-    def write(self, topic: str, twist: Twist) -> bool:
+    def write(self, topic: str, twist: Twist, until: float = math.inf) -> bool:
         """Write a velocity now or drop it; return whether it went out.
 
-        Zero may wait behind other bytes, anything else may not, nor may it be one
-        more than may lie on the way.
+        Zero may wait behind other bytes and is never too late. Anything else may not
+        wait, nor may it be one more than may lie on the way, nor older than it may be.
+
+        Args:
+            topic: Where to.
+            twist: The velocity.
+            until: When it is too old, by the gate's clock.
+
         """
         if not (twist.is_zero or self._unproven.room(topic)):
             return False
         data = words.velocity(topic, self._types[topic], twist)
-        done = self.lane.write(data, only_if_clear=not twist.is_zero)
+        if twist.is_zero:
+            until = math.inf
+        done = self.lane.write(data, only_if_clear=not twist.is_zero, until=until)
         if done:
             self._unproven.wrote(topic, twist)
         return done

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -94,19 +95,21 @@ class Lane:
             del self._holds[id]
             self._say(held.goodbye)
 
-    def write(self, data: bytes, *, only_if_clear: bool) -> bool:
+    def write(
+        self, data: bytes, *, only_if_clear: bool, until: float = math.inf
+    ) -> bool:
         """Write a message now or not at all; return whether it went out.
 
         Args:
             data: The message.
             only_if_clear: Drop it if anything waits to be sent before it.
+            until: When it is too old to be written, by the gate's clock.
 
         """
         link = self._socket
         if link is None or not link.is_open or (only_if_clear and link.unsent):
             return False
-        link.send(data)
-        return True
+        return link.send(data, until)
 
     def cut(self, why: str) -> None:
         """Throw the socket away, with all that it has not sent, and connect anew."""

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 from webmap.gate import actions
-from webmap.gate.events import Event, Key, Wrote, WroteGoal, WrotePose
+from webmap.gate.events import Event, HookEnded, Key, Wrote, WroteGoal, WrotePose
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.tasks import TasksLane, Topic, goal_topics, hook_topics
 from webmap.gate.lanes.witness import WitnessLane
@@ -31,9 +31,9 @@ class Links:
     def perform(self, action: actions.Action) -> Event | None:
         """Do one thing; return what came of it, where that matters."""
         match action:
-            case actions.WriteTwist(key, twist, epoch, by):
+            case actions.WriteTwist(key, twist, epoch, by, until):
                 lane = self._control.get(key.url)
-                done = lane is not None and lane.write(key.topic, twist)
+                done = lane is not None and lane.write(key.topic, twist, until)
                 return Wrote(key, twist, epoch, by, done)
             case actions.SendGoal():
                 return self._send_goal(action)
@@ -44,9 +44,8 @@ class Links:
             case actions.CancelGoals(key, robot):
                 spec = self._robots[key][robot]
                 self._tasks[_goal_url(spec)].cancel(spec)
-            case actions.RunHook(key, robot, hook, stopped):
-                spec = self._robots[key][robot]
-                self._tasks[spec.bridge_url].run_hook(hook, stopped)
+            case actions.RunHook():
+                self._run_hook(action)
             case actions.Watch(key, on):
                 self._unwatch(key)
                 if on:
@@ -90,6 +89,13 @@ class Links:
         spec = self._robots[goal.key][goal.robot]
         done = self._tasks[_goal_url(spec)].send(spec, goal)
         return WroteGoal(goal.robot, goal.id, goal.x, goal.y, goal.yaw, goal.by, done)
+
+    def _run_hook(self, run: actions.RunHook) -> None:
+        def ended(why: str | None) -> None:
+            self._tell(HookEnded(run.robot, run.hook, run.number, why))
+
+        spec = self._robots[run.key][run.robot]
+        self._tasks[spec.bridge_url].run_hook(run.hook, run.stopped, ended)
 
     # Which lane is needed.
 

@@ -205,9 +205,14 @@ def _complaint(text: str, goal: SendGoal) -> GoalEnded | None:
 
 
 def _ended(goal: SendGoal, outcome: Outcome, why: str) -> GoalEnded:
-    plain = " ".join(why.split())
-    text = "".join(letter for letter in plain if letter.isprintable())
-    return GoalEnded(goal.robot, goal.id, outcome, text[:MOST_WORDS])
+    return GoalEnded(goal.robot, goal.id, outcome, readable(why))
+
+
+def readable(said: str) -> str:
+    """Return a robot's own words as people can be shown them: short, on one line."""
+    # Cut first: going through a megabyte, letter by letter, would keep zeros waiting.
+    plain = " ".join(said[: 10 * MOST_WORDS].split())
+    return "".join(letter for letter in plain if letter.isprintable())[:MOST_WORDS]
 
 
 def _read(data: bytes) -> _Frame | None:

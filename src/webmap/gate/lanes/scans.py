@@ -6,6 +6,8 @@ One of many beams is folded to at most 720 here, once; one of far too many is re
 before its numbers are read, and the socket takes no frame of more than a mebibyte.
 """
 
+from typing import Any
+
 from webmap.errors import ProtocolError
 from webmap.gate.events import Sweep
 from webmap.gate.rules.folding import folded, too_long
@@ -15,6 +17,9 @@ THROTTLE = 100
 """Milliseconds between two scans at least."""
 
 TYPE = "sensor_msgs/LaserScan"
+
+NAME = 80
+"""The longest name of a frame that is kept, in characters."""
 
 _FIELDS = ("angle_min", "angle_increment", "range_min", "range_max")
 
@@ -60,4 +65,11 @@ def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
     except (TypeError, ValueError, OverflowError):
         return None
     least, step, near, far = about
-    return topic, folded(Sweep(least, step, near, far, values, now, refused=refused))
+    frame_id = _frame_of(message.get("header"))
+    sweep = Sweep(least, step, near, far, values, now, refused=refused, frame=frame_id)
+    return topic, folded(sweep)
+
+
+def _frame_of(header: Any) -> str:
+    frame = header.get("frame_id") if isinstance(header, dict) else None
+    return frame[:NAME].removeprefix("/") if isinstance(frame, str) else ""

@@ -7,6 +7,7 @@ has the kernel throw away what it still holds.
 
 import asyncio
 import contextlib
+import math
 import socket
 import ssl
 import struct
@@ -23,6 +24,7 @@ from websockets.protocol import State
 from websockets.uri import parse_uri
 
 from webmap.errors import BridgeClosed
+from webmap.gate.clock import now
 
 CONNECT_TIMEOUT = 3.0
 """Seconds for name lookup, TCP, TLS and handshake together."""
@@ -72,10 +74,20 @@ class Socket(asyncio.Protocol):
         """Bytes that were written and that the kernel has not taken yet."""
         return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
-    def send(self, data: bytes) -> None:
-        """Write one text message."""
+    def send(self, data: bytes, until: float = math.inf) -> bool:
+        """Write one text message; return whether it was still worth it.
+
+        The clock is read at the last moment. A process that is stopped (SIGSTOP, a
+        laptop that sleeps) and goes on later would else write what it had decided
+        before, as the first thing that a robot hears.
+
+        Args:
+            data: The message.
+            until: When it is too old to be written, by the gate's clock.
+
+        """
         self._protocol.send_text(data)
-        self._flush()
+        return self._flush(until)
 
     def ping(self, data: bytes) -> None:
         """Write a ping; the bridge answers with a pong of the same data."""
@@ -145,13 +157,18 @@ class Socket(asyncio.Protocol):
                 text, self._parts = b"".join(self._parts), []
                 self.ears.text(text)
 
-    def _flush(self) -> None:
+    def _flush(self, until: float = math.inf) -> bool:
+        """Hand over what the protocol has to say, unless that is too old."""
         assert self._transport is not None
-        for data in self._protocol.data_to_send():
+        waiting = self._protocol.data_to_send()
+        if now() > until:
+            return False
+        for data in waiting:
             if data:
                 self._transport.write(data)
             elif self._transport.can_write_eof():
                 self._transport.write_eof()
+        return True
 
     def _lose(self, why: str) -> None:
         if self._over:
@@ -174,11 +191,13 @@ async def open_socket(url: str, ears: Ears) -> Socket:
     made = Socket(url, ears)
     try:
         async with asyncio.timeout(CONNECT_TIMEOUT):
+            # Reading who may vouch for a name takes 0.1 s: other robots cannot wait.
+            tls = await asyncio.to_thread(_trust) if uri.secure else None
             await asyncio.get_running_loop().create_connection(
                 lambda: made,
                 uri.host,
                 uri.port,
-                ssl=ssl.create_default_context() if uri.secure else None,
+                ssl=tls,
                 happy_eyeballs_delay=0.25,
             )
             await made.opened
@@ -192,6 +211,11 @@ async def open_socket(url: str, ears: Ears) -> Socket:
         _retrieve(made.opened)
         raise
     return made
+
+
+def _trust() -> ssl.SSLContext:
+    """Return how bridges prove who they are, by the system's authorities of now."""
+    return ssl.create_default_context()
 
 
 def _retrieve(future: "asyncio.Future[None]") -> None:

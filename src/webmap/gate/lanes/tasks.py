@@ -11,12 +11,13 @@ itself, its status only while a goal of ours is followed.
 """
 
 import asyncio
+import logging
 from collections.abc import Callable, Iterable
 
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
 from webmap.gate.lanes import navigation, words
-from webmap.gate.lanes.calls import Calls
+from webmap.gate.lanes.calls import Calls, Ended
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.own_map import in_own_map
 from webmap.gate.lanes.sockets import Ears, Socket
@@ -24,6 +25,8 @@ from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.goals import is_move_base
 from webmap.identifiers import generate_id
 from webmap.ros import ops
+
+log = logging.getLogger("webmap.gate")
 
 MAX_SPENT = 8
 """How many sockets of action goals are kept for their results at most."""
@@ -87,7 +90,8 @@ class TasksLane:
         if goal.way == "move_base":
             # First, so that no word is missed: they may be on their way at once.
             self._follow(spec, goal)
-        done = self.lane.write(words.goal(spec, goal), only_if_clear=True)
+        said = words.goal(spec, goal)
+        done = self.lane.write(said, only_if_clear=True, until=goal.until)
         if done and goal.way == "navigate_to_pose":
             self._keep_for_result(goal)
         if not done:
@@ -97,7 +101,7 @@ class TasksLane:
     def tell_pose(self, spec: RobotSpec, at: TellPose) -> bool:
         """Tell where the robot is, now or not; return whether it went out."""
         estimate = words.pose_estimate(spec, in_own_map(spec, at))
-        return self.lane.write(estimate, only_if_clear=True)
+        return self.lane.write(estimate, only_if_clear=True, until=at.until)
 
     def cancel(self, spec: RobotSpec) -> None:
         """Cancel every goal of the robot, by every way that it has."""
@@ -113,13 +117,26 @@ class TasksLane:
             id, what = generate_id(), f"cancelling the goals of {spec.action}"
             self._calls.call(words.cancel_by_service(spec.action, id), id, what)
 
-    def run_hook(self, hook: dict[str, str], stopped: bool) -> None:
-        """Publish the Bool of a stop hook, or call its service."""
-        if "topic" in hook:
-            self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False)
-        else:
+    def run_hook(self, hook: dict[str, str], stopped: bool, ended: Ended) -> None:
+        """Publish the Bool of a stop hook, or call its service.
+
+        Args:
+            hook: The hook.
+            stopped: What the Bool says.
+            ended: Is told what came of it: for a Bool, which nobody answers, whether
+                there was a link to write it to.
+
+        """
+        if "service" in hook:
             id, service = generate_id(), hook["service"]
-            self._calls.call(words.trigger(service, hook["type"], id), id, service)
+            request = words.trigger(service, hook["type"], id)
+            self._calls.call(request, id, f"stop hook {service}", ended)
+        elif self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False):
+            ended(None)
+        else:
+            why = "not sent, for want of a link"
+            log.warning("stop hook %s: %s", hook["topic"], why)
+            ended(why)
 
     async def settle(self) -> None:
         """Wait until what was to be cancelled is, or cannot be."""

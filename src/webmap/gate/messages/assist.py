@@ -19,6 +19,8 @@ class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
     """Where the scanner is on it: x, y in metres, yaw in radians."""
     upside_down: bool = False
     """Whether it hangs head down, so that its rays go round the other way."""
+    frame: str = ""
+    """The frame that its scans must name, without a leading slash; "" for any."""
     stop_distance: float = 0.15
     """What stays free before the robot, in metres."""
     brake: float = 0.5

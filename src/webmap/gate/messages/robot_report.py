@@ -130,6 +130,8 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Whether it can be told where it is."""
     goal: GoalReport | None = None
     """The newest goal of this gate, also when it has ended."""
+    hooks: tuple[str, ...] = ()
+    """Which stop hooks failed, or have not been said yet, and why, in words."""
 
 
 class RobotGone(msgspec.Struct, frozen=True, tag="gone"):

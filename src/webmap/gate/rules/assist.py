@@ -198,6 +198,9 @@ def _blindness(
     age = now - sweep.arrived
     if not 0 <= age <= FRESH:
         return f"the scan is {age:.1f} s old"
+    if spec.frame and sweep.frame != spec.frame:
+        named = f"frame {sweep.frame!r}" if sweep.frame else "no frame"
+        return f"the scan names {named}, expected {spec.frame!r}"
     if sweep.refused is not None:
         return sweep.refused
     step = sweep.angle_increment

@@ -124,7 +124,7 @@ class Base:
             self.hands.lease is not None
             or not self.silent
             or self.motion.owes_zero
-            or self.standing.confirming
+            or self.latch.on
             or self.motion.held
             or self.hands.handover.going_on
             or self.sight.on
@@ -189,7 +189,7 @@ class Base:
         self._expect_standstill(now)
 
     def _expect_standstill(self, now: float) -> None:
-        self.obedience.expect(now)
+        self.obedience.expect(now, firmly=True)
         self._update_watch(now)
 
     def reset(self, now: float) -> None:
@@ -210,7 +210,7 @@ class Base:
         self.speeds.ages.forget_old(now)
         self.hands.step(now)
         self.motion.step(now)
-        if self.standing.confirming:
+        if self.latch.on:
             self.standing.confirm(now)
         self._update_watch(now)
         self._drop_leaving(now)
@@ -266,6 +266,8 @@ class Base:
         """A zero that may not have arrived goes first."""
         if not self.control.up:
             return
+        if self.motion.owes_zero:
+            self.obedience.expect(now)  # also of an earlier gate, whose word was motion
         self.motion.pay(now)
         if self.latch.on:
             self._say_stop(now)

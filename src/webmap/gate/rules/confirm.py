@@ -1,6 +1,6 @@
 """Whether a machine has stopped after STOP: confirmed, not confirmed, not known yet."""
 
-from webmap.gate.rules.standstill import STILL_V, Standstill
+from webmap.gate.rules.standstill import STILL_V, STILL_W, Standstill, moves
 from webmap.geometry import Twist
 
 PATIENCE = 2.0
@@ -8,7 +8,10 @@ PATIENCE = 2.0
 
 
 class Confirmation:
-    """Looks at odometry from a STOP on for standstill, and on for motion. No I/O."""
+    """Looks at odometry from a STOP on for standstill, and on for motion. No I/O.
+
+    What was confirmed is so as long as odometry goes on to say it.
+    """
 
     def __init__(self) -> None:
         self.confirmed: bool | None = None
@@ -16,16 +19,18 @@ class Confirmation:
         """The reason in words; empty while it is not known yet."""
         self.since = float("-inf")
         self._still = Standstill()
+        self._stood = False
 
     def begin(self, now: float) -> None:
         """Look (again) from ``now`` on: what was seen before proves nothing."""
         self.confirmed, self.why, self.since = None, "", now
+        self._stood = False
         self._still.begin()
 
     def saw(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry; one that moves again is not confirmed."""
         self._still.saw(twist, now)
-        if self.confirmed and not self._still.reached:
+        if self.confirmed and twist is not None and moves(twist):
             self.confirmed, self.why = False, self._moving()
 
     def judge(self, trouble: str | None, delivered: bool, now: float) -> None:
@@ -37,21 +42,30 @@ class Confirmation:
             now: The time.
 
         """
+        silent = now - self._still.heard_at > PATIENCE
         if trouble is not None:
-            self.confirmed, self.why = False, trouble
-        elif self._still.reached and delivered:
+            self.confirmed, self.why = False, self._since_then(trouble)
+        elif self._still.reached and delivered and not silent:
             self.confirmed, self.why = True, "stopped, confirmed by odometry"
+            self._stood = True
+        elif self.confirmed and not silent:
+            pass  # odometry had a gap, which is no motion
         elif now - self.since < PATIENCE:
             self.confirmed, self.why = None, ""
         else:
-            self.confirmed, self.why = False, self._reason(delivered, now)
+            self.confirmed, self.why = False, self._reason(delivered, silent)
 
-    def _reason(self, delivered: bool, now: float) -> str:
+    def _reason(self, delivered: bool, silent: bool) -> str:
         if not delivered:
-            return "its bridge does not answer"
-        if self._still.speed is None or now - self._still.heard_at > PATIENCE:
-            return "no odometry"
+            return self._since_then("its bridge does not answer")
+        if self._still.speed is None or silent:
+            return self._since_then("no odometry")
+        if self._still.speed < STILL_V and self._still.turn < STILL_W:
+            return "odometry comes too seldom to tell"
         return self._moving()
+
+    def _since_then(self, trouble: str) -> str:
+        return f"it stood, but since then {trouble}" if self._stood else trouble
 
     def _moving(self) -> str:
         speed = self._still.speed or 0.0

@@ -73,6 +73,7 @@ class Driving:
         return self._motion.silent and self._tests.running is None
 
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
+        self._hands.renew(now)
         if not self._motion.driving:
             self._robots.make_way(now)
         self._motion.drive(wanted, lease, now)
@@ -121,7 +122,8 @@ class Driving:
         if reason := self._hands.unarmable(now):
             raise Refusal(reason)
         self._lapse("a goal was sent", now)
-        self._robots.goals[robot].send(*pose, by)
+        self._robots.goals[robot].send(*pose, by, now)
+        self._hands.renew(now)
 
     def locate(
         self, robot: str, pose: tuple[float, float, float], by: str, now: float
@@ -136,7 +138,8 @@ class Driving:
             raise Refusal(reason)
         if not self.silent:
             raise Refusal("it is driven: let it stand first")
-        self._robots.goals[robot].locate(*pose, by)
+        self._robots.goals[robot].locate(*pose, by, now)
+        self._hands.renew(now)
 
     def link_down(self, why: str, now: float) -> None:
         """The link that velocity goes to is gone."""

@@ -58,6 +58,7 @@ class Fleet:
             events.GoalProgress: self._goal_progress,
             events.GoalLost: self._goal_lost,
             events.GoalEnded: self._goal_ended,
+            events.HookEnded: self._hook_ended,
             events.Echoed: self._echoed,
             events.Measured: self._measured,
             events.Scanned: self._scanned,
@@ -209,7 +210,9 @@ class Fleet:
             return
         base.wrote(event, now)
         if event.by is not None and not event.done:
-            why = "the link is backed up: a command was dropped"
+            why = (
+                "a command was dropped: the link is backed up, or the gate was held up"
+            )
             self._refuse(event.by, base.robots.newest.id, "drive", why, now)
 
     def _wrote_goal(self, event: events.WroteGoal, now: float) -> None:
@@ -222,7 +225,7 @@ class Fleet:
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(Say(sent))
         else:
-            why = "the link is backed up: the goal was dropped"
+            why = "the goal was dropped: the link is backed up, or the gate was held up"
             self._refuse(event.by, event.robot, "goal", why, now)
 
     def _wrote_pose(self, event: events.WrotePose, now: float) -> None:
@@ -230,7 +233,7 @@ class Fleet:
             told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(Say(told))
         else:
-            why = "the link is backed up: the pose was dropped"
+            why = "the pose was dropped: the link is backed up, or the gate was held up"
             self._refuse(event.by, event.robot, "locate", why, now)
 
     def _goal_progress(self, event: events.GoalProgress, now: float) -> None:
@@ -245,6 +248,12 @@ class Fleet:
     def _goal_lost(self, event: events.GoalLost, now: float) -> None:
         if goals := self._goals_of(event.robot):
             goals.gone_dark(event)
+
+    def _hook_ended(self, event: events.HookEnded, now: float) -> None:
+        base = self._by_robot.get(event.robot)
+        if base is not None:
+            self._touched.add(base.key)
+            base.robots.hooks[event.robot].ended(event)
 
     def _goals_of(self, robot: str) -> Goals | None:
         """Return a robot's goals, which may change by that; it may be gone."""

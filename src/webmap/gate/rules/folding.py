@@ -16,6 +16,8 @@ things, each two centimetres or more behind the one before it, are kept too.
 import math
 from collections.abc import Sequence
 
+import msgspec
+
 from webmap.gate.events import Fold, Sweep
 
 MOST = 720
@@ -60,15 +62,7 @@ def _refusal(count: int, step: float) -> str | None:
 
 
 def _without(sweep: Sweep, reason: str) -> Sweep:
-    return Sweep(
-        sweep.angle_min,
-        sweep.angle_increment,
-        sweep.range_min,
-        sweep.range_max,
-        (),
-        sweep.arrived,
-        refused=reason,
-    )
+    return msgspec.structs.replace(sweep, ranges=(), refused=reason)
 
 
 def _folded(sweep: Sweep, each: int) -> Sweep:
@@ -87,13 +81,10 @@ def _folded(sweep: Sweep, each: int) -> Sweep:
         asked.append(len(group))
         # The beam that stands where the fold's does is no neighbour of the next one.
         before = hits[1:] if _hits(group[:1], near) else hits
-    return Sweep(
-        sweep.angle_min,
-        sweep.angle_increment * each,
-        near,
-        sweep.range_max,
-        first,
-        sweep.arrived,
+    return msgspec.structs.replace(
+        sweep,
+        angle_increment=sweep.angle_increment * each,
+        ranges=first,
         fold=Fold(each, len(ranges), behind, said, asked),
     )
 

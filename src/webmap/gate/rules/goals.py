@@ -7,6 +7,7 @@ from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, WroteGoal
 from webmap.gate.messages import GoalReport, RobotSpec, Way
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.health import Health
+from webmap.gate.rules.motion import WAIT_LIMIT
 from webmap.identifiers import generate_id
 from webmap.ros.names import is_type
 
@@ -79,7 +80,7 @@ class Goals:
         """Whether the robot follows a goal, as far as is known."""
         return self.report is not None and self.report.state not in OVER
 
-    def send(self, x: float, y: float, yaw: float, by: str) -> None:
+    def send(self, x: float, y: float, yaw: float, by: str, now: float) -> None:
         """Send a goal; metres and radians in the robot's goal frame.
 
         Raises:
@@ -91,9 +92,10 @@ class Goals:
             raise Refusal("no goal topic is known")
         if not self.link.up:
             raise Refusal("no link to where its goals go")
-        self._emit(SendGoal(self._key, self.spec.id, generate_id(), x, y, yaw, by, way))
+        id, until = generate_id(), now + WAIT_LIMIT
+        self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, way, until))
 
-    def locate(self, x: float, y: float, yaw: float, by: str) -> None:
+    def locate(self, x: float, y: float, yaw: float, by: str, now: float) -> None:
         """Tell the robot where it is; metres and radians in its goal frame.
 
         Raises:
@@ -108,7 +110,8 @@ class Goals:
             raise Refusal("it follows a goal: cancel that first")
         if not self.link.up:
             raise Refusal("no link to where its initial pose goes")
-        self._emit(TellPose(self._key, self.spec.id, x, y, yaw, by))
+        until = now + WAIT_LIMIT
+        self._emit(TellPose(self._key, self.spec.id, x, y, yaw, by, until))
 
     def wrote(self, goal: WroteGoal) -> None:
         """Note that a goal went out."""

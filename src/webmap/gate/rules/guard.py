@@ -1,9 +1,14 @@
 """The scans of one machine, and what they leave of its commands (S17). No I/O."""
 
+import msgspec
+
 from webmap.gate.events import Sweep
 from webmap.gate.rules.assist import FREE, Verdict, assist
 from webmap.gate.rules.robots import Robots
 from webmap.geometry import Twist
+
+MIXED = 2.0
+"""Seconds for which no scan of a topic counts after its frame was seen to change."""
 
 
 class Guard:
@@ -17,6 +22,8 @@ class Guard:
     def __init__(self, robots: Robots) -> None:
         self._robots = robots
         self._sweeps: dict[str, Sweep] = {}
+        self._changed: dict[str, float] = {}
+        """When the frame of a topic's scans was last another than before."""
         self._verdict = FREE
 
     @property
@@ -25,12 +32,19 @@ class Guard:
         return () if self._verdict.why is None else (self._verdict.why,)
 
     def saw(self, topic: str, sweep: Sweep) -> None:
-        """Note that a scan came."""
+        """Note that a scan came; of a topic where two scanners speak none counts."""
+        before = self._sweeps.get(topic)
+        if before is not None and before.frame != sweep.frame:
+            self._changed[topic] = sweep.arrived
+        changed = self._changed.get(topic)
+        if changed is not None and sweep.arrived - changed < MIXED:
+            sweep = msgspec.structs.replace(sweep, refused="scans of two frames come")
         self._sweeps[topic] = sweep
 
     def forget(self) -> None:
         """Know nothing of before: nobody listens to the scans any more."""
         self._sweeps.clear()
+        self._changed.clear()
         self._verdict = FREE
 
     def limit(self, wanted: Twist, now: float) -> Twist:

@@ -13,6 +13,11 @@ from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.robots import Robots
 from webmap.gate.rules.speeds import Speeds
 
+UNUSED = 120.0
+"""Seconds after which a person's lease expires that was neither used nor renewed. A
+page gives back sooner what it does not need; one that hangs does not, and others would
+wait. Browsers let a page that nobody sees act once a minute."""
+
 
 class Hands:
     """The lease of one machine, and who is to have it next.
@@ -48,6 +53,7 @@ class Hands:
         self._epochs = epochs
         self._halt = halt
         self._changed = changed
+        self._used_at = float("-inf")
 
     def unarmable(self, now: float) -> str | None:
         """Return why nobody can take the machine now, in words."""
@@ -65,6 +71,7 @@ class Hands:
         epoch = self._epochs.next()
         self.lease = Lease(to.id, to.name, epoch, to.program)
         self.deadman = DeadMan(needs_neutral=not to.program)
+        self.renew(now)
         self._new_driver(to.cap, now)
         return epoch
 
@@ -74,6 +81,10 @@ class Hands:
         self._speeds.ages.clear()
         self._arming.video.forget()
         self._changed(now)
+
+    def renew(self, now: float) -> None:
+        """Note that its driver does something with it, or says to need it still."""
+        self._used_at = now
 
     def set_cap(self, cap: Cap) -> None:
         """Change what the page of the lease's holder asks for at most."""
@@ -143,8 +154,10 @@ class Hands:
         self._changed(now)
 
     def step(self, now: float) -> None:
-        """Let time have its say about who gets the machine."""
+        """Let time have its say about who has the machine, and who gets it."""
         handover = self.handover
+        if self._expired(now):
+            self.end(f"it was not used for {UNUSED:g} s", now)
         if handover.asker is not None and handover.left(now) == 0:
             self.hand_over(handover.asker, now)
         heir = handover.heir
@@ -157,3 +170,14 @@ class Hands:
             self.give(heir, now)
         elif self._robots.drivable and not self._motion.stopping:
             self._motion.zero(now)
+
+    def _expired(self, now: float) -> bool:
+        """Return whether its driver has forgotten it.
+
+        A program's lease stays: any person may take the machine from it. One that is
+        asked for goes to who asks, in seconds.
+        """
+        lease = self.lease
+        if lease is None or lease.program or self.handover.asker is not None:
+            return False
+        return now - self._used_at >= UNUSED

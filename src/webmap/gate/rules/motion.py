@@ -193,7 +193,9 @@ class Motion:
         self._pending, self._tried_at = None, now
         # The scanners judge what is written and nothing else: a ramp bends the way.
         twist = self._guard(self._bounded(wanted, now), now)
-        self._emit(WriteTwist(self._key, twist, lease.epoch, lease.connection))
+        until = since + WAIT_LIMIT
+        by = lease.connection
+        self._emit(WriteTwist(self._key, twist, lease.epoch, by, until))
 
     def _bounded(self, wanted: Twist, now: float) -> Twist:
         bounds = self._bounds()

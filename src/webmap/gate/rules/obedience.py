@@ -14,16 +14,23 @@ MOVES = 0.05
 TURNS = 0.1
 """Radians per second above which it is said to turn on."""
 
+LASTING = 60.0
+"""Seconds without odometry for which the alarm goes on about a machine that was seen
+not to obey."""
+
 
 class Obedience:
     """Watches a machine from the zero that stops it until it has stood for a while.
 
     Once it has, what moves it afterwards is somebody else's business. One message that
-    says it stands proves nothing: coarse encoders send those while it goes on.
+    says it stands proves nothing: coarse encoders send those while it goes on. Nor does
+    silence: a machine that did not obey, or that STOP stands for, is expected to stand
+    until it was seen to.
     """
 
     def __init__(self) -> None:
         self._zero_at: float | None = None
+        self._firm = False
         # Only above these it moves on, and a standstill ends at its own.
         self._calm = Standstill(math.nextafter(MOVES, 1), math.nextafter(TURNS, 1))
         self._moving: Twist | None = None
@@ -36,21 +43,31 @@ class Obedience:
         elif not last.is_zero:
             self.expect(now)
 
-    def expect(self, now: float) -> None:
-        """Expect standstill from here on, unless that is expected already."""
+    def expect(self, now: float, *, firmly: bool = False) -> None:
+        """Expect standstill from here on, unless that is expected already.
+
+        Args:
+            now: The time.
+            firmly: Whether it is expected also if nobody looks for a while.
+
+        """
         if self._zero_at is None:
-            self._zero_at, self._moving = now, None
+            self._zero_at, self._moving, self._firm = now, None, False
             self._calm.begin()
+        self._firm |= firmly
 
     def excuse(self) -> None:
         """Note that it may move: somebody drives it, or it has a goal."""
         self._zero_at = self._moving = None
+        self._firm = False
 
     def saw(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
         if twist is None:
             return
-        if self._zero_at is None or not self.watching(now):
+        if self._zero_at is None:
+            return
+        if not self._firm and not self.watching(now):
             self.excuse()  # nobody looked for a while: it may be driven by others
             return
         self._seen_at = now
@@ -59,6 +76,7 @@ class Obedience:
             self.excuse()
         elif self._calm.since is None:
             self._moving, self._moving_at = twist, now
+            self._firm |= now - self._zero_at >= GRACE
         elif self._moving_at < self._zero_at + GRACE:
             self._moving = None  # it braked in time, unless it moves again
 
@@ -66,7 +84,8 @@ class Obedience:
         """Return whether odometry could still tell something."""
         if self._zero_at is None:
             return False
-        return now - max(self._zero_at, self._seen_at) <= GRACE
+        patience = LASTING if self._firm else GRACE
+        return now - max(self._zero_at, self._seen_at) <= patience
 
     def alarm(self, now: float) -> str | None:
         """Return what is wrong at ``now``, in words."""
@@ -74,7 +93,9 @@ class Obedience:
             return None
         if now - self._zero_at < GRACE or not self.watching(now):
             return None
+        silent = now - self._seen_at > GRACE
+        until = ", and odometry has ceased since" if silent else ""
         speed = speed_of(self._moving)
         if speed > MOVES:
-            return f"zero sent, still moving at {speed:.2f} m/s"
-        return f"zero sent, still turning at {abs(self._moving.wz):.2f} rad/s"
+            return f"zero sent, still moving at {speed:.2f} m/s{until}"
+        return f"zero sent, still turning at {abs(self._moving.wz):.2f} rad/s{until}"

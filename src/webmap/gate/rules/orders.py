@@ -11,6 +11,7 @@ from webmap.gate.commands import (
     Grant,
     Locate,
     Release,
+    Renew,
     Reset,
     Stop,
     StopTest,
@@ -67,6 +68,10 @@ class Orders:
                 self.take(connection, robot, now)
             case Release(robot):
                 self.release(connection, robot, now)
+            case Renew(robot, epoch):
+                hands = self._fleet.find(robot).hands
+                check_lease(hands.lease, connection.id, epoch)
+                hands.renew(now)
             case Ask(robot):
                 self._ask(connection, robot, now)
             case Grant() | Deny():
@@ -136,6 +141,7 @@ class Orders:
             base.hands.hand_over(asker, now)
         else:
             base.hands.deny(f"{connection.name or connection.id} keeps it")
+            base.hands.renew(now)
 
     def checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float

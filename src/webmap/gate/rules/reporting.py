@@ -53,7 +53,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         link="up" if link.up else "down",
         sent=_velocity(base.motion.sent) or _REST,
         echoed=_velocity(base.sight.echoed),
-        measured=_velocity(base.sight.measured),
+        measured=_velocity(base.sight.shown(now)),
         alarm=base.obedience.alarm(now),
         age=None if age is None else round(age * 1000, 0),
         reaction=round(reaction(age, base.speeds.stop_time), 3),
@@ -68,6 +68,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         cancels=goals.can_cancel,
         locates=spec.pose_topic is not None,
         goal=goals.report,
+        hooks=base.robots.hook_failures,
     )
 
 

@@ -59,6 +59,12 @@ class Robots:
         known = [seconds for seconds in stated if seconds is not None]
         return max(known) if len(known) == len(stated) else None
 
+    @property
+    def hook_failures(self) -> tuple[str, ...]:
+        """Which stop hooks it does not follow, under whatever name, and why."""
+        said = [words for hooks in self.hooks.values() for words in hooks.failures]
+        return tuple(dict.fromkeys(said))
+
     def declare(self, spec: RobotSpec, tasks: Health, hooks: Health) -> None:
         """Take in a robot, or what changed of it.
 
@@ -76,7 +82,11 @@ class Robots:
             self.goals[spec.id] = Goals(self._key, spec, tasks, self._emit)
         else:
             goals.spec, goals.link = spec, tasks
-        self.hooks[spec.id] = Hooks(self._key, spec, hooks, self._emit)
+        said = self.hooks.get(spec.id)
+        if said is None or said.spec.stop_hooks != spec.stop_hooks:
+            self.hooks[spec.id] = Hooks(self._key, spec, hooks, self._emit)
+        else:  # a reset may be owed, and an answer on its way
+            said.spec, said.link = spec, hooks
 
     def drop(self, robot: str) -> None:
         """Have a robot gone."""

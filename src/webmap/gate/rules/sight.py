@@ -50,6 +50,12 @@ class Sight:
         if measured is not None:
             self._seen = (min(said_after, now), now)
 
+    def shown(self, now: float) -> Twist | None:
+        """Return the newest velocity that odometry told, unless that is long ago."""
+        if self._seen is None or now - self._seen[1] > BLIND_LIMIT:
+            return None
+        return self.measured
+
     def doubt(self, now: float) -> str | None:
         """Return why nobody knows by odometry how it moves now, in words."""
         if self._seen is None:

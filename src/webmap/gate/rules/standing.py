@@ -36,11 +36,6 @@ class StandingStop:
         self._control = control
         self._motion = motion
 
-    @property
-    def confirming(self) -> bool:
-        """Whether it stands and nobody knows yet that the machine does as well."""
-        return self.latch.on and not self.confirmation.confirmed
-
     def press(self, by: str, now: float) -> None:
         """Have it stand from now on; zero goes before everything else."""
         if self._robots.drivable:
@@ -92,6 +87,8 @@ class StandingStop:
         if elsewhere:  # it was reset where the machine is, and this is an onlooker
             latch.drop()
             self._motion.let_go()
+            for hooks in self._robots.hooks.values():
+                hooks.drop()
         else:
             latch.keep_again()  # a file that is gone is no reset
         return False

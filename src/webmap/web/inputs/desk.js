@@ -167,7 +167,9 @@ function keepsKey(event) {
   const target = event.target;
   if (!(target instanceof Element)) return false;
   if (event.code === "Escape") {
-    return target.closest("dialog:modal, [popover], input, textarea") !== null;
+    // One that is opened and closed by hand alone, as the alarm is, has no use for it.
+    const closes = "dialog:modal, [popover]:not([popover=manual]), input, textarea";
+    return target.closest(closes) !== null;
   }
   return target.matches("input[type=checkbox], input[type=radio], select, summary");
 }

@@ -152,10 +152,11 @@ class Alarm {
     this._seen = new Set();
     /** @type {ReadonlyMap<string, string>} */
     this._current = new Map();
+    this._ending = new AbortController();
     this._element = html(
       "div",
       "webmap-alarm",
-      { role: "alert", "aria-atomic": "false" },
+      { role: "alert", "aria-atomic": "false", popover: "manual" },
       html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
       html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
       this._names,
@@ -168,6 +169,7 @@ class Alarm {
   }
 
   destroy() {
+    this._ending.abort();
     this._element.remove();
   }
 
@@ -177,7 +179,40 @@ class Alarm {
     for (const robot of this._seen) if (!alarms.has(robot)) this._seen.delete(robot);
     const news = [...alarms].filter(([robot]) => !this._seen.has(robot));
     say(this._names, news.map(([, words]) => words).join(", "));
-    if (news.length === 0) this._element.remove();
-    else if (!this._element.isConnected) document.body.append(this._element);
+    if (news.length === 0) this.destroy();
+    else if (!this._element.isConnected) this._begin();
   }
+
+  _begin() {
+    document.body.append(this._element);
+    this._raise();
+    this._ending.abort();
+    this._ending = new AbortController();
+    const options = { capture: true, signal: this._ending.signal };
+    const raise = (/** @type {Event} */ event) => {
+      if (coversAnew(event)) this._raise();
+    };
+    document.addEventListener("toggle", raise, options);
+    document.addEventListener("fullscreenchange", () => this._raise(), options);
+  }
+
+  /**
+   * Lie over popovers and dialogs as well: what opened last is on top, whatever its
+   * z-index. A browser that knows no popovers has the alarm over all but its dialogs.
+   */
+  _raise() {
+    if (!("popover" in HTMLElement.prototype)) return;
+    this._element.hidePopover();
+    this._element.showPopover();
+  }
+}
+
+/**
+ * @param {Event} event Something was opened or closed.
+ * @returns {boolean} Whether it may lie over the alarm now; that of another map does not
+ *     count, or the two would rise above each other for ever.
+ */
+function coversAnew({ target }) {
+  const covers = "dialog, [popover]:not(.webmap-alarm)";
+  return target instanceof Element && target.matches(covers);
 }

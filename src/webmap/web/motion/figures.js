@@ -1,3 +1,6 @@
+/** What stands where a figure would. */
+const UNKNOWN = "not known";
+
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /**
@@ -60,7 +63,7 @@ export function stoppingDistance(report) {
 export function motions({ sent, echoed, measured }) {
   const text = (/** @type {readonly number[] | null} */ velocity) => {
     const speed = speedAlong(velocity);
-    if (speed === null || !velocity) return { text: "not known", more: "" };
+    if (speed === null || !velocity) return { text: UNKNOWN, more: "" };
     return { text: `${signed(speed)} m/s`, more: `, ${signed(velocity[2])} rad/s` };
   };
   return [
@@ -81,13 +84,14 @@ export function motions({ sent, echoed, measured }) {
 export function timings(report, loop, motion) {
   const age = report.age ?? loop;
   const distance = stoppingDistance(report);
+  const stands = report.measured !== null && speedNow(report) < STANDING;
   return [
     { name: "Loop", kind: "time", text: duration(age) },
     { name: "To motion", kind: "time", text: duration(motion) },
     {
       name: "To a stop",
       kind: "time",
-      text: distance === null ? "stands" : `${distance.toFixed(2)} m`,
+      text: distance === null ? (stands ? "stands" : UNKNOWN) : `${distance.toFixed(2)} m`,
     },
   ];
 }
@@ -131,7 +135,7 @@ export function isTested({ test }) {
 
 /** @param {number | null} ms */
 function duration(ms) {
-  return ms === null ? "not known" : `${Math.round(ms)} ms`;
+  return ms === null ? UNKNOWN : `${Math.round(ms)} ms`;
 }
 
 /** @param {number} value */

@@ -7,6 +7,9 @@ import { Stream } from "./stream.js";
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
 
+/** Between two words that a lease is needed still, in ms. */
+const RENEW = 10_000;
+
 /**
  * Decides what this page says to the gate: which lease to take, keep and give back,
  * and the axes to send with it.
@@ -29,6 +32,11 @@ export class Pilot {
     this.releaseAfter = releaseAfter;
     this._stream = new Stream(hands, loop, now);
     this._leases = new Leases();
+    /**
+     * When leases were last said to be needed still.
+     * @type {Map<string, number>}
+     */
+    this._renewed = new Map();
     this._reach = new Reach(hands, this._leases, this._stream);
   }
 
@@ -183,15 +191,21 @@ export class Pilot {
   }
 
   /**
-   * Note that the lease of a robot that goes somewhere is used still.
+   * Say that the lease of a robot that goes somewhere is needed still.
    *
    * @param {string} robot
    * @param {number} now
+   * @returns {Command[]}
    */
   keep(robot, now) {
     this._leases.use(robot, now);
     const { lease } = this._stream;
     if (lease?.robot === robot) lease.usedAt = now;
+    const epoch = this.epoch(robot);
+    const since = now - (this._renewed.get(robot) ?? -Infinity);
+    if (epoch === null || since < RENEW) return [];
+    this._renewed.set(robot, now);
+    return [{ op: "renew", robot, epoch }];
   }
 
   /**

@@ -37,6 +37,7 @@
  * @property {boolean} [cancels] Whether goals can be called off.
  * @property {boolean} [locates] Whether it can be told where it is.
  * @property {GoalWord | null} [goal] How it stands with its newest goal.
+ * @property {string[]} [hooks] Which of its stop hooks failed, and why.
  */
 
 /**
@@ -74,6 +75,14 @@
 
 /** @typedef {{state: 'creeping' | 'waiting' | 'done' | 'failed', text: string}} StopTest */
 
+const GOING = new Set(["sent", "accepted", "under way", "cancelling", "unknown"]);
+
+/** From here on a robot moves, in m/s: the gate's alarm begins there, too. */
+const MOVES = 0.05;
+
+/** From here on it turns, in rad/s. */
+const TURNS = 0.1;
+
 /** @param {RobotReport} report */
 export function heldByAnother(report) {
   return report.holder !== null && !report.mine;
@@ -96,4 +105,17 @@ export function isLatched(report) {
 export function mayReach(report) {
   if (isLatched(report)) return false;
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
+}
+
+/**
+ * @param {RobotReport} report
+ * @returns {boolean} Whether the robot moves although nobody drives it and no goal of
+ *     ours is under way: it coasts, or something else moves it. Of a goal that nobody
+ *     tells of and nobody can call off there is no end to see, so it does not count.
+ */
+export function rolls({ measured, goal, cancels }) {
+  const told = goal && (goal.way !== "topic" || cancels);
+  if (!measured || (told && GOING.has(goal.state))) return false;
+  const [x, y, turn] = measured;
+  return Math.hypot(x, y) >= MOVES || Math.abs(turn) >= TURNS;
 }

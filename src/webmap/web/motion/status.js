@@ -1,5 +1,5 @@
 import { isTested } from "./figures.js";
-import { heldByAnother, isLatched } from "./report.js";
+import { heldByAnother, isLatched, rolls } from "./report.js";
 import { stopWords } from "./stopping.js";
 
 /** @typedef {import('./asking.js').Request} Request */
@@ -47,9 +47,24 @@ export function inputsOf({ touch, stick, gamepad }) {
  * @returns {Description}
  */
 export function describe(status, robot, report, active, more = {}) {
-  const { verdict, request, inputs = KEYS } = more;
   const link = ofLink(status);
   if (link) return link;
+  const said = ofRobot(status, robot, report, active, more);
+  if (!report?.hooks?.length) return said;
+  // Whatever else there is to say: its STOP is not what it was made to be.
+  const words = [said.detail, ...report.hooks].filter(Boolean).map(sentence);
+  return say(said.state, said.title, words.join(" "));
+}
+
+/**
+ * @param {Status} status
+ * @param {string | null} robot
+ * @param {RobotReport | null} report
+ * @param {boolean} active
+ * @param {{verdict?: Verdict, request?: Request, inputs?: string}} more
+ */
+function ofRobot(status, robot, report, active, more) {
+  const { verdict, request, inputs = KEYS } = more;
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
     return say("unconfirmed", "STOP NOT CONFIRMED", reasonOf(verdict));
   }
@@ -157,6 +172,7 @@ function ofMine(status, report, inputs) {
   if (report.reason) return say("fixed", "Cannot move", sentence(report.reason));
   if (status.pressed && status.dead) return handsOff();
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
+  if (rolls(report)) return rolling(report);
   if (!status.settled) return say("taking", "Getting ready", "");
   return say("ready", "Ready", `Hold ${inputs}. Space stops.`);
 }
@@ -176,9 +192,15 @@ function ofFree(status, report, inputs) {
     );
   }
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
+  if (rolls(report)) return rolling(report);
   if (status.refusal) return say("free", "Free", sentence(status.refusal));
   if (status.pressed && status.dead) return handsOff();
   return say("free", "Free", `Hold ${inputs} to drive.`);
+}
+
+/** @param {RobotReport} report */
+function rolling(report) {
+  return say("stopping", "Still moving", speedOf(report));
 }
 
 function handsOff() {

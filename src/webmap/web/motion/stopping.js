@@ -194,7 +194,9 @@ function judge(robot, report, watch, connected, now) {
   if (report?.stop?.confirmed === false) return unsure(report.stop.why);
   if (report?.link === "down") return unsure("no link to the robot");
   if (watch.stoodAt !== null) {
-    return { robot, name, state: "confirmed", text: "stopped, confirmed by odometry" };
+    const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
+    const words = ["stopped, confirmed by odometry", ...more];
+    return { robot, name, state: "confirmed", text: words.join("; ") };
   }
   if (waited <= STAND_PATIENCE) {
     return { robot, name, state: "stopping", text: "stopping" };
@@ -214,13 +216,23 @@ function judge(robot, report, watch, connected, now) {
 export function stopWords({ stop }) {
   if (!stop) return { confirmed: null, text: "" };
   const by = stop.by ? `By ${stop.by}` : "";
+  const more = besides(stop.why);
   const what = {
-    true: "confirmed by odometry",
+    true: ["confirmed by odometry", ...more].join("; "),
     false: `NOT CONFIRMED: ${stop.why}`,
-    null: "looking whether it stands",
+    null: ["looking whether it stands", ...more].join("; "),
   }[`${stop.confirmed}`];
   const text = [by, what].filter(Boolean).join(", ");
   return { confirmed: stop.confirmed, text: `${text[0].toUpperCase()}${text.slice(1)}.` };
+}
+
+/**
+ * @param {string} [why] What the gate says of a STOP.
+ * @returns {string[]} What it says besides whether the robot stands: that the disk does
+ *     not have the STOP.
+ */
+function besides(why = "") {
+  return why.split("; ").slice(1);
 }
 
 /**
@@ -236,7 +248,10 @@ export function standingStops(reports) {
   const one = stopped.length === 1;
   const who = one ? stopped[0].name : `${stopped.length} robots`;
   const doubt = one ? "NOT CONFIRMED" : `${doubtful} of them NOT CONFIRMED`;
-  return `${who} ${one ? "stays" : "stay"} stopped${doubtful ? `, ${doubt}` : ""}.`;
+  const unhooked = stopped.filter(({ hooks }) => hooks?.length).map(({ name }) => name);
+  const hooks = unhooked.length ? ` Stop hooks failed: ${unhooked.join(", ")}.` : "";
+  const doubts = doubtful ? `, ${doubt}` : "";
+  return `${who} ${one ? "stays" : "stay"} stopped${doubts}.${hooks}`;
 }
 
 /** @param {RobotReport} report */

@@ -1,0 +1,306 @@
+"""Stop hooks that fail: what a bridge answers, and what the gate says of it."""
+
+import json
+
+import pytest
+from gate_harness import KEY, URL, Bench, spec
+from link_bench import frame, in_loop, noting_bridge, raw_bridge, until
+
+from webmap.gate import actions, events, messages, reports
+from webmap.gate.lanes import calls, navigation
+from webmap.gate.lanes.answers import answer_to
+from webmap.gate.lanes.calls import Calls
+from webmap.gate.lanes.links import Links
+from webmap.gate.limits import Cap
+
+LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
+E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+NO_SUCH = "Service /e_stop does not exist"
+REFUSED = f"refused ({NO_SUCH})"
+
+
+def response(**fields):
+    return json.dumps({"op": "service_response", "id": "a", **fields}).encode()
+
+
+class TestAnswer:
+    @pytest.mark.parametrize(
+        ("fields", "why"),
+        [
+            ({}, None),
+            ({"result": True, "values": {}}, None),
+            ({"result": True, "values": {"success": True, "message": "on"}}, None),
+            ({"result": True, "values": [True]}, None),
+            ({"result": False}, "refused"),
+            ({"result": False, "values": {"success": True}}, "refused"),
+            ({"result": False, "values": NO_SUCH}, REFUSED),
+            ({"values": {"success": False}}, "answered that it failed"),
+            (
+                {"result": True, "values": {"success": False, "message": "no power"}},
+                "answered that it failed (no power)",
+            ),
+            (
+                {"values": {"success": False, "message": 7}},
+                "answered that it failed",
+            ),
+            ({"op": "status", "level": "error", "msg": "what?"}, "refused (what?)"),
+        ],
+    )
+    def test_tells_whether_the_call_failed_and_why(self, fields, why):
+        assert answer_to(response(**fields), "a") == (why,)
+
+    @pytest.mark.parametrize(
+        "data",
+        [
+            b"rubbish",
+            b"[" * 100_000,
+            b"[1]",
+            response(id="b"),
+            response(id=None),
+            response(op=7),
+            response(op="publish"),
+            response(op="status", level="warning", msg="slow"),
+        ],
+    )
+    def test_is_nothing_else(self, data):
+        assert answer_to(data, "a") is None
+
+    def test_of_any_length_is_told_in_a_line_that_can_be_shown(self):
+        said = "no\n\x1b[31m\ud800 way " + "x" * 10**6
+        (why,) = answer_to(response(result=False, values=said), "a")
+        assert why.isprintable()
+        assert why.startswith("refused (no [31m way xxx")
+        assert len(why) == len("refused ()") + navigation.MOST_WORDS
+
+
+class TestCall:
+    @in_loop
+    async def test_that_is_refused_says_so(self, caplog):
+        async with noting_bridge() as bridge:
+            bridge.answers_services = False
+            ended, made = [], Calls(bridge.url)
+            made.call(
+                b'{"op": "call_service", "id": "a"}', "a", "/e_stop", ended.append
+            )
+            await until(lambda: bridge.of("call_service"), "the call")
+            await bridge.send(1, response(result=False, values=NO_SUCH).decode())
+            await made.settle()
+            bridge.unblock()
+        assert ended == [REFUSED]
+        assert [r.getMessage() for r in caplog.records] == [f"/e_stop: {REFUSED}"]
+        assert caplog.records[0].levelname == "WARNING"
+
+    @in_loop
+    async def test_over_a_link_that_is_closed_as_it_opens_says_so(self):
+        async def talk(link):
+            await link.accept(frame(0x8))
+
+        async with raw_bridge(talk) as url:
+            ended, made = [], Calls(url)
+            made.call(b"{}", "a", "/e_stop", ended.append)
+            await made.settle()
+        (why,) = ended
+        assert why.startswith("no ")
+        assert "link" in why
+
+
+class Doing:
+    """The links of one robot with both kinds of hooks, and what they tell."""
+
+    def __init__(self, url):
+        self.events = []
+        self.links = Links(self.events.append)
+        self.robot = spec(bridge_url=url, stop_hooks=(LOCK, E_STOP))
+        self.key = events.Key(url, "/cmd_vel")
+        self.links.perform(actions.Attach(self.key, self.robot))
+
+    def run(self, hook, number):
+        self.links.perform(actions.RunHook(self.key, "r1", hook, True, number))
+
+    def of(self, type):
+        return [event for event in self.events if isinstance(event, type)]
+
+    async def __aenter__(self):
+        up = events.LinkUp(self.key.url, "tasks")
+        await until(lambda: up in self.events, "the link")
+        return self
+
+    async def __aexit__(self, *_):
+        self.links.close()
+        await self.links.settle()
+
+
+class TestLinks:
+    @in_loop
+    async def test_tell_how_every_hook_ended(self, monkeypatch):
+        monkeypatch.setattr(calls, "CALL_TIMEOUT", 0.5)
+        async with noting_bridge() as bridge, Doing(bridge.url) as doing:
+            doing.run(LOCK, 1)
+            assert doing.of(events.HookEnded) == [events.HookEnded("r1", LOCK, 1, None)]
+            doing.run(E_STOP, 2)
+            await doing.links.settle()
+            bridge.answers_services = False
+            doing.run(E_STOP, 3)
+            await doing.links.settle()
+            assert doing.of(events.HookEnded)[1:] == [
+                events.HookEnded("r1", E_STOP, 2, None),
+                events.HookEnded("r1", E_STOP, 3, "no answer within 0.5 s"),
+            ]
+            bridge.unblock()
+
+    @in_loop
+    async def test_tell_that_a_flag_had_no_link_to_go_over(self, caplog):
+        async with noting_bridge() as bridge, Doing(bridge.url) as doing:
+            doing.links._tasks[bridge.url].lane.cut("it carries nothing")
+            doing.run(LOCK, 1)
+            (ended,) = doing.of(events.HookEnded)
+            assert ended.why == "not sent, for want of a link"
+            assert f"stop hook /lock: {ended.why}" in caplog.text
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin(spec(stop_hooks=(LOCK, E_STOP)))
+
+
+def stop(bench):
+    bench.say("a", op="stop", robot="r1")
+    bench.run(0.05)
+
+
+def reset(bench):
+    bench.say("a", op="reset", robot="r1")
+    bench.run(0.05)
+
+
+def end(bench, hook, why=None, robot="r1", since=-1):
+    """Have the newest saying of a hook end, or an earlier one."""
+    said = [run for run in bench.did(actions.RunHook) if run.hook == hook]
+    bench.tell(events.HookEnded(robot, hook, said[since].number, why))
+
+
+class TestReport:
+    def test_says_which_hook_failed_until_it_succeeds(self, bench):
+        stop(bench)
+        assert bench.report().hooks == ()
+        end(bench, LOCK)
+        end(bench, E_STOP, REFUSED)
+        assert bench.report().hooks == (f"stop hook /e_stop: {REFUSED}",)
+        stop(bench)
+        assert bench.report().hooks == (f"stop hook /e_stop: {REFUSED}",)
+        end(bench, E_STOP)
+        assert bench.report().hooks == ()
+
+    def test_tells_a_topic_from_a_service_of_the_same_name(self):
+        lock = {"service": "/lock", "type": "std_srvs/Trigger"}
+        bench = Bench().begin(spec(stop_hooks=(lock, LOCK)))
+        stop(bench)
+        end(bench, lock, "refused")
+        end(bench, LOCK)
+        assert bench.report().hooks == ("stop hook /lock: refused",)
+
+    def test_says_no_more_of_it_after_a_reset(self, bench):
+        stop(bench)
+        end(bench, E_STOP, REFUSED)
+        reset(bench)
+        end(bench, LOCK)
+        assert bench.report().hooks == ()
+
+    def test_takes_no_answer_for_that_to_what_was_said_later(self, bench):
+        stop(bench)
+        stop(bench)
+        end(bench, E_STOP, REFUSED, since=0)
+        assert bench.report().hooks == ()
+        reset(bench)
+        end(bench, E_STOP, REFUSED)
+        assert bench.report().hooks == ()
+
+    def test_says_that_there_is_no_link_until_the_hooks_are_said(self, bench):
+        bench.tell(events.LinkDown(URL, "tasks"))
+        stop(bench)
+        why = "not told yet, for want of a link"
+        assert bench.report().hooks == (
+            f"stop hook /lock: {why}",
+            f"stop hook /e_stop: {why}",
+        )
+        assert bench.did(actions.RunHook) == []
+        bench.connect_links()
+        end(bench, LOCK)
+        end(bench, E_STOP)
+        assert bench.report().hooks == ()
+
+    def test_says_that_a_reset_did_not_arrive_until_it_does(self, bench):
+        stop(bench)
+        bench.break_links()
+        reset(bench)
+        why = "not told yet, for want of a link"
+        assert bench.report().hooks == (f"reset of stop hook /lock: {why}",)
+        bench.tell(events.LinkUp(URL, "tasks"))
+        end(bench, LOCK, "not sent, for want of a link")
+        words = "reset of stop hook /lock: not sent, for want of a link"
+        assert bench.report().hooks == (words,)
+        bench.tell(events.LinkUp(URL, "tasks"))
+        end(bench, LOCK)
+        assert bench.report().hooks == ()
+        assert [run.stopped for run in bench.did(actions.RunHook)][2:] == [False] * 2
+
+    def test_says_it_of_the_machine_under_each_of_its_names(self):
+        hooks = (E_STOP,)
+        bench = Bench().begin(spec(stop_hooks=hooks), spec(id="r2", stop_hooks=hooks))
+        stop(bench)
+        end(bench, E_STOP, REFUSED, robot="r1")
+        end(bench, E_STOP, REFUSED, robot="r2")
+        for robot in ("r1", "r2"):
+            assert bench.report(robot).hooks == (f"stop hook /e_stop: {REFUSED}",)
+
+    def test_reaches_the_page(self, bench):
+        stop(bench)
+        end(bench, E_STOP, REFUSED)
+        text = reports.robot_text(bench.report(), mine=False, page=Cap(1.0, 1.0, ""))
+        assert json.loads(text)["hooks"] == [f"stop hook /e_stop: {REFUSED}"]
+
+
+def test_a_hook_that_failed_is_said_again_when_there_is_a_new_link(bench):
+    stop(bench)
+    end(bench, E_STOP, REFUSED)
+    bench.tell(events.LinkDown(URL, "tasks"))
+    bench.tell(events.LinkUp(URL, "tasks"))
+    assert bench.report().hooks == (f"stop hook /e_stop: {REFUSED}",)
+    end(bench, E_STOP)
+    assert bench.report().hooks == ()
+
+
+def test_a_stop_that_was_reset_elsewhere_is_not_said_to_the_robot_any_more(bench):
+    bench.tell(events.LinkDown(URL, "tasks"))
+    stop(bench)
+    bench.tell(events.LockState(KEY, held=False, why="it has", elsewhere=True))
+    bench.tell(events.LatchSeen(KEY, None))
+    assert bench.report().hooks == ()
+    bench.tell(events.LinkUp(URL, "tasks"))
+    assert bench.did(actions.RunHook) == []
+
+
+class TestDeclaredAnew:
+    def test_a_robot_is_still_owed_its_reset(self, bench):
+        stop(bench)
+        bench.tell(events.LinkDown(URL, "tasks"))
+        reset(bench)
+        bench.tell(spec(name="Robert", stop_hooks=(LOCK, E_STOP)))
+        assert len(bench.report().hooks) == 1
+        bench.tell(events.LinkUp(URL, "tasks"))
+        assert bench.did(actions.RunHook)[-1].stopped is False
+
+    def test_with_other_hooks_it_is_told_by_those(self, bench):
+        stop(bench)
+        end(bench, E_STOP, REFUSED)
+        bench.tell(spec(stop_hooks=(LOCK,)))
+        assert bench.report().hooks == ()
+        assert bench.did(actions.RunHook)[-1].hook == LOCK
+
+
+def test_an_answer_may_come_when_the_robot_is_forgotten(bench):
+    stop(bench)
+    bench.tell(messages.Forget("r1"))
+    said = len(bench.of(messages.RobotReport))
+    end(bench, E_STOP, REFUSED)
+    assert len(bench.of(messages.RobotReport)) == said
