@@ -1,5 +1,7 @@
 """Which form of goal a robot has, as its topics show it."""
 
+from dataclasses import replace
+
 import pytest
 
 from webmap.discovery import discover
@@ -56,3 +58,16 @@ def test_a_fleet_file_keeps_what_was_found():
     assert 'move.action = "/navigate_to_pose" # Nav2\'s action' in text
     assert 'move.action_type = "nav2_msgs/action/NavigateToPose"' in text
     assert 'initial_pose = "/initialpose"' in text
+
+
+def test_the_file_of_a_robot_without_goals_says_the_frame_of_its_map():
+    topics = {
+        "/bob/odom": "nav_msgs/Odometry",
+        "/bob/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
+    }
+    found = discover(topics, "bob")
+    (robot,) = found.robots
+    mapped = replace(found, robots=(replace(robot, root_frame="bob/map"),))
+    text = fleet_toml([("bob", "ws://bob", mapped)])
+    assert 'initial_pose.topic = "/bob/initialpose"' in text
+    assert 'initial_pose.frame = "bob/map"' in text

@@ -87,6 +87,43 @@ def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
     assert capsys.readouterr().err.count("A robot appeared") == 1
 
 
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
+    quick, dialect, capsys
+):
+    """As with a localiser that waits for its initial pose."""
+    base = ("odom", "base_link", Pose(0.0, 3.0, 0.5))
+    told = {"/tf": [base]}
+    with telling(told, dialect) as url:
+
+        async def scenario() -> None:
+            loop = asyncio.get_running_loop()
+            bridge = Bridge(url)
+            late = LateRobots(Console())
+            looking = LookingForRobots(bridge, [], greet(late, [], None))
+            bridge.start(loop)
+            looking.start(loop)
+            try:
+                await until(lambda: late.robots and late.robots[0].valid)
+                (robot,) = late.robots
+                assert (robot.position.x, robot.position.y) == (0.0, 3.0)
+                told["/tf"] = [("map", "odom", Pose(5.0, 1.0, 0.0)), base]
+                await until(lambda: robot.position.x)
+                at = (robot.position.x, robot.position.y)
+                assert at == pytest.approx((5.0, 4.0))
+                told["/tf"] = [base]
+                heard = bridge._topics["/tf"].count
+                await until(lambda: bridge._topics["/tf"].count > heard + 20)
+                assert robot.tf["map_frame"] == "map", "never back"
+                robot.destroy()
+            finally:
+                for service in (looking, bridge):
+                    await service.stop()
+
+        asyncio.run(scenario())
+    assert capsys.readouterr().err.count("is drawn where map has base_link") == 1
+
+
 def test_a_bridge_without_frames_is_not_listened_to():
     async def scenario() -> None:
         late = late_frames(Bridge("ws://127.0.0.1:9"))

@@ -5,7 +5,7 @@ import inspect
 import pytest
 
 from webmap.core.registry import map_modules, robot_modules
-from webmap.discovery.drawing import drawing
+from webmap.discovery.drawing import Drawing, drawing
 from webmap.discovery.layers import RULES, FoundLayer, find_layers, left_out
 
 FRAMES = {"map_frame": "map", "namespace": "/a"}
@@ -22,6 +22,7 @@ NAV2 = {
     "/tb/initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped",
     "/tb/local_plan": "nav_msgs/msg/Path",
     "/tb/plan": "nav_msgs/msg/Path",
+    "/tb/lookahead_point": "geometry_msgs/msg/PointStamped",
     "/tb/camera/depth/points": "sensor_msgs/msg/PointCloud2",
     "/tb/waypoints": "visualization_msgs/msg/MarkerArray",
     "/tb/gps/fix": "sensor_msgs/msg/NavSatFix",
@@ -43,6 +44,33 @@ def test_what_an_aggregator_says_is_shown_where_nobody_else_does(first):
     assert [layer.topic for layer in find_layers(topics, [""])[""]] == [first]
 
 
+@pytest.mark.parametrize("space", ["/a", "/z"])
+def test_a_robots_own_diagnostics_come_before_those_that_all_share(space):
+    topics = dict.fromkeys(
+        ["/diagnostics", f"{space}/diagnostics"], "diagnostic_msgs/DiagnosticArray"
+    )
+    (layer,) = find_layers(topics, [space])[space]
+    assert layer.topic == f"{space}/diagnostics"
+    assert drawing(layer, space, None).options == {"namespace": ""}
+
+
+def test_of_a_topic_that_robots_share_each_gets_what_is_in_its_namespace():
+    layer = FoundLayer("health", "/diagnostics", "diagnostic_msgs/DiagnosticArray", "")
+    drawn = drawing(layer, "/a", None)
+    assert drawn == Drawing("Diagnostics", {"namespace": "/a"})
+
+
+@pytest.mark.parametrize("type", ["gps_common/GPSFix", "gps_msgs/msg/GPSFix"])
+def test_a_gps_fix_is_drawn_where_there_is_no_other(type):
+    topics = {"/gps/detailed": type}
+    (layer,) = find_layers(topics, [""])[""]
+    assert (layer.kind, layer.topic) == ("fix", "/gps/detailed")
+    assert drawing(layer, "", None) == Drawing("NavSatFix", {"type": type})
+    topics["/gps/plain"] = "sensor_msgs/NavSatFix"
+    (layer,) = find_layers(topics, [""])[""]
+    assert drawing(layer, "", None) == Drawing("NavSatFix")
+
+
 def test_what_nav2_publishes_is_drawn_once_each():
     found = find_layers(NAV2, ["/tb"])["/tb"]
     assert kinds(found) == {
@@ -53,6 +81,7 @@ def test_what_nav2_publishes_is_drawn_once_each():
         "/amcl_pose": "doubt",
         "/local_plan": "local plan",
         "/camera/depth/points": "cloud",
+        "/lookahead_point": "lookahead",
         "/waypoints": "markers",
         "/gps/fix": "fix",
         "/ir_left": "range",
@@ -89,6 +118,30 @@ def test_move_base_has_other_names():
     ]
 
 
+def test_inflated_cells_of_a_local_costmap_come_first_and_the_unknown_is_none():
+    names = "obstacles", "inflated_obstacles", "unknown_space"
+    costmaps = "/a/global_costmap", "/a/local_costmap"
+    topics = {
+        f"{costmap}/{name}": "nav_msgs/GridCells"
+        for costmap in costmaps
+        for name in names
+    }
+    assert [layer.topic for layer in find_layers(topics, ["/a"])["/a"]] == [
+        "/a/local_costmap/inflated_obstacles",
+        "/a/local_costmap/obstacles",
+        "/a/global_costmap/inflated_obstacles",
+    ]
+    (other,) = left_out(topics, ["/a"])["/a"]
+    assert other.topic == "/a/global_costmap/obstacles"
+
+
+def test_what_a_controller_steers_to_is_on_the_robot_where_no_frames_are_told():
+    topics = {"/lookahead_point": "geometry_msgs/msg/PointStamped"}
+    (layer,) = find_layers(topics, [""])[""]
+    options = drawing(layer, "", None).options
+    assert (options["name"], options["frame"]) == ("lookahead", "robot")
+
+
 def test_what_has_an_odd_name_is_drawn_by_its_type():
     topics = {
         "/a/front": "sensor_msgs/LaserScan",
@@ -103,6 +156,8 @@ def test_what_has_an_odd_name_is_drawn_by_its_type():
         "/a/move_base/current_goal": "geometry_msgs/PoseStamped",
         "/a/move_base_simple/goal": "geometry_msgs/PoseStamped",
         "/a/dock": "geometry_msgs/PoseStamped",
+        "/a/clicked_point": "geometry_msgs/PointStamped",
+        "/a/frontiers": "nav_msgs/GridCells",
         "/a/ekf_pose": "geometry_msgs/PoseWithCovarianceStamped",
         "/a/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
     }
@@ -120,6 +175,8 @@ def test_what_has_an_odd_name_is_drawn_by_its_type():
         # The same goal a second time is left out; where a pose is told is no layer.
         "move_base/current_goal": "goal",
         "dock": "pose",
+        "clicked_point": "point",
+        "frontiers": "cells",
         "ekf_pose": "doubt",
     }
     (other,) = left_out(topics, ["/a"])["/a"]

@@ -1,7 +1,12 @@
-"""Robots and topics that appear later."""
+"""Robots, topics and frames that appear later."""
+
+from itertools import pairwise
+
+import pytest
 
 from webmap.discovery import discover
 from webmap.discovery.newcomers import Newcomers
+from webmap.discovery.tf_robots import Trees
 
 ODOM = {"/a/odom": "nav_msgs/Odometry"}
 BOTH = ODOM | {"/a/cmd_vel": "geometry_msgs/Twist"}
@@ -39,3 +44,44 @@ def test_what_a_known_robot_has_more_is_told_once():
 def test_a_topic_that_goes_and_comes_back_is_no_news():
     newcomers = Newcomers(discover(BOTH).robots)
     assert looks(newcomers, ODOM, ODOM, BOTH, BOTH) == [[], [], [], []]
+
+
+TF = ODOM | {"/a/tf": "tf2_msgs/TFMessage"}
+
+
+def with_frames(*chain):
+    """A robot whose frames hang from each other, the root first."""
+    trees = Trees()
+    for parent, child in pairwise(chain):
+        trees.take("/a", parent, child)
+    return discover(TF, trees=trees)
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "moved"),
+    [
+        (("odom", "base_link"), ("map", "odom", "base_link"), True),
+        (("map", "odom", "base_link"), ("world", "map", "odom", "base_link"), False),
+        (("a/map", "odom", "base_link"), ("world", "a/map", "odom", "base_link"), True),
+        ((), ("odom", "base_link"), True),
+        (("map", "odom", "base_link"), ("odom", "base_link"), False),
+        (("map", "odom", "base_link"), (), False),
+        (("world", "odom", "base_link"), ("world", "map", "odom", "base_link"), False),
+        (("odom", "base_link"), ("map", "base_link"), False),
+    ],
+)
+def test_frames_are_news_once_if_they_lead_above_those_that_are_known(
+    first, then, moved
+):
+    newcomers = Newcomers(with_frames(*first).robots)
+    later = with_frames(*then)
+    told = [[news.moved for news in newcomers.look(later)] for _ in range(3)]
+    assert told == [[], [True] if moved else [], []]
+
+
+def test_what_a_robot_has_more_is_told_with_the_frames_that_are_known_of_it():
+    newcomers = Newcomers(with_frames("world", "odom", "base_link").robots)
+    more = discover(TF | BOTH)
+    newcomers.look(more)
+    (news,) = newcomers.look(more)
+    assert (news.robot.map_frame, news.moved) == ("world", False)

@@ -31,6 +31,12 @@ PLAIN: Mapping[Kind, Drawing] = {
     "polygon": Drawing("Polygon", {"name": "other", "age_limit": 60.0}),
     "goal": Drawing("PoseStamped", {"name": "goal"}),
     "pose": Drawing("PoseStamped"),
+    # A controller gives it in the frame of the base, also where no frames are told.
+    "lookahead": Drawing(
+        "PointStamped", {"name": "lookahead", "frame": "robot", "age_limit": 2.0}
+    ),
+    "point": Drawing("PointStamped"),
+    "cells": Drawing("GridCells"),
     "range": Drawing("Range"),
     "fix": Drawing("NavSatFix"),
 }
@@ -58,6 +64,8 @@ def drawing(
         placed = {key: frames[key] for key in ("map_frame", "namespace")}
     topic = layer.topic
     match layer.kind:
+        case "fix" if layer.type.endswith("GPSFix"):
+            return Drawing("NavSatFix", {"type": layer.type})
         case "map":
             if not is_own(topic, namespace):
                 return Drawing("OccupancyGrid", shared=True)
@@ -79,7 +87,9 @@ def drawing(
         case "markers":
             return Drawing("Markers", {"type": layer.type, **placed}, of_maps=True)
         case "health":
-            return Drawing("Diagnostics", {"prefix": _prefix(topic, namespace)})
+            # On a topic of its own there is nobody to tell it from.
+            shared = namespace if not is_own(topic, namespace) else ""
+            return Drawing("Diagnostics", {"namespace": shared})
         case _:
             return PLAIN[layer.kind]
 
@@ -87,9 +97,3 @@ def drawing(
 def scan_name(number: int) -> str:
     """Return the class that gives one of a robot's scans a colour of its own."""
     return f"scan-{number}" if number > 1 else ""
-
-
-def _prefix(topic: str, namespace: str) -> str:
-    """Return what the names of a robot's parts begin with on a topic of all robots."""
-    shared = namespace and not topic.startswith(namespace + "/")
-    return namespace.strip("/") + "/" if shared else ""

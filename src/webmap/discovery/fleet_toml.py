@@ -171,8 +171,12 @@ def _motion(robot: FoundRobot) -> list[str]:
     if (goal is not None or robot.action is not None) and robot.map_frame != "map":
         lines.append(f"move.frame = {_text(robot.map_frame)}")
     pose = robot.first("initialpose")
-    if pose is not None:
+    moves = goal is not None or robot.action is not None
+    if pose is not None and (moves or robot.map_frame == "map"):
         lines.append(f"initial_pose = {_text(pose.topic)} # {pose.rule}")
+    elif pose is not None:
+        lines.append(f"initial_pose.topic = {_text(pose.topic)} # {pose.rule}")
+        lines.append(f"initial_pose.frame = {_text(robot.map_frame)}")
     return lines
 
 

@@ -87,6 +87,9 @@ class FoundRobot:
     root_frame: str = ""
     """The frame that its base can be drawn in: a map, or where odometry begins."""
 
+    above: tuple[str, ...] = ()
+    """The frames that its base hangs from, the nearest first."""
+
     def first(self, role: Role) -> Guess | None:
         """Return the best guess for a role, None if nothing fits."""
         found = self.guesses.get(role, ())
@@ -96,6 +99,11 @@ class FoundRobot:
         """Return the best topic for a role, empty if nothing fits."""
         found = self.first(role)
         return "" if found is None else found.topic
+
+    def type_of(self, role: Role) -> str:
+        """Return the type of the best topic for a role, empty if it is not known."""
+        found = self.first(role)
+        return "" if found is None else found.type
 
     @property
     def action(self) -> tuple[str, str] | None:

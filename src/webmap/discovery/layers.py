@@ -29,6 +29,9 @@ Kind: TypeAlias = Literal[
     "polygon",
     "goal",
     "pose",
+    "lookahead",
+    "point",
+    "cells",
     "range",
     "markers",
     "fix",
@@ -80,9 +83,12 @@ PARTICLES = ("nav2_msgs/ParticleCloud",)
 DOUBT = ("geometry_msgs/PoseWithCovarianceStamped",)
 POLYGON = ("geometry_msgs/PolygonStamped",)
 POSE = ("geometry_msgs/PoseStamped",)
+POINT = ("geometry_msgs/PointStamped",)
+CELLS = ("nav_msgs/GridCells",)
 MARKERS = ("visualization_msgs/MarkerArray",)
 MARKER = ("visualization_msgs/Marker",)
 FIX = ("sensor_msgs/NavSatFix",)
+GPS_FIX = ("gps_msgs/GPSFix", "gps_common/GPSFix")
 HEALTH = ("diagnostic_msgs/DiagnosticArray",)
 
 RULES: tuple[LayerRule, ...] = (
@@ -135,14 +141,33 @@ RULES: tuple[LayerRule, ...] = (
         "goal", POSE, r"/move_base_simple/goal\Z", 1, "where RViz sends move_base"
     ),
     LayerRule("pose", POSE, r"", 3, "its type alone"),
+    LayerRule(
+        "lookahead", POINT, r"/lookahead_point\Z", 1, "what a controller steers to"
+    ),
+    LayerRule("point", POINT, r"", 3, "its type alone"),
+    LayerRule(
+        "cells", CELLS, r"local_costmap/(?!unknown_space\Z)", 3, "of a local costmap"
+    ),
+    LayerRule(
+        "cells",
+        CELLS,
+        r"\A(?!.*unknown_space\Z)",
+        3,
+        "its type alone, unless it is all that nobody knows",
+    ),
     LayerRule("range", ("sensor_msgs/Range",), r"", 8, "its type alone"),
     LayerRule("markers", MARKERS, r"", 3, "its type alone"),
     LayerRule("markers", MARKER, r"", 3, "its type alone"),
     LayerRule("fix", FIX, r"/fix\Z", 1, "the usual name"),
     LayerRule("fix", FIX, r"", 1, "its type alone"),
+    LayerRule("fix", GPS_FIX, r"", 1, "its type alone"),
     LayerRule("health", HEALTH, r"/diagnostics\Z", 1, "the usual name"),
     LayerRule("health", HEALTH, r"/diagnostics_agg\Z", 1, "what an aggregator says"),
 )
+
+
+Order: TypeAlias = tuple[int, bool, str]
+"""The place of a rule, whether the topic is no robot's own, and the topic."""
 
 
 def find_layers(
@@ -180,16 +205,15 @@ def is_own(topic: str, namespace: str) -> bool:
 def _sorted(
     topics: Mapping[str, str], robots: Iterable[str]
 ) -> dict[str, tuple[list[FoundLayer], list[FoundLayer]]]:
-    matched: dict[str, list[tuple[int, str, FoundLayer]]] = {
-        space: [] for space in robots
-    }
+    matched: dict[str, list[tuple[Order, FoundLayer]]] = {space: [] for space in robots}
     for topic, type in topics.items():
         found = _match(topic, type)
         if found is None:
             continue
         place, layer = found
         for space in _owners(topic, layer.kind, matched):
-            matched[space].append((place, topic, layer))
+            order = (place, not is_own(topic, space), topic)
+            matched[space].append((order, layer))
     return {space: _best(layers) for space, layers in matched.items()}
 
 
@@ -217,11 +241,11 @@ def _owners(topic: str, kind: Kind, spaces: Mapping[str, object]) -> list[str]:
 
 
 def _best(
-    found: list[tuple[int, str, FoundLayer]],
+    found: list[tuple[Order, FoundLayer]],
 ) -> tuple[list[FoundLayer], list[FoundLayer]]:
     best: list[FoundLayer] = []
     others: list[FoundLayer] = []
-    for place, _, layer in sorted(found, key=lambda each: each[:2]):
+    for (place, _, _), layer in sorted(found, key=lambda each: each[0]):
         count = sum(other.kind == layer.kind for other in best)
         (best if count < RULES[place].most else others).append(layer)
     return best, others

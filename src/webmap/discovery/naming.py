@@ -41,15 +41,22 @@ def unique_names(
             name = robot.name
             if often[same_name(name)] > 1:
                 name = f"{name} ({bridge})"
-            robots.append(replace(robot, name=_free(name, taken)))
+            robots.append(replace(robot, name=free_name(name, taken)))
         result.append(replace(findings, robots=tuple(robots)))
     return result
 
 
-def _free(name: str, taken: set[str]) -> str:
-    number, free = 1, name
-    while same_name(free) in taken:
+def free_name(wanted: str, taken: set[str]) -> str:
+    """Return a name that nobody has, and take it.
+
+    Args:
+        wanted: What a number is put behind, if need be.
+        taken: What :func:`same_name` makes of each name.
+
+    """
+    name, number = wanted, 1
+    while same_name(name) in taken:
         number += 1
-        free = f"{name} {number}"
-    taken.add(same_name(free))
-    return free
+        name = f"{wanted} {number}"
+    taken.add(same_name(name))
+    return name

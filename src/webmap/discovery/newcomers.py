@@ -1,4 +1,4 @@
-"""What is new since the last look: robots, and topics of robots."""
+"""What is new since the last look: robots, and topics and frames of robots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -16,6 +16,9 @@ class News:
     roles: tuple[Role, ...] = ()
     """What it has more than before; empty for a robot that is new."""
 
+    moved: bool = False
+    """Whether it is known to move in other frames than before."""
+
 
 class Newcomers:
     """Says once what is new, when it has settled.
@@ -23,7 +26,8 @@ class Newcomers:
     The topics of a robot that is being switched on come one by one. So news is told
     when two looks in a row say the same of the robot, and not before. A topic that
     goes, or a better one that comes, is no news: what is in use stays in use. Of
-    cameras all are used, so each one more is news.
+    cameras all are used, so each one more is news. Frames are news as
+    :func:`leads_further` has it, and else they stay as well.
 
     Args:
         known: Robots that are there already.
@@ -41,17 +45,45 @@ class Newcomers:
         for robot in findings.robots:
             known = self._known.get(robot.namespace)
             roles = () if known is None else _more(robot, known)
-            if known is not None and not roles:
+            moved = known is not None and leads_further(robot, known)
+            if known is not None and not roles and not moved:
                 continue
             if before.get(robot.namespace) != robot:
                 self._seen[robot.namespace] = robot
                 continue
+            if known is not None and not moved:
+                robot = with_frames_of(robot, known)
             guesses = {**robot.guesses, **(known.guesses if known else {})}
             if "camera" in guesses:
                 guesses["camera"] = _all_cameras(robot, known)
             self._known[robot.namespace] = replace(robot, guesses=guesses)
-            news.append(News(robot, roles))
+            news.append(News(robot, roles, moved))
         return news
+
+
+def leads_further(robot: FoundRobot, known: FoundRobot) -> bool:
+    """Tell whether the frames of a robot lead further up than those known of it.
+
+    They do if none were known, or if what was their root hangs from the new one, as
+    ``odom`` hangs from ``map`` once a robot knows where it is. What was not heard for
+    a while, and a root beside the known one, change nothing.
+    """
+    if not known.root_frame:
+        return robot.root_frame != ""
+    above = robot.above
+    if known.root_frame not in above or robot.root_frame not in above:
+        return False
+    return above.index(robot.root_frame) > above.index(known.root_frame)
+
+
+def with_frames_of(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
+    """Return a robot with the frames that are known of it."""
+    return replace(
+        robot,
+        base_frame=known.base_frame,
+        root_frame=known.root_frame,
+        above=known.above,
+    )
 
 
 def _more(robot: FoundRobot, known: FoundRobot) -> tuple[Role, ...]:

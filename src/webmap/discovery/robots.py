@@ -141,7 +141,9 @@ def _robot(
         guesses[each.role] = (*guesses.get(each.role, ()), guess)
     robot = FoundRobot(name, space, guesses)
     if base is not None:
-        robot = replace(robot, base_frame=base.frame, root_frame=base.root)
+        robot = replace(
+            robot, base_frame=base.frame, root_frame=base.root, above=base.above
+        )
     return replace(robot, notes=_robot_notes(robot, twists))
 
 

@@ -36,6 +36,9 @@ class Base:
     prefix: str = ""
     """Before the name of the base, without what parts them."""
 
+    above: tuple[str, ...] = ()
+    """What it hangs from, the nearest first."""
+
     @property
     def space(self) -> str:
         """The namespace in which its other topics are likely to be."""
@@ -84,7 +87,7 @@ def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
         if worlds or odometry:
             root = MAP if MAP in worlds else (worlds or odometry)[-1]
             prefix = (found["prefix"] or found["space"] or "").rstrip("/_")
-            yield Base(frame, root, namespace, prefix)
+            yield Base(frame, root, namespace, prefix, tuple(chain))
 
 
 def _above(frame: str, parents: Parents) -> list[str]:

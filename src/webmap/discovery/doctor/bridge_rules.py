@@ -128,12 +128,20 @@ def _rosapi(seen: Observed) -> Iterator[Finding]:
     source = "rosapi answers"
     if seen.told:
         source = "The topics are those that were given"
+    which = "robots looked at" if seen.meant else "robots found"
     if not robots:
         said = " ".join(seen.findings.notes)
         yield Finding("wrong", ABOUT, f"No robot was found. {said}", TELL)
         return
     names = ", ".join(robot.name for robot in robots)
-    yield Finding("good", ABOUT, f"{source}; robots found: {names}.")
+    yield Finding("good", ABOUT, f"{source}; {which}: {names}.")
+    if seen.others:
+        yield Finding(
+            "note",
+            ABOUT,
+            f"Robots that nobody named here were found too, and not looked at: "
+            f"{', '.join(seen.others)}.",
+        )
     if len(robots) > MOST_ROBOTS:
         yield Finding(
             "note",
@@ -185,6 +193,13 @@ def _blocking(seen: Observed) -> Finding:
             f"A service that hangs blocks its whole socket{how}.",
             advice,
         )
+    if seen.untold:
+        return Finding(
+            "note",
+            ABOUT,
+            f"Whether a service that hangs blocks its socket was tried, and is not "
+            f"known: {seen.untold}.",
+        )
     if seen.findings.dialect is None:
         return Finding(
             "note",
@@ -197,7 +212,8 @@ def _blocking(seen: Observed) -> Finding:
             ABOUT,
             "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
             "does unless told otherwise; it was not tried.",
-            f"webmap doctor {seen.url} --try-call finds out. {advice}",
+            f"The button Try a call of the console's report finds out, or webmap "
+            f"doctor {seen.url} --try-call. {advice}",
         )
     return Finding(
         "good",

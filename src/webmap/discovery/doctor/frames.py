@@ -1,13 +1,11 @@
 """Whether the frames lead from the map to a robot; without I/O."""
 
+from webmap.discovery.tf_robots import MAP
 from webmap.errors import ProtocolError
 from webmap.geometry import Quaternion, Vector3
 from webmap.ros.events import Publish
 from webmap.ros.messages import TFMessage
 from webmap.tf import Buffer, Transform, TransformError
-
-MAP = "map"
-"""The frame that robots are drawn in."""
 
 
 class FrameListening:

@@ -58,7 +58,7 @@ async def listen(
             listening = Listening([*topics, *tf], time.monotonic())
             protocol = Protocol()
             try:
-                async with asyncio.timeout(seconds if topics else 0):
+                async with asyncio.timeout(seconds if topics or tf else 0):
                     while True:
                         frame = await socket.recv(decode=False)
                         event = protocol.receive(frame, time.monotonic())

@@ -4,7 +4,7 @@ Nothing is published, each socket is of its own and closed after, and only those
 services of rosapi are called that were seen to answer on every bridge.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from urllib.parse import urlsplit
 
@@ -13,11 +13,14 @@ from webmap.discovery.doctor.asking import Asking
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.hanging import try_a_call
 from webmap.discovery.doctor.heard_from import listen, sample
+from webmap.discovery.doctor.meant import MeantRobot, lay_over
 from webmap.discovery.doctor.observed import MOST_ROBOTS, Heard, Observed, Way
 from webmap.discovery.doctor.ports import is_loopback, listening_addresses
 from webmap.discovery.doctor.shown_rules import shown_topics
-from webmap.discovery.found import FoundRobot
+from webmap.discovery.found import Findings, FoundRobot
+from webmap.discovery.hearing import frame_topics, hear_frames
 from webmap.discovery.robots import discover, host_name
+from webmap.discovery.tf_robots import MAP
 from webmap.errors import BridgeClosed, BridgeError
 from webmap.ros.calls import Calls
 
@@ -30,6 +33,8 @@ MOST_SCANS = 6
 NEEDLESS = ("/rosout", "/parameter_events")
 """Topics of every ROS that no client needs; whoever hides topics hides these."""
 
+TRYING = "Trying what a call that hangs holds up."
+
 
 async def observe(
     url: str,
@@ -39,7 +44,7 @@ async def observe(
     ask_parameters: bool = False,
     try_call: bool = False,
     topics: Mapping[str, str] | None = None,
-    known: Mapping[str, str] | None = None,
+    meant: Callable[[Findings], Sequence[MeantRobot]] = lambda _found: (),
     waiting: Callable[[str], object] = lambda _why: None,
     progress: Callable[[str], object] = lambda _what: None,
 ) -> Observed:
@@ -53,9 +58,13 @@ async def observe(
         try_call: Whether a service is offered and called that hangs for a second, to
             see what that holds up.
         topics: Types by topic, which are taken in place of what rosapi says.
-        known: Types by topic, which are taken if rosapi says nothing.
+        meant: Takes what was found and returns the robots as somebody configured
+            them; if there are any, these are measured and no others.
         waiting: Called once with the reason if the bridge is waited for.
         progress: Called with what is being done now, in a sentence.
+
+    Raises:
+        ConfigError: If ``meant`` says that what was found cannot be meant.
 
     """
     rosapi, told, asked = "", topics is not None, dict(topics or {})
@@ -67,24 +76,26 @@ async def observe(
         return Observed(url, trouble=error.why or str(error))
     except BridgeError as error:
         rosapi = str(error)
-        if known and not told:
-            asked, told = dict(known), True
-    findings = discover(asked, host_name(url))
+    trees = None
+    if frame_topics(asked):
+        progress("Listening to frames for a moment.")
+        trees = await hear_frames(url, asked)
     seen = Observed(
         url,
         rosapi=rosapi,
         told=told,
         shown=tuple(name for name in NEEDLESS if name in asked and not told),
-        findings=findings,
+        types=asked,
+        findings=discover(asked, host_name(url), trees),
     )
+    seen = _as_meant(seen, meant(seen.findings))
     if not rosapi:
         progress("Asking for the time, and who writes and who listens.")
         seen = await _ask(seen, ask_parameters=ask_parameters)
     try:
-        if try_call and not rosapi:
-            progress("Trying what a call that hangs holds up.")
-            free = await try_a_call(url)
-            seen = replace(seen, calls_in_threads=free, tried=free is not None)
+        if try_call:
+            progress(TRYING)
+            seen = await tried(seen)
         progress(f"Listening for {seconds:g} s.")
         seen = await _listen(seen, seconds)
         rest = _shown(seen.findings.robots[:MOST_ROBOTS])
@@ -97,6 +108,37 @@ async def observe(
         return seen
     except (OSError, TimeoutError) as error:
         return Observed(url, trouble=str(error) or type(error).__name__)
+
+
+async def tried(seen: Observed) -> Observed:
+    """Return what was seen, with what a call that hangs holds up; it is tried."""
+    if seen.tried:  # what was found out before may be so no more
+        seen = replace(seen, calls_in_threads=None, tried=False)
+    if seen.rosapi:
+        return replace(seen, untold="it takes a rosapi that answers")
+    try:
+        free = await try_a_call(seen.url)
+    except (OSError, TimeoutError) as error:
+        return replace(seen, untold=str(error) or type(error).__name__)
+    if free is None:
+        return replace(seen, untold="the bridge offers no services of its clients")
+    return replace(seen, calls_in_threads=free, tried=True, untold="")
+
+
+def _as_meant(seen: Observed, robots: Sequence[MeantRobot]) -> Observed:
+    """Return what was seen with the robots as somebody configured them, if any."""
+    if not robots:
+        return seen
+    findings, meant = lay_over(seen.findings, robots, seen.types)
+    known = {one.found_as for one in meant.values()}
+    others = [robot.name for robot in seen.findings.robots if robot.name not in known]
+    return replace(
+        seen,
+        told=seen.told or seen.rosapi != "",
+        findings=findings,
+        meant=meant,
+        others=tuple(others),
+    )
 
 
 async def _ask(seen: Observed, *, ask_parameters: bool) -> Observed:
@@ -134,7 +176,8 @@ async def _listen(seen: Observed, seconds: float) -> Observed:
     peer, deflate, heard = await listen(seen.url, topics, seconds, tf, frames)
     ways = {}
     for robot in robots:
-        way = _way(robot, heard, frames)
+        one = seen.meant.get(robot.name)
+        way = _way(robot, heard, frames, one.map_frame if one else "")
         if way is not None:
             ways[robot.name] = way
     port = urlsplit(seen.url).port
@@ -158,20 +201,28 @@ def place_of(robot: FoundRobot) -> str:
 
 
 def _way(
-    robot: FoundRobot, heard: Mapping[str, Heard], frames: FrameListening
+    robot: FoundRobot, heard: Mapping[str, Heard], frames: FrameListening, start: str
 ) -> Way | None:
-    """Return what the frames say of a robot whose odometry names its frame."""
-    space, where = robot.tf_namespace, heard.get(place_of(robot))
-    if space is None or where is None or not where.frame:
+    """Return what the frames say of a robot whose odometry names its frame.
+
+    Of one without odometry it is the frame of its base that counts. It is drawn in the
+    frame ``start``, if somebody said so, else in the one that was found.
+    """
+    space, where = robot.tf_namespace, heard.get(place_of(robot), Heard())
+    frame, base = where.frame, where.child
+    if robot.tf_alone:
+        frame = base = robot.base_frame
+    if space is None or not frame:
         return None
+    start = start or robot.tf_options.get("map_frame", MAP)
     scan = heard.get(robot.topic("scan"), Heard()).frame
-    base = where.child
     return Way(
-        where.frame,
-        frames.missing(space, where.frame),
+        frame,
+        frames.missing(space, frame, start),
         frames.oddities(space),
         base,
-        frames.missing(space, base, where.frame) if base else "",
+        frames.missing(space, base, frame) if base else "",
         scan,
         frames.missing(space, scan, base) if scan and base else "",
+        start,
     )

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+from webmap.discovery.doctor.meant import MeantRobot
 from webmap.discovery.found import Findings
+from webmap.discovery.tf_robots import MAP
 
 Level: TypeAlias = Literal["wrong", "warning", "note", "good"]
 """``wrong``: it will not work, or not safely. ``note``: cannot be told from here."""
@@ -87,7 +89,7 @@ class Way:
     """The frames from the map to a robot's odometry, its base and its scanner."""
 
     frame: str
-    """The frame of the odometry."""
+    """The frame of the odometry; that of the base where there is none."""
 
     missing: str = ""
     """Why nothing leads there from the map, empty if it does."""
@@ -106,6 +108,9 @@ class Way:
 
     scan_missing: str = ""
     """Why nothing leads there from the base."""
+
+    start: str = MAP
+    """The frame that the robot is drawn in: its map's, or where its frames begin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +139,18 @@ class Observed:
     shown: tuple[str, ...] = ()
     """Topics that no client needs and that the bridge shows all the same."""
 
+    types: Mapping[str, str] = field(default_factory=dict)
+    """Types by topic, as rosapi or the user's list tells them."""
+
     findings: Findings = field(default_factory=Findings)
+    """The robots that are measured, with the topics that are in use."""
+
+    meant: Mapping[str, MeantRobot] = field(default_factory=dict)
+    """What somebody said of them, by their names; empty if all of it was found."""
+
+    others: tuple[str, ...] = ()
+    """Robots that were found too and not measured, since nobody meant them."""
+
     clock: Clock | None = None
     publishers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """The nodes that publish on a topic, where rosapi said so."""
@@ -151,3 +167,6 @@ class Observed:
 
     tried: bool = False
     """Whether that was tried with a call that hangs, and not only asked."""
+
+    untold: str = ""
+    """Why trying it told nothing; empty if it did, or if it was not tried."""

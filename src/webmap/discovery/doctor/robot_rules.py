@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 
 from webmap.discovery.doctor.heard_rules import heard_finding, rare_finding
+from webmap.discovery.doctor.meant import MeantRobot
 from webmap.discovery.doctor.observed import Finding, Observed, Way
 from webmap.discovery.doctor.shown_rules import shown_findings
 from webmap.discovery.found import FoundRobot, Guess
-from webmap.ros.names import is_type
+from webmap.ros.names import is_type, same_type
 
 MOST_ODDITIES = 3
 BRIDGES = ("rosbridge", "webmap")
@@ -15,17 +16,11 @@ BRIDGES = ("rosbridge", "webmap")
 
 def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Say what holds for one robot."""
-    yield from _velocity(robot, seen)
-    where = robot.first("odometry") or robot.first("pose")
-    if where is None:
-        yield Finding(
-            "wrong",
-            robot.name,
-            "Nothing says where it is.",
-            "Start its odometry, or name the topic with --robot.",
-        )
-    elif where.topic in seen.heard:
-        yield heard_finding(robot.name, where, seen, needed=True)
+    one = seen.meant.get(robot.name, MeantRobot(robot.name))
+    if "velocity" not in one.elsewhere:
+        yield from _velocity(robot, seen)
+    if "odometry" not in one.elsewhere:
+        yield from _place(robot, seen)
     battery = robot.first("battery")
     for scan in robot.guesses.get("scan", ()):
         if scan.topic in seen.heard:
@@ -36,14 +31,33 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     yield from shown_findings(robot, seen)
     yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
+        # The command knows robots by the names that it finds.
+        name = one.found_as if robot.name in seen.meant else robot.name
+        command = f"webmap doctor {seen.url} --stop-test {name}, or " if name else ""
         yield Finding(
             "note",
             robot.name,
             "Whether the base stops by itself when commands cease cannot be seen from "
             "here.",
-            "Set its timeout, and try it where it may creep for three seconds: webmap "
-            f"doctor {seen.url} --stop-test {robot.name}, or the button on its card.",
+            "Set its timeout, and try it where it may creep for three seconds: "
+            f"{command}the button on its card.",
         )
+
+
+def _place(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+    """Say what holds for that which says where a robot is."""
+    where = robot.first("odometry") or robot.first("pose")
+    if robot.tf_alone:
+        yield from _drawn_by_frames(robot, seen)
+    elif where is None:
+        yield Finding(
+            "wrong",
+            robot.name,
+            "Nothing says where it is.",
+            "Start its odometry, or name the topic with --robot.",
+        )
+    elif where.topic in seen.heard:
+        yield heard_finding(robot.name, where, seen, needed=True)
 
 
 def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
@@ -57,25 +71,50 @@ def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
 
 
+def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+    """Say whether frames tell where a robot is of which nothing else does."""
+    topic, way = robot.topic("tf"), seen.ways.get(robot.name)
+    if way is not None and not way.missing:
+        yield Finding(
+            "good",
+            robot.name,
+            f"It is drawn where its frames have {way.frame} in {way.start}"
+            f"{_often(topic, seen)}; there is no odometry.",
+        )
+    elif way is not None or (topic in seen.heard and not robot.base_frame):
+        why = way.missing if way else f"{topic} tells of no base_link in a map or odom"
+        yield Finding(
+            "wrong",
+            robot.name,
+            f"Nothing says where it is: {why}.",
+            f"Start what tells of its frames on {topic}, or its odometry.",
+        )
+
+
+def _often(topic: str, seen: Observed) -> str:
+    rate = seen.heard[topic].rate if topic in seen.heard else 0.0
+    return f" ({topic}: {rate:.1f} messages a second)" if rate else ""
+
+
 def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     way = seen.ways.get(robot.name)
     if way is None:
         return
-    topic = f"{robot.tf_namespace}/tf"
-    rate = seen.heard[topic].rate if topic in seen.heard else 0.0
-    often = f" ({topic}: {rate:.1f} messages a second)" if rate else ""
-    if way.missing:
+    if robot.tf_alone:
+        pass  # said already: nothing else tells where it is
+    elif way.missing:
         yield Finding(
             "note",
             robot.name,
             f"It is drawn in the frame {way.frame}, where odometry has it: "
             f"{way.missing}.",
-            "To see it on the map, start what tells of the frame map: amcl, "
+            f"To see it on the map, start what tells of the frame {way.start}: amcl, "
             "slam_toolbox, or a static transform.",
         )
     else:
+        often = _often(f"{robot.tf_namespace}/tf", seen)
         yield Finding(
-            "good", robot.name, f"Frames lead from map to {way.frame}{often}."
+            "good", robot.name, f"Frames lead from {way.start} to {way.frame}{often}."
         )
     yield from _inner_frames(robot.name, way)
     for oddity in way.oddities[:MOST_ODDITIES]:
@@ -107,15 +146,22 @@ def _inner_frames(name: str, way: Way) -> Iterator[Finding]:
             f"static_transform_publisher from {way.base} to {way.scan}.",
         )
     elif way.scan and way.base and not way.base_missing:
+        base = f"{way.base} and to " if way.base != way.frame else ""
         yield Finding(
-            "good",
-            name,
-            f"Frames lead on from {way.frame} to {way.base} and to {way.scan}.",
+            "good", name, f"Frames lead on from {way.frame} to {base}{way.scan}."
         )
 
 
 def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     velocity = robot.first("velocity")
+    meant = seen.meant.get(robot.name)
+    if velocity is None and meant is not None and "velocity" in meant.topics:
+        yield Finding(
+            "note",
+            robot.name,
+            "It was given no topic for velocity, so it can be seen and not driven.",
+        )
+        return
     if velocity is None:
         yield Finding(
             "warning",
@@ -124,14 +170,7 @@ def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             "Name it: --robot NAME:ODOM:CMD_VEL:SCAN.",
         )
         return
-    short = velocity.type.rpartition("/")[2]
-    stamped = is_type(velocity.type, "geometry_msgs/TwistStamped")
-    yield Finding(
-        "note" if seen.told else "good",
-        robot.name,
-        f"{velocity.topic} {'is said to take' if seen.told else 'takes'} {short}, and "
-        f"WebMap sends that{', with a stamp of zero' if stamped else ''}.",
-    )
+    yield _type(robot, velocity, seen)
     yield from _writers(robot, velocity, seen)
     listeners = seen.subscribers.get(velocity.topic)
     if listeners == ():
@@ -141,6 +180,30 @@ def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             f"Nobody listens to {velocity.topic}: the robot would not move, nor stop.",
             "Start the base's driver, or name the topic that it listens to.",
         )
+
+
+def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
+    """Say which type the base takes, and which one WebMap sends."""
+    short = velocity.type.rpartition("/")[2]
+    takes = seen.types.get(velocity.topic, "").strip()
+    said = seen.told or (robot.name in seen.meant and not takes)
+    verb = "is said to take" if said else "takes"
+    if takes and not same_type(takes, velocity.type):
+        return Finding(
+            "wrong",
+            robot.name,
+            f"{velocity.topic} {verb} {takes.rpartition('/')[2]}, and WebMap is set to "
+            f"send {short}: the robot would not move, nor stop.",
+            "Correct the type where the robot is configured (twist.type of a fleet "
+            "file, velocity_type of --set), or leave it out, so that it is asked for.",
+        )
+    stamped = is_type(velocity.type, "geometry_msgs/TwistStamped")
+    return Finding(
+        "note" if said else "good",
+        robot.name,
+        f"{velocity.topic} {verb} {short}, and "
+        f"WebMap sends that{', with a stamp of zero' if stamped else ''}.",
+    )
 
 
 def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Finding]:
