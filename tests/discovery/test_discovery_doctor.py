@@ -1,21 +1,26 @@
 """What the readiness check decides."""
 
+import asyncio
 import ipaddress
 import json
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
+from frames_only import telling
 
 from webmap.discovery import discover
 from webmap.discovery.doctor import Heard, Observed, is_ready, judge
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
+from webmap.discovery.doctor.measure import observe
 from webmap.discovery.doctor.observed import Clock, Way
 from webmap.discovery.doctor.ports import is_loopback, listening_addresses
 from webmap.discovery.doctor.sampling import MOST_BYTES, Sampling
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
+from webmap.geometry import Pose
 from webmap.ros.events import Publish
 
 TOPICS = {
@@ -394,6 +399,79 @@ def test_a_way_from_the_map_is_good_and_a_missing_one_a_note():
     assert said(seen, "Frames lead from map to odom") == "good"
     seen = replace(GOOD, ways={"bob": Way("odom", "there is no frame 'map'")})
     assert said(seen, "where odometry has it: there is no frame 'map'") == "note"
+
+
+def test_the_way_begins_in_the_map_that_the_robot_is_drawn_in():
+    seen = replace(GOOD, ways={"bob": Way("bob/odom", start="world")})
+    assert said(seen, "Frames lead from world to bob/odom") == "good"
+    lost = Way("bob/odom", "there is no frame 'world'", start="world")
+    seen = replace(GOOD, ways={"bob": lost})
+    (found,) = [each for each in judge(seen) if "no frame 'world'" in each.words]
+    assert "start what tells of the frame world" in found.advice
+
+
+PLACED = Pose(1.0, 0.0, 0.0)
+
+
+def chain(*frames):
+    """Transforms from each frame to the next."""
+    return [(*pair, PLACED) for pair in pairwise(frames)]
+
+
+def checked(told, extra=None):
+    """What the check sees of robots that tell of their frames."""
+    with telling(told, extra=extra or {}) as url:
+        return asyncio.run(observe(url, seconds=0.5))
+
+
+@pytest.mark.parametrize(
+    ("topic", "frames", "name", "words"),
+    [
+        (
+            "/tf",
+            ("map", "bob/odom", "bob/base_link"),
+            "bob",
+            "It is drawn where its frames have bob/base_link in map (/tf: ",
+        ),
+        (
+            "/bob/tf",
+            ("map", "odom", "base_link"),
+            "bob",
+            "It is drawn where its frames have base_link in map (/bob/tf: ",
+        ),
+        (
+            "/bob/tf",
+            ("odom", "base_link"),
+            "bob",
+            "It is drawn where its frames have base_link in odom (/bob/tf: ",
+        ),
+    ],
+)
+def test_a_robot_that_frames_alone_tell_of_is_found_and_drawn(
+    topic, frames, name, words
+):
+    seen = checked({topic: chain(*frames)})
+    assert [robot.name for robot in seen.findings.robots] == [name]
+    assert said(seen, words) == "good"
+    assert not [each for each in judge(seen) if each.level == "wrong"]
+
+
+def test_a_robot_whose_frames_are_silent_is_nowhere():
+    seen = checked({"/bob/tf": []}, {"/bob/scan": TOPICS["/scan"]})
+    words = "Nothing says where it is: /bob/tf tells of no base_link in a map or odom"
+    assert said(seen, words) == "wrong"
+
+
+def test_robots_with_a_map_each_are_followed_from_what_holds_the_maps():
+    names = ("ann", "bob")
+    told = [
+        transform
+        for name in names
+        for transform in chain("world", f"{name}/map", f"{name}/base_link")
+    ]
+    seen = checked({"/tf": told})
+    for name in names:
+        assert said(seen, f"have {name}/base_link in world") == "good"
 
 
 def test_odd_frames_are_a_warning():

@@ -7,9 +7,9 @@ import pytest
 from faulty_site import site
 from websockets.asyncio.server import serve
 
-from webmap.discovery.doctor import judge
+from webmap.discovery.doctor import Observed, judge
 from webmap.discovery.doctor.heard_from import listen
-from webmap.discovery.doctor.measure import observe
+from webmap.discovery.doctor.measure import observe, tried
 from webmap.discovery.doctor.sampling import ENOUGH
 
 SECONDS = 0.4
@@ -185,6 +185,31 @@ def test_frames_that_are_complete_are_good(dialect):
     )
 
 
+def apart(name, message):
+    """Lay the robot's own map into a world, as several robots of ROS 1 have it."""
+    if name != "/tf":
+        return message
+    own = [
+        {**each, "header": {**each["header"], "frame_id": "robot_0/map"}}
+        if each["header"]["frame_id"] == "map"
+        else each
+        for each in message["transforms"]
+    ]
+    where = {
+        **message["transforms"][0],
+        "header": {**message["transforms"][0]["header"], "frame_id": "world"},
+        "child_frame_id": "robot_0/map",
+    }
+    return {"transforms": [*own, where]}
+
+
+@DIALECTS
+def test_the_frames_of_a_robot_with_a_map_of_its_own_are_good(dialect):
+    _, findings, _ = looked_at(site(dialect, change=apart))
+    assert said(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
+    assert not any("where odometry has it" in each.words for each in findings)
+
+
 @pytest.mark.parametrize(
     ("quirks", "level", "words"),
     [
@@ -205,7 +230,37 @@ def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
 
     _, findings, seen = looked_at(site("ros2"), deaf, try_call=True)
     assert seen.calls_in_threads is None
-    assert said(findings, "it was not tried") == "note"
+    words = "was tried, and is not known: the bridge offers no services of its clients"
+    assert said(findings, words) == "note"
+
+
+def test_without_rosapi_a_call_is_not_tried_and_why_is_said():
+    there, findings, _ = looked_at(site("ros2", rosapi=False), try_call=True)
+    assert said(findings, "is not known: it takes a rosapi that answers") == "note"
+    assert not any("webmap_doctor" in name for name in there.called)
+
+
+def test_a_call_is_tried_again_without_looking_at_the_rest_again():
+    async def run():
+        async with site("ros2", quirks="polite") as there:
+            seen = await observe(there.url, seconds=SECONDS)
+            asked = len(there.called)
+            again = await tried(seen)
+            return there.called[asked:], seen, again
+
+    called, seen, again = asyncio.run(run())
+    assert (seen.tried, again.tried, again.calls_in_threads) == (False, True, True)
+    assert again.heard == seen.heard
+    ours = [name for name in called if name.startswith("/webmap_doctor_")]
+    assert len(ours) == len(called) - 1, called
+    assert "/rosapi/get_time" in called, "nothing that hangs or ends a rosapi"
+
+
+def test_what_trying_told_before_is_not_said_of_a_bridge_that_went_away():
+    blocking = Observed("ws://127.0.0.1:1", calls_in_threads=False, tried=True)
+    seen = asyncio.run(tried(blocking))
+    assert (seen.calls_in_threads, seen.tried) == (None, False)
+    assert said(judge(seen), "was tried, and is not known") == "note"
 
 
 TOPICS = {
@@ -222,15 +277,6 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     assert said(findings, "The topics are those that were given") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
     assert said(findings, "cannot be told: rosapi did not say") == "note"
-
-
-def test_what_is_known_is_taken_only_where_rosapi_says_nothing():
-    _, findings, seen = looked_at(site(rosapi=False), known=TOPICS)
-    assert said(findings, "/robot_0/cmd_vel is said to take Twist") == "note"
-    assert said(findings, "/robot_0/odom:") == "good"
-    _, findings, seen = looked_at(site(), known={"/bob/odom": "nav_msgs/Odometry"})
-    assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
-    assert not seen.told
 
 
 def test_without_rosapi_and_without_a_list_the_list_is_asked_for():
