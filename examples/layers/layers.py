@@ -22,6 +22,8 @@ robot.add_module("LaserScanner", bridge, "/robot_0/base_scan", max_dots=None)
 robot.add_module("PointCloud", bridge, "/robot_0/points", z_min=0.1, colour_by="z")
 robot.add_module("Range", bridge, "/robot_0/sonar")
 robot.add_module("Path", bridge, "/robot_0/plan")
+lookahead = {"name": "lookahead", "frame": "robot"}
+robot.add_module("PointStamped", bridge, "/robot_0/lookahead_point", **lookahead)
 robot.add_module("Trail")
 robot.add_module("PoseArray", bridge, "/robot_0/particlecloud")
 robot.add_module("PoseWithCovariance", bridge, "/robot_0/amcl_pose")

@@ -25,6 +25,9 @@ FINEST = 1e-4
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 """What map_server reads, by its magic bytes; PPM includes PGM."""
 
+MAGIC = (b"P", b"\x89PNG", b"BM", b"\xff\xd8")
+"""How files of these formats begin."""
+
 MODES = ("trinary", "scale", "raw")
 TRUTH = {"0": False, "1": True, "false": False, "true": True}
 
@@ -90,7 +93,12 @@ def _settings(file: Path) -> _Settings:
     said = LinedYaml(file, texts=True)
     table = said.data
     if not isinstance(table, dict):
-        raise said.wrong((), "needs image, resolution and origin")
+        got = "a list" if isinstance(table, list) else repr(table)[:60]
+        raise said.wrong(
+            (),
+            "needs image, resolution and origin, each as a line KEY: VALUE, got "
+            + ("nothing" if table is None else got),
+        )
     resolution = _number(said, table.get("resolution"), ("resolution",))
     if resolution <= 0:
         raise said.wrong(
@@ -169,10 +177,13 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
     not opaque is unknown, here NaN, and in ``raw`` it is nothing.
     """
     import numpy as np
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     too_many = (Image.DecompressionBombError, Image.DecompressionBombWarning)
+    begins = b""
     try:
+        with settings.image.open("rb") as stream:
+            begins = stream.read(8)
         with Image.open(settings.image, formats=FORMATS) as opened:
             if opened.width * opened.height > MAX_PIXELS:
                 raise ConfigError(
@@ -185,12 +196,14 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
             pixels = np.asarray(opened if deep else opened.convert(colours))
     except too_many as error:
         raise ConfigError(f"{file}: the image is too large: {error}") from error
+    except UnidentifiedImageError as error:
+        raise ConfigError(
+            f"{file}: the image must be PGM, PNG, BMP or JPEG, got {_kind(begins)}"
+        ) from error
     except (OSError, ValueError, SyntaxError) as error:
         if isinstance(error, ConfigError):
             raise
-        raise ConfigError(
-            f"{file}: the image must be PGM, PNG, BMP or JPEG: {error}"
-        ) from error
+        raise ConfigError(f"{file}: the image cannot be read: {error}") from error
     if deep:
         return np.asarray(pixels / 65535, np.float32)
     counted = pixels if settings.mode == "trinary" else pixels[..., :3]
@@ -198,6 +211,14 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
     if has_alpha and settings.mode == "scale":
         light[pixels[..., 3] < 255] = np.nan
     return light
+
+
+def _kind(begins: bytes) -> str:
+    """Return what a file is that is no image, by its first bytes."""
+    if not begins:
+        return "an empty file"
+    further = " and makes no sense further on" if begins.startswith(MAGIC) else ""
+    return f"one that begins with {begins!r}{further}"
 
 
 def _cells(light: "NDArray[np.float32]", settings: _Settings) -> "NDArray[np.int8]":

@@ -1,5 +1,7 @@
 """Modules: any object, by name, and never at another's cost."""
 
+import asyncio
+
 import pytest
 
 from webmap import Extendable, Namespace, Robot
@@ -105,6 +107,84 @@ def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
     owner.notify_modules("on_silence")
     assert heard == [3]
     assert reported == ["Bad.on_ring failed: RuntimeError: flat battery"]
+
+
+class Reporting(Extendable):
+    def __init__(self, namespace):
+        super().__init__(namespace)
+        self.reported = []
+
+    def report_error(self, text):
+        self.reported.append(text)
+
+
+class Slow:
+    """A module whose trigger waits."""
+
+    def __init__(self, owner) -> None:
+        self.go, self.heard = asyncio.Event(), []
+
+    async def on_ring(self, n):
+        await self.go.wait()
+        self.heard.append((n, 10 // n, current_scope()))
+
+
+def test_a_trigger_that_is_a_coroutine_goes_on_beside_the_others(namespace):
+    async def scenario():
+        owner = Reporting(namespace)
+        slow, slower = owner.add_module(Slow), owner.add_module(Slow)
+        owner.notify_modules("on_ring", 5)
+        for module in (slower, slow):
+            module.go.set()
+            await asyncio.wait_for(heard(module), 10)
+        assert [told[:2] for told in slow.heard + slower.heard] == [(5, 2), (5, 2)]
+        assert slow.heard[0][2] is not slower.heard[0][2], "each in its own scope"
+        assert owner.reported == []
+
+    async def heard(module):
+        while not module.heard:
+            await asyncio.sleep(0)
+
+    asyncio.run(scenario())
+
+
+def test_a_coroutine_that_still_waits_ends_with_its_module(namespace):
+    async def scenario():
+        owner = Reporting(namespace)
+        slow = owner.add_module(Slow)
+        owner.notify_modules("on_ring", 5)
+        await asyncio.sleep(0)
+        owner.remove_module(slow)
+        slow.go.set()
+        while len(asyncio.all_tasks()) > 1:
+            await asyncio.sleep(0)
+        assert slow.heard == owner.reported == []
+
+    asyncio.run(scenario())
+
+
+def test_a_coroutine_that_raises_later_is_reported_as_any_module(namespace):
+    async def scenario():
+        owner = Reporting(namespace)
+        owner.add_module(Slow).go.set()
+        owner.notify_modules("on_ring", 0)
+        async with asyncio.timeout(10):
+            while not owner.reported:
+                await asyncio.sleep(0)
+        (said,) = owner.reported
+        assert said.startswith("Slow.on_ring failed: ZeroDivisionError: ")
+
+    asyncio.run(scenario())
+
+
+def test_a_coroutine_that_nothing_would_run_is_said(namespace):
+    owner = Reporting(namespace)
+    owner.add_module(Slow)
+    owner.notify_modules("on_ring", 1)
+    assert owner.reported == [
+        "Slow.on_ring failed: RuntimeError: it is a coroutine, which only WebMap runs: "
+        "after webmap.start(), and in the model's thread"
+    ]
 
 
 def test_what_a_module_made_reports_to_its_owner_until_it_is_mended(namespace):

@@ -13,6 +13,8 @@ SURE = (0.25, 0.25, 0.068)
 class Link:
     """A bridge as far as goals need one."""
 
+    lag = 0.0
+
     def __init__(self, url="ws://test:9090"):
         self.url = url
         self.protected = {}
@@ -54,10 +56,15 @@ def test_a_robot_may_have_an_initial_pose_alone():
     assert spec.pose_type == "geometry_msgs/PoseWithCovarianceStamped"
 
 
+def test_a_robot_without_goals_is_told_its_place_in_the_map_that_is_said():
+    spec = spec_of(lambda robot: robot.set_initial_pose_topic(Link(), frame="tb1/map"))
+    assert spec.goal_frame == "tb1/map"
+
+
 def test_the_initial_pose_is_spelled_and_framed_as_the_goals_are():
     def set_up(robot):
         robot.set_move_topic(link, action="/navigate_to_pose", frame="hall")
-        robot.set_initial_pose_topic(link, "/here", covariance=[1, 2, 3])
+        robot.set_initial_pose_topic(link, "/here", covariance=[1, 2, 3], frame="x")
 
     link = Link()
     spec = spec_of(set_up)
@@ -86,6 +93,37 @@ def test_goals_that_go_nowhere_are_refused():
 
 
 @pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"on_operator_loss": "cancle"}, "'continue' or 'cancel', got 'cancle'"),
+        ({"action": "/go", "action_type": "a/Fibonacci"}, "got 'a/Fibonacci'"),
+        ({"action_type": "a/Fibonacci"}, "got 'a/Fibonacci'"),
+        ({"cancel_topic": "can cel"}, "'can cel' is not the name of a topic"),
+    ],
+)
+def test_goals_that_cannot_be_meant_are_refused(options, said):
+    robot = Robot("Bob")
+    with pytest.raises(ConfigError) as error:
+        robot.set_move_topic(Link(), "/goal", **options)
+    assert said in str(error.value)
+    assert robot.motion.move_topic is None
+
+
+@pytest.mark.parametrize("policy", ["continue", "cancel"])
+def test_what_becomes_of_a_goal_is_told_to_the_gate(policy):
+    def set_up(robot):
+        robot.set_move_topic(Link(), "/goal", on_operator_loss=policy)
+
+    assert spec_of(set_up).on_operator_loss == policy
+
+
+def test_a_typing_error_in_plain_data_does_not_let_a_goal_go_on():
+    move = {"bridge": "ws://robot:9090", "topic": "/goal", "on_operator_loss": "cancle"}
+    with pytest.raises(ConfigError, match="'continue' or 'cancel', got 'cancle'"):
+        Robot.from_dict({"name": "Bob", "move": move})
+
+
+@pytest.mark.parametrize(
     "covariance", [(1, 2), (1, 2, -3), (1, 2, float("nan")), (1, 2, "3"), "abc"]
 )
 def test_a_covariance_that_is_none_is_refused(covariance):
@@ -110,8 +148,9 @@ def test_goals_and_initial_pose_are_plain_data_and_back():
     link = Link()
     robot = Robot("Bob")
     robot.set_move_topic(link, action="/navigate_to_pose")
-    robot.set_initial_pose_topic(link, "/here", covariance=(1, 2, 3))
+    robot.set_initial_pose_topic(link, "/here", covariance=(1, 2, 3), frame="hall")
     data = robot.to_dict()
     assert data["move"] == {"bridge": link.url, "action": "/navigate_to_pose"}
     assert data["initial_pose"]["covariance"] == (1, 2, 3)
+    assert data["initial_pose"]["frame"] == "hall"
     assert Robot.from_dict(data, {link.url: link}).to_dict() == data

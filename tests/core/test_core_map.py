@@ -192,6 +192,20 @@ def test_a_container_that_is_on_no_page_is_refused():
         Map(svg.g())
 
 
+def test_no_map_is_made_on_a_page_that_was_closed(page, container):
+    page.close()
+    with pytest.raises(ConfigError, match="page '/' of Ann was closed"):
+        Map(container, 700, 500)
+    assert page.maps == []
+
+
+def test_a_map_knows_where_its_browser_has_it(container):
+    map = Map(container, 700, 500)
+    map.on_view_report(map.world.tf, Rect(12.0, 34.0, 700.0, 500.0))
+    place = map.get_bounding_rect()
+    assert (place.left, place.top) == (12.0, 34.0)
+
+
 def test_a_browser_half_sends_to_its_module_and_ends_with_it(container, channel):
     map = Map(container, 700, 500)
     got = []

@@ -18,6 +18,7 @@ class Link:
     """A bridge that is open at once and says what it is told to say."""
 
     url = "ws://test:9090"
+    lag = 0.0
 
     def __init__(self, **types: str) -> None:
         self.types = {f"/{topic}": type for topic, type in types.items()}
@@ -142,6 +143,28 @@ def test_a_message_of_another_shape_is_a_clear_error():
 def test_a_type_without_a_pose_is_refused_at_once():
     with pytest.raises(ConfigError, match="does not say where"):
         Robot("Bob").set_odometry_topic(Link(), "/odom", type="std_msgs/String")
+
+
+def test_a_robot_has_the_orientation_that_its_odometry_says():
+    link = Link()
+    robot = Robot("Bob")
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    q = {"x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5}
+    link.say("/odom", {**pose(), "orientation": q})
+    o = robot.orientation
+    assert (o.x, o.y, o.z, o.w) == (0.5, -0.5, 0.5, 0.5)
+
+
+def test_a_robot_whose_odometry_is_unsubscribed_stays_where_it_was_last():
+    link = Link()
+    robot = Robot("Bob")
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
+    link.say("/odom", pose())
+    robot.unsubscribe_odometry_topic()
+    link.say("/odom", pose(x=3.0))
+    assert (robot.position.x, robot.position.y) == (1.0, 2.0)
+    assert link.subscribed == []
+    robot.unsubscribe_odometry_topic()
 
 
 def test_odometry_update_fires_only_when_something_changed():

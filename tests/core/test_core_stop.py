@@ -1,12 +1,18 @@
 """What a robot does on STOP, its reset, and scan assist: set, told, kept, refused."""
 
+import asyncio
 import json
+from concurrent.futures import Future
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from webmap import Bridge, Robot
 from webmap.core.motion import MotionRoad
 from webmap.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
+from webmap.gate import framing
+from webmap.gate.specs import checked
 from webmap.lifecycle import lifecycle
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
@@ -15,6 +21,7 @@ E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}
 
 class Link:
     url = "ws://robot:9090"
+    lag = 0.0
 
     def protect(self, topic, carries):
         pass
@@ -23,8 +30,16 @@ class Link:
 class Gate:
     """Notes what a robot asks of it."""
 
+    ready = True
+
     def __init__(self):
         self.asked = []
+
+    def take(self, robot_id):
+        self.asked.append(("take", robot_id))
+        taken = Future()
+        taken.set_result(7)
+        return taken
 
     def declare(self, spec):
         self.spec = spec
@@ -66,6 +81,25 @@ def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
     assert gate.asked == [("stop", robot.motion.id), ("reset", robot.motion.id)]
 
 
+def test_a_lease_waits_for_the_word_of_a_gate_that_was_started_anew(robot, gate):
+    free = SimpleNamespace(
+        armable=True, latched=False, holder=None, epoch=7, reason=None
+    )
+
+    async def scenario():
+        drivable(robot).on_gate_report(free)
+        robot.on_gate_down()
+        asking = asyncio.create_task(robot.acquire_lease(timeout=10.0))
+        await asyncio.sleep(0.1)
+        assert gate.asked == [], "what the gate before said counts no more"
+        assert robot.report is free, "but it is what pages show"
+        robot.on_gate_report(free)
+        assert await asking == 7
+
+    asyncio.run(scenario())
+    assert gate.asked == [("take", robot.motion.id)]
+
+
 def test_what_stop_says_is_the_gates_alone_to_write(robot):
     bridge = Bridge("ws://robot:9090")
     robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=[LOCK, E_STOP])
@@ -96,7 +130,7 @@ def test_what_cannot_move_is_neither_stopped_nor_reset(robot, gate, ask):
 def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
     drivable(robot, stop_hooks=[LOCK, E_STOP])
     corners = [(0.3, 0.2), (-0.3, 0), (0.3, -0.2)]
-    robot.set_scan_assist("/scan", corners, angle=30, upside_down=True)
+    robot.set_scan_assist("/scan", corners, angle=30, upside_down=True, frame="/l")
     data = json.loads(json.dumps(robot.to_dict()))
     assert data["twist"]["stop_hooks"] == [LOCK, E_STOP]
     assert data["scan_assist"] == data["scan_assist"] | {
@@ -104,12 +138,26 @@ def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
         "footprint": [[0.3, 0.2], [-0.3, 0.0], [0.3, -0.2]],
         "angle": 30.0,
         "upside_down": True,
+        "frame": "l",
     }
     again = Robot.from_dict(data, {Link.url: Link()})
     assert json.loads(json.dumps(again.to_dict())) == data
     assert again.motion.spec().assist == robot.motion.spec().assist
     assert again.motion.spec().stop_hooks == (LOCK, E_STOP)
     again.motion.close()
+
+
+@pytest.mark.parametrize("size", [np.float32(0.25), np.array([[1, 0], [0, 1], [0, 0]])])
+def test_numbers_of_numpy_are_numbers_that_the_gate_can_be_told(robot, size):
+    far = np.float64(0.5)
+    drivable(robot).set_scan_assist("/scan", size, x=far, stop_distance=far, brake=far)
+    framing.pack(checked(robot.motion.spec()))
+
+
+@pytest.mark.parametrize("size", ["0.3", [1.0, 2.0], None])
+def test_a_footprint_that_is_neither_radius_nor_corners_is_refused(robot, size):
+    with pytest.raises(ConfigError, match=r"is a radius or corners \(x, y\)"):
+        drivable(robot).set_scan_assist("/scan", size)
 
 
 def test_a_robot_without_them_says_nothing_of_them(robot):

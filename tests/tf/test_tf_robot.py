@@ -18,6 +18,7 @@ class Link:
     """A bridge that says what it is told to say."""
 
     url, name = "ws://test:9090", "test"
+    lag = 0.0
 
     def __init__(self):
         self.subscribed = []

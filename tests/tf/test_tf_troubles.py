@@ -185,8 +185,61 @@ def test_a_robot_that_is_in_two_places_again_and_again_is_told_of_twice():
 def test_what_may_have_been_driven_is_no_jump(poses):
     jumps = Jumps()
     for x, stamp in poses:
-        jumps.look(reading(x, stamp), 0.0)
+        jumps.look(reading(x, stamp), stamp)
     assert jumps.problem is None
+
+
+@pytest.mark.parametrize(
+    ("stamp", "passed", "leapt"),
+    [
+        (13600.0, 0.1, "+3600.0"),
+        (6400.0, 0.1, "-3600.0"),
+        (10020.0, 30.0, None),  # not heard of for a while
+        (10009.0, 0.1, None),  # a link that stalled leaves things out
+        (9999.5, 0.1, None),  # one that another has overtaken
+    ],
+)
+def test_a_clock_of_poses_that_leaps_is_told_with_how_far(stamp, passed, leapt):
+    jumps = Jumps()
+    jumps.look(reading(0.0, 10000.0), 5.0)
+    jumps.look(reading(0.0, stamp), 5.0 + passed)
+    if leapt is None:
+        assert jumps.problem is None
+    else:
+        assert f"the clock of its poses leapt by {leapt} s" in jumps.problem
+
+
+def test_frames_alone_that_leap_are_told_of_once(link, clock):
+    robot = Robot("Bob")
+    robot.set_tf(link)
+    for stamp in (5000.0, 1400.0):
+        clock.now += 1.0
+        chain = [transform("map", "base_link", 1.0, stamp=stamp)]
+        link.say("/tf", {"transforms": chain})
+    (problem,) = robot.problems.values()
+    assert "time jumped back by 3600.000 s" in problem
+    robot.destroy()
+
+
+@pytest.mark.parametrize(
+    ("ahead", "said"), [(3600, "3600.0 s later"), (-3600, "3600.0 s earlier")]
+)
+@pytest.mark.parametrize("quiet", [False, True])
+def test_odometry_by_another_clock_than_the_frames_is_said_with_the_difference(
+    link, bob, clock, ahead, said, quiet
+):
+    bob.set_tf(link, quiet=quiet)
+    for seconds in (0.0, 1.5, 3.0, 4.5):
+        clock.now = 1000.0 + seconds
+        stamp = 9000.0 + seconds
+        chain = [transform("map", "odom", 1.0, stamp=stamp)]
+        link.say("/tf", {"transforms": chain})
+        link.say("/odom", odometry(0.4, stamp=stamp + ahead))
+    (problem,) = bob.problems.values()
+    assert f"its odometry is stamped {said} than the newest of 'map'" in problem
+    assert bob.position.x == pytest.approx(1.4)
+    link.say("/odom", odometry(0.4, stamp=9004.6))
+    assert "tf" not in bob.problems
 
 
 def test_a_pose_in_another_frame_is_no_jump():

@@ -43,7 +43,7 @@ class CameraFeed:
         self.url: str | None = None
         """Where pages find the newest picture; None until there is one."""
         self.stamp: float | None = None
-        """When it came, in monotonic seconds."""
+        """When it was sent, in monotonic seconds."""
         self._watchers: dict[object, Callable[[], None]] = {}
         self._kept: deque[tuple[str, float, int]] = deque()
 
@@ -91,11 +91,19 @@ class CameraFeed:
         watching = keep(Removal(undo))
         return watching
 
-    def show(self, data: bytes, media_type: str) -> None:
-        """Show a picture to everybody who watches, in place of the one before."""
+    def show(self, data: bytes, media_type: str, lag: float = 0.0) -> None:
+        """Show a picture to everybody who watches, in place of the one before.
+
+        Args:
+            data: The picture.
+            media_type: Its type, as in ``image/jpeg``.
+            lag: How many seconds it was under way.
+
+        """
         # What a camera saw is nothing to be found on an operator's disk later.
         self.url = pictures.publish(data, media_type, fleeting=True)
-        self.stamp = now = time.monotonic()
+        now = time.monotonic()
+        self.stamp = now - lag
         kept = self._kept
         kept.append((self.url, now, len(data)))
         while len(kept) > LEAST_KEPT and (

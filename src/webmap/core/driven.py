@@ -2,10 +2,13 @@
 
 import asyncio
 import math
+import reprlib
 import time
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any, Literal
 
+from webmap.core.call_arguments import checks_kinds
 from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
 from webmap.core.goal_topics import (
@@ -14,9 +17,10 @@ from webmap.core.goal_topics import (
     InitialPoseTopic,
     MoveTopic,
 )
-from webmap.core.motion import MotionRoad, TwistTopic
+from webmap.core.motion import MotionRoad
 from webmap.core.registry import Namespace
-from webmap.errors import MotionError
+from webmap.core.twist_topic import TwistTopic
+from webmap.errors import ConfigError, MotionError
 from webmap.gate.messages import AssistSpec, RobotReport
 from webmap.gate.rules.assist import polygon_around
 from webmap.geometry import Quaternion, Twist
@@ -41,6 +45,7 @@ class Driven(Extendable):
         self.name = str(name)
         self.motion = MotionRoad(self.name, self.report_error)
         self.report: RobotReport | None = None
+        self._report_is_old = False
 
     @property
     def id(self) -> str:
@@ -49,6 +54,7 @@ class Driven(Extendable):
 
     # Where velocity and goals go.
 
+    @checks_kinds(but=["stop_hooks"])
     def set_twist_topic(
         self,
         bridge: Bridge,
@@ -83,8 +89,8 @@ class Driven(Extendable):
                 calls the service.
 
         Raises:
-            ConfigError: If ``type`` carries no velocity, or a stop hook cannot be
-                meant.
+            ConfigError: If ``type`` carries no velocity, or a number or a stop hook
+                cannot be meant.
 
         """
         with no_scope():
@@ -106,6 +112,7 @@ class Driven(Extendable):
     def _show_base(self, *, holonomic: bool) -> None:
         """Let pages know what the base can."""
 
+    @checks_kinds(but=["footprint"])
     def set_scan_assist(
         self,
         topic: str,
@@ -115,6 +122,7 @@ class Driven(Extendable):
         y: float = 0.0,
         angle: float = 0.0,
         upside_down: bool = False,
+        frame: str = "",
         stop_distance: float = 0.15,
         brake: float = 0.5,
         blind: Literal["stop", "creep"] = "stop",
@@ -135,6 +143,8 @@ class Driven(Extendable):
                 seen from above.
             upside_down: Whether it hangs head down, so that its rays go round the other
                 way; frames are not asked.
+            frame: The frame that its scans must name; the robot is blind by a scan of
+                another. Left out, any will do, but not two on one topic.
             stop_distance: What stays free before the robot, in metres.
             brake: How hard the robot slows down, in metres per second squared.
             blind: Whether it stops or creeps while the scan is older than 0.3 s, is
@@ -145,17 +155,13 @@ class Driven(Extendable):
             ConfigError: If something of that cannot be meant.
 
         """
-        corners = (
-            polygon_around(footprint)
-            if isinstance(footprint, int | float)
-            else tuple((float(cx), float(cy)) for cx, cy in footprint)
-        )
         self.motion.set_assist(
             AssistSpec(
                 topic=topic,
-                footprint=corners,
+                footprint=_corners(self.name, footprint),
                 sensor=(x, y, math.radians(angle)),
                 upside_down=upside_down,
+                frame=frame.removeprefix("/"),
                 stop_distance=stop_distance,
                 brake=brake,
                 blind=blind,
@@ -171,6 +177,7 @@ class Driven(Extendable):
         """Give up the twist topic; does nothing if there is none."""
         self.motion.set_twist(None)
 
+    @checks_kinds()
     def set_move_topic(
         self,
         bridge: Bridge,
@@ -199,7 +206,8 @@ class Driven(Extendable):
                 ``"move_base_msgs/MoveBaseAction"``, of ROS 1.
 
         Raises:
-            ConfigError: If there is neither a topic nor an action.
+            ConfigError: If there is neither a topic nor an action, or something else
+                cannot be meant.
 
         """
         with no_scope():
@@ -215,20 +223,24 @@ class Driven(Extendable):
                 )
             )
 
+    @checks_kinds(but=["covariance"])
     def set_initial_pose_topic(
         self,
         bridge: Bridge,
         topic: str = "/initialpose",
         *,
         covariance: Sequence[float] = COVARIANCE,
+        frame: str = "map",
     ) -> None:
-        """Say where the robot is told where it is, in the frame of its goals.
+        """Say where the robot is told where it is.
 
         Args:
             bridge: The link to its localisation; the bridge of its goals.
             topic: A topic of ``geometry_msgs/PoseWithCovarianceStamped``.
             covariance: How sure one is: the variances of x and y in m², of yaw in
                 rad². RViz's are given if not said.
+            frame: The frame of the map that it is told in. A robot that takes goals is
+                told in the frame of those.
 
         Raises:
             ConfigError: If the covariance is not three numbers from 0 on, or goals go
@@ -236,7 +248,7 @@ class Driven(Extendable):
 
         """
         with no_scope():
-            self.motion.set_pose(InitialPoseTopic.of(bridge, topic, covariance))
+            self.motion.set_pose(InitialPoseTopic.of(bridge, topic, covariance, frame))
 
     def unadvertise_move_topic(self) -> None:
         """Give up the move topic; does nothing if there is none."""
@@ -250,8 +262,9 @@ class Driven(Extendable):
         Any operator takes it away by driving.
 
         Args:
-            timeout: Seconds to wait until the robot can be driven: the links over
-                which it is driven open now, and its odometry must be heard.
+            timeout: Seconds to wait until the robot can be driven: the gate may have
+                been started a moment ago, the links over which the robot is driven
+                open now, and its odometry must be heard.
 
         Returns:
             The lease's epoch.
@@ -261,8 +274,12 @@ class Driven(Extendable):
             MotionError: If the robot cannot be driven, and why.
 
         """
-        epoch = await asyncio.wrap_future(self.motion.take())
         deadline = time.monotonic() + timeout
+        while self._may_be_had_soon():
+            if time.monotonic() > deadline:
+                break  # the gate says why not
+            await asyncio.sleep(0.02)
+        epoch = await asyncio.wrap_future(self.motion.take())
         while (why := self._not_drivable(epoch)) is not None:
             if time.monotonic() > deadline:
                 self.release_lease()
@@ -270,10 +287,21 @@ class Driven(Extendable):
             await asyncio.sleep(0.02)
         return epoch
 
+    def _may_be_had_soon(self) -> bool:
+        """Tell whether it cannot be taken yet, and nobody's word is against it."""
+        gate, report = self.motion.gate, self.report
+        if gate is None or self.motion.spec() is None:
+            return False
+        if not gate.ready or report is None or self._report_is_old:
+            return True
+        return not (report.armable or report.latched or report.holder)
+
     def _not_drivable(self, epoch: int) -> str | None:
         report = self.report
         if report is None or report.epoch != epoch:
             return "the gate has not said that it can"
+        if self.motion.twist_topic is None:  # it takes goals alone
+            return None if report.armable else report.reason
         return report.reason
 
     def release_lease(self) -> None:
@@ -310,11 +338,12 @@ class Driven(Extendable):
         self.motion.twist(Twist(x, y, rz))
 
     def move(self, position: Position, orientation: Orientation) -> None:
-        """Send the robot to a pose, by its own navigation.
+        """Send the robot to a pose in the plane, by its own navigation.
 
         Args:
-            position: Where the base link is to be, in metres on the common map.
-            orientation: Its orientation there.
+            position: Where the base link is to be, in metres on the common map; ``z``
+                is left out.
+            orientation: Its orientation there, of which the heading counts.
 
         Raises:
             NoLease: If the program does not hold the lease.
@@ -355,11 +384,37 @@ class Driven(Extendable):
 
     # What the gate says.
 
+    def on_gate_down(self) -> None:
+        """Wait for the next gate's word before a lease; pages show the last one."""
+        self._report_is_old = True
+
     def on_gate_report(self, report: RobotReport) -> None:
         """Keep what the gate says of this robot and fire ``on_report``."""
-        self.report = report
+        self.report, self._report_is_old = report, False
         self.notify_modules("on_report", report)
 
     def on_written(self, kind: str, message: dict[str, Any]) -> None:
-        """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote."""
+        """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote.
+
+        Args:
+            kind: ``"twist"`` or ``"move"``.
+            message: As :func:`webmap.core.runtime.twist_message` or
+                :func:`webmap.core.runtime.goal_message` has it.
+
+        """
         self.notify_modules(f"on_send_{kind}", message)
+
+
+def _corners(
+    name: str, footprint: Sequence[tuple[float, float]] | float
+) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a footprint, which may be given as a radius."""
+    if isinstance(footprint, float | Real):  # numpy's numbers are Real
+        return polygon_around(float(footprint))
+    try:
+        return tuple((float(x), float(y)) for x, y in footprint)
+    except (TypeError, ValueError):
+        raise ConfigError(
+            f"robot {name!r}: the footprint for scan assist is a radius or corners "
+            f"(x, y) in metres, got {reprlib.repr(footprint)}"
+        ) from None

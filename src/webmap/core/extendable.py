@@ -1,12 +1,15 @@
 """What maps and robots both are: owners of modules."""
 
+import asyncio
+import inspect
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import Namespace
-from webmap.scope import Scope, no_scope
+from webmap.core.tasks import spawn
+from webmap.scope import Removal, Scope, current_scope, no_scope
 
 log = logging.getLogger("webmap.modules")
 
@@ -16,7 +19,7 @@ class Extendable:
 
     Any object can be a module. A module is constructed by :meth:`add_module` with its
     owner as the first argument; a method of it that is named like a trigger is called
-    when the trigger fires.
+    when the trigger fires. It may be a coroutine function: the others do not wait.
     """
 
     def __init__(self, namespace: Namespace) -> None:
@@ -118,13 +121,38 @@ class Extendable:
         if method is None:
             return
         scope = self._scopes.get(id(module))
+        what = f"{type(module).__name__}.{name}"
+        with scope.active() if scope is not None else no_scope():
+            try:
+                result = method(*args)
+                if inspect.isawaitable(result):
+                    self._begin(result, what)
+            except Exception as error:
+                self._report(error, what)
+
+    def _begin(self, work: Awaitable[Any], what: str) -> None:
         try:
-            if scope is None:
-                with no_scope():
-                    method(*args)
-            else:
-                scope.run(method, *args)
+            asyncio.get_running_loop()
+        except RuntimeError:
+            if inspect.iscoroutine(work):
+                work.close()  # Python would say that nobody waited for it
+            raise RuntimeError(
+                "it is a coroutine, which only WebMap runs: after webmap.start(), and "
+                "in the model's thread"
+            ) from None
+        task, scope = spawn(self._finish(work, what)), current_scope()
+        if scope is not None:  # it ends with the module
+            ending = Removal(task.cancel)
+            scope.add(ending)
+            task.add_done_callback(lambda _: scope.discard(ending))
+
+    async def _finish(self, work: Awaitable[Any], what: str) -> None:
+        """Wait for what a trigger began, in the scope that it began in."""
+        try:
+            await work
         except Exception as error:
-            what = f"{type(module).__name__}.{name}"
-            log.exception("module %s of %r failed", what, self)
-            self.report_error(f"{what} failed: {type(error).__name__}: {error}")
+            self._report(error, what)
+
+    def _report(self, error: Exception, what: str) -> None:
+        log.error("module %s of %r failed", what, self, exc_info=error)
+        self.report_error(f"{what} failed: {type(error).__name__}: {error}")

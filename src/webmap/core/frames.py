@@ -132,8 +132,10 @@ class Frames:
                     each.stamp,
                     static=static,
                 )
-            except (TransformError, ProtocolError) as error:
+            except TransformError as error:
                 note = f"a transform was left out: {error}"
+            except ProtocolError as error:  # Of its stamp, which names no frames.
+                note = f"a transform was left out: {parent!r} -> {child!r}: {error}"
             if note and self.faults.note(parent, child, note, now):
                 log.warning("%s: %s", self.bridge.name, note)
         if not static or self.faults.any:

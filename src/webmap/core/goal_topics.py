@@ -5,13 +5,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from webmap.errors import ConfigError
-from webmap.ros.names import normalise_topic
+from webmap.gate.specs import ACTIONS
+from webmap.ros.names import is_type, normalise_topic
 
 if TYPE_CHECKING:
     from webmap.ros.bridge import Bridge
 
 NAVIGATE_TO_POSE = "nav2_msgs/action/NavigateToPose"
 MOVE_BASE = "move_base_msgs/MoveBaseAction"
+
+ON_LOSS = ("continue", "cancel")
+"""What becomes of a goal when its operator is lost."""
 
 COVARIANCE = (0.25, 0.25, 0.068)
 """How sure RViz has a person be: half a metre each way, and 15 degrees."""
@@ -33,6 +37,17 @@ class MoveTopic:
     def __post_init__(self) -> None:
         if not self.topic and not self.action:
             raise ConfigError("goals go to a topic or to an action: neither is given")
+        # Were a typing error taken for one of the two, a goal might go on unwatched.
+        if self.on_operator_loss not in ON_LOSS:
+            raise ConfigError(
+                f"on_operator_loss is {' or '.join(map(repr, ON_LOSS))}, "
+                f"got {self.on_operator_loss!r}"
+            )
+        if not is_type(self.action_type, *ACTIONS):
+            raise ConfigError(
+                f"the type of an action that takes goals is {' or '.join(ACTIONS)}, "
+                f"got {self.action_type!r}"
+            )
 
     def writes(self) -> dict[str, str]:
         """Return what the gate alone writes: topics, and what each carries."""
@@ -65,9 +80,7 @@ class MoveTopic:
             "action": self.action,
             "action_type": self.action_type,
             "goal_type": self.spelled("PoseStamped"),
-            "on_operator_loss": "cancel"
-            if self.on_operator_loss == "cancel"
-            else "continue",
+            "on_operator_loss": self.on_operator_loss,
         }
 
 
@@ -78,10 +91,11 @@ class InitialPoseTopic:
     bridge: "Bridge"
     topic: str
     covariance: tuple[float, float, float]
+    frame: str = "map"
 
     @classmethod
     def of(
-        cls, bridge: "Bridge", topic: str, covariance: Sequence[float]
+        cls, bridge: "Bridge", topic: str, covariance: Sequence[float], frame: str
     ) -> "InitialPoseTopic":
         """Return what was said, once it makes sense.
 
@@ -97,7 +111,7 @@ class InitialPoseTopic:
                 "the covariance of an initial pose is three numbers from 0 on, of x "
                 f"and y in m² and of yaw in rad²; got {covariance!r}"
             )
-        return cls(bridge, topic, (numbers[0], numbers[1], numbers[2]))
+        return cls(bridge, topic, (numbers[0], numbers[1], numbers[2]), frame)
 
     def writes(self) -> dict[str, str]:
         """Return what the gate alone writes: the topic, and what it carries."""
@@ -119,6 +133,7 @@ class InitialPoseTopic:
         plain = f"geometry_msgs/{name}"
         return {
             "goal_url": self.bridge.url,
+            "goal_frame": self.frame if goals is None else goals.frame,
             "pose_type": plain if goals is None else goals.spelled(name),
             "pose_topic": self.topic,
             "pose_covariance": self.covariance,

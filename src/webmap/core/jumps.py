@@ -1,4 +1,4 @@
-"""Jumps: poses between which nothing can have driven."""
+"""Jumps: poses between which nothing can have driven, and clocks that leap."""
 
 import math
 
@@ -13,6 +13,13 @@ SMALLEST = 0.5
 LONGEST = 5.0
 """Seconds between two poses after which it may be anywhere."""
 
+BACK = 1.0
+"""Seconds by which a stamp may be older than one before; more is a jump of time."""
+
+AHEAD = 10.0
+"""Seconds by which stamps may go ahead of the time that passes here; links that
+stalled deliver late, and may leave out what is between."""
+
 STANDS = 10.0
 """Seconds for which a jump is said, after the last one."""
 
@@ -24,24 +31,36 @@ class Jumps:
         self.problem: str | None = None
         """What happened, in a sentence, as long as it is worth saying."""
         self._last: PoseReading | None = None
+        self._came = -math.inf
         self._jumped = -math.inf
         self._count = 0
 
-    def look(self, reading: PoseReading, now: float) -> None:
+    def look(self, reading: PoseReading, now: float, *, timed: bool = True) -> None:
         """Take the next pose, in the frame that all of them are in.
 
         Args:
             reading: The pose.
             now: When it came, in seconds of any clock that only goes forward.
+            timed: Whether a leap of its clock is to be said; not if who told of the
+                pose says that already.
 
         """
         if self.problem is not None and now - self._jumped > STANDS:
             self.problem, self._count = None, 0
         before, self._last = self._last, reading
+        passed, self._came = now - self._came, now
         if before is None or before.frame_id != reading.frame_id:
             return
         # By the robot's own clock: after a stall of the link poses come all at once.
         took = reading.stamp - before.stamp
+        known = timed and before.stamp and reading.stamp
+        if known and not -BACK <= took <= passed + AHEAD:
+            self._jumped = now
+            self.problem = (
+                f"the clock of its poses leapt by {took:+.1f} s: it was set, a "
+                f"recording began anew, or two nodes with other clocks tell where it is"
+            )
+            return
         one, other = before.position, reading.position
         went = math.dist((one.x, one.y), (other.x, other.y))
         if not 0 < took < LONGEST or went <= SMALLEST + FASTEST * took:

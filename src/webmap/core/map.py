@@ -21,6 +21,9 @@ class Map(WorldView):
         canvas_height: The height in pixels; the container's if not given.
         namespace: Where its modules are looked up.
 
+    Raises:
+        ConfigError: If the container is on no page, or its page was closed.
+
     """
 
     def __init__(

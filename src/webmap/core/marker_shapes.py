@@ -8,6 +8,7 @@ from webmap.core.placed import check_finite
 from webmap.errors import ProtocolError
 from webmap.geometry import Affine, Pose, Quaternion
 from webmap.ros import messages_marker as kinds
+from webmap.ros.messages import PoseMsg, QuaternionMsg
 from webmap.ros.messages_marker import MarkerMsg
 from webmap.scene import svg
 from webmap.scene.element import Element
@@ -19,17 +20,20 @@ MAX_POINTS = 20_000
 SEEN = 3
 """Decimals of a rotation up to which a marker is drawn anew as it tilts."""
 
+UNTURNED = QuaternionMsg(0.0, 0.0, 0.0, 1.0)
+
 AS_IT_COMES = Transform()
 """The frame of a marker that is drawn with its own numbers."""
 
 
-ROUND = (kinds.SPHERE, kinds.SPHERE_LIST, kinds.POINTS)
-"""Types that are often sent without an orientation, since they look alike with any."""
-
-
 def lies_unturned(marker: MarkerMsg) -> bool:
-    """Return whether a marker has no orientation and needs none: it has that of 1."""
-    return marker.type in ROUND and marker.pose.turns_nowhere
+    """Return whether nobody has set a marker's orientation, so that it is not turned.
+
+    A quaternion of exact zeros is how ROS 1 begins a message, and RViz draws it so.
+    What is merely too short to be a rotation was worked out by somebody, and wrongly.
+    """
+    q = marker.pose.orientation
+    return marker.type != kinds.TEXT_VIEW_FACING and q.x == q.y == q.z == q.w == 0.0
 
 
 def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
@@ -108,13 +112,10 @@ def _split(marker: MarkerMsg, frame: Transform) -> tuple[Pose, Transform]:
         (found,) = flat(in_space([at]), frame)
         return Pose(*found), Transform()
     (place,) = in_space([marker.pose.position])
-    if lies_unturned(marker):
-        check_finite([(place.x, place.y)], "the place of a marker")
-        turn = Quaternion()
-    else:
-        _ = marker.pose.usable
-        q = marker.pose.orientation.quaternion
-        n = q.norm
-        turn = Quaternion(q.x / n, q.y / n, q.z / n, q.w / n)
+    orientation = UNTURNED if lies_unturned(marker) else marker.pose.orientation
+    _ = PoseMsg(marker.pose.position, orientation).usable
+    q = orientation.quaternion
+    n = q.norm
+    turn = Quaternion(q.x / n, q.y / n, q.z / n, q.w / n)
     pose, tilt = (frame @ Transform(place, turn)).heading_and_tilt
     return pose, Transform(rotation=tilt.rotation)

@@ -2,23 +2,20 @@
 
 import itertools
 import logging
-from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.goal_topics import InitialPoseTopic, MoveTopic
-from webmap.core.tasks import spawn
+from webmap.core.twist_topic import TWIST_TYPES, TwistTopic, check_twist_type
+from webmap.core.type_asking import TypeAsking
 from webmap.errors import ConfigError, MotionError
 from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import AssistSpec, RobotSpec
-from webmap.gate.specs import checked_assist
+from webmap.gate.specs import checked, checked_assist
 from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
-from webmap.ros.names import normalise_topic, same_type
-from webmap.ros.publications import STOP
-from webmap.scope import Removable
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import GateClient
@@ -26,29 +23,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.robot")
 
 _numbers = itertools.count(1)
-
-TWIST_TYPES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
-
-
-@dataclass(frozen=True, slots=True)
-class TwistTopic:
-    """Where velocity goes, and what is known of the base behind it."""
-
-    bridge: Bridge
-    topic: str
-    type: str | None
-    stops_within: float | None
-    v_max: float | None
-    w_max: float | None
-    a_max: float | None
-    holonomic: bool
-    stop_hooks: Sequence[Mapping[str, str]] = ()
-
-    def writes(self) -> dict[str, str]:
-        """Return what the gate alone writes: topics, and what each carries."""
-        hooks = [hook["topic"] for hook in self.stop_hooks if "topic" in hook]
-        said = {normalise_topic(topic): STOP for topic in hooks}
-        return {**said, normalise_topic(self.topic): "a velocity"}
 
 
 class MotionRoad:
@@ -70,7 +44,7 @@ class MotionRoad:
         self._odometry: tuple[Bridge, str, str] | None = None
         self._assist: AssistSpec | None = None
         self._own_map = Pose()
-        self._opening: Removable | None = None
+        self._asking: TypeAsking | None = None
         roads.add(self)
 
     @property
@@ -92,23 +66,24 @@ class MotionRoad:
         """Set or clear where velocity goes.
 
         Raises:
-            ConfigError: If the type is none that carries a velocity, or a stop hook
-                cannot be meant.
+            ConfigError: If the type is none that carries a velocity, or a number or a
+                stop hook cannot be meant.
 
         """
         if twist is not None:
             if twist.type is not None:
-                _check_twist_type(twist.topic, twist.type)
+                check_twist_type(twist.topic, twist.type)
             hooks = checked_hooks(self._name, twist.stop_hooks, twist.topic)
             twist = replace(twist, stop_hooks=hooks)
+            self._check(twist, self._move, self._pose)
             for topic, carried in twist.writes().items():
                 twist.bridge.protect(topic, carried)
-        if self._opening is not None:
-            self._opening.remove()
-            self._opening = None
+        if self._asking is not None:
+            self._asking.remove()
+            self._asking = None
         self._twist = twist
         if twist is not None and twist.type is None:
-            self._opening = twist.bridge.on_open(lambda: spawn(self._find_type()))
+            self._asking = TypeAsking(twist.bridge, twist.topic, self._take_type)
         self.declare()
 
     @property
@@ -117,10 +92,15 @@ class MotionRoad:
         return self._assist
 
     def set_move(self, move: MoveTopic | None) -> None:
-        """Set or clear where goals go."""
+        """Set or clear where goals go.
+
+        Raises:
+            ConfigError: If the initial pose goes to another bridge, or something in it
+                cannot be meant.
+
+        """
         if move is not None:
-            if self._pose is not None:
-                self._pose.fields(move)
+            self._check(self._twist, move, self._pose)
             move.protect()
         self._move = move
         self.declare()
@@ -133,7 +113,7 @@ class MotionRoad:
 
         """
         if pose is not None:
-            pose.fields(self._move)
+            self._check(self._twist, self._move, pose)
             for topic, carried in pose.writes().items():
                 pose.bridge.protect(topic, carried)
         self._pose = pose
@@ -176,10 +156,38 @@ class MotionRoad:
         else:
             self.gate.declare(spec)
 
+    def declare_or_complain(self) -> None:
+        """Tell the gate likewise; what it does not take is said of this robot alone."""
+        try:
+            self.declare()
+        except Exception as error:
+            log.exception("robot %r was not declared to the gate", self._name)
+            self._complain(f"it cannot be moved: {error}")
+
     def spec(self) -> RobotSpec | None:
         """Return what the gate needs to know, or None if nothing moves the robot."""
-        twist, move = self._twist, self._move
-        pose = self._pose
+        return self._spec(self._twist, self._move, self._pose)
+
+    def _check(
+        self,
+        twist: TwistTopic | None,
+        move: MoveTopic | None,
+        pose: InitialPoseTopic | None,
+    ) -> None:
+        """Refuse what the gate would refuse, before any of it is kept.
+
+        Who says it hears of it there, and not whoever starts the gate.
+        """
+        spec = self._spec(twist, move, pose)
+        if spec is not None:
+            checked(spec)
+
+    def _spec(
+        self,
+        twist: TwistTopic | None,
+        move: MoveTopic | None,
+        pose: InitialPoseTopic | None,
+    ) -> RobotSpec | None:
         link = twist or move or pose
         if link is None:
             return None
@@ -271,29 +279,18 @@ class MotionRoad:
             )
         return self.gate
 
-    async def _find_type(self) -> None:
+    def _take_type(self, found: str) -> None:
         twist = self._twist
-        if twist is None:
-            return
-        found = await twist.bridge.topic_type(twist.topic)
-        if found is None or twist is not self._twist:
+        if twist is None or twist.type == found:
             return
         try:
-            _check_twist_type(twist.topic, found)
+            check_twist_type(twist.topic, found)
         except ConfigError as error:
             self._complain(str(error))
             self.set_twist(None)
             return
         self._twist = replace(twist, type=found)
         self.declare()
-
-
-def _check_twist_type(topic: str, type_name: str) -> None:
-    if not any(same_type(known, type_name) for known in TWIST_TYPES):
-        raise ConfigError(
-            f"topic {topic!r} has type {type_name}; velocity goes to "
-            f"{TWIST_TYPES[0]} or {TWIST_TYPES[1]}"
-        )
 
 
 roads: set[MotionRoad] = set()

@@ -109,7 +109,7 @@ class Page:
         self.maps: list[Map] = []
         self.scope = Scope(f"page {entry.path}", lambda text, _: self.notice(text))
         self.closed = False
-        self._publisher = publisher
+        self.publisher = publisher
         self._sizes = dict(sizes)
         self._document = Document()
         self.fragment = Fragment(self._document)
@@ -156,14 +156,26 @@ class Page:
                 image.
 
         """
+        url = self.publisher.publish_image(self.image_file(href))
+        self.scope.add(Removal(lambda: self.publisher.withdraw_image(url)))
+        return url
+
+    def image_file(self, href: str) -> Path:
+        """Return the path of an image, which may not exist.
+
+        Args:
+            href: A file of the page's folder, or an absolute path.
+
+        Raises:
+            ConfigError: If it lies outside the folder.
+
+        """
         file = Path(href)
         if not file.is_absolute():
             file = self.entry.folder / file
             if not file.resolve().is_relative_to(self.entry.folder):
                 raise ConfigError(f"{href!r} lies outside {self.entry.folder}")
-        url = self._publisher.publish_image(file)
-        self.scope.add(Removal(lambda: self._publisher.withdraw_image(url)))
-        return url
+        return file
 
     def notice(self, text: str) -> None:
         """Show a sentence to the viewer until it is dismissed."""
@@ -235,7 +247,7 @@ class Page:
                 or the path of a file.
 
         """
-        return file if isinstance(file, str) else self._publisher.publish_file(file)
+        return file if isinstance(file, str) else self.publisher.publish_file(file)
 
     def dispatch(self, mount: int, element: Element, event: Event) -> None:
         """Call who listens: the element's owner, then this viewer's own listeners."""

@@ -6,8 +6,15 @@ from dataclasses import replace
 from webmap.core.odometry import PoseReading
 from webmap.tf import Buffer, NotKnownThen, Transform, TransformError
 
+OTHER_CLOCK = 60.0
+"""Seconds between two stamps of one moment beyond which they are by different clocks;
+what is less may be a recording that was put together."""
+
 LATE = 2.0
 """Seconds for which nothing new is told of a way before that is said."""
+
+CLOCKS = "clocks"
+"""The kind of trouble that poses and frames have other clocks."""
 
 
 class Placing:
@@ -56,6 +63,7 @@ class Placing:
             map_from_frame = self._lookup(frame, reading.stamp)
             self._known[frame] = map_from_frame
             self._look_whether_it_stopped(frame, now)
+            self._look_at_clocks(frame, reading.stamp)
         except TransformError as error:
             self._wrong(error, f"it is drawn where {frame!r} has it: {error}")
             if frame not in self._known:
@@ -116,6 +124,21 @@ class Placing:
                 f"nothing new of {self.map_frame!r} -> {frame!r} was told for more "
                 f"than {LATE:g} s, so it may be somewhere else: does what publishes "
                 f"it still run?"
+            )
+
+    def _look_at_clocks(self, frame: str, stamp: float) -> None:
+        """Say so if a pose and the frames cannot be by one clock."""
+        newest = self._buffer.newest(self.map_frame, frame)
+        if self.kind or not stamp or newest is None:
+            return
+        apart = stamp - newest
+        if abs(apart) > OTHER_CLOCK:
+            self.kind = CLOCKS
+            self.problem = (
+                f"its odometry is stamped {abs(apart):.1f} s "
+                f"{'later' if apart > 0 else 'earlier'} than the newest of "
+                f"{self.map_frame!r} -> {frame!r}, so it is drawn by the newest: are "
+                f"the clocks of both the same?"
             )
 
     def _wrong(self, error: TransformError, words: str) -> None:

@@ -1,6 +1,6 @@
 """Robots as plain data: what JSON or TOML can hold, and back."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
@@ -14,6 +14,9 @@ from webmap.ros.bridge import Bridge
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+
+NONE = {"none": True}
+"""What stands for ``None`` among the arguments of a module."""
 
 R = TypeVar("R", bound="Robot")
 D = TypeVar("D", bound=msgspec.Struct)
@@ -70,10 +73,15 @@ class InitialPoseData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=
     bridge: str
     topic: str
     covariance: tuple[float, float, float] = COVARIANCE
+    frame: str = "map"
 
 
 class ModuleData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """The arguments of ``add_module``; a bridge among them is ``{"bridge": URL}``."""
+    """The arguments of ``add_module``.
+
+    A bridge among them is ``{"bridge": URL}``, and ``None``, for which TOML has no
+    word, is ``{"none": True}``.
+    """
 
     name: str
     args: list[Any] = []
@@ -103,6 +111,10 @@ def robot_from_dict(
     cls: type[R], data: Mapping[str, Any], bridges: Mapping[str, Bridge] | None
 ) -> R:
     """Make a robot from plain data; see :meth:`Robot.from_dict`."""
+    if not isinstance(data, Mapping):
+        raise ConfigError(
+            f"a robot's plain data is a table such as {{'name': 'Bob'}}, got {data!r}"
+        )
     try:
         plain = msgspec.convert(dict(data), RobotData)
     except msgspec.ValidationError as error:
@@ -117,6 +129,15 @@ def robot_from_dict(
 
     model = None if plain.model is None else element_from_dict(plain.model)
     robot = cls(plain.name, model, base_link=plain.base_link)
+    try:
+        _set_up(robot, plain, link)
+    except BaseException:
+        robot.destroy()  # else the gate would be told of it
+        raise
+    return robot
+
+
+def _set_up(robot: "Robot", plain: RobotData, link: Callable[[str], Bridge]) -> None:
     for name in plain.classes:
         robot.svg.classes.add(name)
     if plain.odometry is not None:
@@ -139,10 +160,9 @@ def robot_from_dict(
         p = msgspec.structs.asdict(plain.initial_pose)
         robot.set_initial_pose_topic(link(p.pop("bridge")), **p)
     for module in plain.modules:
-        args = [_bridge_in(value, link) for value in module.args]
-        options = {key: _bridge_in(v, link) for key, v in module.options.items()}
+        args = [_meant(value, link) for value in module.args]
+        options = {key: _meant(value, link) for key, value in module.options.items()}
         robot.add_module(module.name, *args, **options)
-    return robot
 
 
 def robot_to_dict(robot: "Robot") -> dict[str, Any]:
@@ -156,7 +176,7 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
         name=robot.name,
         base_link=robot.base_link,
         classes=[name for name in robot.svg.classes if name not in known],
-        model=element_to_dict(robot.model),
+        model=element_to_dict(robot.model, robot.model_images.names),
         odometry=_arguments(OdometryData, feed),
         tf=None
         if robot.tf is None
@@ -175,7 +195,10 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
             for name, args, options in robot.module_arguments()
         ],
     )
-    result: dict[str, Any] = msgspec.to_builtins(plain)
+    try:
+        result: dict[str, Any] = msgspec.to_builtins(plain)
+    except TypeError as error:  # a module was given what no file can hold
+        raise ConfigError(f"robot {robot.name!r} is no plain data: {error}") from error
     return result
 
 
@@ -187,11 +210,17 @@ def _arguments(cls: type[D], kept: Any, **others: Any) -> D | None:
     return cls(**{**fields, "bridge": kept.bridge.url, **others})
 
 
-def _bridge_in(value: Any, link: Any) -> Any:
-    if isinstance(value, Mapping) and set(value) == {"bridge"}:
-        return link(value["bridge"])
+def _meant(value: Any, link: Callable[[str], Bridge]) -> Any:
+    """Return what an argument of a module stands for."""
+    if isinstance(value, Mapping):
+        if set(value) == {"bridge"}:
+            return link(value["bridge"])
+        if value == NONE:
+            return None
     return value
 
 
 def _plain(value: Any) -> Any:
+    if value is None:
+        return dict(NONE)
     return {"bridge": value.url} if isinstance(value, Bridge) else value

@@ -17,6 +17,7 @@ class ScanAssistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=T
     y: float = 0.0
     angle: float = 0.0
     upside_down: bool = False
+    frame: str = ""
     stop_distance: float = 0.15
     brake: float = 0.5
     blind: Literal["stop", "creep"] = "stop"
@@ -35,6 +36,7 @@ def assist_data(assist: AssistSpec | None) -> ScanAssistData | None:
         y,
         round(math.degrees(yaw), 9),  # so that 30 degrees are 30 again
         assist.upside_down,
+        assist.frame,
         assist.stop_distance,
         assist.brake,
         assist.blind,

@@ -8,13 +8,25 @@ from webmap.scene.element import Element
 from webmap.scene.node import Text
 
 
-def element_to_dict(element: Element) -> dict[str, Any]:
-    """Return an element with its children as a tag, attributes and children."""
+def element_to_dict(
+    element: Element, names: Mapping[Element, str] | None = None
+) -> dict[str, Any]:
+    """Return an element with its children as a tag, attributes and children.
+
+    Args:
+        element: The element.
+        names: What to write as the ``href`` of some, in place of what it is now.
+
+    """
+    names = names or {}
     data: dict[str, Any] = {"tag": element.tag}
-    if element.attributes:
-        data["attributes"] = dict(element.attributes)
+    attributes = dict(element.attributes)
+    if element in names:
+        attributes["href"] = names[element]
+    if attributes:
+        data["attributes"] = attributes
     children = [
-        child.data if isinstance(child, Text) else element_to_dict(child)
+        child.data if isinstance(child, Text) else element_to_dict(child, names)
         for child in element.children
         if isinstance(child, Text | Element)
     ]

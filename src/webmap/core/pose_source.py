@@ -10,6 +10,7 @@ from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.placing import Placing
 from webmap.core.pose_troubles import PoseTroubles
 from webmap.core.refusals import Owner
+from webmap.core.silence import SilenceWatch
 from webmap.core.whereabouts import Whereabouts
 from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
@@ -21,6 +22,8 @@ TF_PERIOD = 0.05
 
 class PoseOwner(Owner, Protocol):
     """Who is told what is wrong with its poses: a robot."""
+
+    name: str
 
     def report_error(self, text: str) -> None:
         """Show people what failed and is over."""
@@ -46,7 +49,9 @@ class PoseSource:
     ) -> None:
         self.whereabouts = Whereabouts()
         self.stamp: float | None = None
-        """When the newest came in, in seconds of :func:`time.monotonic`."""
+        """When the newest was sent, in seconds of :func:`time.monotonic`."""
+        self.heard_at: float | None = None
+        """When the newest came in, by the same clock."""
         self.feed: OdometryFeed | None = None
         """The topic, if there is one."""
         self._owner = owner
@@ -58,6 +63,7 @@ class PoseSource:
         self._quiet = False
         self._hears_frames = Removal(lambda: None)
         self._troubles = PoseTroubles(owner)
+        self._silence = SilenceWatch(owner)
 
     def follow(
         self, bridge: Bridge, topic: str, throttle: int, type: str | None
@@ -128,10 +134,12 @@ class PoseSource:
         self.unplace()
 
     def _on_pose(self, reading: PoseReading) -> None:
-        now = self._hear()
         feed = self.feed
+        now = self._hear(0.0 if feed is None else feed.bridge.lag)
         if feed is not None and feed.type == "nav_msgs/Odometry":
             self._motion.set_odometry(feed.bridge, feed.topic, feed.type)
+            # Other poses may come only while the robot moves.
+            self._silence.hear(feed.bridge, feed.topic, feed.throttle / 1000)
         if self._placing is not None:
             reading = self._placing.of_reading(reading, now)
         self._take(reading)
@@ -140,11 +148,14 @@ class PoseSource:
     def _on_frames(self) -> None:
         """Look where the frames have the base, if no topic says where it is."""
         now = time.monotonic()
-        soon = self.stamp is not None and now - self.stamp < TF_PERIOD
-        if self.feed is None and self._placing is not None and not soon:
-            reading = self._placing.of_base(now)
+        soon = self.heard_at is not None and now - self.heard_at < TF_PERIOD
+        placing, frames = self._placing, self._frames
+        if self.feed is None and placing and frames and not soon:
+            reading = placing.of_base(now)
             if reading is not None:
-                self._hear()
+                self._hear(frames.bridge.lag)
+                if reading.stamp:  # else it is fixed to the map, and told once
+                    self._silence.hear(frames.bridge, f"{frames.namespace}/tf")
                 self._take(reading)
         self._tell_trouble()
         self.whereabouts.tell()
@@ -172,6 +183,7 @@ class PoseSource:
         """Note where poses come from now: the alignment of that bridge holds."""
         self.whereabouts.forget()
         self._troubles.forget()
+        self._silence.forget()
         source = self._frames if self.feed is None else self.feed
         bridge = None if source is None else source.bridge
         if bridge is not self.whereabouts.bridge:
@@ -184,14 +196,17 @@ class PoseSource:
             self._placing, self._frames, self.whereabouts.jumps, quiet=self._quiet
         )
 
-    def _hear(self) -> float:
-        self.stamp = now = time.monotonic()
+    def _hear(self, lag: float) -> float:
+        self.heard_at = now = time.monotonic()
+        self.stamp = now - lag
         self._heard()
         return now
 
     def _take(self, reading: PoseReading) -> None:
         """Take the newest pose, in the robot's own map."""
         period = 0.0 if self.feed is None else self.feed.throttle / 1000
-        self.whereabouts.jumps.look(reading, time.monotonic())
+        # Of poses by frames alone the frames say it themselves when time leaps.
+        timed = self.feed is not None
+        self.whereabouts.jumps.look(reading, time.monotonic(), timed=timed)
         self._show(self.whereabouts.take(reading, period))
         self.whereabouts.tell()

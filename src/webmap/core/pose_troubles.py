@@ -3,6 +3,8 @@
 import time
 from typing import TYPE_CHECKING
 
+from webmap.core.placing import CLOCKS
+
 if TYPE_CHECKING:
     from webmap.core.frames import Frames
     from webmap.core.jumps import Jumps
@@ -75,6 +77,7 @@ class PoseTroubles:
             quiet: Whether poses that do not get to the map are no trouble.
 
         """
+        quiet = quiet and (placing is None or placing.kind != CLOCKS)
         self._look_at_placing(None if quiet else placing, frames)
         fault = None
         if placing is not None and frames is not None:

@@ -8,11 +8,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.alignment import alignment
+from webmap.core.call_arguments import checks_kinds
 from webmap.core.driven import Driven
+from webmap.core.model_images import ModelImages
 from webmap.core.odometry import OdometryFeed, PoseReading
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
+from webmap.core.robot_model import checked_model
 from webmap.geometry import Quaternion, Twist, Vector3
 from webmap.ros.bridge import Bridge
 from webmap.scene import svg
@@ -40,9 +43,13 @@ class Robot(Driven):
     Args:
         name: What people call it. A label: it need not be unique.
         model: How it looks from above, in metres, x forward; a plain arrow if not
-            given. It becomes part of the robot's own group, :attr:`svg`.
+            given. It becomes part of the robot's own group, :attr:`svg`. An image in
+            it may name a file of the page's folder.
         base_link: The frame that the navigation stack calls the robot's own.
         namespace: Where its modules are looked up.
+
+    Raises:
+        ConfigError: If the model is no element, or another robot's.
 
     """
 
@@ -54,9 +61,10 @@ class Robot(Driven):
         base_link: str = "base_link",
         namespace: Namespace = robot_modules,
     ) -> None:
+        model = checked_model(name, model, robots)
         super().__init__(name, namespace)
         self.base_link = base_link
-        self.model = default_model() if model is None else model
+        self.model = model
         self._told: Problems[Map] = Problems(log, lambda text: f"{self.name}: {text}")
         self.maps = self._told.maps
         self.problems: dict[object, str] = self._told.standing
@@ -74,6 +82,7 @@ class Robot(Driven):
         self.svg.set("data-name", self.name)
         self.svg.set("data-robot", self.motion.id)
         self.fragment = Fragment(self.svg)
+        self.model_images = ModelImages(self.svg)
         robots[self.id] = self
         keep(Removal(self.destroy))
 
@@ -109,9 +118,14 @@ class Robot(Driven):
 
     @property
     def pose_age(self) -> float | None:
-        """Seconds since the newest pose came in; None if there was none yet."""
+        """Seconds since the newest pose was sent; None if there was none yet."""
         stamp = self.pose_stamp
         return None if stamp is None else time.monotonic() - stamp
+
+    def hears_poses(self, within: float) -> bool:
+        """Return whether a pose came in the last seconds, however old it was then."""
+        heard = self._poses.heard_at
+        return heard is not None and time.monotonic() - heard <= within
 
     def destroy(self) -> None:
         """Stop all communication, remove the modules, leave every map."""
@@ -127,6 +141,7 @@ class Robot(Driven):
 
     # Where it is.
 
+    @checks_kinds()
     def set_odometry_topic(
         self,
         bridge: Bridge,
@@ -149,15 +164,16 @@ class Robot(Driven):
             type: The message type.
 
         Raises:
-            ConfigError: If ``type`` has no pose.
+            ConfigError: If ``type`` has no pose, or something else cannot be meant.
 
         """
-        self._poses.follow(bridge, topic, throttle, type)
+        self._poses.follow(bridge, topic, int(throttle), type)
 
     def unsubscribe_odometry_topic(self) -> None:
         """Stop following poses; does nothing if there is no topic."""
         self._poses.unfollow()
 
+    @checks_kinds()
     def set_tf(
         self,
         bridge: Bridge,
@@ -182,6 +198,9 @@ class Robot(Driven):
                 ``map``, ``world`` and ``earth``, which are everybody's.
             quiet: Whether poses that stay in the odometry's frame, because nobody
                 tells of ``map_frame``, are no problem to be shown.
+
+        Raises:
+            ConfigError: If something of that cannot be meant.
 
         """
         base_frame = base_frame or self.base_link
@@ -235,7 +254,15 @@ class Robot(Driven):
         return robot_from_dict(cls, data, bridges)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the robot, its topics and its modules as plain data."""
+        """Return the robot, its topics and its named modules as plain data.
+
+        JSON and TOML can hold it: ``None`` among a module's arguments is
+        ``{"none": True}`` there, and a bridge ``{"bridge": URL}``.
+
+        Raises:
+            ConfigError: If a module was given what no such file can hold.
+
+        """
         from webmap.core.plain import robot_to_dict
 
         return robot_to_dict(self)
@@ -263,9 +290,12 @@ class Robot(Driven):
     def on_map(self, map: "Map", shown: bool) -> None:
         """Note that a map shows this robot, or does so no more; fire ``on_map``."""
         if shown:
+            self.model_images.show(map.page)
             self._told.join(map)
         else:
             self._told.leave(map)
+            if not self.maps:
+                self.model_images.end()
         self.update_selected()
         self.notify_modules("on_map", map, shown)
 
@@ -277,7 +307,7 @@ class Robot(Driven):
             self.notify_modules("on_select", selected)
 
     def _on_heard(self) -> None:
-        self.svg.set_age(0.0, limit=POSE_LIMIT)
+        self.svg.set_age(self.pose_age or 0.0, limit=POSE_LIMIT)
 
     def _show(self, reading: PoseReading) -> None:
         """Draw the robot at a pose on the common map, if that is news."""
@@ -296,8 +326,3 @@ class Robot(Driven):
             self.valid = True
             self.svg.classes.remove("unplaced")
         self.notify_modules("on_odometry_update")
-
-
-def default_model() -> Element:
-    """Return an arrowhead of 0.5 m that points along x."""
-    return svg.path(d="M0.25 0L-0.2 0.18L-0.1 0L-0.2 -0.18Z", class_="model")

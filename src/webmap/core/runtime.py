@@ -64,9 +64,9 @@ class Runtime:
         return self._thread is not None
 
     def start(self) -> None:
-        """Start the model's thread and the gate; return when both are up.
+        """Start the model's thread and the gate; return when the first is up.
 
-        The second call does nothing.
+        The gate's process hears a moment later. The second call does nothing.
         """
         if self._thread is not None:
             return
@@ -145,7 +145,7 @@ class Runtime:
             lifecycle.begin(loop)
             MotionRoad.gate = gate
             for road in list(roads):
-                road.declare()
+                road.declare_or_complain()
             ready.set()
             ticking = spawn(self._tick_on())
             await self._ending.wait()
@@ -178,6 +178,8 @@ class Runtime:
             refusals.note(report.by, report.count, report.last, now)
             return
         if isinstance(report, GateDown):
+            for each in list(robots.values()):
+                each.on_gate_down()
             if report.failing:
                 for watcher in list(self._watchers.values()):
                     watcher.notice(report.why)
@@ -195,7 +197,11 @@ class Runtime:
 
 
 def twist_message(sent: SentTwist) -> dict[str, Any]:
-    """Return what was written as ``geometry_msgs/Twist`` has it."""
+    """Return a velocity that was written as ``geometry_msgs/Twist`` has it.
+
+    It is in the robot's own frame, in metres and radians per second, and a Twist also
+    where the topic takes TwistStamped.
+    """
     return {
         "linear": {"x": sent.vx, "y": sent.vy, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": sent.wz},
@@ -203,7 +209,11 @@ def twist_message(sent: SentTwist) -> dict[str, Any]:
 
 
 def goal_message(sent: SentGoal) -> dict[str, Any]:
-    """Return what was written as ``geometry_msgs/Pose`` has it."""
+    """Return where a robot was sent as ``geometry_msgs/Pose`` has it.
+
+    It is on the common map, in metres, and has no header. What the robot heard is the
+    same place in its own map, in the frame of its move topic.
+    """
     q = Quaternion.from_yaw(sent.yaw)
     return {
         "position": {"x": sent.x, "y": sent.y, "z": 0.0},

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.frames import frames_of
+from webmap.core.placing import OTHER_CLOCK
 from webmap.geometry import Pose
 from webmap.tf import Buffer, NotKnownThen, Transform, TransformError
 
@@ -140,8 +141,9 @@ class Sightings:
             reach = min(stamp, newest + AHEAD)
             base = where.at(reach, AHEAD)
             return Sighting(base @ mount, base.translation.z, settled=False)
-        age = self._robot.pose_age
-        if age is None or age > FLOWING or self._robot.tf is None:
+        if not self._robot.hears_poses(FLOWING):
+            return on_robot
+        if self._robot.tf is None and abs(stamp - newest) <= OTHER_CLOCK:
             return on_robot  # who has no frames does not ask for more
         return Sighting(
             mount,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from webmap.core.alignment import HERE, alignments
-from webmap.core.jumps import Jumps
+from webmap.core.jumps import BACK, Jumps
 from webmap.core.odometry import PoseReading
 from webmap.geometry import Affine, Pose
 from webmap.ros.bridge import Bridge
@@ -18,9 +18,6 @@ HISTORY = 10.0
 
 GAP = 1.0
 """Seconds between two poses beyond which nothing is told in between."""
-
-BACK = 1.0
-"""Seconds by which a stamp may be older than the newest; more is a jump of time."""
 
 
 class Whereabouts:

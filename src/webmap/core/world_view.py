@@ -41,6 +41,9 @@ class WorldView(Extendable):
         canvas_height: The height in pixels; the container's if not given.
         namespace: Where its modules are looked up.
 
+    Raises:
+        ConfigError: If the container is on no page, or its page was closed.
+
     """
 
     def __init__(
@@ -52,6 +55,12 @@ class WorldView(Extendable):
     ) -> None:
         super().__init__(namespace)
         self.page: Page = page_of(container)
+        if self.page.closed:  # nobody would ever destroy it
+            raise ConfigError(
+                f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
+                "so no map can be made on it: what waits in a page function may take "
+                "longer than the viewer stays"
+            )
         self.container = container
         width, height = self.page.size_of(container)
         self._rect = Rect(0.0, 0.0, canvas_width or width, canvas_height or height)

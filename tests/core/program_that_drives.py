@@ -1,0 +1,108 @@
+"""Drives a simulated robot as a user's program does, and prints what came of it."""
+
+import asyncio
+import json
+import math
+import sys
+import threading
+import time
+
+import webmap
+from webmap.errors import NoLease
+from webmap.geometry import Pose, Quaternion, Vector3
+
+GOAL = "/move_base_simple/goal"
+
+bridge = webmap.Bridge(sys.argv[1])
+bob = webmap.Robot("Bob")
+bob.set_odometry_topic(bridge, "/odom", 50)
+bob.set_twist_topic(bridge, "/cmd_vel", stops_within=0.25)
+bob.set_move_topic(bridge, GOAL, cancel_topic="/move_base/cancel")
+bob.set_alignment(10.0, 0.0, 90.0)
+# Navigation alone, of the same machine.
+ann = webmap.Robot("Ann")
+ann.set_move_topic(bridge, GOAL)
+told: dict[str, object] = {}
+
+
+class Ears:
+    """Hears what the gate wrote."""
+
+    def __init__(self, robot) -> None:
+        self.twists: list[dict] = []
+        self.goals: list[dict] = []
+
+    def on_send_twist(self, msg) -> None:
+        self.twists.append(msg)
+
+    def on_send_move(self, msg) -> None:
+        self.goals.append(msg)
+
+
+async def repeat(act, until, what: str) -> None:
+    """Do something at 20 Hz until it has its effect."""
+    deadline = time.monotonic() + 20.0
+    while not until():
+        assert time.monotonic() < deadline, what
+        act()
+        await asyncio.sleep(0.05)
+
+
+def taken(act) -> str:
+    """Say whether the gate's client takes a command."""
+    try:
+        act()
+    except NoLease as error:
+        return type(error).__name__
+    return "taken"
+
+
+async def drive() -> None:
+    ears = bob.add_module(Ears)
+    heard: list[dict] = []
+    bridge.subscribe(GOAL, heard.append, "geometry_msgs/PoseStamped")
+    # At once after the start: neither the gate nor a link is there yet.
+    told["epoch"] = await bob.acquire_lease(timeout=20.0)
+    begun = bob.yaw
+    await repeat(
+        lambda: bob.twist(0.1, rz=0.5),
+        lambda: abs(math.remainder(bob.yaw - begun, math.tau)) > 0.1,
+        "odometry does not turn",
+    )
+    told["twists"] = [(msg["linear"]["x"], msg["angular"]["z"]) for msg in ears.twists]
+    # A metre ahead of the robot, wherever that is.
+    at = Pose(bob.position.x, bob.position.y, bob.yaw) @ Pose(1.0, 0.0, 0.0)
+    place, turn = Vector3(at.x, at.y), Quaternion.from_yaw(at.yaw)
+    # What comes before the robot stands is refused.
+    await repeat(
+        lambda: ears.goals or bob.move(place, turn),
+        lambda: ears.goals and heard,
+        "no goal arrives",
+    )
+    told["asked"] = (at.x, at.y)
+    told["said"] = [ears.goals[0]["position"][axis] for axis in "xy"]
+    told["heard"] = [heard[0]["pose"]["position"][axis] for axis in "xy"]
+    told["frame"] = heard[0]["header"]["frame_id"]
+    bob.release_lease()
+    told["twist afterwards"] = taken(lambda: bob.twist(0.1))
+    told["move afterwards"] = taken(lambda: bob.move(place, turn))
+    told["epoch of goals alone"] = await ann.acquire_lease()
+
+
+def main() -> None:
+    done = threading.Event()
+    tasks = []
+
+    def begin() -> None:
+        tasks.append(asyncio.get_running_loop().create_task(drive()))
+        tasks[0].add_done_callback(lambda _: done.set())
+
+    webmap.start()
+    webmap.call(begin)
+    done.wait(90)
+    webmap.stop()
+    tasks[0].result()  # whatever went wrong
+    print(json.dumps(told))
+
+
+main()

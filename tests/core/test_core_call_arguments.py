@@ -1,0 +1,85 @@
+"""What a robot is told wrongly is refused where it is said, and is not kept."""
+
+import pytest
+
+from webmap import Bridge, Robot
+from webmap.errors import ConfigError
+
+
+@pytest.fixture
+def bridge():
+    return Bridge("ws://robot:9090")
+
+
+@pytest.fixture
+def robot():
+    robot = Robot("Bob")
+    yield robot
+    robot.destroy()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"stops_within": "0.25"}, "stops_within: expected a number, got '0.25'"),
+        ({"v_max": True}, "v_max: expected a number, got True"),
+        ({"holonomic": "no"}, "holonomic: expected true or false, got 'no'"),
+        ({"vmax": 1.0}, 'there is no argument "vmax"; did you mean "v_max"?'),
+    ],
+)
+def test_what_is_said_of_a_base_is_of_its_kind(robot, bridge, options, said):
+    with pytest.raises(ConfigError) as error:
+        robot.set_twist_topic(bridge, "/cmd_vel", **options)
+    assert str(error.value).startswith("robot 'Bob': set_twist_topic: ")
+    assert said in str(error.value)
+    assert robot.motion.spec() is None
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"action_type": 5}, "action_type: expected a text, got 5"),
+        ({"frame": None}, "frame: expected a text, got None"),
+    ],
+)
+def test_what_is_said_of_goals_is_of_its_kind(robot, bridge, options, said):
+    with pytest.raises(ConfigError) as error:
+        robot.set_move_topic(bridge, "/goal", **options)
+    assert said in str(error.value)
+    assert robot.motion.spec() is None
+
+
+@pytest.mark.parametrize(
+    "say",
+    [
+        lambda robot: robot.set_twist_topic("ws://robot:9090", "/cmd_vel"),
+        lambda robot: robot.set_move_topic("ws://robot:9090", "/goal"),
+        lambda robot: robot.set_odometry_topic("ws://robot:9090", "/odom"),
+        lambda robot: robot.set_tf("ws://robot:9090"),
+        lambda robot: robot.set_initial_pose_topic("ws://robot:9090"),
+    ],
+    ids=["twist", "move", "odometry", "tf", "initial pose"],
+)
+def test_an_address_is_no_bridge(robot, say):
+    with pytest.raises(ConfigError, match="bridge: expected a Bridge, got 'ws://rob"):
+        say(robot)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("bad topic",), "the name of a topic, such as \"/odom\", got 'bad topic'"),
+        (("/odom", -5), "throttle: expected milliseconds, 0 or more, got -5"),
+        (("/odom", "100"), "throttle: expected a whole number, got '100'"),
+    ],
+)
+def test_odometry_that_cannot_be_meant_is_refused(robot, bridge, arguments, said):
+    with pytest.raises(ConfigError) as error:
+        robot.set_odometry_topic(bridge, *arguments)
+    assert said in str(error.value)
+    assert robot.feed is None
+
+
+def test_a_scanner_of_no_size_is_refused_in_words(robot):
+    with pytest.raises(ConfigError, match="stop_distance: expected a number, got '1'"):
+        robot.set_scan_assist("/scan", 0.3, stop_distance="1")

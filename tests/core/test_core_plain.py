@@ -1,0 +1,91 @@
+"""Robots as JSON and as TOML, and back."""
+
+import json
+import tomllib
+
+import pytest
+
+from webmap import Bridge, Namespace, Robot, svg
+from webmap.core.motion import roads
+from webmap.errors import ConfigError
+
+
+def toml(value) -> str:
+    """Return a value as TOML has it, in one line; there is no word for None."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return repr(value)
+        case str():
+            return json.dumps(value)
+        case list() | tuple():
+            return f"[{', '.join(map(toml, value))}]"
+        case dict():
+            pairs = [f"{json.dumps(key)} = {toml(each)}" for key, each in value.items()]
+            return f"{{{', '.join(pairs)}}}"
+    raise TypeError(f"TOML cannot hold {value!r}")
+
+
+def through_json(data):
+    return json.loads(json.dumps(data))
+
+
+def through_toml(data):
+    return tomllib.loads(f"robot = {toml(data)}")["robot"]
+
+
+@pytest.fixture
+def robot():
+    bridge = Bridge("ws://robot:9090")
+    robot = Robot("Bob", svg.g(svg.circle(r=0.2), "a text"))
+    robot.set_odometry_topic(bridge, "/odom", 50, type="nav_msgs/Odometry")
+    robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=[{"topic": "/lock"}])
+    robot.set_move_topic(bridge, "/goal", on_operator_loss="cancel")
+    robot.set_initial_pose_topic(bridge, covariance=(1, 2, 3))
+    robot.set_scan_assist("/scan", 0.3)
+    robot.set_alignment(1.0, 2.0, 90.0)
+    robot.add_module("LaserScanner", bridge, "/scan", 0.2, max_dots=None, name="rear")
+    robot.add_module("Battery", bridge, "/battery")
+    yield robot
+    robot.destroy()
+
+
+@pytest.mark.parametrize("through", [through_json, through_toml])
+def test_a_robot_with_modules_goes_through_a_file_and_comes_back(robot, through):
+    data = robot.to_dict()
+    again = Robot.from_dict(through(data), {"ws://robot:9090": robot.feed.bridge})
+    assert through(again.to_dict()) == through(data)
+    again.destroy()
+
+
+@pytest.mark.parametrize("through", [through_json, through_toml])
+def test_all_dots_of_a_scan_are_all_dots_again(robot, through):
+    again = Robot.from_dict(through(robot.to_dict()))
+    assert again.modules[0].max_dots is None
+    again.destroy()
+
+
+@pytest.mark.parametrize("data", [[1], "Bob", None, 5])
+def test_what_is_no_table_is_no_robot(data):
+    with pytest.raises(ConfigError, match="plain data is a table such as"):
+        Robot.from_dict(data)
+
+
+def test_a_robot_whose_plain_data_is_refused_is_not_there():
+    before = set(roads)
+    twist = {"bridge": "ws://robot:9090", "topic": "/cmd_vel"}
+    for wrong in ({"modules": [{"name": "Horn"}]}, {"twist": {**twist, "v_max": -1}}):
+        with pytest.raises((ConfigError, LookupError)):
+            Robot.from_dict({"name": "Bob", "twist": twist, **wrong})
+    assert roads == before
+
+
+def test_a_module_that_no_file_can_hold_is_said():
+    namespace = Namespace("lamp")
+    namespace.register(lambda robot, bulb: bulb, name="Lamp")
+    robot = Robot("Bob", namespace=namespace)
+    robot.add_module("Lamp", object())
+    with pytest.raises(ConfigError, match=r"robot 'Bob' is no plain data: .*object"):
+        robot.to_dict()
+    robot.destroy()

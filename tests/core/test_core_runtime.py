@@ -1,0 +1,60 @@
+"""The start: what is wrong with one robot is said, and the others start."""
+
+import pytest
+
+from webmap import Bridge, Robot
+from webmap.core import runtime as runtime_module
+from webmap.core.runtime import Runtime
+from webmap.errors import ConfigError
+from webmap.lifecycle import Lifecycle
+
+
+class Gate:
+    """Notes whom it was told of; refuses one."""
+
+    def __init__(self):
+        self.declared = []
+
+    def declare(self, spec):
+        if spec.name == "Eve":
+            raise ConfigError("robot 'Eve': no such thing")
+        self.declared.append(spec.name)
+
+    def forget(self, robot_id):
+        pass
+
+    def on_report(self, fn):
+        pass
+
+    def start(self):
+        pass
+
+    def stop(self):
+        pass
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    """A gate in place of the process, which hears of nobody else's robots."""
+    gate = Gate()
+    monkeypatch.setattr("webmap.gate.display.client.GateClient", lambda: gate)
+    monkeypatch.setattr(runtime_module, "lifecycle", Lifecycle())
+    monkeypatch.setattr(runtime_module, "roads", set())
+    return gate
+
+
+def test_a_robot_that_the_gate_refuses_does_not_keep_the_others_from_starting(
+    gate, monkeypatch, caplog
+):
+    bridge = Bridge("ws://robot:9090")
+    robots = [Robot(name) for name in ("Ann", "Eve", "Bob")]
+    for robot in robots:
+        robot.set_twist_topic(bridge, "/cmd_vel")
+        runtime_module.roads.add(robot.motion)
+    runtime = Runtime()
+    runtime.start()
+    runtime.stop()
+    assert sorted(gate.declared) == ["Ann", "Bob"]
+    assert "Eve: it cannot be moved: robot 'Eve': no such thing" in caplog.text
+    for robot in robots:
+        robot.destroy()
