@@ -11,6 +11,8 @@ from webmap import html
 
 ABOVE = {"ros1": "/robot_0/move_base", "ros2": "/robot_0"}
 FOOT = {"ros1": "footprint", "ros2": "published_footprint"}
+# In ROS 2 the names of parts do not tell robots apart.
+PARTS = {"ros1": "robot_0/", "ros2": ""}
 
 
 def robot_of(dialect: str, bridge: webmap.Bridge) -> webmap.Robot:
@@ -27,6 +29,8 @@ def robot_of(dialect: str, bridge: webmap.Bridge) -> webmap.Robot:
     foot = f"{ABOVE[dialect]}/local_costmap/{FOOT[dialect]}"
     robot.add_module("Polygon", bridge, foot)
     robot.add_module("Range", bridge, "/robot_0/sonar")
+    robot.add_module("PointStamped", bridge, "/robot_0/lookahead_point", frame="robot")
+    robot.add_module("GridCells", bridge, "/robot_0/inflated_obstacles")
     robot.add_module("NavSatFix", bridge, "/robot_0/fix", datum=(48.4, 9.95))
     return robot
 
@@ -47,21 +51,21 @@ def build(page: webmap.Page, dialect: str, bridge: webmap.Bridge) -> None:
         ).layer.svg.classes.add(part)
     map.add_module("Markers", bridge, "/robot_0/markers")
     map.add_module("LayerSwitches")
+    map.add_image("page_of_export.png", 15.0, 9.0, 3.0, 2.0)
     map.add_robot(robot)
     map.fit(-20, -13, 40, 26)
-    robot.add_module(Words, page, bridge)
+    robot.add_module(Words, page, bridge, PARTS[dialect])
 
 
 class Words:
     """What is said beside the map: battery, health, logs and a picture."""
 
-    def __init__(self, robot, page, bridge) -> None:
+    def __init__(self, robot, page, bridge, parts) -> None:
         self.charge, self.view = html.p(id="charge"), html.img(id="view", alt="")
         health, log = html.ul(id="health"), html.ol(id="log")
         page.element("beside").append(self.charge, health, log, self.view)
-        prefix = "robot_0/"
         self.battery = robot.add_module("Battery", bridge, "/robot_0/battery_state")
-        robot.add_module("Diagnostics", bridge, prefix=prefix).show_in(health)
+        robot.add_module("Diagnostics", bridge, prefix=parts).show_in(health)
         robot.add_module("Rosout", bridge, prefix="robot_0", level="info").show_in(log)
         camera = "/robot_0/camera/image_raw/compressed"
         self.camera = robot.add_module("Camera", bridge, camera)

@@ -135,18 +135,29 @@ def test_a_scan_by_another_clock_goes_along_and_that_is_said(link, scanner, robo
     assert robot.problems == {}
 
 
-def test_of_a_robot_without_frames_another_clock_is_not_said(link, scanner, robot):
+def test_of_a_robot_without_frames_stamps_that_hardly_fit_are_not_said(
+    link, scanner, robot
+):
     odometry(link, 100.0)
-    link.say("/scan", scan(WALL, 163.0))
+    link.say("/scan", scan(WALL, 159.0))
     odometry(link, 100.2)
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.2))
     assert robot.problems == {}
 
 
+def test_of_a_robot_without_frames_a_clock_that_is_a_minute_off_is_said(
+    link, scanner, robot
+):
+    odometry(link, 100.0)
+    link.say("/scan", scan(WALL, 163.0))
+    (problem,) = robot.problems.values()
+    assert "63.000 s later; are the clocks" in problem
+
+
 def test_who_stands_and_says_nothing_more_is_no_trouble(link, scanner, robot):
     odometry(link, 100.0)
-    robot.pose_stamp -= 30.0
-    link.say("/scan", scan(WALL, 130.0))
+    robot._poses.heard_at -= 90.0
+    link.say("/scan", scan(WALL, 190.0))
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.0))
     assert robot.problems == {}
 

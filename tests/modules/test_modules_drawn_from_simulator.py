@@ -9,6 +9,7 @@ import math
 import re
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from urllib.parse import urljoin
 
@@ -69,14 +70,18 @@ window.pixels = async (selector, places) => {
 WALL, FREE, CLEAR = [0, 0, 0, 255], [255, 255, 255, 255], [0, 0, 0, 0]
 LETHAL, INSCRIBED = [255, 0, 255, 255], [0, 255, 255, 255]
 
+INFLATED = "/robot_0/inflated_obstacles"
 LAYERS = {
     "Maps": ".occupancy-grid.map > image",
+    "Pictures": ".images > image",
     "Costmaps": ".occupancy-grid.local > image",
+    "Cells": ".gridcells > .cells",
     "Scans": ".laserscan > .dot",
     "Clouds": ".pointcloud > .dot.band-0",
     "Plans": ".path > polyline",
     "Trails": ".trail",
     "Poses": ".posearray > .arrow",
+    "Points": ".pointstamped > .point",
     "Uncertainty": ".covariance > .ellipse",
     "Footprints": ".polygon > polygon",
     "Ranges": ".range > .cone",
@@ -94,6 +99,7 @@ def worlds() -> Iterator[dict[str, Running]]:
             other.pose = other.odometry = _reachable(each.world, one.pose, 1.8, 3)
             # What is measured from where it started is not what is measured on the map.
             one.odometry = Pose(1.5, -2.0, 0.7)
+            each.do(partial(each.node.advertise, INFLATED, "nav_msgs/GridCells"))
         yield found
 
 
@@ -315,6 +321,48 @@ def test_a_cone_begins_at_the_sonar_and_ends_at_what_it_hears(tab, running):
     until(lambda: tab.evaluate(arc), lambda path: apart(path) < 0.002, "its length")
 
 
+def test_points_of_the_base_and_cells_of_odometry_are_in_place_on_the_map(tab, running):
+    node, robot = running.node, running.world.robots[0]
+    at = robot.odometry @ Pose(1.0, 0.5)
+    messages = {
+        "/robot_0/lookahead_point": ("base_link", {"point": place(1.2, -0.4)}),
+        INFLATED: (
+            "odom",
+            {
+                "cell_width": 0.2,
+                "cell_height": 0.1,
+                "cells": [place(at.x, at.y), place(at.x + 0.2, at.y)],
+            },
+        ),
+    }
+
+    def say() -> None:
+        stamp = node.graph.clock()
+        for topic, (frame, message) in messages.items():
+            name = f"{robot.frames}{frame}"
+            header = node.messages.dialect.header(topic, stamp, name)
+            node.publish(topic, {"header": header, **message})
+
+    running.do(say)
+    ahead = robot.pose @ Pose(1.2, -0.4)
+    find = 'inWorld(".pointstamped > .point", [[0, 0]])'
+    near(tab, find, [(ahead.x, ahead.y)], 0.005, "point")
+    map_from_odom = robot.pose @ robot.odometry.inverse
+    corners = ((-0.1, -0.05), (0.3, -0.05), (0.3, 0.05))
+    there = [map_from_odom @ Pose(at.x + x, at.y + y) for x, y in corners]
+    find = """(() => {
+      const { x, y, width, height } =
+        document.querySelector(".gridcells > .cells").getBBox();
+      const [right, top] = [x + width, y + height];
+      return inWorld(".gridcells > .cells", [[x, y], [right, y], [right, top]]);
+    })()"""
+    near(tab, find, [(corner.x, corner.y) for corner in there], 0.005, "cells")
+
+
+def place(x: float, y: float) -> dict[str, float]:
+    return {"x": x, "y": y, "z": 0.0}
+
+
 def test_a_fix_of_satellites_is_where_the_robot_is(tab, running):
     pose = running.world.robots[0].pose
     near(
@@ -329,15 +377,16 @@ def test_battery_health_and_picture_are_said_and_shown(tab, running):
     expect(tab.locator("#charge")).to_have_text(f"{100 * charge:.1f} %")
     expect(tab.locator("#health > li")).to_have_count(3)
     names = tab.locator("#health .name").all_inner_texts()
+    space = "" if running.node.messages.dialect.is_ros2 else "robot_0/"
     assert sorted(names) == [
-        "robot_0/base: Battery",
-        "robot_0/base: Motors",
-        "robot_0/laser: Frequency",
+        f"{space}base: Battery",
+        f"{space}base: Motors",
+        f"{space}laser: Frequency",
     ]
     expect(tab.locator(".diagnostics")).to_have_class(re.compile(r"\bok\b"))
     running.do(lambda: setattr(running.world.robots[0], "charge", 0.08))
     expect(tab.locator(".diagnostics.error title")).to_have_text(
-        "robot_0/base: Battery: 8 %, charge it"
+        f"{space}base: Battery: 8 %, charge it"
     )
     expect(tab.locator("#health > li").first).to_have_class("error")
     expect(tab.locator("#log > li.warn .message").first).to_have_text(
@@ -364,11 +413,14 @@ def test_a_goal_has_a_path_a_marker_a_trail_and_lines_in_the_log(tab, running):
     world = running.world
     robot, navigator = world.robots[0], world.navigators[0]
     way: list[tuple[float, float]] = [(robot.pose.x, robot.pose.y)]
+    steered: list[tuple[float, float]] = []
     step = world.step
 
     def note(dt: float) -> None:
         step(dt)
         way.append((robot.pose.x, robot.pose.y))
+        if navigator.steers_to is not None:
+            steered.append(navigator.steers_to)
 
     target = _reachable(world, robot.pose, 2, 4)
     world.step = note
@@ -394,6 +446,13 @@ def test_a_goal_has_a_path_a_marker_a_trail_and_lines_in_the_log(tab, running):
     off = np.hypot(*(drawn[:, np.newaxis] - true).transpose(2, 0, 1)).min(axis=1)
     assert off.max() < 0.03
     assert math.dist(drawn[0], way[0]) < 0.1
+    # It stays where it was told last, as none is told of a robot that stands.
+    ahead = 'inWorld(".pointstamped > .point", [[0, 0]])[0]'
+    until(
+        lambda: min(math.dist(tab.evaluate(ahead), each) for each in steered),
+        lambda off: off < 0.05,
+        "what it steers to",
+    )
     log = tab.locator("#log .message")
     said = f"a goal at ({target.x:.2f}, {target.y:.2f})"
     expect(log.get_by_text(said, exact=True)).to_have_count(1)

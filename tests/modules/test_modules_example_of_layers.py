@@ -21,6 +21,7 @@ DRAWN = (
     ".path > polyline",
     ".trail",
     ".posearray > .arrow[d]",
+    ".pointstamped.lookahead > .point",
     ".covariance > .ellipse[rx]",
     ".polygon > polygon[points]",
     ".navsatfix > .cross:not([visibility])",

@@ -6,6 +6,8 @@ import pytest
 from module_fakes import header, pose, to_root
 from test_modules_frames import tell, transform
 
+from webmap.errors import ConfigError
+
 DATUM = (50.0, 14.0)
 # By the ellipsoid of WGS 84, at 50 degrees north.
 METRES_A_DEGREE = {"lat": 111_229.0, "lon": 71_695.8}
@@ -35,6 +37,25 @@ def test_a_fix_is_as_many_metres_from_the_datum_as_the_globe_has(link, robot, ro
         (-0.002 * METRES_A_DEGREE["lon"], 0.001 * METRES_A_DEGREE["lat"]), abs=0.01
     )
     assert module.position == pytest.approx(at(module))
+
+
+@pytest.mark.parametrize("type", ["gps_common/GPSFix", "gps_msgs/msg/GPSFix"])
+def test_a_gps_fix_is_drawn_as_a_fix(link, robot, type):
+    ros2 = type.startswith("gps_msgs")
+    module = robot.add_module("NavSatFix", link, "/gps", datum=DATUM, type=type)
+    assert link.types["/gps"] == type
+    said = fix(50.001, 14.0, status=18, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0])
+    more = {"header": header("", ros2=ros2), "satellites_used": 7, "status": 18}
+    link.say("/gps", {**said, "status": more, "track": 90.0, "speed": 1.0, "dip": 0.0})
+    assert at(module) == pytest.approx((0, 111.229), abs=0.01)
+    assert module.doubt.get("r") == "2"
+    link.say("/gps", {**said, "status": {**more, "status": -1}})
+    assert "lost" in module.svg.classes
+
+
+def test_what_tells_of_no_fix_is_refused(link, robot):
+    with pytest.raises(ConfigError, match="type is one of sensor_msgs/NavSatFix, "):
+        robot.add_module("NavSatFix", link, type="sensor_msgs/LaserScan")
 
 
 def test_a_map_whose_x_is_north_has_north_to_the_right(link, robot):

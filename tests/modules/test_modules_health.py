@@ -5,6 +5,8 @@ import base64
 import pytest
 from module_fakes import header
 
+from webmap import Robot
+from webmap.errors import ConfigError
 from webmap.modules.robot import diagnostics as room
 from webmap.scene import html
 from webmap.scope import Scope
@@ -82,6 +84,113 @@ def test_robots_that_share_a_topic_have_each_its_own_parts(link, robot):
     module = robot.add_module("Diagnostics", link, prefix="bob: ")
     link.say("/diagnostics", array(status("bob: arm", 0), status("eve: arm", 2)))
     assert levels(module) == {"bob: arm": "ok"}
+
+
+@pytest.mark.parametrize("said", ["robot_0/", "/robot_0/"])
+@pytest.mark.parametrize("name", ["robot_0/base: Motors", "/robot_0/base: Motors"])
+def test_a_slash_in_front_makes_no_other_prefix_or_name(link, robot, said, name):
+    module = robot.add_module("Diagnostics", link, prefix=said)
+    link.say("/diagnostics", array(status(name, 2), status("/robot_01/arm: a", 1)))
+    assert levels(module) == {name: "error"}
+
+
+@pytest.mark.parametrize("name", ["base: Motors", "/Power/base", "a/base: Motors"])
+def test_the_only_robot_of_a_topic_has_all_parts_whatever_they_are_called(
+    link, robot, name
+):
+    module = robot.add_module("Diagnostics", link, namespace="/robot_0")
+    link.say("/diagnostics", array(status(name, 0)))
+    assert (levels(module), module.level) == ({name: "ok"}, "ok")
+    assert set(module.svg.classes) == {"diagnostics", "ok"}
+
+
+@pytest.fixture
+def two(link):
+    """The diagnostics of two robots that share a topic."""
+    robots = [Robot("A"), Robot("B")]
+    yield [
+        robot.add_module("Diagnostics", link, namespace=space)
+        for robot, space in zip(robots, ["/a", "/b"], strict=True)
+    ]
+    for robot in robots:
+        robot.destroy()
+
+
+def test_of_robots_that_share_a_topic_each_has_what_begins_with_its_namespace(
+    link, two
+):
+    names = ["a/base: Motors", "/b/laser: Frequency", "/a/Power/battery"]
+    link.say("/diagnostics", array(*(status(name, 0) for name in names)))
+    assert [set(levels(module)) for module in two] == [
+        {"a/base: Motors", "/a/Power/battery"},
+        {"/b/laser: Frequency"},
+    ]
+    assert [module.level for module in two] == ["ok", "ok"]
+
+
+def test_an_error_of_a_part_that_no_namespace_is_in_front_of_is_on_every_robot(
+    link, two
+):
+    link.say("/diagnostics", array(status("a/base: Motors", 0)))
+    link.say("/diagnostics", array(status("base: Motors", 2, "hot")))
+    assert [module.level for module in two] == ["error", "error"]
+    assert [module.svg.text for module in two] == ["base: Motors: hot"] * 2
+    assert [part.shared for part in two[0].parts] == [True, False]
+
+
+def test_that_parts_of_nobody_are_well_says_nothing_of_any_robot(link, two):
+    link.say("/diagnostics", array(status("b/x: y", 0), status("base: Motors", 0)))
+    a, b = two
+    assert (a.level, b.level) == (None, "ok")
+    assert set(a.svg.classes) == {"diagnostics", "unheard"}
+    assert a.svg.text == "no part of this robot was heard"
+
+
+def test_a_robot_whose_filter_lets_nothing_through_is_not_well(link, robot):
+    module = robot.add_module("Diagnostics", link, prefix="robot_0/")
+    assert set(module.svg.classes) == {"diagnostics", "unheard"}
+    link.say("/diagnostics", array(status("base: Motors", 0)))
+    assert module.level is None
+    assert set(module.svg.classes) == {"diagnostics", "unheard"}
+
+
+def test_a_robot_that_comes_later_takes_its_parts_from_the_one_that_was_alone(
+    link, robot
+):
+    first = robot.add_module("Diagnostics", link, namespace="/a")
+    link.say("/diagnostics", array(status("b/base: Motors", 2), status("base: x", 0)))
+    assert first.level == "error"
+    later = Robot("B")
+    later.add_module("Diagnostics", link, namespace="/b")
+    assert (levels(first), first.level) == ({"base: x": "ok"}, None)
+    later.destroy()
+    assert first.level == "error", "it is the only one again"
+
+
+def test_an_error_is_not_hidden_by_another_robots_part_of_the_same_name(
+    link, two, monkeypatch
+):
+    now = room.time.monotonic()
+    link.say("/diagnostics", array(status("base: Motors", 2, "hot")))
+    link.say("/diagnostics", array(status("base: Motors", 0)))
+    assert two[0].level == "error"
+    monkeypatch.setattr(room.time, "monotonic", lambda: now + 12)
+    link.say("/diagnostics", array(status("base: Motors", 0)))
+    assert two[0].level is None, "nobody says it any more"
+
+
+def test_of_two_parts_of_one_name_on_other_hardware_the_worse_counts(link, module):
+    bad, good = status("motor: Driver", 2), status("motor: Driver", 0)
+    link.say("/diagnostics", array({**bad, "hardware_id": "left"}))
+    link.say("/diagnostics", array({**good, "hardware_id": "right"}))
+    assert module.level == "error"
+    link.say("/diagnostics", array({**good, "hardware_id": "left"}))
+    assert module.level == "ok"
+
+
+def test_a_namespace_and_a_prefix_are_not_given_both(link, robot):
+    with pytest.raises(ConfigError, match="or a prefix, not both, got '/a' and 'b/'"):
+        robot.add_module("Diagnostics", link, namespace="/a", prefix="b/")
 
 
 def test_a_list_on_a_page_has_a_row_for_each_part_until_the_page_ends(link, module):

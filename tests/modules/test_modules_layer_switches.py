@@ -6,7 +6,7 @@ from webmap.errors import ConfigError
 
 
 def test_a_layer_that_does_not_exist_is_named_with_those_that_do(map):
-    there_are = "no layer 'Scan'; there are Tiles, Maps, Costmaps"
+    there_are = "no layer 'Scan'; there are Tiles, Maps, Pictures, Costmaps"
     with pytest.raises(ConfigError, match=there_are):
         map.add_module("LayerSwitches", off=["Scan"])
 

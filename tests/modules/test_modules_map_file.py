@@ -3,7 +3,9 @@
 import asyncio
 import math
 import os
+import re
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -237,30 +239,46 @@ def test_a_description_that_makes_no_sense_is_refused(tmp_path, why):
     assert str(file) in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        b"",
-        b"P5\n3 2\n0\n" + bytes(6),
-        b"P5\n3 2\n255\n" + bytes(3),
-        b"P5\n2147483648 2147483648\n255\n",
-        b"P5\n8193 8193\n255\n",
-        b"P5\n12000 12000\n255\n",
-        b"GIF89a" + bytes(20),
-        b"<svg/>",
-    ],
-)
-def test_an_image_that_is_none_is_refused_before_it_costs_anything(tmp_path, data):
-    (tmp_path / "map.pgm").write_bytes(data)
-    with pytest.raises(ConfigError, match=r"map\.yaml: the image"):
+NO_IMAGE = {
+    "is too large: ": b"P5\n2147483648 2147483648\n255\n",
+    "has 8193 x 8193 pixels; 67108864 in all are": b"P5\n8193 8193\n255\n",
+    "is too large: Image size (144000000": b"P5\n12000 12000\n255\n",
+    "cannot be read: maxval must be greater than 0": b"P5\n3 2\n0\n" + bytes(6),
+    "cannot be read: image file is truncated": b"P5\n3 2\n255\n" + bytes(3),
+    "must be PGM, PNG, BMP or JPEG, got an empty file": b"",
+    "must be PGM, PNG, BMP or JPEG, got one that begins with b'GIF89a": (
+        b"GIF89a" + bytes(20)
+    ),
+    "must be PGM, PNG, BMP or JPEG, got one that begins with b'<svg/>'": b"<svg/>",
+    "begins with b'P5\\n0 0\\n2' and makes no sense further on": b"P5\n0 0\n255\n",
+}
+
+
+@pytest.mark.parametrize("why", NO_IMAGE)
+def test_an_image_that_is_none_is_refused_before_it_costs_anything(tmp_path, why):
+    (tmp_path / "map.pgm").write_bytes(NO_IMAGE[why])
+    with pytest.raises(ConfigError, match=re.escape(why)) as refused:
         read_map(described(tmp_path))
+    assert str(refused.value).startswith(f"{tmp_path / 'map.yaml'}: the image ")
+
+
+def test_a_device_is_neither_a_description_nor_an_image(tmp_path):
+    endless = Path("/dev/zero")
+    (tmp_path / "map.pgm").symlink_to(endless)
+    with pytest.raises(ConfigError, match=r"'map\.pgm' is not in the folder"):
+        read_map(described(tmp_path))
+    (tmp_path / "link.yaml").symlink_to(endless)
+    for file in (endless, tmp_path / "link.yaml"):
+        with pytest.raises(ConfigError, match="expected a file, got a device"):
+            read_map(file)
 
 
 @pytest.mark.parametrize(
     ("data", "why"),
     [
-        (b"", "needs image"),
-        (b"- 1", "needs image"),
+        (b"", "needs image, resolution and origin, .*, got nothing"),
+        (b"- 1", "needs image, resolution and origin, .*, got a list"),
+        (b"map.pgm", "needs image, resolution and origin, .*, got 'map.pgm'"),
         (b"a: [", "map.yaml"),
         (b"image: !!python/object/apply:os.system [ls]", "map.yaml:1: resolution"),
         (b" " * ((1 << 14) + 1), "no map's YAML"),

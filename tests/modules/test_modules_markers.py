@@ -214,8 +214,9 @@ def test_single_markers_are_drawn_too(map, link, channel):
 
 
 ZEROS = {"position": vector(), "orientation": {"x": 0, "y": 0, "z": 0, "w": 0}}
+ALMOST_ZEROS = {**ZEROS, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1e-9}}
 BAD = {
-    "quaternion of zeros": marker(CUBE, pose=ZEROS),
+    "quaternion of zeros": marker(CUBE, pose=ALMOST_ZEROS),
     "a pose must be of finite": marker(CUBE, pose=pose(math.nan, 0)),
     "place of a text": marker(TEXT, pose=pose(math.inf, 0), text="x"),
     "scale.y must be metres above 0, got nan": marker(CUBE, scale=(1, None, 1)),
@@ -248,14 +249,32 @@ def test_a_marker_that_makes_no_sense_is_left_out_by_itself(link, layer, channel
     assert layer.problems == {}
 
 
-@pytest.mark.parametrize("type", [SPHERE, SPHERES, POINTS])
-def test_what_no_turn_changes_needs_no_quaternion_and_that_is_logged_once(
-    link, layer, channel, caplog, type
+ENDS = [(0, 0), (1, 0)]
+
+
+@pytest.mark.parametrize(
+    ("type", "points"),
+    [
+        (ARROW, []),
+        (ARROW, ENDS),
+        (CUBE, []),
+        (CYLINDER, []),
+        (SPHERE, []),
+        (CUBES, ENDS),
+        (SPHERES, ENDS),
+        (POINTS, ENDS),
+        (LINES, ENDS),
+        (STRIP, ENDS),
+        (TRIANGLES, [*ENDS, (0, 1)]),
+    ],
+)
+def test_a_marker_whose_quaternion_nobody_set_is_drawn_unturned_which_is_logged_once(
+    link, layer, channel, caplog, type, points
 ):
     nowhere = {**pose(3, -2), "orientation": ZEROS["orientation"]}
-    turned = marker(type, [(1, 0)], pose=nowhere)
-    say(link, turned, {**turned, "id": 2})
-    say(link, turned)
+    unset = marker(type, points, pose=nowhere)
+    say(link, unset, {**unset, "id": 2})
+    say(link, unset)
     assert len(layer.svg.children) == 2
     assert to_root(layer.svg.children[0]).apply(1, 0) == pytest.approx((4, -2))
     assert channel.errors == []

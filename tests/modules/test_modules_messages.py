@@ -9,6 +9,7 @@ from test_modules_fix import fix
 from test_modules_grid import CORNERS, grid, update
 from test_modules_health import array, status
 from test_modules_markers import CUBE, marker
+from test_modules_points import cells, point
 from test_modules_poses import FOOT, covariance, doubtful, polygon, sonar
 from test_modules_ways import path
 
@@ -22,6 +23,7 @@ from webmap.ros.messages_diagnostics import DiagnosticArrayMsg
 from webmap.ros.messages_fix import NavSatFixMsg
 from webmap.ros.messages_grid import OccupancyGridUpdateMsg
 from webmap.ros.messages_marker import MarkerArrayMsg
+from webmap.ros.messages_points import GridCellsMsg, PointStampedMsg
 from webmap.ros.messages_poses import (
     DoubtfulPoseStampedMsg,
     ParticleCloudMsg,
@@ -44,6 +46,8 @@ MESSAGES = {
     DoubtfulPoseStampedMsg: doubtful(pose(1, 2), covariance(1, 1)),
     PolygonStampedMsg: polygon(FOOT),
     RangeMsg: sonar(1.0),
+    PointStampedMsg: point(1, 2),
+    GridCellsMsg: cells([(1, 2), (3, 4)]),
     PointCloud2Msg: cloud(POINTS),
     MarkerArrayMsg: {"markers": [marker(CUBE)]},
     DiagnosticArrayMsg: array(status("one", 1)),

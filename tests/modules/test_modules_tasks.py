@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from types import SimpleNamespace
 
 import pytest
 from module_fakes import Channel, Someone
@@ -209,6 +210,17 @@ class TestOnTheCard:
         text = "3.2 m to go, about 12 s, 5 s under way, got stuck 2 times"
         assert figures(told) == text
         assert figures(goal(recoveries=1)) == "got stuck once"
+
+    def test_the_line_has_the_time_and_how_often_it_got_stuck(self):
+        line = GoalLine()
+        told = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
+        line.show(SimpleNamespace(report=SimpleNamespace(goal=told)))
+        _, words = line.element.children
+        assert line.element.get("hidden") is None
+        assert [each.text for each in words.children] == [
+            "On its way",
+            "3.2 m to go, about 12 s, 5 s under way, got stuck 2 times",
+        ]
 
     def test_a_robot_without_a_goal_has_no_line(self, robot):
         line = GoalLine()

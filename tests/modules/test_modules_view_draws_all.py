@@ -25,14 +25,17 @@ OF_A_ROBOT = (
     ".polygon > polygon[points]",
     ".range > .cone[d]",
     ".navsatfix > .cross:not([visibility])",
-    ".diagnostics.ok",
 )
+# In ROS 2 no part says which of the two robots it is of.
+HEALTH = {"ros1": ".diagnostics.ok", "ros2": ".diagnostics.unheard"}
 # What a real robot has besides, under names that nobody can know.
 ODD = (
     '.laserscan.scan-2[data-layer="rear/ranges"] > .dot[d]',
     '.path[data-layer="transformed_global_plan"] > polyline[points]',
     '.posestamped[data-layer="dock"]:not([visibility]) > .arrow[d]',
     '.posearray[data-layer="trees"] > .arrow[d]',
+    '.pointstamped[data-layer="clicked_point"]:not([visibility]) > .point',
+    '.gridcells[data-layer="inflated_obstacles"] > .cells[d]',
     '.polygon.other[data-layer="keep_in"] > polygon[points]',
 )
 ON_THE_MAP = {
@@ -60,7 +63,7 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
             tab.set_default_timeout(20_000)
             tab.add_init_script(HELPERS)
             tab.goto(url)
-            for selector in OF_A_ROBOT:
+            for selector in (*OF_A_ROBOT, HEALTH[dialect]):
                 for name in ("robot_0", "robot_1"):
                     inside = f'.robot[data-name="{name}"] {selector}'
                     tab.wait_for_selector(inside, state="attached")
@@ -75,6 +78,8 @@ def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
             assert math.dist((x, y), (pose.x, pose.y)) < 0.05
             dots_are_where_walls_are(tab, world, clouds=2 if tilted else 1)
             x, y = tab.evaluate(PLACE, '[data-layer="dock"] > .arrow')
+            assert math.dist((x, y), (DOCK.x, DOCK.y)) < 0.05
+            x, y = tab.evaluate(PLACE, '[data-layer="clicked_point"] > .point')
             assert math.dist((x, y), (DOCK.x, DOCK.y)) < 0.05
             switch_one_map(tab)
             assert tab.locator(".webmap-notice").count() == 0
@@ -140,6 +145,8 @@ def say_more(node):
         "transformed_global_plan": "nav_msgs/Path",
         "dock": "geometry_msgs/PoseStamped",
         "trees": "geometry_msgs/PoseArray",
+        "clicked_point": "geometry_msgs/PointStamped",
+        "inflated_obstacles": "nav_msgs/GridCells",
         "keep_in": "geometry_msgs/PolygonStamped",
     }
     for name, type in kinds.items():
@@ -161,6 +168,12 @@ def say_more(node):
         node.publish(f"{robot.topics}/dock", at)
         trees = {"header": at["header"], "poses": [at["pose"]]}
         node.publish(f"{robot.topics}/trees", trees)
+        here = at["pose"]["position"]
+        clicked = {"header": at["header"], "point": here}
+        node.publish(f"{robot.topics}/clicked_point", clicked)
+        sides = {"cell_width": 0.25, "cell_height": 0.25}
+        grown = {"header": at["header"], **sides, "cells": [here]}
+        node.publish(f"{robot.topics}/inflated_obstacles", grown)
         fence = {"header": at["header"], "polygon": {"points": corners}}
         node.publish(f"{robot.topics}/keep_in", fence)
 

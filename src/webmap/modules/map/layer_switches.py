@@ -11,12 +11,15 @@ if TYPE_CHECKING:
 LAYERS = {
     "Tiles": ".tiles",
     "Maps": ".floor, .map-file, .occupancy-grid:not(.costmap)",
+    "Pictures": ".images > image:not(.floor)",
     "Costmaps": ".occupancy-grid.costmap",
+    "Cells": ".gridcells",
     "Scans": ".laserscan",
     "Clouds": ".pointcloud",
     "Plans": ".path",
     "Trails": ".trail",
     "Poses": ".posearray, .posestamped",
+    "Points": ".pointstamped",
     "Uncertainty": ".covariance",
     "Footprints": ".polygon",
     "Ranges": ".range",
@@ -25,7 +28,7 @@ LAYERS = {
     "Labels": ".labels",
     "Health": ".diagnostics",
 }
-"""What the built-in modules draw: what people call it, and its CSS selector."""
+"""What the built-in modules and ``add_image`` draw: its name and CSS selector."""
 
 
 class LayerSwitches:
@@ -39,7 +42,7 @@ class LayerSwitches:
     Args:
         map: The map.
         layers: A CSS selector for each name, in the order of the list; what the
-            built-in modules draw if not given.
+            built-in modules and ``map.add_image`` draw if not given.
         off: Names of those that are off until the viewer switches them on.
 
     Raises:

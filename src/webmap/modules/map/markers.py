@@ -183,7 +183,7 @@ class MarkerLayer(Layer):
                 wrong.append(f"marker {marker.id} of {marker.ns!r}: {error}")
         self.frames.say()
         self._set_timer()
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self.bridge.lag, limit=self.age_limit)
         if wrong:
             more = "" if single else f" ({len(wrong)} of {len(markers)} are left out)"
             raise ProtocolError(wrong[0] + more)
@@ -233,7 +233,7 @@ class MarkerLayer(Layer):
             self._said_unturned = True
             log.warning(
                 "%s: %s: marker %d of %r has a quaternion of zeros and is drawn "
-                "unturned, as all such spheres and points are",
+                "unturned, as all such markers are",
                 self.bridge.url,
                 self.topic,
                 marker.id,

@@ -165,8 +165,8 @@ class Grid(Layer):
                 f"{grid.info.width} x {grid.info.height} cells of {resolution:g} m"
             )
         check_values(cells, self.palette)
-        self.info, self.cells = grid.info, cells
         self.anchor.stand_in(grid.frame_id, grid.stamp)
+        self.info, self.cells = grid.info, cells
         self._draw()
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
@@ -192,7 +192,7 @@ class Grid(Layer):
         self._draw()
 
     def _draw(self) -> None:
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self.bridge.lag, limit=self.age_limit)
         if self.cells is not None and self.cells.size <= SMALL:
             self._show(grid_png(self.cells, self.palette), self.info)
             return

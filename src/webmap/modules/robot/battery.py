@@ -38,9 +38,10 @@ class Battery:
         self.voltage: float | None = None
         """In volts; None if the robot does not know."""
         self.stamp: float | None = None
-        """When the newest message came, in monotonic seconds."""
+        """When the newest message was sent, in monotonic seconds."""
         self._topic = topic
         self._hundredths = False
+        self._bridge = bridge
         keep(Removal(lambda: robot.clear_problem(self)))
         bridge.subscribe(
             topic,
@@ -55,7 +56,7 @@ class Battery:
         voltage = message.voltage
         self.charge = self._charge_of(message.percentage)
         self.voltage = voltage if math.isfinite(voltage) else None
-        self.stamp = time.monotonic()
+        self.stamp = time.monotonic() - self._bridge.lag
         self.robot.notify_modules("on_battery_update", self)
 
     def _charge_of(self, percentage: float) -> float | None:

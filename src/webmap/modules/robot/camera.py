@@ -133,7 +133,7 @@ class Camera(CameraFeed):
             ProtocolError: If no browser can show it.
 
         """
-        self.show(image.data, image.media_type)
+        self.show(image.data, image.media_type, self._bridge.lag)
 
     def on_image(self, image: ImageMsg) -> None:
         """Show a raw picture; while one is being made ready, the newest waits.
@@ -157,7 +157,7 @@ class Camera(CameraFeed):
                     continue
                 self.robot.clear_problem(self)
                 if self._scope is not None:
-                    self.show(data, "image/jpeg")
+                    self.show(data, "image/jpeg", self._bridge.lag)
         finally:
             self._drawing = None
 

@@ -1,9 +1,10 @@
 """What the parts of a robot say of their health."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from webmap.core.part_owners import Whose, bare, part_owners
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError
 from webmap.ros.bridge import Bridge
@@ -24,6 +25,12 @@ if TYPE_CHECKING:
 MAX_PARTS = 1000
 """The most parts that one robot may have."""
 
+UNHEARD = "unheard"
+"""The class of a badge while nothing was heard that tells how the robot is."""
+
+UNSAID = "no part of this robot was heard"
+GREY = "#8a8f98"
+
 # An error weighs more than a part that has gone silent, though its number is less.
 _WEIGHT = {"ok": 0, "warn": 1, "stale": 2, "error": 3}
 
@@ -42,6 +49,9 @@ class Health:
     heard: float
     """When, in monotonic seconds."""
 
+    shared: bool = False
+    """Whether several robots follow the topic and its name is of none of them."""
+
 
 class Diagnostics:
     """Follows a ``diagnostic_msgs/DiagnosticArray`` and says what is worst.
@@ -49,21 +59,28 @@ class Diagnostics:
     On the robot there is a badge, whose class is the worst level and whose title says
     what it is. Fires ``on_diagnostics_update``.
 
-    Style it by CSS: ``.diagnostics.ok``, ``.warn``, ``.error`` and ``.stale``; rows of
-    :meth:`show_in` have these classes too.
+    A part whose name begins with another robot's namespace is left out. One that begins
+    with nobody's is shown with every robot that follows the topic, so that no error is
+    lost; that it is well says nothing of any of them.
+
+    Style it by CSS: ``.diagnostics.ok``, ``.warn``, ``.error``, ``.stale``, and
+    ``.unheard`` while no part of the robot was heard; rows of :meth:`show_in` have
+    these classes too, but for the last.
 
     Args:
         robot: The robot.
         bridge: The link to the ROS system that has the topic.
         topic: The topic: ``/diagnostics``, or ``/diagnostics_agg``.
-        prefix: Only parts whose names begin with this are taken, where robots share
-            a topic.
+        namespace: The robot's, such as ``/robot_0``, where robots share a topic.
+        prefix: Only parts whose names begin with this are taken, and all of them are
+            the robot's. A slash in front counts neither here nor there.
         hold: Seconds after which a part that says nothing counts as stale.
         throttle: The least time between two messages, in milliseconds. It is 0
             since each message tells of other parts.
 
     Raises:
-        ConfigError: If ``hold`` is not above 0.
+        ConfigError: If ``hold`` is not above 0, or there are both a namespace and a
+            prefix.
 
     """
 
@@ -73,23 +90,40 @@ class Diagnostics:
         bridge: Bridge,
         topic: str = "/diagnostics",
         *,
+        namespace: str = "",
         prefix: str = "",
         hold: float = 10.0,
         throttle: int = 0,
     ) -> None:
         if not hold > 0:
             raise ConfigError(f"hold must be seconds above 0, got {hold}")
+        if namespace and prefix:
+            raise ConfigError(
+                f"give the namespace of the robot or a prefix, not both, got "
+                f"{namespace!r} and {prefix!r}"
+            )
         self.robot = robot
-        self.prefix = prefix
+        self.namespace = bare(namespace)
+        self.prefix = prefix.lstrip("/")
         self.hold = hold
+        self._owners = part_owners(bridge, topic)
+        self._joined = None if self.prefix else self._owners.join(self.namespace)
         self._parts: dict[str, Health] = {}
         self._lists: list[Element] = []
         self._shown: list[tuple[str, str, str]] = []
-        self._title = svg.title(text="")
+        self._title = svg.title(text=UNSAID)
         self.svg = svg.circle(
-            self._title, class_="diagnostics ok", cx=0.3, cy=0.3, r=0.08, fill="none"
+            self._title,
+            class_=f"diagnostics {UNHEARD}",
+            cx=0.3,
+            cy=0.3,
+            r=0.08,
+            fill="none",
+            stroke=GREY,
+            stroke_width=0.03,
         )
         robot.svg.append(self.svg)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_array),
@@ -101,22 +135,32 @@ class Diagnostics:
 
     def destroy(self) -> None:
         """Take the badge away."""
+        if self._joined is not None:
+            self._joined.remove()
         self.svg.remove()
 
     @property
     def parts(self) -> list[Health]:
         """What all parts said last, the worst first."""
         now = time.monotonic()
-        return sorted(
-            (self._aged(part, now) for part in self._parts.values()),
-            key=lambda part: (-_WEIGHT[part.level], part.name),
-        )
+        parts = []
+        for part in self._parts.values():
+            # Since it was taken, robots may have come and gone.
+            whose = self._whose(part.name)
+            if whose == "another":
+                continue
+            shared = whose == "nobody"
+            right = part if part.shared == shared else replace(part, shared=shared)
+            parts.append(self._aged(right, now))
+        return sorted(parts, key=lambda part: (-_WEIGHT[part.level], part.name))
 
     @property
     def level(self) -> str | None:
-        """The worst level of all parts; None if nothing was heard."""
-        parts = self.parts
-        return parts[0].level if parts else None
+        """The worst level of all parts; None if nothing was heard of this robot.
+
+        That parts of nobody are well does not count.
+        """
+        return _level(self.parts)
 
     def show_in(self, element: Element) -> None:
         """List the parts in an element of a page until the current scope ends.
@@ -138,7 +182,7 @@ class Diagnostics:
         """
         wrong: ProtocolError | None = None
         for status in message.status:
-            if not status.name.startswith(self.prefix):
+            if self._whose(status.name) == "another":
                 continue
             try:
                 self._take(status)
@@ -151,31 +195,52 @@ class Diagnostics:
     def _take(self, status: DiagnosticStatusMsg) -> None:
         if status.name not in self._parts and len(self._parts) >= MAX_PARTS:
             raise ProtocolError(f"{MAX_PARTS} parts are the limit")
-        self._parts[status.name] = Health(
+        said = Health(
             status.name,
             LEVELS[status.level],
             status.message,
             status.hardware_id,
             {pair.key: pair.value for pair in status.values},
             time.monotonic(),
+            self._whose(status.name) == "nobody",
         )
+        if not self._hides_worse(said):
+            self._parts[status.name] = said
+
+    def _hides_worse(self, said: Health) -> bool:
+        """Tell whether another part of this name said worse just now.
+
+        In ROS 2 the same nodes of two robots say the same names, one after the other.
+        """
+        before = self._parts.get(said.name)
+        if before is None or said.heard - before.heard > self.hold:
+            return False
+        another = said.shared or said.hardware_id != before.hardware_id
+        return another and _WEIGHT[said.level] < _WEIGHT[before.level]
+
+    def _whose(self, name: str) -> Whose:
+        if self.prefix:
+            return "own" if name.lstrip("/").startswith(self.prefix) else "another"
+        return self._owners.whose(name, self.namespace)
 
     def _aged(self, part: Health, now: float) -> Health:
         if now - part.heard <= self.hold or part.level == LEVELS[STALE]:
             return part
         said = f"silent for {now - part.heard:.0f} s"
-        return Health(
-            part.name, LEVELS[STALE], said, part.hardware_id, part.values, part.heard
-        )
+        return replace(part, level=LEVELS[STALE], message=said)
 
     def _show(self) -> None:
         parts = self.parts
-        worst = parts[0] if parts else None
-        level = worst.level if worst else LEVELS[OK]
-        colours = {"ok": "none", "warn": "#e8a317", "error": "#d02f2f"}
-        self.svg.set(class_=f"diagnostics {level}", fill=colours.get(level, "#8a8f98"))
-        self.svg.set_age(0.0, limit=self.hold)
-        self._title.text = f"{worst.name}: {worst.message}" if worst else ""
+        level = _level(parts) or UNHEARD
+        colours = {"warn": "#e8a317", "error": "#d02f2f", "stale": GREY}
+        self.svg.set(
+            class_=f"diagnostics {level}",
+            fill=colours.get(level, "none"),
+            stroke=GREY if level == UNHEARD else "none",
+        )
+        self.svg.set_age(self._bridge.lag, limit=self.hold)
+        heard = level != UNHEARD
+        self._title.text = f"{parts[0].name}: {parts[0].message}" if heard else UNSAID
         shown = [(part.name, part.level, part.message) for part in parts]
         if shown != self._shown:
             self._shown = shown
@@ -193,3 +258,11 @@ class Diagnostics:
                     class_=level,
                 )
             )
+
+
+def _level(parts: list[Health]) -> str | None:
+    """Return the worst level, of parts of which the worst is first."""
+    if not parts:
+        return None
+    well = parts[0].level == LEVELS[OK]
+    return None if well and all(part.shared for part in parts) else parts[0].level

@@ -105,6 +105,7 @@ class LaserScanner:
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
         keep(Removal(lambda: robot.clear_problem(self)))
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_scan),
@@ -136,7 +137,7 @@ class LaserScanner:
             points = straightened(points, rays / len(scan.ranges), moved)
         draw = partial(self._draw, points)
         self._placed.stand_in(scan.frame_id, scan.stamp, draw)
-        self.svg.set_age(0.0, limit=AGE_LIMIT)
+        self.svg.set_age(self._bridge.lag, limit=AGE_LIMIT)
 
     def _draw(self, points: "NDArray[np.float64]", tilt: "Transform") -> None:
         points, _ = levelled(points, tilt)

@@ -11,14 +11,20 @@ from webmap.errors import ConfigError, ProtocolError
 from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_fix import NavSatFixMsg
+from webmap.ros.names import split_type
 from webmap.scene import svg
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
+TYPES = ("sensor_msgs/NavSatFix", "gps_msgs/GPSFix", "gps_common/GPSFix")
+"""What tells of a fix."""
+
 
 class NavSatFix:
     """Draws a ``sensor_msgs/NavSatFix`` as a cross with a circle of its doubt.
+
+    A ``GPSFix`` of ``gps_common`` or ``gps_msgs`` says the same in the same words.
 
     A fix is put on the map as on a plane that touches the globe at a datum: lengths are
     right to 4 mm at 10 km from there, and to 0.5 m at 50 km. ``TileLayer`` with the
@@ -39,9 +45,11 @@ class NavSatFix:
             from above.
         throttle: The least time between two fixes, in milliseconds.
         age_limit: Seconds after which a fix is drawn as old.
+        type: Of the messages: ``sensor_msgs/NavSatFix`` or a ``GPSFix``.
 
     Raises:
-        ConfigError: If the datum is on no globe, or ``east`` is not finite.
+        ConfigError: If the datum is on no globe, ``east`` is not finite, or messages of
+            the type tell of no fix.
 
     """
 
@@ -55,7 +63,10 @@ class NavSatFix:
         east: float = 0.0,
         throttle: int = 500,
         age_limit: float = 5.0,
+        type: str = "sensor_msgs/NavSatFix",
     ) -> None:
+        if str(split_type(type)) not in TYPES:
+            raise ConfigError(f"type is one of {', '.join(TYPES)}, got {type!r}")
         if datum is not None and len(datum) != 2:
             raise ConfigError(
                 f"datum is a latitude and a longitude in degrees, got {datum!r}"
@@ -81,10 +92,11 @@ class NavSatFix:
         )
         self._placed = Placed(robot, self.doubt, self.cross, class_="navsatfix")
         self.svg = self._placed.svg
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_fix),
-            "sensor_msgs/NavSatFix",
+            type,
             throttle=throttle,
             decode=NavSatFixMsg,
         )
@@ -122,7 +134,7 @@ class NavSatFix:
         doubt = fix.deviation or 0.0
         self.doubt.set(r=doubt if doubt <= FARTHEST else 0.0)
         self.cross.unset("visibility")
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
         if doubt > FARTHEST:
             raise ProtocolError(
                 f"a fix has a doubt of {FARTHEST:g} m at the most, got {doubt:g} m, "

@@ -72,6 +72,7 @@ class Path:
         self._placed = Placed(robot, self.line, class_=f"path {name}".strip())
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_path),
@@ -99,7 +100,7 @@ class Path:
         drawn = in_space(path.poses[index].pose.position for index in kept)
         self._placed.stand_in(path.frame_id, path.stamp, partial(self._draw, drawn))
         self.points = points
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
         self.robot.notify_modules("on_path_update", self)
 
     def on_odometry_update(self) -> None:

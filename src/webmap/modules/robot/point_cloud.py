@@ -129,6 +129,7 @@ class PointCloud:
         )
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_cloud),
@@ -147,7 +148,7 @@ class PointCloud:
         points, values = self._read(cloud)
         draw = partial(self._draw, points, values)
         self._placed.stand_in(cloud.frame_id, cloud.stamp, draw)
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:
         """Keep a cloud in the map's frame where it is while the robot goes along."""

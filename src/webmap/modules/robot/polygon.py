@@ -69,6 +69,7 @@ class Polygon:
         )
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_polygon),
@@ -94,7 +95,7 @@ class Polygon:
         draw = partial(self._draw, in_space(message.polygon.points))
         self._placed.stand_in(message.frame_id, message.stamp, draw)
         self.points = points
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:
         """Keep it where it is while the robot goes along."""

@@ -75,6 +75,7 @@ class PoseArray:
         self._placed = Placed(robot, self.arrows, class_="posearray", frame=frame)
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_poses),
@@ -91,12 +92,13 @@ class PoseArray:
                 the others are drawn then.
 
         """
-        self.poses = [pose.usable for pose in message.poses if not pose.turns_nowhere]
+        poses = [pose.usable for pose in message.poses if not pose.turns_nowhere]
         self._placed.stand_in(message.frame_id, message.stamp)
+        self.poses = poses
         kept = thinned(len(self.poses), self.max_poses)
         arrows = [arrow(self.poses[index], self.length) for index in kept]
         self.arrows.set(d="".join(arrows) or None)
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
         missing = len(message.poses) - len(self.poses)
         if missing:
             raise ProtocolError(

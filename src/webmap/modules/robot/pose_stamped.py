@@ -77,6 +77,7 @@ class PoseStamped:
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
         self.svg.set(visibility="hidden")
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_pose),
@@ -93,15 +94,15 @@ class PoseStamped:
 
         """
         pose = message.pose.usable
+        self._placed.stand_in(message.frame_id, message.stamp)
         self.pose = pose
         self._goes_to = pose if self._ends and self._in_map(message.frame_id) else None
-        self._placed.stand_in(message.frame_id, message.stamp)
         self.arrow.set_pose(pose.x, pose.y, pose.yaw)
         self._count += 1
         # By this the page knows one that the goal tool has shown already.
         self.svg.set("data-pose", f"{self.topic} {self._count}")
         self.svg.set(visibility=None)
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:
         """Keep it where it is while the robot goes along, until that gets there."""

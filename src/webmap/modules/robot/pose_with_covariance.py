@@ -69,6 +69,7 @@ class PoseWithCovariance:
         self._placed = Placed(robot, self.ellipse, self.heading, class_="covariance")
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_pose),
@@ -97,7 +98,7 @@ class PoseWithCovariance:
         self.ellipse.set_pose(place.x, place.y, ellipse.yaw)
         self.heading.set(d=sector(max(0.4, n * ellipse.major), turn))
         self.heading.set_pose(place.x, place.y, place.yaw)
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
 
     def on_odometry_update(self) -> None:
         """Keep it where it is while the robot goes along."""

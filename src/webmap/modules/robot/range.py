@@ -70,6 +70,7 @@ class Range:
         )
         self.svg = self._placed.svg
         label(self.svg, topic, robot)
+        self._bridge = bridge
         bridge.subscribe(
             topic,
             refusing(robot, topic, self.on_range),
@@ -96,13 +97,12 @@ class Range:
             )
         measured = message.range
         low = nearest if math.isfinite(nearest) else 0.0
-        if math.isnan(measured):
-            self.distance = None
-        elif measured == -math.inf or low <= measured <= reach:
-            self.distance = max(low, measured)
-        else:
-            self.distance = math.inf if measured > reach else None
-        drawn = 0.0 if self.distance is None else min(self.distance, reach)
+        distance = None
+        if measured == -math.inf or low <= measured <= reach:
+            distance = max(low, measured)
+        elif measured > reach:
+            distance = math.inf
+        drawn = 0.0 if distance is None else min(distance, reach)
         if drawn > FARTHEST:
             raise ProtocolError(
                 f"a cone is {FARTHEST:g} m long at the most, got a max_range of "
@@ -110,8 +110,9 @@ class Range:
             )
         draw = partial(self._draw, drawn, view / 2)
         self._placed.stand_in(message.frame_id, message.stamp, draw)
+        self.distance = distance
         self.cone.classes.toggle("clear", self.distance == math.inf)
-        self.svg.set_age(0.0, limit=self.age_limit)
+        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
 
     def _draw(self, reach: float, half: float, tilt: "Transform") -> None:
         if abs(tilt.rows[2][0]) < LEVEL:

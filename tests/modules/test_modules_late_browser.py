@@ -1,0 +1,65 @@
+"""What a slow link brings is drawn as old, though it has only just come."""
+
+import re
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from running_simulators import simulators
+
+from real_browser import watched_tab
+from webmap.testing import FaultProxy, Shape
+from webmap_process import webmap
+
+pytestmark = pytest.mark.browser
+
+LATE = 1.6
+"""Seconds by which everything is late that comes from the robots."""
+
+DRAWN = (".robot", ".laserscan", ".range")
+
+
+def test_what_comes_late_is_drawn_as_old_with_its_age(chromium: Browser):
+    with (
+        simulators("ros2") as found,
+        FaultProxy(urlsplit(found["ros2"].url).port) as link,
+        webmap(
+            "view", f"ws://127.0.0.1:{link.port}", "--port", "0", "--no-browser"
+        ) as url,
+        watched_tab(chromium, 1000, 700) as tab,
+    ):
+        tab.set_default_timeout(20_000)
+        tab.goto(url)
+        for drawn in DRAWN:
+            tab.wait_for_selector(f"{drawn}:not(.stale)", state="attached")
+        assert age_of(tab, ".robot") < 1.0
+        link.shape(Shape(latency=LATE), "down")
+        for drawn in DRAWN:
+            tab.wait_for_selector(f"{drawn}.stale", state="attached")
+        tab.wait_for_timeout(2 * 1000 * LATE)  # what comes now comes late, and often
+        assert tab.evaluate(LEAST_AGES, list(DRAWN)) >= 0.9 * LATE
+        line = tab.locator("#robots .age").first
+        expect(line).to_have_text(re.compile(r"^[1-3]\.\d s$"))
+        link.shape(Shape(), "down")
+        for drawn in DRAWN:
+            tab.wait_for_selector(f"{drawn}:not(.stale)", state="attached")
+
+
+def age_of(tab: Page, selector: str) -> float:
+    return tab.evaluate(LEAST_AGES, [selector])
+
+
+# Looked at for a second, so that what is drawn as new in between is seen.
+LEAST_AGES = """async (selectors) => {
+  let least = Infinity;
+  const end = performance.now() + 1000;
+  while (performance.now() < end) {
+    for (const selector of selectors) {
+      for (const element of document.querySelectorAll(selector)) {
+        least = Math.min(least, Number(element.dataset.age));
+      }
+    }
+    await new Promise(requestAnimationFrame);
+  }
+  return least;
+}"""
