@@ -42,8 +42,43 @@ test("a loop begins anew", () => {
   run.skip("g1");
   run.accepted(0);
   say(run, goal("g3"));
-  assert.deepEqual(say(run, goal("g3", "reached")), { send: POINTS[0] });
+  const later = { now: 1000 };
+  assert.deepEqual(say(run, goal("g3", "reached"), later), { send: POINTS[0] });
   assert.equal(run.rounds, 1);
+});
+
+test("a loop of points that are all reached already sends one goal a second", () => {
+  const run = new RouteRun(POINTS, { loop: true });
+  run.go(null);
+  run.accepted(0);
+  const sent = [];
+  for (let now = 0; now < 10_000; now += 50) {
+    const there = goal(`g${sent.length}`, "sent", { way: "topic" });
+    if (say(run, there, { away: 0.1, now }) === null) continue;
+    sent.push(now);
+    run.accepted(now);
+  }
+  assert.deepEqual(sent, [1, 2, 3, 4, 5, 6, 7, 8, 9].map((second) => 1000 * second));
+});
+
+test("a route that does not loop does not wait at points that are reached at once", () => {
+  assert.deepEqual(say(underWay(), goal("g1", "reached")), { send: POINTS[1] });
+});
+
+test("a STOP while a loop waits at a point that it has reached halts it", () => {
+  const run = underWay({ loop: true });
+  assert.equal(say(run, goal("g1", "reached"), { now: 500 }), null);
+  say(run, goal("g1", "reached"), { now: 1500, latched: true });
+  assert.equal(run.state, "halted");
+});
+
+test("a loop of one point ends there, as there is nowhere to go on to", () => {
+  const run = new RouteRun(POINTS.slice(0, 1), { loop: true });
+  run.go(null);
+  run.accepted(0);
+  say(run, goal("g1"));
+  assert.equal(say(run, goal("g1", "reached"), { now: 60_000 }), null);
+  assert.equal(run.state, "ended");
 });
 
 test("a failure halts it, and a person goes on or skips", () => {

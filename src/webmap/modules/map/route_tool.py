@@ -21,6 +21,8 @@ log = logging.getLogger("webmap.modules.route_tool")
 class RouteTool:
     """Routes of waypoints: drawn on the map, kept by name, gone along by a robot.
 
+    An area that is drawn becomes waypoints of sweeps over it, in the page alone.
+
     The page sends one goal after the other, under the lease that it has: a route goes
     on only as long as its page is there. Routes are kept on the server, in the folder
     of WebMap's state, for each map.

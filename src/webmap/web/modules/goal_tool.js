@@ -6,16 +6,13 @@ import { Marking } from "./marking.js";
 import { lay } from "./overlay.js";
 import { PressAim } from "./press_aim.js";
 import { chosen, poseOf } from "./robot_places.js";
+import { sendGoal } from "./send_goal.js";
 
 /** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
 /** @typedef {import('../halves.js').Half} Half */
 /** @typedef {{button?: boolean, key?: string, spacing?: number}} Options */
-
-/** How long a goal waits, before it is sent, for a link that another goal used up; ms. */
-const LINK_PATIENCE = 2000;
-const LINK_RETRY = 150;
 
 /**
  * Send the selected robots to a place: press there, drag for the heading, release.
@@ -186,7 +183,11 @@ class GoalTool {
       // A STOP, or another goal, that came meanwhile.
       if (this._goals.get(robot) !== goal) continue;
       try {
-        await this._sendOne(robot, pose, goal);
+        const accepted = await sendGoal(
+          () => this._drive.goal(robot, pose),
+          () => this._goals.get(robot) === goal,
+        );
+        if (!accepted) throw new Error("called off");
         if (this._goals.get(robot) === goal) goal.state = "sent";
         if (this._drive.robots.get(robot)?.goal) this._goals.delete(robot);
         this._send({ goal: { robot, ...pose } });
@@ -199,29 +200,6 @@ class GoalTool {
       this._show();
     }
     if (problems.length > 0) say(this._word, `Not sent: ${problems.join("; ")}`);
-  }
-
-  /**
-   * Send one goal. The goal of an action uses its link up, and the gate has a new one a
-   * moment later: the next robot's goal, which was not taken, is offered again.
-   *
-   * @param {string} robot
-   * @param {Pose} pose
-   * @param {object} goal
-   */
-  async _sendOne(robot, pose, goal) {
-    const until = performance.now() + LINK_PATIENCE;
-    for (;;) {
-      try {
-        await this._drive.goal(robot, pose);
-        return;
-      } catch (error) {
-        const linkless = error instanceof Error && error.message.startsWith("no link to");
-        if (!linkless || performance.now() > until) throw error;
-        await new Promise((resolve) => setTimeout(resolve, LINK_RETRY));
-        if (this._goals.get(robot) !== goal) throw new Error("called off");
-      }
-    }
   }
 
   _callOff() {

@@ -12,6 +12,15 @@ export const THERE = 0.3;
 const PATIENCE = 5000;
 
 /**
+ * A loop whose points are all reached already sends a goal as seldom as this, in ms:
+ * nothing else would hold it back.
+ */
+const LOOP_PERIOD = 1000;
+
+/** With fewer points a loop would send the same goal for ever. */
+export const LEAST_LOOP = 2;
+
+/**
  * Decides how one robot goes along a route: which goal is next, and when it ends.
  *
  * Sends nothing by itself: every method returns what is to be done. After a failure, a
@@ -21,11 +30,12 @@ const PATIENCE = 5000;
 export class RouteRun {
   /**
    * @param {Pose[]} points
-   * @param {{loop?: boolean}} [options]
+   * @param {{loop?: boolean}} [options] `loop`: whether it begins anew after the last
+   *     point, if there are {@link LEAST_LOOP} at least.
    */
   constructor(points, { loop = false } = {}) {
     this.points = points;
-    this.loop = loop;
+    this.loop = loop && points.length >= LEAST_LOOP;
     /** The point that it goes to, counted from 0. */
     this.index = 0;
     /** @type {RunState} */
@@ -107,6 +117,18 @@ export class RouteRun {
   }
 
   /**
+   * Take what the gate says of the robot while the goal waits to be offered again.
+   *
+   * @param {Pick<RobotReport, 'latched' | 'goal'>} report
+   * @returns {null}
+   */
+  waits({ latched, goal }) {
+    if (latched) this.halt("STOP was pressed");
+    else if (goal && goal.id !== this._before) this.halt("another goal was sent");
+    return null;
+  }
+
+  /**
    * Take what the gate says of the robot.
    *
    * @param {Pick<RobotReport, 'mine' | 'latched' | 'goal'>} report
@@ -125,13 +147,14 @@ export class RouteRun {
     }
     this._goal ??= goal.id;
     if (goal.id !== this._goal) return this._halted("another goal was sent");
-    if (goal.state === "reached") return this._arrived(goal.id);
+    const since = now - this._acceptedAt;
+    if (goal.state === "reached") return this._arrived(goal.id, since);
     if (look(goal).over || goal.state === "cancelling") {
       const what = goal.state === "failed" ? "failed" : "its goal was cancelled";
       return this._halted(goal.why ? `${what}: ${goal.why}` : what);
     }
     const silent = goal.way === "topic" && away !== null && away < THERE;
-    return silent ? this._arrived(goal.id) : null;
+    return silent ? this._arrived(goal.id, since) : null;
   }
 
   /** @param {string} why @returns {null} */
@@ -140,8 +163,10 @@ export class RouteRun {
     return null;
   }
 
-  /** @param {string} goal @returns {Action} */
-  _arrived(goal) {
+  /** @param {string} goal @param {number} since How old it is. @returns {Action} */
+  _arrived(goal, since) {
+    // The next look at the robot finds it here still.
+    if (this.loop && since < LOOP_PERIOD) return null;
     return this._next() ? this._send(goal) : null;
   }
 

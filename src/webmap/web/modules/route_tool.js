@@ -2,8 +2,10 @@ import { button, html, say } from "./elements.js";
 import { lay } from "./overlay.js";
 import { PressAim } from "./press_aim.js";
 import { poseOf } from "./robot_places.js";
+import { RouteArea } from "./route_area.js";
 import { RoutePoints } from "./route_points.js";
-import { RouteRun } from "./route_run.js";
+import { RouteRobots } from "./route_robots.js";
+import { LEAST_LOOP } from "./route_run.js";
 import { SavedRoutes } from "./route_saved.js";
 
 /** @typedef {import('./aim.js').Pose} Pose */
@@ -14,8 +16,11 @@ import { SavedRoutes } from "./route_saved.js";
 /** As many as the server keeps of one route. */
 const MOST_POINTS = 500;
 
+const TOO_SHORT = `A loop needs ${LEAST_LOOP} points at least.`;
+
 /**
- * Routes: points that are pressed on the map, and a robot that goes from one to the next.
+ * Routes: points that are pressed on the map, or lie over an area there, and a robot that
+ * goes from one to the next.
  *
  * Sends `{op: "save", name, route}`, `{op: "load", name}` and `{op: "delete", name}`;
  * hears `{routes: [name]}`, `{loaded: {name, points, loop}}`, `{saved: name}` and
@@ -48,8 +53,6 @@ class RouteTool {
     this._drive = map.drive;
     /** @type {Pose[]} */
     this._points = [];
-    /** @type {Map<string, {run: RouteRun, busy: boolean}>} The robots on their routes. */
-    this._runs = new Map();
     /** @type {Pose | null} A point that is being aimed. */
     this._aimed = null;
     this._listed = "";
@@ -64,7 +67,19 @@ class RouteTool {
       origin: () => this._points.at(-1) ?? this._robotPose(),
       lasting: true,
     });
+    this._robots = new RouteRobots(
+      this._drive,
+      (robot) => poseOf(map, robot),
+      () => this._show(),
+    );
     this._drawing = new RoutePoints(map, (index, pose) => this._change(index, pose));
+    this._area = new RouteArea(map, {
+      mayBegin: () => this._details.open,
+      room: () => MOST_POINTS - this._points.length,
+      here: () => this._robotPose(),
+      take: (points) => this._set([...this._points, ...points], this._loops),
+      changed: () => this._show(),
+    });
     this._edit = button("webmap-route-edit", "Add points", () => this._aim.toggle());
     this._edit.title = "Press on the map for each point";
     this._here = button("webmap-route-here", "Its place", () => {
@@ -93,30 +108,38 @@ class RouteTool {
       "webmap-panel webmap-route",
       {},
       html("summary", "", {}, "Route"),
-      html("div", "webmap-route-row begin", {}, this._edit, this._here, this._clear),
+      html(
+        "div",
+        "webmap-route-row begin",
+        {},
+        ...[this._edit, this._area.button, this._here, this._clear],
+      ),
+      this._area.element,
       this._list,
       html("div", "webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
       this._word,
       this._saved.element,
     );
     this._details.addEventListener("toggle", () => {
-      if (!this._details.open) this._aim.leave();
+      if (!this._details.open) for (const each of [this._aim, this._area]) each.leave();
       this._show();
     });
     this._offs = [
       lay(map, this._details, "top-left"),
       map.onSelect(() => this._show()),
-      this._drive.on("robot", ({ robot }) => this._look(robot)),
-      this._drive.on("step", () => this._keep()),
     ];
-    this._timer = setInterval(() => this._lookAll(), 250);
+    this._timer = setInterval(() => {
+      this._robots.look();
+      this._show();
+    }, 250);
     this._show();
   }
 
   destroy() {
     clearInterval(this._timer);
-    // Nobody is left to send the next goal; the one that is under way stays as it is.
+    this._robots.destroy();
     this._aim.destroy();
+    this._area.destroy();
     this._drawing.destroy();
     for (const off of this._offs) off();
   }
@@ -183,98 +206,33 @@ class RouteTool {
     const { selected } = this._map;
     if (selected === null || this._points.length === 0) return;
     this._aim.leave();
-    const run = new RouteRun([...this._points], { loop: this._loops });
-    this._runs.set(selected, { run, busy: false });
-    this._perform(selected, run.go(this._goalOf(selected)));
+    this._robots.begin(selected, [...this._points], { loop: this._loops });
   }
 
   _pauseOrGoOn() {
-    const { run } = this._chosen() ?? {};
+    const { run } = this._robots.of(this._map.selected) ?? {};
     this._do(run?.state === "going" ? "pause" : "go");
   }
 
   /** @param {'go' | 'pause' | 'skip' | 'end'} what */
   _do(what) {
-    const { selected } = this._map;
-    const { run } = this._chosen() ?? {};
-    if (selected === null || !run) return;
-    this._perform(selected, run[what](this._goalOf(selected)));
-  }
-
-  /**
-   * @param {string} robot
-   * @param {import('./route_run.js').Action} action
-   */
-  _perform(robot, action) {
-    if (action && "send" in action) void this._send(robot, action.send);
-    else if (action) this._drive.cancel(robot);
-    this._show();
-  }
-
-  /** @param {string} robot @param {Pose} pose */
-  async _send(robot, pose) {
-    const going = this._runs.get(robot);
-    if (!going) return;
-    going.busy = true;
-    try {
-      await this._drive.goal(robot, pose);
-      going.run.accepted(performance.now());
-    } catch (error) {
-      going.run.halt(error instanceof Error ? error.message : String(error));
-    }
-    going.busy = false;
-    this._look(robot);
-    this._show();
-  }
-
-  _keep() {
-    for (const [robot, { run }] of this._runs) {
-      if (run.state === "going") this._drive.keep(robot);
-    }
-  }
-
-  _lookAll() {
-    for (const robot of this._runs.keys()) this._look(robot);
-    this._show();
-  }
-
-  /** @param {string} robot */
-  _look(robot) {
-    const { run, busy } = this._runs.get(robot) ?? {};
-    if (!run || busy || run.state !== "going") return;
-    const report = this._drive.robots.get(robot);
-    if (!report) {
-      run.halt("the robot is gone");
-      return;
-    }
-    const at = poseOf(this._map, robot);
-    const point = run.points[run.index];
-    const away = at && Math.hypot(at.x - point.x, at.y - point.y);
-    const told = { ...report, mine: this._drive.holds(robot) };
-    this._perform(robot, run.report(told, away, performance.now()));
-  }
-
-  /** @param {string} robot */
-  _goalOf(robot) {
-    return this._drive.robots.get(robot)?.goal?.id ?? null;
-  }
-
-  _chosen() {
-    const { selected } = this._map;
-    return selected === null ? undefined : this._runs.get(selected);
+    if (this._map.selected !== null) this._robots.act(this._map.selected, what);
   }
 
   // What is seen ---------------------------------------------------------------
 
   _show() {
-    const { run, busy = false } = this._chosen() ?? {};
+    const { run, busy = false } = this._robots.of(this._map.selected) ?? {};
     const live = run?.live === true;
     const report = this._drive.robots.get(this._map.selected ?? "");
     const open = this._details.open;
     this._edit.setAttribute("aria-pressed", String(this._aim.active));
     say(this._edit, this._aim.active ? "Done" : "Add points");
     // So that there is a map to press on, on a phone too.
-    this._details.classList.toggle("adding", this._aim.active || this._aim.waits);
+    const adding = this._aim.active || this._aim.waits || this._area.draws;
+    this._details.classList.toggle("adding", adding);
+    this._details.classList.toggle("area", this._area.active);
+    this._area.look();
     this._loop.setAttribute("aria-pressed", String(this._loops));
     this._here.disabled = this._robotPose() === null;
     this._clear.disabled = this._points.length === 0;
@@ -284,7 +242,8 @@ class RouteTool {
     for (const each of [this._pause, this._skip]) each.disabled = busy;
     say(this._pause, run?.state === "going" ? "Pause" : "Go on");
     say(this._word, this._words(run, report?.name ?? ""));
-    this._word.dataset.state = run?.state ?? "";
+    const refused = this._area.refused ? "refused" : "";
+    this._word.dataset.state = this._area.active ? refused : (run?.state ?? "");
     this._showList();
     const points = this._aimed ? [...this._points, this._aimed] : this._points;
     const shown = open ? points : live ? run.points : [];
@@ -295,10 +254,18 @@ class RouteTool {
     });
   }
 
-  /** @param {RouteRun | undefined} run @param {string} name */
+  /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
   _words(run, name) {
     if (this._aim.active) return "Press on the map for each point, drag for the heading.";
     if (this._aim.waits) return "More points afterwards.";
+    if (this._area.active) return this._area.words;
+    const how = this._running(run, name);
+    const short = this._loops && this._points.length < LEAST_LOOP;
+    return short ? `${how} ${TOO_SHORT}`.trim() : how;
+  }
+
+  /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
+  _running(run, name) {
     if (run === undefined) {
       return this._map.selected === null ? "Select the robot that is to go." : "";
     }
