@@ -51,12 +51,8 @@ def standing(witness):
     return witness.speed(ODOM) == (0.0, 0.0)
 
 
-def test_anybody_stops_a_robot_that_somebody_else_drives(
-    server, witness, tab, chromium
-):
+def test_anybody_stops_a_robot_that_somebody_else_drives(server, witness, tab, other):
     open_and_drive(tab, server, witness)
-    context = chromium.new_context()
-    other = context.new_page()
     other.goto(server.url)
     row = other.locator("#robots .row")
     expect(row).to_contain_text(re.compile("drives|holds it"))
@@ -66,13 +62,10 @@ def test_anybody_stops_a_robot_that_somebody_else_drives(
     tab.wait_for_timeout(700)
     assert standing(witness), "the key that is still held drives on"
     tab.keyboard.up("s")
-    context.close()
 
 
-def test_only_one_of_two_viewers_drives(server, witness, tab, chromium):
+def test_only_one_of_two_viewers_drives(server, witness, tab, other):
     open_and_drive(tab, server, witness)
-    context = chromium.new_context()
-    other = context.new_page()
     other.goto(server.url)
     other.locator("#robots .row button").click()
     expect(other.locator(".webmap-teleop")).to_have_attribute("data-state", "held")
@@ -81,7 +74,6 @@ def test_only_one_of_two_viewers_drives(server, witness, tab, chromium):
     other.wait_for_timeout(600)
     assert witness.speed(ODOM)[0] <= 0, "the other's key had an effect"
     other.keyboard.up("w")
-    context.close()
     tab.keyboard.up("s")
     wait_until(lambda: standing(witness), what="standing still")
 

@@ -146,16 +146,13 @@ def test_a_click_on_the_robot_selects_and_one_on_nothing_clears(opened):
     opened.locator(".robot:not(.selected)").wait_for()
 
 
-def test_a_selection_is_in_one_viewers_page_only(opened, chromium, server):
-    context = chromium.new_context()
-    other = context.new_page()
+def test_a_selection_is_in_one_viewers_page_only(opened, other, server):
     other.goto(server.url)
     other.locator(".robot:not(.unplaced)").wait_for(state="attached")
     opened.mouse.click(*robot_on_screen(opened))
     opened.locator(".robot.selected").wait_for()
     other.wait_for_timeout(300)
     assert other.locator(".robot.selected").count() == 0
-    context.close()
 
 
 def select(tab):
@@ -174,10 +171,12 @@ def test_each_key_drives_the_selected_robot_while_it_is_held(
     before = robot_place(opened)
 
     def moving():
+        # The speeds that the tutorial says, which a base that nobody vouches for
+        # is never driven at.
         v, w = witness.speed(ODOM)
         if forward:
-            return v * forward > 0.2 and math.dist(before, robot_place(opened)) > 0.1
-        return w * turn > 0.3
+            return v * forward > 0.9 and math.dist(before, robot_place(opened)) > 0.1
+        return w * turn > 1.3
 
     hold(opened.keyboard, key, moving)
     opened.keyboard.up(key)
@@ -229,14 +228,12 @@ def test_a_hidden_tab_stops_the_robot_and_coming_back_does_not_start_it(
         tab.close()
 
 
-def test_a_closed_tab_stops_the_robot(opened, witness, chromium, server):
-    context = chromium.new_context()
-    other = context.new_page()
+def test_a_closed_tab_stops_the_robot(opened, witness, other, server):
     other.goto(server.url)
     other.locator(".robot:not(.unplaced)").wait_for(state="attached")
     select(other)
     hold(other.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
-    context.close()
+    other.context.close()
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
 
 

@@ -4,6 +4,7 @@ import warnings
 from types import SimpleNamespace
 
 import pytest
+from page_loop import Loop
 from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite
 
 with warnings.catch_warnings():
@@ -56,3 +57,10 @@ def client(app, make_client):
     client = make_client(app)
     assert client.get(f"/?token={TOKEN}").status_code == 303
     return client
+
+
+@pytest.fixture
+def loop():
+    loop = Loop()
+    yield loop
+    loop.end()

@@ -2,115 +2,18 @@
 
 import gc
 import json
-import threading
-import time
-from pathlib import Path
 
 import pytest
+from page_loop import HELLO, make_model, open_page, wait_for
 
 import webmap
 from webmap.core.layer import Layer
-from webmap.core.page import PageEntry
-from webmap.core.runtime import Runtime
-from webmap.core.tasks import spawn
+from webmap.modules.robot.laser_scanner import LaserScanner, SweepMsg
+from webmap.ros.events import Publish
 from webmap.scope import Removal, keep
 from webmap.server import page_host as host_module
-from webmap.server.model import Model
-from webmap.server.published import Published
 from webmap.server.viewer import Viewer
-
-ANN = Viewer("v1", "Ann")
-HELLO = {
-    "op": "hello",
-    "page": "page0001",
-    "url": "/",
-    "width": 800,
-    "height": 600,
-    "containers": {"webmap_container": [700, 500]},
-}
-
-
-class Loop:
-    """The runtime's thread, without gate and bridges."""
-
-    def __init__(self) -> None:
-        self.runtime = Runtime()
-        self.ready = threading.Event()
-        self.thread = threading.Thread(target=self._run)
-        self.thread.start()
-        assert self.ready.wait(10)
-
-    def _run(self) -> None:
-        import asyncio
-
-        async def live() -> None:
-            runtime = self.runtime
-            runtime._loop = asyncio.get_running_loop()
-            runtime._thread = self.thread
-            self.over = asyncio.Event()
-            ticking = spawn(runtime._tick_on())
-            self.ready.set()
-            await self.over.wait()
-            ticking.cancel()
-
-        asyncio.run(live())
-
-    def call(self, fn, *args):
-        """Call in the model's thread and return what it returned."""
-        done, result = threading.Event(), []
-
-        def run() -> None:
-            try:
-                result.append(fn(*args))
-            finally:
-                done.set()
-
-        self.runtime.call(run)
-        assert done.wait(30)
-        assert result, "it raised; the log says what"
-        return result[0]
-
-    def end(self) -> None:
-        self.runtime.call(self.over.set)
-        self.thread.join(10)
-
-
-class Outbox:
-    def __init__(self) -> None:
-        self.frames: list[bytes] = []
-        self.reason: str | None = None
-
-    def offer(self, data: bytes) -> None:
-        self.frames.append(data)
-
-    def close(self, reason: str) -> None:
-        self.reason = reason
-
-
-@pytest.fixture
-def loop():
-    loop = Loop()
-    yield loop
-    loop.end()
-
-
-def make_model(loop, function):
-    entry = PageEntry("/", function, None, Path(), "test")
-    return Model(loop.runtime, {"/": entry}, Published())
-
-
-def open_page(model, page_id="page0001", viewer=ANN):
-    outbox = Outbox()
-    handle = model.open_scene("/", page_id, viewer, outbox)
-    handle.receive(json.dumps({**HELLO, "page": page_id}))
-    return handle, outbox
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.01)
+from webmap.testing.witness import WitnessRobot
 
 
 def test_the_page_function_knows_the_container_and_a_frame_comes(loop):
@@ -215,6 +118,7 @@ class Link:
     """A bridge that counts who listens."""
 
     url = "ws://test:9090"
+    lag = 0.0
 
     def __init__(self) -> None:
         self.listeners: list = []
@@ -326,3 +230,63 @@ def test_fifty_viewers_of_one_grid_cost_one_decode_and_one_encoding(loop):
     }
     assert len(bodies) == 1
     loop.call(lambda: model.close() or True)
+
+
+SCAN = {
+    "header": {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "laser"},
+    "angle_min": 0.0,
+    "angle_increment": 0.1,
+    "range_min": 0.1,
+    "range_max": 9.0,
+    "ranges": [1.0] * 20,
+}
+
+
+def counted(monkeypatch, owner, name):
+    """Note the arguments of each call of a method, which goes on as it is."""
+    calls, method = [], getattr(owner, name)
+
+    def noting(self, *args):
+        calls.append(args)
+        return method(self, *args)
+
+    monkeypatch.setattr(owner, name, noting)
+    return calls
+
+
+def test_fifty_viewers_of_one_scan_cost_one_decode_and_one_drawing(loop, monkeypatch):
+    decoded = counted(monkeypatch, Publish, "_decode")
+    drawn = counted(monkeypatch, LaserScanner, "_draw")
+    with WitnessRobot() as there:
+        bridge, bob = webmap.Bridge(there.url), webmap.Robot("Bob")
+        bob.add_module("LaserScanner", bridge, "/scan")
+
+        def build(page):
+            webmap.Map(page.element("webmap_container")).add_robot(bob)
+
+        def subscribed():
+            said = [heard.message for heard in there.log.heard]
+            return [m for m in said if (m["op"], m["topic"]) == ("subscribe", "/scan")]
+
+        model = make_model(loop, build)
+        pages = [open_page(model, f"page{number:04}") for number in range(50)]
+        wait_for(lambda: all(outbox.frames for _, outbox in pages))
+        for handle, outbox in pages:
+            for frame in range(1, len(outbox.frames) + 1):
+                handle.receive(json.dumps({"op": "seen", "frame": frame}))
+        loop.call(lambda: bridge.start(loop.runtime._loop) or True)
+        wait_for(subscribed)
+        said = [len(outbox.frames) for _, outbox in pages]
+        there.publish("/scan", SCAN)
+        wait_for(
+            lambda: all(
+                len(outbox.frames) > count
+                for (_, outbox), count in zip(pages, said, strict=True)
+            )
+        )
+        assert len(drawn) == 1
+        assert decoded == [(SweepMsg,)]
+        assert len(subscribed()) == 1
+        loop.call(lambda: model.close() or True)
+        loop.call(lambda: bob.destroy() or True)
+        loop.wait(bridge.stop())

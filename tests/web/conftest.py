@@ -40,7 +40,7 @@ def open_bench(chromium: Browser, gate: FakeDrive) -> Iterator[Callable[..., Ben
     yield open_bench
     for bench in benches:
         bench.context.close()
-    assert [problem for bench in benches for problem in bench.problems] == []
+    assert [line for bench in benches for line in bench.complaints.unexpected] == []
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "wire"))
 
 from wire_picture import f32, histories, play
 
+from real_browser import watched_tab
 from webmap.geometry import Affine
 from webmap.scene import Text
 from webmap.wire import SceneSession
@@ -95,11 +96,9 @@ def expected(node, mount=None):
 def blank(chromium, request):
     from scene_host import SceneHost
 
-    with SceneHost() as host:
-        page = chromium.new_page()
+    with SceneHost() as host, watched_tab(chromium, 800, 600) as page:
         page.goto(host.url)
         yield page
-        page.close()
 
 
 @given(histories)

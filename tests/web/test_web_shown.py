@@ -107,6 +107,67 @@ def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> Non
     alarm.wait_for(timeout=5000)
 
 
+IN_THE_MIDDLE = """() => {
+    const title = document.querySelector(".webmap-alarm-title").getBoundingClientRect();
+    const page = [innerWidth / 2, innerHeight / 2];
+    const words = [title.x + title.width / 2, title.y + title.height / 2];
+    const at = (x, y) => document.elementFromPoint(x, y).closest(".webmap-alarm");
+    return at(...page) !== null && at(...words) !== null;
+}"""
+"""Whether what is seen there is the alarm."""
+
+OPEN = """(kind) => {
+    const cover = document.createElement(kind === "dialog" ? "dialog" : "section");
+    if (kind !== "dialog") cover.popover = kind;
+    for (const side of ["position", "inset", "width", "height"]) {
+        cover.style[side] = {position: "fixed", inset: 0}[side] ?? "100%";
+    }
+    document.body.append(cover);
+    if (kind === "dialog") cover.show();
+    else cover.showPopover();
+}"""
+
+
+def test_the_alarm_lies_above_what_is_open_and_what_opens(open_bench) -> None:
+    phone = {"width": 390, "height": 844}
+    bench = open_bench("?modules=stop,teleop", viewport=phone, has_touch=True)
+    bench.page.evaluate(OPEN, "auto")
+    bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
+    alarm = bench.page.get_by_role("alert")
+    alarm.wait_for(timeout=5000)
+    assert bench.page.evaluate(IN_THE_MIDDLE)
+    assert alarm.bounding_box() == {"x": 0, "y": 0, **phone}
+    for kind in ("manual", "auto", "dialog"):
+        bench.page.evaluate(OPEN, kind)
+        bench.until(lambda: bench.page.evaluate(IN_THE_MIDDLE))
+    alarm.get_by_role("button", name="Stop all").click()
+    bench.until(lambda: len(bench.gate.of("stop")) == 1)
+    bench.page.keyboard.press("Escape")
+    bench.until(lambda: len(bench.gate.of("stop")) == 2)
+    bench.gate.change("r1", alarm=None)
+    alarm.wait_for(state="detached")
+    bench.page.evaluate(OPEN, "auto")
+    bench.page.wait_for_timeout(100)
+    assert alarm.count() == 0
+
+
+def test_the_alarms_of_two_maps_do_not_rise_above_each_other_for_ever(
+    open_bench,
+) -> None:
+    bench = open_bench("?two&modules=stop,teleop")
+    bench.page.evaluate(
+        """() => {
+            window.toggles = 0;
+            document.addEventListener("toggle", () => { toggles += 1; }, true);
+        }"""
+    )
+    bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
+    bench.page.get_by_role("alert").first.wait_for(timeout=5000)
+    bench.page.evaluate(OPEN, "auto")
+    bench.page.wait_for_timeout(300)
+    assert bench.page.evaluate("toggles") < 10
+
+
 def test_a_robots_line_has_a_width_that_any_word_of_the_user_overrides(
     bench: Bench,
 ) -> None:

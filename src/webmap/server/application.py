@@ -1,6 +1,7 @@
 """``webmap.page``, ``run``, ``start``, ``stop`` and ``asgi_app``."""
 
 import logging
+import threading
 import webbrowser
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
@@ -144,7 +145,8 @@ def _serve(
     def ready(url: str) -> None:
         announce(url)
         if open_browser:
-            webbrowser.open(url)
+            # Some browsers return only when they are closed.
+            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
     try:
         runtime.start()

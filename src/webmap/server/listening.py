@@ -3,11 +3,11 @@
 Bound first, so that a port in use is one sentence and not half a server.
 """
 
-import errno
 import os
 import socket
 
 from webmap.errors import ConfigError
+from webmap.not_listening import why_not_listening
 from webmap.server.origins import WILDCARD, is_loopback
 
 _BACKLOG = 256
@@ -64,7 +64,7 @@ def listen(host: str, port: int) -> socket.socket:
         listener.listen(_BACKLOG)
     except OSError as error:
         listener.close()
-        raise ConfigError(_why_not(host, port, error)) from error
+        raise ConfigError(why_not_listening(host, port, error)) from error
     return listener
 
 
@@ -73,16 +73,3 @@ def url_of(listener: socket.socket, host: str) -> str:
     name = "127.0.0.1" if host in WILDCARD else host
     bracketed = f"[{name}]" if ":" in name else name
     return f"http://{bracketed}:{listener.getsockname()[1]}/"
-
-
-def _why_not(host: str, port: int, error: OSError) -> str:
-    if error.errno == errno.EADDRINUSE:
-        return (
-            f"port {port} on {host} is in use: end what uses it, choose another port, "
-            "or 0 to let the kernel choose"
-        )
-    if error.errno == errno.EACCES:
-        return f"port {port} on {host} is not permitted: choose one from 1024 up"
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{host} is not an address of this machine"
-    return f"cannot listen on {host}, port {port}: {error.strerror}"

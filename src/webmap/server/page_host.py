@@ -232,7 +232,10 @@ class PageHost:
             with page.scope.active():
                 await result
         except Exception as error:
-            self._failed(error)
+            if page.closed:  # nobody looks any more, and it may well be for that
+                log.info("%r was closed before it was built: %s", self, error)
+            else:
+                self._failed(error)
 
     def _failed(self, error: Exception) -> None:
         log.error("%r: the page function failed", self, exc_info=error)

@@ -155,7 +155,10 @@ export class Page {
 
   /** @param {string} text */
   _disconnected(text) {
-    document.documentElement.classList.add("disconnected");
+    const { classList } = document.documentElement;
+    // Who drives goes by the picture: a press that began on a live one ends with it.
+    if (!classList.contains("disconnected")) this._drive?.doubt();
+    classList.add("disconnected");
     this.notices.show("link", text);
   }
 

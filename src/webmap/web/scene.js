@@ -1,3 +1,4 @@
+import { BASE } from "./addresses.js";
 import { Ages } from "./ages.js";
 import { DisplayClock } from "./clock.js";
 import { Dots } from "./dots.js";
@@ -12,6 +13,9 @@ import { readFrame } from "./wire.js";
 /** @typedef {import('./wire.js').Matrix} Matrix */
 /** @typedef {import('./wire.js').Sink} Sink */
 /** @typedef {import('./wire.js').ViewState} ViewState */
+
+/** How many images that cannot be loaded are told of. */
+const MOST_LOST = 20;
 
 /**
  * What the scene asks of the page that it is on.
@@ -57,6 +61,21 @@ export class Scene {
     this._heard = new WeakMap();
     this._reselected = false;
     this._onGone = this._onGone.bind(this);
+    /** @type {Set<string>} The paths of images that could not be loaded. */
+    this._lost = new Set();
+    // Such an error does not bubble, but is heard on its way down.
+    document.addEventListener("error", ({ target }) => this._onLost(target), true);
+  }
+
+  /** @param {EventTarget | null} target Could not be loaded. */
+  _onLost(target) {
+    if (!(target instanceof SVGImageElement) || !this.mapOf(target)) return;
+    const { href, pathname } = new URL(target.getAttribute("href") ?? "", document.baseURI);
+    // Of ours the next version may be on its way, and whoever draws them sees to that.
+    if (href.startsWith(BASE.href) || this._lost.has(pathname)) return;
+    if (this._lost.size >= MOST_LOST) return;
+    this._lost.add(pathname);
+    this._page.notice(`The image ${pathname} could not be loaded.`);
   }
 
   /**

@@ -1,0 +1,49 @@
+"""Somebody drives, and the page's picture is cut off while its other line holds."""
+
+import json
+import threading
+
+import pytest
+from playwright.sync_api import expect
+from processes import WEB, hold, running, wait_until
+
+pytestmark = pytest.mark.browser
+
+
+def test_who_drives_lets_go_when_the_picture_is_cut_off(tab):
+    pictures, said = [], []
+    cut = threading.Event()
+
+    def through(route):
+        pictures.append(route)
+        if not cut.is_set():
+            route.connect_to_server()
+
+    def listen(link):
+        if "/drive" in link.url:
+            link.on("framesent", lambda frame: said.append(json.loads(frame)))
+
+    tab.route_web_socket("**/scene*", through)
+    tab.on("websocket", listen)
+    demo = ("demo", "--robots", 1, "--port", 0, "--no-browser")
+    with running(*demo, pattern=WEB) as process:
+        tab.goto(process.url)
+        tab.locator("#robots .row button").first.click()
+        expect(tab.locator(".robot.selected")).to_be_attached()
+
+        def asked():
+            tab.wait_for_timeout(20)
+            last = [word["x"] for word in said if word["op"] == "drive"][-1:]
+            return last[0] if last else None
+
+        hold(tab.keyboard, "w", lambda: asked() == 1)
+        cut.set()
+        pictures[-1].close()
+        wait_until(lambda: asked() == 0, what="letting go")
+        cut.clear()
+        pictures[-1].close()
+        expect(tab.locator("html.disconnected")).not_to_be_attached()
+        assert asked() == 0, "a key that is held on moves nothing"
+        tab.keyboard.up("w")
+        hold(tab.keyboard, "w", lambda: asked() == 1)
+        tab.close()

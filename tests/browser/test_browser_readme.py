@@ -1,0 +1,51 @@
+"""The twelve lines of the first page, as a stranger types them."""
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+from processes import BRIDGE, WEB, hold, running
+from robots import Witness
+
+pytestmark = pytest.mark.browser
+
+ROOT = Path(__file__).parents[2]
+
+
+def program(page: str) -> str:
+    """Return the program with a bridge that stands on a page of the docs."""
+    text = (ROOT / page).read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S)
+    [found] = [block for block in blocks if "webmap.Bridge(" in block]
+    return found
+
+
+def test_the_documentation_begins_with_the_same_twelve_lines():
+    text = program("README.md")
+    assert program("docs/index.md") == text
+    assert len([line for line in text.splitlines() if line.strip()]) == 12
+
+
+def test_they_show_a_robot_that_can_be_clicked_and_driven(tab, tmp_path):
+    simulator = ("sim", "--flat", "--port", 0, "--seed", 7)
+    file = tmp_path / "first.py"
+    with running(*simulator, pattern=BRIDGE) as robot:
+        text = program("README.md")
+        assert text.count("ws://localhost:9090") == 1
+        file.write_text(text.replace("ws://localhost:9090", robot.url))
+        command = ("run", file, "--port", 0, "--no-browser")
+        with running(*command, pattern=WEB) as process:
+            tab.goto(process.url)
+            expect(tab.locator(".dot[d]")).to_be_attached()
+            circle = tab.locator(".robot circle").first
+            expect(circle).to_be_in_viewport()
+            assert circle.bounding_box()["width"] == pytest.approx(16, abs=1)
+            circle.click()
+            expect(tab.locator(".robot.selected")).to_be_attached()
+            witness = Witness(robot.url)
+            witness.follow("/odom", "nav_msgs/Odometry")
+            hold(tab.keyboard, "w", lambda: witness.speed("/odom")[0] > 0.9)
+            tab.keyboard.up("w")
+            witness.close()
+            tab.close()

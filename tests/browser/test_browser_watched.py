@@ -1,0 +1,61 @@
+"""What a page complains of fails the test, whichever page of the test it is."""
+
+import pytest
+from playwright.sync_api import Page
+
+from real_browser import watched_tab
+
+pytestmark = pytest.mark.browser
+
+
+def the_same(page: Page) -> Page:
+    return page
+
+
+def another(page: Page) -> Page:
+    return page.context.new_page()
+
+
+def one_that_it_opens(page: Page) -> Page:
+    with page.expect_popup() as popup:
+        page.evaluate("void window.open('about:blank')")
+    return popup.value
+
+
+def failure(chromium, do) -> str:
+    """Return why a test fails that does something with its tab."""
+    try:
+        with watched_tab(chromium, 400, 300) as tab:
+            do(tab)
+    except AssertionError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("which", [the_same, another, one_that_it_opens])
+@pytest.mark.parametrize(
+    ("kind", "script"),
+    [
+        ("error", "console.error('ouch')"),
+        ("warning", "console.warn('ouch')"),
+        ("exception", "setTimeout(() => { throw 'ouch'; })"),
+    ],
+)
+def test_a_complaint_of_any_page_of_a_tab_s_context_fails_its_test(
+    chromium, which, kind, script
+):
+    def do(tab: Page) -> None:
+        page = which(tab)
+        page.evaluate(f"() => {{ {script}; }}")
+        page.evaluate("new Promise(done => setTimeout(done))")
+
+    assert f"{kind}: ouch" in failure(chromium, do)
+
+
+def test_what_a_test_provokes_is_named_and_nothing_else_is_let_pass(chromium):
+    def do(tab: Page) -> None:
+        tab.allowed = ["expected"]
+        tab.evaluate("console.error('as expected'), console.error('another')")
+
+    assert "another" in failure(chromium, do)
+    assert "expected" not in failure(chromium, do)

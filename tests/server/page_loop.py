@@ -1,0 +1,102 @@
+"""The model's thread with pages in it, but for sockets: what the server would do."""
+
+import asyncio
+import json
+import threading
+import time
+from pathlib import Path
+
+from webmap.core.page import PageEntry
+from webmap.core.runtime import Runtime
+from webmap.core.tasks import spawn
+from webmap.server.model import Model
+from webmap.server.published import Published
+from webmap.server.viewer import Viewer
+
+ANN = Viewer("v1", "Ann")
+HELLO = {
+    "op": "hello",
+    "page": "page0001",
+    "url": "/",
+    "width": 800,
+    "height": 600,
+    "containers": {"webmap_container": [700, 500], "map": [700, 500]},
+}
+
+
+class Loop:
+    """The runtime's thread, without gate and bridges."""
+
+    def __init__(self) -> None:
+        self.runtime = Runtime()
+        self.ready = threading.Event()
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+        assert self.ready.wait(10)
+
+    def _run(self) -> None:
+        async def live() -> None:
+            runtime = self.runtime
+            runtime._loop = asyncio.get_running_loop()
+            runtime._thread = self.thread
+            self.over = asyncio.Event()
+            ticking = spawn(runtime._tick_on())
+            self.ready.set()
+            await self.over.wait()
+            ticking.cancel()
+
+        asyncio.run(live())
+
+    def call(self, fn, *args):
+        """Call in the model's thread and return what it returned."""
+        done, result = threading.Event(), []
+
+        def run() -> None:
+            try:
+                result.append(fn(*args))
+            finally:
+                done.set()
+
+        self.runtime.call(run)
+        assert done.wait(30)
+        assert result, "it raised; the log says what"
+        return result[0]
+
+    def wait(self, work):
+        """Run a coroutine in the model's thread and return what it returned."""
+        return asyncio.run_coroutine_threadsafe(work, self.runtime._loop).result(30)
+
+    def end(self) -> None:
+        self.runtime.call(self.over.set)
+        self.thread.join(10)
+
+
+class Outbox:
+    def __init__(self) -> None:
+        self.frames: list[bytes] = []
+        self.reason: str | None = None
+
+    def offer(self, data: bytes) -> None:
+        self.frames.append(data)
+
+    def close(self, reason: str) -> None:
+        self.reason = reason
+
+
+def make_model(loop, function):
+    entry = PageEntry("/", function, None, Path(), "test")
+    return Model(loop.runtime, {"/": entry}, Published())
+
+
+def open_page(model, page_id="page0001", viewer=ANN):
+    outbox = Outbox()
+    handle = model.open_scene("/", page_id, viewer, outbox)
+    handle.receive(json.dumps({**HELLO, "page": page_id}))
+    return handle, outbox
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + 20
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.01)

@@ -1,0 +1,128 @@
+"""Consoles as they come and go: nothing of one is left when its page is closed."""
+
+import asyncio
+import gc
+
+import pytest
+from page_loop import make_model, open_page, wait_for
+
+from webmap import Bridge, Robot
+from webmap.console import RobotDescription
+from webmap.console.fleet import make_robot
+from webmap.console.opened import Console
+from webmap.console.page import build as build_console
+from webmap.core.bridge_log import log_of
+from webmap.core.layer import Layer
+from webmap.modules.map.rosout_panel import RosoutPanel
+from webmap.server import page_host as host_module
+
+
+@pytest.fixture
+def bridge():
+    return Bridge("ws://localhost:9090")
+
+
+@pytest.fixture
+def robots(loop, bridge):
+    def make():
+        return [
+            make_robot(
+                RobotDescription(
+                    name=name,
+                    bridge=bridge,
+                    odometry=f"/{name}/odom",
+                    twist=f"/{name}/cmd_vel",
+                    scan=f"/{name}/scan",
+                    battery=f"/{name}/battery",
+                    cameras=(f"/{name}/camera/compressed",),
+                    goal=f"/{name}/goal",
+                    initial_pose=f"/{name}/initialpose",
+                )
+            )
+            for name in ("Bob", "Ann", "Cid")
+        ]
+
+    robots = loop.call(make)
+    yield robots
+    loop.call(lambda: [robot.destroy() for robot in robots])
+
+
+class Held:
+    """Everything that outlives pages, counted."""
+
+    def __init__(self, bridge: Bridge, robots: list[Robot]) -> None:
+        # Tasks and the bridge are asked for in the model's thread, as they live there.
+        self.tasks = len(asyncio.all_tasks())
+        self.topics = {
+            name: len(topic.listeners) for name, topic in bridge._topics.items()
+        }
+        self.callbacks = [
+            len(callbacks)
+            for callbacks in (bridge._on_open, bridge._on_close, bridge._on_error)
+        ]
+        self.modules = [len(robot.modules) for robot in robots]
+        self.maps = [len(robot.maps) for robot in robots]
+        self.elements = [len(robot.fragment) for robot in robots]
+        self.watched = [m.watched for r in robots for m in r.modules if _camera(m)]
+        self.listeners = sum(
+            len(element._listeners) for robot in robots for element in _all(robot.svg)
+        )
+        self.layers = len(Layer._shared)
+        self.log_watchers = log_of(bridge)._watchers
+
+
+def _camera(module: object) -> bool:
+    return hasattr(module, "watched")
+
+
+def _all(element):
+    yield element
+    for child in getattr(element, "children", ()):
+        if hasattr(child, "children"):
+            yield from _all(child)
+
+
+def test_a_hundred_consoles_opened_and_closed_leave_nothing_behind(
+    loop, bridge, robots, monkeypatch
+):
+    monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
+    opened, held, names = Console(), {}, []
+
+    def build(page):
+        build_console(page, [bridge], robots, None, "test")
+        opened.opened(page)
+        (map,) = page.maps
+        # The card with its feed and its camera, and the log: all that listens.
+        map.set_selected(robots[len(names) % 3])
+        panel = next(m for m in map.modules if isinstance(m, RosoutPanel))
+        panel.on_message({"open": True})
+        held.update(vars(Held(bridge, robots)))
+        names.append(page.viewer.name)
+
+    opened.add_grid(bridge, "/map")
+    model = make_model(loop, build)
+
+    def round_of(count):
+        for number in range(count):
+            handle, _ = open_page(model, f"page{number:04}")
+            handle.closed()
+        loop.call(lambda: True)
+        wait_for(lambda: not model._hosts)
+        # What was cancelled ends in the turns that follow.
+        wait_for(lambda: loop.call(lambda: len(asyncio.all_tasks())) <= tasks)
+        gc.collect()
+
+    tasks = loop.call(lambda: len(asyncio.all_tasks()))
+    round_of(10)
+    before = loop.call(lambda: vars(Held(bridge, robots)))
+    objects = len(gc.get_objects())
+    round_of(100)
+    more = len(gc.get_objects()) - objects
+    after = loop.call(lambda: vars(Held(bridge, robots)))
+    assert len(names) == 110
+    assert after == before
+    assert loop.runtime._watchers == {}
+    assert more < 2 * 100, "fewer than two objects for each page"
+    # What is compared is what an open console holds more of.
+    differs = {name for name in before if held[name] != before[name]}
+    assert differs >= {"tasks", "topics", "modules", "maps", "watched", "layers"}
