@@ -67,8 +67,8 @@ def open_console(chromium: Browser, demo: Demo):
     def open_(size: str = "desk", scheme: str = "light") -> Page:
         context = chromium.new_context(color_scheme=scheme, **SIZES[size])
         contexts.append(context)
+        complaints.listen(context)
         page = context.new_page()
-        complaints.listen(page)
         page.goto(demo.url)
         # A phone has the list in the sheet, which is closed at first.
         expect(page.locator("#robots .row")).to_have_count(10)

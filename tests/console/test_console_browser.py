@@ -1,9 +1,10 @@
 """What an operator sees of the console and does with it."""
 
 import re
+from contextlib import contextmanager
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, TimeoutError, expect
 
 pytestmark = pytest.mark.browser
 
@@ -143,18 +144,87 @@ def test_the_view_s_buttons_zoom_and_show_everything(open_console):
     assert scale_of(page) == pytest.approx(whole, rel=0.02)
 
 
-def assert_in_the_middle(page: Page) -> None:
-    off = page.evaluate(
+@pytest.mark.parametrize("way", ["button", "key"])
+def test_everything_is_the_floor_and_every_robot_and_no_card_lies_over_it(
+    open_console, way
+):
+    page = open_console()
+    page.locator("g.world").evaluate(
+        """world => {
+          const far = world.querySelector(".robot").cloneNode();
+          far.id = "far";
+          far.setAttribute("transform", "matrix(1 0 0 1 60 45)");
+          world.append(far);
+        }"""
+    )
+    row(page, "Robot 4").click()
+    expect(page.locator("#card")).to_be_visible()
+    if way == "key":
+        page.locator("svg.webmap").focus()
+        page.keyboard.press("0")
+    else:
+        page.get_by_role("button", name="Show everything").click()
+    free = page.locator("#card").bounding_box()["x"]
+    top = page.locator("svg.webmap").bounding_box()["y"]
+    for name in ("#far", ".floor.day"):
+        box = page.locator(name).evaluate(
+            """one => {
+              const box = one.getBBox();
+              const { a, b, c, d, e, f } = one.getScreenCTM();
+              const at = (x, y) => [a * x + c * y + e, b * x + d * y + f];
+              return [at(box.x, box.y), at(box.x + box.width, box.y + box.height)];
+            }"""
+        )
+        for x, y in box:
+            assert 0 < x < free
+            assert top < y < page.viewport_size["height"]
+
+
+def from_the_middle(page: Page) -> list[float]:
+    """Return how far from the map's middle the selected robot is, in pixels."""
+    return page.evaluate(
         """() => {
           const map = document.querySelector("svg.webmap").getBoundingClientRect();
           const { e, f } = document.querySelector(".robot.selected").getCTM();
           return [e - map.width / 2, f - map.height / 2];
         }"""
     )
-    assert off == pytest.approx([0, 0], abs=3)
 
 
-def test_follow_keeps_the_robot_in_the_middle_until_pressed_again(open_console):
+IN_THE_MIDDLE = pytest.approx([0, 0], abs=3)
+
+WENT = """([x, y]) => {
+  const robot = document.querySelector(".robot.selected");
+  const { e, f } = robot.transform.baseVal[0].matrix;
+  return Math.hypot(e - x, f - y) >= 0.5;
+}"""
+
+
+@contextmanager
+def driven(page: Page):
+    """Drive the selected robot by half a metre, whichever way is free, and further."""
+    start = page.locator(".robot.selected").evaluate(
+        "r => (({ e, f }) => [e, f])(r.transform.baseVal[0].matrix)"
+    )
+    page.locator("svg.webmap").focus()
+    for key in 4 * "ws":  # a page that is too busy drives nothing
+        page.wait_for_timeout(300)  # hands must be off before a press counts
+        page.keyboard.down(key)
+        try:
+            page.wait_for_function(WENT, arg=start, timeout=3000)
+        except TimeoutError:
+            continue
+        else:
+            yield
+            return
+        finally:
+            page.keyboard.up(key)
+    raise AssertionError(page.locator(".webmap-teleop").inner_text())
+
+
+def test_follow_keeps_a_robot_that_drives_in_the_middle_until_pressed_again(
+    open_console,
+):
     page = open_console()
     row(page, "Robot 4").click()
     follow = page.get_by_role("button", name="Follow")
@@ -162,9 +232,13 @@ def test_follow_keeps_the_robot_in_the_middle_until_pressed_again(open_console):
     expect(follow).to_have_attribute("aria-pressed", "true")
     for _ in range(2):
         page.get_by_role("button", name="Zoom in").click()
-        assert_in_the_middle(page)
+        assert from_the_middle(page) == IN_THE_MIDDLE
+    with driven(page):
+        assert from_the_middle(page) == IN_THE_MIDDLE
     follow.click()
     expect(follow).to_have_attribute("aria-pressed", "false")
+    with driven(page):
+        assert from_the_middle(page) != IN_THE_MIDDLE
 
 
 def test_send_to_begins_with_a_word_of_what_to_do(open_console):

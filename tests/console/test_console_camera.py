@@ -86,8 +86,8 @@ def open_page(chromium, url, camera):
             viewport={"width": width, "height": height}, **more
         )
         contexts.append(context)
+        complaints.listen(context)
         page = context.new_page()
-        complaints.listen(page)
         return come(page)
 
     def come(page: Page) -> Page:

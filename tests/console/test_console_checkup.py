@@ -1,14 +1,14 @@
 """The readiness check that all viewers of a page share."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
 from webmap import Bridge
-from webmap.console import RobotDescription
-from webmap.console.checkup import Checkup, checkup_of, remember
+from webmap.console.checkup import Checkup, checkup_of
 from webmap.console.doctor import groups
-from webmap.discovery.doctor import Finding, Observed
+from webmap.discovery.doctor import Finding, MeantRobot, Observed
 
 
 async def until(condition):
@@ -20,7 +20,7 @@ async def until(condition):
 def test_however_many_ask_there_is_one_look_at_a_time():
     asked, go_on = [], asyncio.Event()
 
-    async def observe(url, *, seconds, known, progress):
+    async def observe(url, *, seconds, meant, progress):
         asked.append(url)
         progress("Listening for 3 s.")
         await go_on.wait()
@@ -49,7 +49,7 @@ def test_however_many_ask_there_is_one_look_at_a_time():
 
 
 def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
-    async def observe(url, *, seconds, known, progress):
+    async def observe(url, *, seconds, meant, progress):
         raise RuntimeError("broken")
 
     async def run():
@@ -84,24 +84,70 @@ def test_viewers_of_one_bridge_share_its_check():
     assert checkup_of(one) is not checkup_of(other)
 
 
-def test_robots_that_were_told_are_known_where_a_bridge_says_nothing():
+def test_the_robots_that_the_page_has_are_looked_at():
     asked = []
 
-    async def observe(url, *, seconds, known, progress):
-        asked.append(dict(known))
+    async def observe(url, *, seconds, meant, progress):
+        asked.append(meant(None))
         return Observed(url)
 
     async def run():
-        bridge = Bridge("ws://a:1")
-        checkup = checkup_of(bridge)
-        checkup._observe = observe
-        described = {"name": "Bob", "bridge": bridge}
-        remember([RobotDescription(**described, odometry="/odom", twist="/cmd_vel")])
-        checkup.start()
+        checkup = Checkup("ws://bob:9090", observe=observe)
+        bob = MeantRobot("Bob")
+        checkup.start([bob])
         await until(lambda: not checkup.is_running)
+        assert asked == [[bob]]
 
     asyncio.run(run())
-    assert asked == [{"/odom": "nav_msgs/Odometry", "/cmd_vel": "geometry_msgs/Twist"}]
+
+
+async def seen_at(url, **_):
+    return Observed(url)
+
+
+def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told():
+    told = []
+
+    async def tried(seen):
+        told.append(checkup.doing)
+        return replace(seen, calls_in_threads=False, tried=True)
+
+    checkup = Checkup("ws://bob:9090", observe=seen_at, tried=tried)
+
+    async def run():
+        checkup.start()
+        await until(lambda: not checkup.is_running)
+        assert not told, "it is not tried of itself"
+        ended = checkup.ended
+        checkup.try_call()
+        assert not checkup.can_try, "one at a time"
+        await until(lambda: not checkup.is_running)
+        assert checkup.ended == ended, "nothing was listened to again"
+
+    asyncio.run(run())
+    assert told == ["Trying what a call that hangs holds up."]
+    assert "hangs blocks its whole socket (tried)" in checkup.text
+
+
+@pytest.mark.parametrize("trouble", [None, "nothing listens there"])
+def test_no_call_is_tried_at_a_bridge_that_was_not_there(trouble):
+    async def observe(url, **_):
+        return Observed(url, trouble=trouble)
+
+    async def tried(seen):
+        raise AssertionError
+
+    async def run():
+        checkup = Checkup("ws://bob:9090", observe=observe, tried=tried)
+        if trouble is not None:
+            checkup.start()
+            await until(lambda: not checkup.is_running)
+        assert not checkup.can_try
+        version = checkup.version
+        checkup.try_call()
+        assert checkup.version == version
+
+    asyncio.run(run())
 
 
 def test_what_a_robot_is_called_is_only_ever_text():

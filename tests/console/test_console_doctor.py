@@ -43,7 +43,7 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
         for line in (velocity, notes.first)
     )
     assert good != note, "not by colour alone"
-    expect(report.get_by_role("heading", name="robot_9")).to_be_attached()
+    expect(report.get_by_role("heading", name="Robot 9")).to_be_attached()
     expect(page.get_by_role("button", name="Stop all")).to_be_in_viewport(ratio=1)
 
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
@@ -62,6 +62,20 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
     expect(report.locator(".status")).to_contain_text("Checked")
     expect(other.get_by_role("button", name="Stop all")).to_be_in_viewport(ratio=1)
     assert other.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_a_call_is_tried_from_the_report_and_what_that_told_stands_in_it(open_console):
+    page = open_console()
+    report = open_report(page)
+    expect(report.locator(".status")).to_contain_text("Checked", timeout=20_000)
+    report.get_by_role("button", name="Try a call").click()
+    question = report.get_by_role("group", name="Try a call that hangs")
+    expect(question).to_contain_text("offers a service of its own")
+    expect(question).to_contain_text("try it while nobody drives")
+    question.get_by_role("button", name="Try it").click()
+    told = report.locator(".finding").filter(has_text="blocks no socket (tried)")
+    expect(told).to_have_attribute("data-level", "good")
+    expect(question).to_be_hidden()
 
 
 def test_where_the_page_may_not_copy_the_text_is_shown_and_chosen(open_console):

@@ -196,7 +196,7 @@ def test_a_yaml_that_is_none_is_refused(tmp_path, text):
 
 def test_an_image_that_is_none_is_refused(tmp_path):
     (tmp_path / "floor.png").write_bytes(b"\x89PNG\r\n\x1a\n nothing")
-    with pytest.raises(ConfigError, match=r"floor\.yaml: the image must be PGM"):
+    with pytest.raises(ConfigError, match=r"floor\.yaml: the image cannot be read"):
         load_floor(write(tmp_path), tmp_path)
 
 

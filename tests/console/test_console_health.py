@@ -13,8 +13,9 @@ class Diagnosing:
 
     def __init__(self, *parts):
         self.parts = [
-            SimpleNamespace(name=name, level=level, message=message)
-            for name, level, message in parts
+            SimpleNamespace(name=name, level=level, message=message, shared=shared)
+            for name, level, message, *rest in parts
+            for shared in [bool(rest)]
         ]
 
 
@@ -67,6 +68,30 @@ def test_a_robot_without_diagnostics_has_no_health(map):
     chosen(map, SimpleNamespace(parts=["of something else"]))
     health = RobotHealth(map, html.section())
     assert health.element.get("hidden") is not None
+
+
+UNHEARD = ("note", "Unheard: no part of this robot says how it is")
+
+
+@pytest.mark.parametrize("parts", [[], [("base: Motors", "ok", "fine", "nobody's")]])
+def test_of_a_robot_of_which_no_part_was_heard_nothing_is_said_to_be_well(map, parts):
+    chosen(map, Diagnosing(*parts))
+    health = RobotHealth(map, html.section())
+    assert health.element.get("hidden") is None
+    assert said(health) == [UNHEARD]
+
+
+def test_a_part_that_may_be_another_robots_is_listed_as_such_if_it_is_not_well(map):
+    nobodys = [
+        ("base: Motors", "error", "hot", "nobody's"),
+        ("base: Laser", "stale", "silent for 12 s", "nobody's"),
+    ]
+    chosen(map, Diagnosing(*nobodys, ("robot_0/base: Battery", "ok", "full")))
+    health = RobotHealth(map, html.section())
+    assert said(health) == [
+        ("wrong", "Error: base: Motors (of some robot here): hot"),
+        ("note", "Silent: base: Laser (of some robot here)"),
+    ]
 
 
 def test_very_many_parts_are_counted(map):

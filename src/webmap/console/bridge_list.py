@@ -11,6 +11,13 @@ if TYPE_CHECKING:
     from webmap import Bridge, Element
 
 
+WORST = ("lost", "connecting", "late")
+"""States that are not well, the worst first."""
+
+LATE = 0.5
+"""Seconds from which on it is said that what comes from a bridge comes late."""
+
+
 class BridgeList:
     """A summary of the bridges that unfolds into a list of them.
 
@@ -60,13 +67,15 @@ class BridgeList:
             line.set("data-link", link)
             word.text = text
         links = {link for link, _ in states}
-        worst = next((name for name in ("lost", "connecting") if name in links), "open")
+        worst = next((name for name in WORST if name in links), "open")
         self._summary.set("data-link", worst)
         self._text.text = summary([link for link, _ in states])
 
 
 def describe_link(bridge: "Bridge") -> tuple[str, str]:
     """Return what the page calls a bridge's state, and a sentence for it."""
+    if bridge.state == "open" and bridge.lag >= LATE:
+        return "late", f"open, {bridge.lag:.1f} s late"
     if bridge.state == "open":
         return "open", "open"
     if is_lost(bridge):
@@ -77,11 +86,14 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
 
 def summary(links: Sequence[str]) -> str:
     """Return a few words for the states of all bridges."""
-    total, open_ = len(links), sum(link == "open" for link in links)
+    total, open_ = len(links), sum(link in ("open", "late") for link in links)
+    late = links.count("late")
     if total == 1:
-        return {"open": "Bridge open", "lost": "No bridge"}.get(
+        return {"open": "Bridge open", "lost": "No bridge", "late": "Bridge late"}.get(
             links[0], "Bridge connecting"
         )
+    if late:
+        return f"{open_} of {total} bridges open, {late} late"
     if open_ == total:
         return f"{total} bridges open"
     return f"{open_} of {total} bridges open"

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 from webmap import html, svg
 from webmap.console.checkup import Checkup, checkup_of
+from webmap.console.in_use import in_use
 from webmap.console.robot_card import icon
+from webmap.console.try_call import TryCall
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Map
@@ -47,7 +49,7 @@ class DoctorReports:
         self.map = map
         folder = Path(__file__).parent
         map.add_browser_half(self, folder / "doctor.js", {}, folder / "doctor.css")
-        self._reports = [Report(bridge) for bridge in bridges]
+        self._reports = [Report(bridge, map) for bridge in bridges]
         self.buttons = [report.opener for report in self._reports]
         """For each bridge what opens its report, and makes the first."""
         element.append(*(report.element for report in self._reports))
@@ -63,11 +65,15 @@ class Report:
 
     Args:
         bridge: The bridge.
+        map: The page's map, whose robots it is about.
 
     """
 
-    def __init__(self, bridge: "Bridge") -> None:
+    def __init__(self, bridge: "Bridge", map: "Map") -> None:
         self._checkup: Checkup = checkup_of(bridge)
+        self._bridge = bridge
+        self._map = map
+        self._try = TryCall(self._checkup, map.page.viewer.role)
         self._shown = -1
         name = bridge.name or bridge.url
         where = f"doctor-{next(_numbers)}"
@@ -84,7 +90,7 @@ class Report:
         self._age.set_age(math.inf, limit=OLD, age_text=True)
         self._checked = html.span("Checked ", self._age, " ago. ", hidden=True)
         self._again = html.button("Check again", type="button", class_="button")
-        self._again.on("click", lambda event: self._checkup.start())
+        self._again.on("click", lambda event: self._start())
         copy = html.button(
             html.span(text="Copy as text", class_="before"),
             html.span(text="Copied", class_="after"),
@@ -99,7 +105,10 @@ class Report:
         self.element: Element = html.section(
             html.div(html.h2(text=f"Is {name} ready?"), close, class_="doctor-head"),
             status,
-            html.div(self._again, self._copy, class_="doctor-actions"),
+            html.div(
+                self._again, self._copy, self._try.button, class_="doctor-actions"
+            ),
+            self._try.question,
             self._list,
             self._text,
             class_="doctor",
@@ -115,6 +124,7 @@ class Report:
         if self._shown == checkup.version:
             return
         self._shown = checkup.version
+        self._try.poll()
         running, known = checkup.is_running, checkup.ended is not None
         doing = checkup.doing.removesuffix(".")  # the page puts dots that go on
         self._doing.text = doing if running or not known else checkup.summary
@@ -132,7 +142,12 @@ class Report:
     def _opened(self) -> None:
         """Make the first report; one that is there is kept until asked for anew."""
         if self._checkup.ended is None:
-            self._checkup.start()
+            self._start()
+
+    def _start(self) -> None:
+        """Look at the robots that are shown now, by the topics that they use now."""
+        made = self._map.module_arguments()
+        self._checkup.start(in_use(self._map.robots, self._bridge, made))
 
 
 def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":

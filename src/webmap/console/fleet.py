@@ -22,6 +22,9 @@ class RobotDescription:
     bridge: "Bridge"
     odometry: str = ""
     twist: str = ""
+    twist_type: str = ""
+    """``geometry_msgs`` Twist or TwistStamped in either dialect; empty if the bridge is
+    to be asked for it."""
     scan: str = ""
     battery: str = ""
     cameras: tuple[str, ...] = ()
@@ -37,6 +40,7 @@ class RobotDescription:
     """A topic of ``geometry_msgs/PoseWithCovarianceStamped`` that tells it where it
     is."""
     goal_frame: str = "map"
+    """The frame of its map, in which goals and its place are told."""
     stops_within: float | None = None
     """Seconds within which the base stops by itself when velocity ceases, if known."""
     picture: Picture | None = None
@@ -117,12 +121,18 @@ def make_robot(about: RobotDescription) -> "Robot":
     if about.odometry:
         robot.set_odometry_topic(bridge, about.odometry)
     if about.twist:
-        robot.set_twist_topic(bridge, about.twist, stops_within=about.stops_within)
+        robot.set_twist_topic(
+            bridge,
+            about.twist,
+            type=about.twist_type or None,
+            stops_within=about.stops_within,
+        )
     set_goals(
         robot, bridge, about.goal, about.cancel, about.action, frame=about.goal_frame
     )
     if about.initial_pose:
-        robot.set_initial_pose_topic(bridge, about.initial_pose)
+        frame = about.goal_frame
+        robot.set_initial_pose_topic(bridge, about.initial_pose, frame=frame)
     if about.scan:
         scanner = robot.add_module(
             "LaserScanner", bridge, about.scan, max_dots=None, throttle=100

@@ -23,7 +23,8 @@ LEVELS = {
 class RobotHealth:
     """Lists the parts of the selected robot that are not well; a module of maps.
 
-    A robot without diagnostics has no such list, and one of which all is well one line.
+    A robot without diagnostics has no such list. One of which all is well has one line,
+    and so has one of which nothing was heard.
 
     Args:
         map: The map.
@@ -54,8 +55,10 @@ class RobotHealth:
         """Look at the parts again; those that say nothing become silent by that."""
         robot = self.map.selected
         modules = [] if robot is None else robot.modules
-        parts = [part for module in modules for part in _parts_of(module)]
-        said = _lines(parts)
+        found = [module for module in modules if _follows(module)]
+        said = _lines([part for module in found for part in module.parts])
+        if found and not said:
+            said = [("note", "Unheard: ", "no part of this robot says how it is")]
         if said == self._shown:
             return
         self._shown = said
@@ -65,22 +68,25 @@ class RobotHealth:
         self.element.set(hidden=not said)
 
 
-def _parts_of(module: Any) -> list[Any]:
-    """Return the parts of a module that follows diagnostics; none of any other."""
-    return module.parts if hasattr(module, "parts") and hasattr(module, "hold") else []
+def _follows(module: Any) -> bool:
+    """Tell whether a module follows diagnostics."""
+    return hasattr(module, "parts") and hasattr(module, "hold")
 
 
 def _lines(parts: list[Any]) -> list[tuple[str, str, str]]:
+    """Return what is wrong, or that all is well; nothing if no part tells either."""
     bad = [part for part in parts if part.level != "ok"]
     lines = []
     for part in bad[:MOST]:
         level, word = LEVELS[part.level]
         # A count of seconds would be another line every second.
         words = "" if part.level == "stale" else f": {part.message}"
-        lines.append((level, f"{word}: ", f"{part.name}{words}"))
+        whose = " (of some robot here)" if part.shared else ""
+        lines.append((level, f"{word}: ", f"{part.name}{whose}{words}"))
     if len(bad) > MOST:
         lines.append(("note", "", f"and {len(bad) - MOST} more parts"))
-    if parts and not bad:
+    # That the parts of nobody are well tells nothing of this robot.
+    if not bad and any(not part.shared for part in parts):
         count = f"{len(parts)} part{'' if len(parts) == 1 else 's'}"
         lines.append(("good", "All is well: ", count))
     return lines

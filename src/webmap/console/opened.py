@@ -1,11 +1,14 @@
 """The console that is open: what comes later is shown on all its pages."""
 
 import weakref
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
+
+Factory: TypeAlias = str | Callable[..., Any]
+"""The name of a module, or what makes one."""
 
 TOP = 10.0
 """How near the first map lies: over those from files, under costmaps and robots."""
@@ -30,7 +33,7 @@ class Console:
         self.images: list[tuple[str, float, float, float, float]] = []
         """Pictures under everything else, as ``Map.add_image`` takes them."""
         self._modules: dict[str, dict[str, Any]] = {}
-        self._more: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []
+        self._more: list[tuple[Factory, tuple[Any, ...], dict[str, Any]]] = []
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
 
     def add(self, robot: "Robot") -> None:
@@ -78,11 +81,11 @@ class Console:
         for page in list(self._pages):
             _show_image(self.images[-1], page)
 
-    def add_module(self, name: str, /, *args: Any, **options: Any) -> None:
+    def add_module(self, name: Factory, /, *args: Any, **options: Any) -> None:
         """Give the map of every page one module more.
 
         Args:
-            name: The module's name.
+            name: The module's name, or what makes it.
             *args: What its constructor gets after the map.
             **options: Its arguments by name.
 
@@ -106,8 +109,8 @@ class Console:
         self._pages.add(page)
         for name, options in self._modules.items():
             _add_module(name, (), options, page)
-        for name, args, options in self._more:
-            _add_module(name, args, options, page)
+        for made, args, options in self._more:
+            _add_module(made, args, options, page)
         for image in self.images:
             _show_image(image, page)
         self._show_grids(page)
@@ -139,7 +142,7 @@ def _show_image(image: tuple[str, float, float, float, float], page: "Page") -> 
 
 
 def _add_module(
-    name: str, args: tuple[Any, ...], options: dict[str, Any], page: "Page"
+    name: Factory, args: tuple[Any, ...], options: dict[str, Any], page: "Page"
 ) -> None:
     for map in page.maps:
         try:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import webmap
 from webmap.console.bridge_list import BridgeList
 from webmap.console.camera_panel import CameraPanel
-from webmap.console.checkup import remember
 from webmap.console.costmaps import CostmapNames
 from webmap.console.doctor import DoctorReports
 from webmap.console.fleet import RobotDescription, make_robot
@@ -66,7 +65,6 @@ def open_console(
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(about) for about in robots]
-    remember(robots)
     opened = Console(fleet)
     opened.set_module("Labels", name=place_of(bridges))
 

@@ -10,6 +10,12 @@ const STEP = 1.5;
 /** The least space around what is shown as a whole, in pixels. */
 const MARGIN = 24;
 
+/** The room that a robot gets to each side, in metres. */
+const AROUND = 1;
+
+/** A place and a size in metres: x, y, to the right, up. */
+/** @typedef {[number, number, number, number]} Box */
+
 /**
  * Let map.css draw names and marks in pixels at every zoom, and upright at every turn.
  *
@@ -48,6 +54,17 @@ export function listenToTools(map, options, signal) {
   on("zoom-in", () => zoom(map, STEP));
   on("zoom-out", () => zoom(map, 1 / STEP));
   on("show-all", () => showAll(map, options.bounds));
+  // Before the module that moves the view, which knows no floor.
+  map.svg.addEventListener(
+    "keydown",
+    (event) => {
+      if (event.key !== "0" || event.ctrlKey || event.altKey || event.metaKey) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      byId("show-all").click();
+    },
+    { signal, capture: true },
+  );
 }
 
 /**
@@ -73,19 +90,61 @@ function zoom(map, factor) {
 
 /**
  * @param {MapCanvas} map
- * @param {[number, number, number, number] | null} bounds
- * @returns {Matrix | null} The view of the floor, or of all that is drawn, north up;
- *     null if there is nothing yet.
+ * @param {Box | null} bounds
+ * @returns {Matrix | null} The view of the floor and of every robot, or of all that is
+ *     drawn where there is no floor, north up; null if there is nothing yet.
  */
-function showAll({ world, width, height }, bounds) {
+function showAll({ svg, world, width, height }, bounds) {
   const box = world.getBBox();
-  const [x, y, across, up] = bounds ?? [box.x, box.y, box.width, box.height];
-  const room = [width - 2 * MARGIN, height - 2 * MARGIN];
+  const free = besideCard(svg, width);
+  const all = bounds ?? [box.x, box.y, box.width, box.height];
+  const [x, y, across, up] = placesOfRobots(world).reduce(withPlace, all);
+  const room = [free - 2 * MARGIN, height - 2 * MARGIN];
   const scale = Math.min(room[0] / across, room[1] / up);
   if (!(scale > 0) || !Number.isFinite(scale)) return null;
-  const e = width / 2 - scale * (x + across / 2);
+  const e = free / 2 - scale * (x + across / 2);
   const f = height / 2 + scale * (y + up / 2);
   return { a: scale, b: 0, c: 0, d: -scale, e, f };
+}
+
+/**
+ * @param {SVGSVGElement} svg
+ * @param {number} width
+ * @returns {number} How much of the map's width the card leaves, in pixels; all of it
+ *     where little would be left, as on a phone, whose card lies in the sheet.
+ */
+function besideCard(svg, width) {
+  const card = byId("card").getBoundingClientRect();
+  const left = card.left - svg.getBoundingClientRect().left;
+  return card.width > 0 && left > width / 2 && left < width ? left : width;
+}
+
+/**
+ * @param {Box} box
+ * @param {[number, number]} place
+ * @returns {Box} The box, and the place with room around it.
+ */
+function withPlace([x, y, across, up], [px, py]) {
+  const left = Math.min(x, px - AROUND);
+  const low = Math.min(y, py - AROUND);
+  const right = Math.max(x + across, px + AROUND);
+  const top = Math.max(y + up, py + AROUND);
+  return [left, low, right - left, top - low];
+}
+
+/**
+ * @param {SVGGElement} world
+ * @returns {[number, number][]} Where the robots are, in metres.
+ */
+function placesOfRobots(world) {
+  const toWorld = world.getScreenCTM()?.inverse();
+  if (!toWorld) return [];
+  return [...world.querySelectorAll(".robot:not(.unplaced)")].flatMap((robot) => {
+    const place = robot instanceof SVGGraphicsElement && robot.getScreenCTM();
+    if (!place) return [];
+    const { e, f } = toWorld.multiply(place);
+    return Number.isFinite(e + f) ? [/** @type {[number, number]} */ ([e, f])] : [];
+  });
 }
 
 /**

@@ -1,0 +1,117 @@
+"""Which topics of a bridge the robots of a page use, for the check of that bridge."""
+
+import inspect
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from webmap.discovery.doctor import MeantRobot
+from webmap.discovery.found import ACTIONS, Role
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+DRAWN: Mapping[str, Role] = {
+    "Battery": "battery",
+    "Camera": "camera",
+    "LaserScanner": "scan",
+    "Path": "plan",
+    "PointCloud": "cloud",
+}
+"""What a topic is to a robot that one of these modules reads."""
+
+GRIDS: tuple[Role, ...] = ("map", "costmap")
+
+Made: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
+"""The name and the arguments of a module, as ``module_arguments()`` returns them."""
+
+Topics: TypeAlias = dict[Role, tuple[tuple[str, str], ...]]
+
+
+def in_use(
+    robots: "Iterable[Robot]", bridge: "Bridge", maps: Iterable[Made] = ()
+) -> list[MeantRobot]:
+    """Return the robots that use a bridge, with the topics that they use of it.
+
+    Args:
+        robots: The robots that are shown.
+        bridge: The bridge.
+        maps: The modules of the map that they are shown on.
+
+    """
+    grids = list(maps)
+    found = (_in_use(robot, bridge, grids) for robot in robots)
+    return [each for each in found if each is not None]
+
+
+def _in_use(
+    robot: "Robot", bridge: "Bridge", maps: Iterable[Made]
+) -> MeantRobot | None:
+    feed, twist, goals = robot.feed, robot.motion.twist_topic, robot.motion.move_topic
+    frames = robot.tf
+    topics: Topics = {"odometry": (), "pose": (), "velocity": (), "action": ()}
+    elsewhere: set[Role] = set()
+    if feed is not None and feed.bridge is bridge:
+        topics["odometry"] = ((feed.topic, feed.type or ""),)
+    elif feed is not None:
+        elsewhere.add("odometry")
+    if twist is not None and twist.bridge is bridge:
+        topics["velocity"] = ((twist.topic, twist.type or ""),)
+    elif twist is not None:
+        elsewhere.add("velocity")
+    if goals is not None and goals.bridge is bridge and goals.action:
+        kind = goals.action_type.rpartition("/")[2]
+        tails = [tail for tail, type in ACTIONS.items() if type.endswith(f"/{kind}")]
+        topics["action"] = tuple((goals.action + tail, "") for tail in tails)
+    base = start = ""
+    if frames is not None and frames["bridge"] is bridge:
+        topics["tf"] = ((f"{frames['namespace']}/tf", ""),)
+        base, start = frames["base_frame"], frames["map_frame"]
+    elif feed is None:
+        # Whatever frames are told of, it is not drawn by them.
+        topics["tf"] = ()
+        if frames is not None:
+            elsewhere.add("odometry")
+    topics |= _drawn(robot, bridge, maps)
+    if not any(topics[role] for role in topics if role not in GRIDS):
+        return None  # it has at most a map there that it shares with others
+    return MeantRobot(robot.name, topics, base, start, frozenset(elsewhere))
+
+
+def _drawn(robot: "Robot", bridge: "Bridge", maps: Iterable[Made]) -> Topics:
+    """Return what is drawn of a robot, and the maps that it is shown on."""
+    roles: tuple[Role, ...] = (*DRAWN.values(), *GRIDS)
+    topics: Topics = dict.fromkeys(roles, ())
+    grids = list(maps)
+    for name, args, options in robot.module_arguments():
+        if name in DRAWN:
+            given = inspect.signature(robot.namespace[name]).bind(
+                robot, *args, **options
+            )
+            given.apply_defaults()
+            if given.arguments.get("bridge") is bridge:
+                topic, type = (given.arguments.get(key) for key in ("topic", "type"))
+                said = (str(topic), str(type or ""))
+                topics[DRAWN[name]] = (*topics[DRAWN[name]], said)
+        elif name == "OnMaps" and args:
+            grids.append((args[0], args[1:], {"robot": robot, **options}))
+    for name, args, options in grids:
+        role, grid = _grid(robot, bridge, name, args, options)
+        if grid and (grid, "") not in topics[role]:
+            topics[role] = (*topics[role], (grid, ""))
+    return topics
+
+
+def _grid(
+    robot: "Robot",
+    bridge: "Bridge",
+    name: str,
+    args: tuple[Any, ...],
+    options: dict[str, Any],
+) -> tuple[Role, str]:
+    """Return a grid's role and topic; no topic if it is none that the robot is on."""
+    said = {**dict(zip(("bridge", "topic"), args, strict=False)), **options}
+    role: Role = "costmap" if said.get("palette") == "costmap" else "map"
+    mine = said.get("bridge") is bridge and said.get("robot") in (None, robot)
+    if name != "OccupancyGrid" or not mine:
+        return role, ""
+    return role, str(said.get("topic", "/map"))

@@ -1,0 +1,45 @@
+"""How it stands with the bridges, in words."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from webmap.console.bridge_list import describe_link, summary
+
+
+def bridge(state="open", lag=0.0, trouble=None):
+    return SimpleNamespace(state=state, lag=lag, trouble=trouble)
+
+
+@pytest.mark.parametrize(
+    ("bridge", "link", "text"),
+    [
+        (bridge(), "open", "open"),
+        (bridge(lag=0.4), "open", "open"),
+        (bridge(lag=1.44), "late", "open, 1.4 s late"),
+        (bridge("connecting"), "connecting", "connecting"),
+        (
+            bridge("connecting", trouble="no answer within 5 s", lag=9.0),
+            "lost",
+            "cannot be reached: no answer within 5 s; trying again",
+        ),
+    ],
+)
+def test_a_bridge_is_open_late_connecting_or_lost(bridge, link, text):
+    assert describe_link(bridge) == (link, text)
+
+
+@pytest.mark.parametrize(
+    ("links", "text"),
+    [
+        (["open"], "Bridge open"),
+        (["late"], "Bridge late"),
+        (["lost"], "No bridge"),
+        (["connecting"], "Bridge connecting"),
+        (["open", "open"], "2 bridges open"),
+        (["open", "lost"], "1 of 2 bridges open"),
+        (["open", "late", "lost"], "2 of 3 bridges open, 1 late"),
+    ],
+)
+def test_all_bridges_are_summed_up_in_a_few_words(links, text):
+    assert summary(links) == text

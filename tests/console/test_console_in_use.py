@@ -1,0 +1,241 @@
+"""Which topics the robots of a page use, as the check of their bridge is told."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from webmap import Bridge, Map, Robot
+from webmap.console import RobotDescription
+from webmap.console.checkup import checkup_of
+from webmap.console.doctor import DoctorReports
+from webmap.console.fleet import make_robot
+from webmap.console.in_use import in_use
+from webmap.core.page import Page, PageEntry
+from webmap.discovery import discover
+from webmap.discovery.doctor import Observed
+from webmap.discovery.doctor.meant import lay_over
+from webmap.scene.events import Event
+from webmap.server.viewer import Viewer
+from webmap.wire.session import SceneSession
+
+
+@pytest.fixture
+def bridge():
+    return Bridge("ws://localhost:9090")
+
+
+@pytest.fixture
+def other():
+    return Bridge("ws://localhost:9091")
+
+
+def only(found):
+    (one,) = found
+    return one
+
+
+def test_a_described_robot_uses_what_it_was_given(bridge):
+    about = RobotDescription(
+        name="Bob",
+        bridge=bridge,
+        odometry="/odom",
+        twist="/cmd_vel",
+        twist_type="geometry_msgs/TwistStamped",
+        scan="/scan",
+        battery="/battery",
+        cameras=("/front/image_raw", "/rear/image_raw/compressed"),
+        action=("/navigate_to_pose", "nav2_msgs/action/NavigateToPose"),
+    )
+    bob = only(in_use([make_robot(about)], bridge))
+    assert bob.name == "Bob"
+    assert bob.topics["odometry"] == (("/odom", ""),)
+    assert bob.topics["velocity"] == (("/cmd_vel", "geometry_msgs/TwistStamped"),)
+    assert bob.topics["scan"] == (("/scan", ""),)
+    assert bob.topics["battery"] == (("/battery", ""),)
+    assert [topic for topic, _ in bob.topics["camera"]] == list(about.cameras)
+    assert bob.topics["action"] == (("/navigate_to_pose/_action/feedback", ""),)
+    assert bob.topics["cloud"] == bob.topics["plan"] == ()
+    assert "tf" not in bob.topics, "frames are told of as they are found"
+
+
+def test_what_is_drawn_with_a_robot_is_in_use_by_whatever_name_it_was_said(bridge):
+    bob = Robot("Bob")
+    bob.add_module("LaserScanner", bridge, "/front")
+    bob.add_module("LaserScanner", topic="/rear", bridge=bridge)
+    bob.add_module("Path", bridge)
+    bob.add_module("PointCloud", bridge, "/points")
+    bob.add_module("OnMaps", "OccupancyGrid", bridge, "/costs", palette="costmap")
+    topics = only(in_use([bob], bridge)).topics
+    assert topics["scan"] == (("/front", ""), ("/rear", ""))
+    assert topics["plan"] == (("/plan", ""),)
+    assert topics["cloud"] == (("/points", ""),)
+    assert topics["costmap"] == (("/costs", ""),)
+
+
+def test_a_map_under_the_robots_is_every_robots_and_a_robots_own_is_not(bridge):
+    bob, ann = Robot("Bob"), Robot("Ann")
+    for robot in (bob, ann):
+        robot.set_odometry_topic(bridge, "/odom")
+    shared = ("OccupancyGrid", (bridge, "/hall"), {})
+    own = (
+        "OccupancyGrid",
+        (bridge, "/ann/costs"),
+        {"palette": "costmap", "robot": ann},
+    )
+    bobs, anns = (one.topics for one in in_use([bob, ann], bridge, [shared, own]))
+    assert bobs["map"] == anns["map"] == (("/hall", ""),)
+    assert bobs["costmap"] == ()
+    assert anns["costmap"] == (("/ann/costs", ""),)
+
+
+def test_a_robot_of_two_bridges_is_at_each_with_what_it_uses_there(bridge, other):
+    bob = Robot("Bob")
+    bob.set_odometry_topic(other, "/odom", type="nav_msgs/Odometry")
+    bob.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
+    here, there = only(in_use([bob], bridge)), only(in_use([bob], other))
+    assert here.topics["odometry"] == there.topics["velocity"] == ()
+    assert here.elsewhere == {"odometry"}
+    assert there.elsewhere == {"velocity"}
+    assert there.topics["odometry"] == (("/odom", "nav_msgs/Odometry"),)
+
+
+def test_a_robot_of_another_bridge_is_none_of_this_one(bridge, other):
+    bob = Robot("Bob")
+    bob.set_odometry_topic(other, "/odom")
+    assert in_use([bob], bridge, [("OccupancyGrid", (bridge, "/map"), {})]) == []
+
+
+def test_a_robot_that_is_drawn_by_its_frames_is_followed_by_those(bridge):
+    bob = Robot("Bob")
+    bob.set_tf(bridge, namespace="/bob", map_frame="site")
+    meant = only(in_use([bob], bridge))
+    assert meant.topics["tf"] == (("/bob/tf", ""),)
+    topics = {"/bob/tf": "tf2_msgs/TFMessage"}
+    (robot,) = lay_over(discover(topics), [meant], topics)[0].robots
+    assert robot.tf_alone
+    assert (robot.base_frame, meant.map_frame) == ("bob/base_link", "bob/site")
+
+
+def test_a_robot_that_nothing_places_is_not_placed_by_frames_it_does_not_use(bridge):
+    bob = Robot("Bob")
+    bob.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
+    assert only(in_use([bob], bridge)).topics["tf"] == ()
+
+
+# The report on a page.
+
+
+class Publisher:
+    """Takes the files of the page; nobody loads them here."""
+
+    def publish_file(self, file):
+        assert Path(file).is_file(), file
+        return f"/_webmap/{Path(file).name}"
+
+
+def map_of(viewer):
+    entry = PageEntry("/", lambda page: None, None, Path(), "test")
+    sizes = {"map": (800.0, 600.0)}
+    page = Page(entry, SceneSession(), viewer, Publisher(), sizes)
+    with page.scope.active():
+        return Map(page.element("map"))
+
+
+def press(report, words):
+    """Press the button of a report that says this, as a page can say at any time."""
+    (button,) = [
+        each
+        for each in report.walk()
+        if getattr(each, "tag", "") == "button" and each.text == words
+    ]
+    (handler,) = button.handlers("click")
+    handler(Event(kind="click"))
+    return button
+
+
+async def until(condition):
+    async with asyncio.timeout(5):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+@pytest.fixture
+def checkup(bridge):
+    """The check of the bridge, which looks at nothing and notes what it is asked."""
+    checkup = checkup_of(bridge)
+    checkup.asked = []
+
+    async def observe(url, *, seconds, meant, progress):
+        checkup.asked.append(meant(None))
+        return Observed(url)
+
+    async def tried(seen):
+        checkup.asked.append("tried")
+        return seen
+
+    checkup._observe, checkup._tried = observe, tried
+    return checkup
+
+
+def report_for(viewer, bridge):
+    """Return a page's map and the report on that page."""
+    map = map_of(viewer)
+    with map.page.scope.active():
+        element = map.page.element("bridges")
+        map.add_module(DoctorReports, element, [bridge])
+    (report,) = element.children
+    return map, report
+
+
+def test_the_report_is_about_the_robots_of_the_page_also_those_that_came_later(
+    bridge, checkup
+):
+    async def run():
+        map, report = report_for(Viewer("v1", "Ann"), bridge)
+        for name in ("Bob", "Eve"):
+            robot = Robot(name)
+            robot.set_odometry_topic(bridge, f"/{name}/odom")
+            map.add_robot(robot)
+            press(report, "Check again")
+            await until(lambda: not checkup.is_running)
+        map.page.close()
+
+    asyncio.run(run())
+    names = [[one.name for one in asked] for asked in checkup.asked]
+    assert names == [["Bob"], ["Bob", "Eve"]]
+
+
+@pytest.mark.parametrize(("role", "may"), [("operator", True), ("viewer", False)])
+def test_only_an_operator_may_have_a_call_tried(bridge, checkup, role, may):
+    async def run():
+        map, report = report_for(Viewer("v1", "Ann", role), bridge)
+        press(report, "Check again")
+        await until(lambda: not checkup.is_running)
+        asking = press(report, "Try a call")
+        assert (asking.get("hidden") is None) is may
+        press(report, "Try it")
+        await until(lambda: not checkup.is_running)
+        map.page.close()
+
+    asyncio.run(run())
+    assert ("tried" in checkup.asked) is may
+
+
+def test_a_call_is_not_tried_before_what_it_does_was_said(bridge, checkup):
+    async def run():
+        map, report = report_for(Viewer("v1", "Ann"), bridge)
+        press(report, "Check again")
+        await until(lambda: not checkup.is_running)
+        divs = [each for each in report.walk() if getattr(each, "tag", "") == "div"]
+        (question,) = [each for each in divs if each.get("role") == "group"]
+        assert question.get("hidden") is not None
+        press(report, "Try a call")
+        assert question.get("hidden") is None
+        assert "try it while nobody drives" in question.text
+        press(report, "Not now")
+        assert question.get("hidden") is not None
+        map.page.close()
+
+    asyncio.run(run())
+    assert "tried" not in checkup.asked
