@@ -1,11 +1,13 @@
 """The wheel holds all that WebMap needs, and starts where nothing else is."""
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
+import httpx
 import pytest
 
 import webmap
@@ -69,7 +71,37 @@ def test_an_installed_wheel_says_its_version(installed: Path, tmp_path: Path) ->
     assert webmap.__version__ in said
 
 
-def test_an_installed_wheel_shows_the_demo(installed: Path, tmp_path: Path) -> None:
+LOADED = re.compile(
+    r'''(?:\b(?:src|href)=|\bfrom |\bimport |\bimport\(|\burl\()"([^"#?][^"]*)"'''
+)
+"""What a page, a module or a style sheet names that a browser loads."""
+
+
+def load(url: str) -> set[str]:
+    """Load a page with all that it needs, as a browser would, and return the paths."""
+    wanted = [
+        f"{below}{path.relative_to(SOURCE / 'webmap' / room).as_posix()}"
+        for room, below in (("web", "/_webmap/"), ("console", "/"))
+        for path in (SOURCE / "webmap" / room).rglob("*")
+        if path.suffix in {".js", ".css"}
+    ]
+    with httpx.Client(follow_redirects=True) as client:
+        page = client.get(url).url
+        # Browser halves are named by the page's socket alone.
+        todo, seen = [page, *map(page.join, wanted)], set()
+        while todo:
+            answer = client.get(todo.pop())
+            assert answer.status_code == 200, answer.url
+            seen.add(answer.url.path)
+            if answer.headers["content-type"].startswith("text/"):
+                named = {answer.url.join(name) for name in LOADED.findall(answer.text)}
+                todo += [name for name in named if name.path not in seen]
+    return seen
+
+
+def test_an_installed_wheel_shows_the_demo_and_all_that_its_page_loads(
+    installed: Path, tmp_path: Path
+) -> None:
     command = [installed / "webmap", "demo", "--port", "0", "--bridge-port", "0"]
     with subprocess.Popen(
         [*command, "--no-browser"],
@@ -80,7 +112,10 @@ def test_an_installed_wheel_shows_the_demo(installed: Path, tmp_path: Path) -> N
     ) as demo:
         try:
             assert demo.stdout is not None
-            assert demo.stdout.readline().startswith("WebMap is ready at http://")
+            line = demo.stdout.readline()
+            assert line.startswith("WebMap is ready at http://")
+            loaded = load(line.split()[-1])
+            assert loaded >= {"/", "/map.css", "/_webmap/page.js", "/_webmap/icon.svg"}
         finally:
             demo.terminate()
             assert demo.wait(10) == 0

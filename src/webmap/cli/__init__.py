@@ -14,10 +14,17 @@ COMMANDS = {
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
     "doctor": "webmap.cli.doctor:doctor",
+    "play": "webmap.cli.play:play",
+    "record": "webmap.cli.record:record",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
     "view": "webmap.cli.view:view",
 }
+
+ANSWERING = ("check", "discover", "doctor")
+"""Commands whose exit status is an answer: an interrupted one has not given it."""
+
+INTERRUPTED = 128 + signal.SIGINT
 
 
 class LazyGroup(click.Group):
@@ -51,14 +58,21 @@ def cli() -> None:
     webmap view ws://robot:9090    the robots behind a rosbridge
     webmap discover ws://...       which robots are there, and why it thinks so
     webmap doctor ws://...         what would be in the way of driving
+    webmap record ws://...         a bag of what they say
+    webmap play FILE               a bag on the map
     webmap run FILE.py             your own page, in Python
     webmap run FILE.toml           the robots of a fleet file
     webmap check FILE.toml         what is wrong in a fleet file
     webmap sim                     the simulator and its rosbridge alone
 
-    Each command prints one line when it is ready, logs to standard error, and ends
-    on Ctrl+C.
+    What serves (demo, view, play, run, sim) prints one line when it is ready, logs to
+    standard error, and ends on Ctrl+C.
     """
+
+
+def _told() -> str | None:
+    """Return which command was asked for."""
+    return next((word for word in sys.argv[1:] if word in COMMANDS), None)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
@@ -76,9 +90,11 @@ def main() -> None:
     except click.exceptions.Exit as done:
         sys.exit(done.exit_code)
     except click.Abort:
-        sys.exit(0)
+        sys.exit(INTERRUPTED if _told() in ANSWERING else 0)
     except click.UsageError as error:
-        error.show()
+        path = error.ctx.command_path if error.ctx else "webmap"
+        said = error.format_message().rstrip(".").replace("\n", " ")
+        click.echo(f"Error: {said} (see '{path} --help').", err=True)
         sys.exit(2)
     except (WebMapError, OSError) as error:
         click.echo(f"Error: {error}", err=True)

@@ -1,14 +1,14 @@
 """``webmap demo``: the simulator, and the console on it."""
 
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from webmap.cli.beside import GRACE, beside
 from webmap.cli.options import PORT, web_options
 from webmap.cli.sim_options import simulator_options
 from webmap.errors import ConfigError
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
 READY = "rosbridge is ready at "
+USAGE = 2
+"""What a command ends with that has said in one sentence what is wrong."""
 
 
 @click.command()
@@ -109,8 +111,17 @@ def demo_robot(bridge: "Bridge", index: int, dialect: str = "ros1") -> "Robot":
     )
     robot.add_module("Path", bridge, f"{topics}/plan")
     robot.add_module("Trail", length=10.0)
-    robot.add_module("Diagnostics", bridge, prefix=f"robot_{index}/")
+    lookahead = {"name": "lookahead", "frame": "robot", "age_limit": 2.0}
+    robot.add_module("PointStamped", bridge, f"{topics}/lookahead_point", **lookahead)
+    robot.add_module("Diagnostics", bridge, namespace=topics)
     return robot
+
+
+def _give_up(status: int) -> NoReturn:
+    """End the command, in words if the simulator has not found any itself."""
+    if status == USAGE:
+        sys.exit(USAGE)
+    raise ConfigError(f"the simulator ended with status {status} before it was ready")
 
 
 @contextmanager
@@ -123,23 +134,7 @@ def simulator(*arguments: object) -> Iterator[str]:
         ConfigError: If it does not come up.
 
     """
-    command = [sys.executable, "-m", "webmap", "sim", "--with-parent"]
-    with subprocess.Popen(
-        [*command, *map(str, arguments)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        assert process.stdout is not None
-        try:
-            line = process.stdout.readline()
-            if not line.startswith(READY):
-                raise ConfigError("the simulator did not start; what it said is above")
-            yield line.removeprefix(READY).strip()
-        finally:
-            process.terminate()
-            try:
-                process.wait(3.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
+    with beside("-m", "webmap", "sim", "--with-parent", *arguments) as started:
+        if not started.line.startswith(READY):
+            _give_up(started.process.wait(GRACE))
+        yield started.line.removeprefix(READY).strip()

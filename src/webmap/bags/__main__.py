@@ -1,0 +1,120 @@
+"""A replay and its rosbridge as a process: ``python -m webmap.bags FILE``."""
+
+import argparse
+import asyncio
+import contextlib
+import logging
+import os
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from webmap.bags.needed import need_rosbags
+from webmap.bags.player import Player
+from webmap.bags.recording import Recording
+from webmap.errors import ConfigError, WebMapError
+from webmap.not_listening import why_not_listening
+from webmap.sim.process import signals_set
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.quirks import POLITE
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+log = logging.getLogger("webmap.bags")
+
+HOST = "127.0.0.1"
+"""Others need not listen: what is recorded is nobody else's."""
+
+READY = "rosbridge is ready at "
+WRONG = "error: "
+"""How the one line on standard output begins if there is nothing to be played."""
+
+
+def main() -> int:
+    """Play a recording until SIGINT or SIGTERM and return the exit status."""
+    options = vars(_parser().parse_args())
+    logging.basicConfig(
+        level=logging.INFO,
+        stream=sys.stderr,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    logging.getLogger("websockets").setLevel(logging.WARNING)
+    try:
+        asyncio.run(_run(**options))
+    except (WebMapError, OSError) as error:
+        print(f"{WRONG}{error}", flush=True)
+        return 2
+    return 0
+
+
+async def _run(
+    paths: list[Path],
+    rate: float,
+    start: float,
+    loop: bool,
+    port: int,
+    with_parent: bool,
+) -> None:
+    need_rosbags()
+    recording = Recording(paths, warn=log.warning)
+    try:
+        player = Player(recording, rate=rate, start=start, loop=loop)
+        player.replay.start()
+        server = RosbridgeServer(player.replay.graph, Encoder(recording.schema, POLITE))
+        stop = asyncio.Event()
+        with signals_set(stop):
+            try:
+                url = await server.start(HOST, port)
+            except OSError as error:
+                raise ConfigError(why_not_listening(HOST, port, error)) from error
+            print(f"{READY}{url}", flush=True)
+            if with_parent:
+                _hear_parent(player.begin_anew, stop.set)
+            playing = asyncio.create_task(player.run())
+            stopped = asyncio.create_task(stop.wait())
+            try:
+                await asyncio.wait(
+                    [playing, stopped], return_when=asyncio.FIRST_COMPLETED
+                )
+                if playing.done():  # which it never is unless something is wrong
+                    playing.result()
+            finally:
+                playing.cancel()
+                stopped.cancel()
+                await asyncio.wait([playing, stopped])
+                await server.stop()
+    finally:
+        recording.close()
+
+
+def _hear_parent(again: Callable[[], Any], end: Callable[[], Any]) -> None:
+    """Begin anew at each line on standard input, and end when that does."""
+    loop = asyncio.get_running_loop()
+
+    def hear() -> None:
+        # Not through sys.stdin, whose lock would be held while the interpreter ends.
+        with contextlib.suppress(OSError, RuntimeError):  # all has ended already
+            while os.read(0, 4096):
+                loop.call_soon_threadsafe(again)
+            loop.call_soon_threadsafe(end)
+
+    threading.Thread(target=hear, name="stdin", daemon=True).start()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m webmap.bags", description="A recording behind a rosbridge."
+    )
+    add = parser.add_argument
+    add("paths", nargs="+", type=Path, help="a bag of ROS 1 or ROS 2")
+    add("--rate", type=float, default=1.0, help="seconds of it that are played in one")
+    add("--start", type=float, default=0.0, help="where it begins, in seconds")
+    add("--loop", action="store_true", help="begin anew when it has ended")
+    add("--port", type=int, default=0, help="of the rosbridge; 0: any that is free")
+    add("--with-parent", action="store_true", help="end when standard input does")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,198 @@
+"""Listening to everything behind a bridge, as long as it is recorded."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+from webmap.bags.incoming import Incoming
+from webmap.bags.recorder import Recorder
+from webmap.bags.replay import STATUS
+from webmap.errors import BridgeError, ConfigError
+from webmap.ros.bridge import Bridge
+from webmap.ros.events import Publish
+from webmap.ros.names import normalise_topic
+
+LOOK = 2.0
+"""Seconds between two looks which topics there are."""
+
+SHOW = 1.0
+"""Seconds between two words of how much was recorded."""
+
+OPEN_WITHIN = 5.0
+"""Seconds after which it is said that the link is not open yet."""
+
+QUEUE = 100
+"""Messages of a topic that the bridge may hold back; each one counts."""
+
+
+class Listening:
+    """Subscribes to topics behind a bridge, also to those that come later.
+
+    Args:
+        bridge: The bridge, not started yet.
+        recorder: Gets what comes.
+        only: The topics that are wanted; all if there are none.
+        told: Types by topic, where the bridge cannot be asked for them.
+        say: Told in a sentence what people should know.
+
+    """
+
+    def __init__(
+        self,
+        bridge: Bridge,
+        recorder: Recorder,
+        *,
+        only: Sequence[str] = (),
+        told: Mapping[str, str] | None = None,
+        say: Callable[[str], object],
+    ) -> None:
+        self._bridge = bridge
+        self._recorder = recorder
+        self._only = frozenset(only)
+        self._told = told
+        self._say = say
+        self._seen: set[str] = set()
+        self._lost = 0.0
+        self._was_open = False
+        self._incoming = Incoming(recorder, self._failed)
+        self._stop = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._failure: OSError | None = None
+
+    async def run(
+        self,
+        topics: Mapping[str, str],
+        stop: asyncio.Event,
+        *,
+        duration: float | None = None,
+        ready: Callable[[], object],
+        show: Callable[[float], object],
+    ) -> float:
+        """Record until ``stop`` is set, or for a time; return for how many seconds.
+
+        Args:
+            topics: Types by topic, as the bridge has them now.
+            stop: Ends it.
+            duration: How long it lasts at most, in seconds.
+            ready: Called once all is subscribed.
+            show: Called once a second with the seconds since then.
+
+        Raises:
+            OSError: If the bag cannot be written any more.
+
+        """
+        self._stop, self._loop = stop, asyncio.get_running_loop()
+        removals = [
+            self._bridge.on_open(self._opened),
+            self._bridge.on_close(self._closed),
+        ]
+        self._incoming.start()
+        self.take(topics)
+        self._bridge.start(self._loop)
+        began = time.monotonic()
+        tasks = [
+            asyncio.create_task(self._look_on()),
+            asyncio.create_task(self._say_if_not_open()),
+            asyncio.create_task(_show_on(began, show)),
+        ]
+        ready()
+        try:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(duration):
+                    await stop.wait()
+        finally:
+            lasted = time.monotonic() - began
+            for task in tasks:
+                task.cancel()
+            await asyncio.wait(tasks)
+            for removal in removals:
+                removal.remove()
+            why = self._why_not_open()
+            await self._bridge.stop()
+            await self._incoming.finish()
+        if not self._was_open:
+            self._say(f"Nothing is recorded: the link was never open{why}")
+        if self._failure is not None:
+            raise self._failure
+        return lasted
+
+    def take(self, topics: Mapping[str, str]) -> None:
+        """Subscribe to those topics that are wanted and new; name what is left out."""
+        unknown = []
+        for topic, type_name in sorted(topics.items()):
+            wanted = topic in self._only if self._only else topic != STATUS
+            if not wanted or topic in self._seen or not type_name:
+                continue
+            self._seen.add(topic)
+            if not self._subscribe(topic, type_name):
+                unknown.append(f"{topic} ({type_name})")
+        if unknown:
+            self._say(
+                f"Left out, since nothing here knows their types: {', '.join(unknown)}"
+            )
+
+    @property
+    def missing(self) -> list[str]:
+        """The topics that are wanted and that nobody has yet."""
+        return sorted(self._only - self._seen)
+
+    def _subscribe(self, topic: str, type_name: str) -> bool:
+        try:
+            name = normalise_topic(topic)
+            if not self._recorder.add(name, type_name):
+                return False
+            heard = partial(self._heard, name)
+            subscription = self._bridge.subscribe(
+                name, heard, type_name, queue_length=QUEUE
+            )
+            subscription.undecoded = True
+        except ConfigError as error:
+            self._say(f"{topic} is left out: {error}")
+        return True
+
+    def _heard(self, topic: str, message: Publish) -> None:
+        if not self._stop.is_set():
+            self._incoming.put(topic, message, time.time_ns())
+
+    def _failed(self, error: OSError) -> None:
+        self._failure = error
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._stop.set)
+
+    async def _say_if_not_open(self) -> None:
+        await asyncio.sleep(OPEN_WITHIN)
+        if not self._was_open:
+            why = self._why_not_open()
+            self._say(f"Nothing is recorded yet: the link is not open{why}")
+
+    def _why_not_open(self) -> str:
+        trouble = self._bridge.trouble
+        return f" ({trouble})" if trouble else ""
+
+    async def _look_on(self) -> None:
+        while self._told is None:
+            await asyncio.sleep(LOOK)
+            if self._bridge.state == "open":
+                with contextlib.suppress(BridgeError):  # it is asked again
+                    self.take(await self._bridge.topics())
+
+    def _closed(self, reason: str) -> None:
+        self._lost = time.monotonic()
+        self._say(f"The link was lost ({reason}): nothing is recorded until it is back")
+
+    def _opened(self) -> None:
+        self._was_open = True
+        if self._lost:
+            gone = time.monotonic() - self._lost
+            self._lost = 0.0
+            self._say(
+                f"The link is back after {gone:.1f} s, which are missing in the bag"
+            )
+
+
+async def _show_on(began: float, show: Callable[[float], object]) -> None:
+    while True:
+        await asyncio.sleep(SHOW)
+        show(time.monotonic() - began)

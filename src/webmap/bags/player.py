@@ -1,0 +1,171 @@
+"""Playing a recording at its pace, from its begin or from anywhere in it."""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Callable
+
+from webmap.bags.pace import SECOND, Pace
+from webmap.bags.recording import Recorded, Recording
+from webmap.bags.replay import Replay
+from webmap.errors import ConfigError
+
+log = logging.getLogger(__name__)
+
+SAY_EVERY = 0.5
+"""Seconds between two words of where in the recording it is."""
+
+SLOWEST, FASTEST = 0.001, 1000.0
+"""The rates at which a recording can be played."""
+
+ROUND = 1.0
+"""Least seconds from one round to the next; a recording may be one message long."""
+
+SOON = 1_000_000
+"""Nanoseconds for which it is not worth while to wait."""
+
+
+def steady_clock() -> Callable[[], int]:
+    """Return a clock in nanoseconds since 1970 that nobody sets meanwhile."""
+    since = time.time_ns() - time.monotonic_ns()
+    return lambda: since + time.monotonic_ns()
+
+
+class Player:
+    """Plays a recording for whoever listens.
+
+    Args:
+        recording: The recording.
+        rate: How many seconds of it are played in one, from 0.001 to 1000.
+        start: Where in it the playing begins, in seconds.
+        loop: Whether it begins anew when it has ended.
+        now: The time in nanoseconds since 1970.
+
+    Raises:
+        ConfigError: If the recording is shorter than ``start``, or the rate makes no
+            sense.
+
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        rate: float = 1.0,
+        start: float = 0.0,
+        loop: bool = False,
+        now: Callable[[], int] | None = None,
+    ) -> None:
+        if not SLOWEST <= rate <= FASTEST:
+            raise ConfigError(
+                f"a rate is a number from {SLOWEST:g} to {FASTEST:g}, got {rate:g}"
+            )
+        if not 0 <= start < recording.seconds:
+            raise ConfigError(
+                f"{recording.name} is {recording.seconds:.1f} s long, so it cannot be "
+                f"played from {start:g} s on"
+            )
+        self._now = now or steady_clock()
+        self.replay = Replay(recording, clock=lambda: self._now() / SECOND)
+        self._recording = recording
+        self._rate = rate
+        self._loop = loop
+        self._first = recording.begin + round(start * SECOND)
+        self._pace = Pace(self._first, self._now(), rate)
+        self._kept: list[Recorded] | None = None
+        self._over = False
+        self._ended = False
+        self._late = False
+        self._again = False
+        self._woken = asyncio.Event()
+
+    @property
+    def words(self) -> str:
+        """Which recording is played, where in it, and how fast; for people."""
+        recording = self._recording
+        at = (self._pace.at(self._now()) - recording.begin) / SECOND
+        at = min(max(at, 0.0), recording.seconds)
+        speed = "" if self._rate == 1 else f", {self._rate:g} times as fast"
+        if self._ended:
+            return f"Recording {recording.name}: ended after {recording.seconds:.1f} s"
+        length = f"{recording.seconds:.1f} s"
+        return f"Recording {recording.name}: {at:.1f} of {length}{speed}"
+
+    def begin_anew(self) -> None:
+        """Go back to where the playing began."""
+        self._again = True
+        self._woken.set()
+
+    async def run(self) -> None:
+        """Play until cancelled; nothing is played before somebody listens."""
+        await self.replay.graph.heard.wait()
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._say_on())
+            group.create_task(self._play_on())
+
+    async def _play_on(self) -> None:
+        while True:
+            self._again, self._ended = False, False
+            self._woken.clear()
+            self._pace = Pace(self._first, self._now(), self._rate)
+            soonest = self._now() + round(ROUND * SECOND)
+            try:
+                await self._once()
+            except ConfigError as error:
+                log.error("%s; what comes behind it is not played", error)
+            if self._again:
+                continue
+            if self._loop:
+                end = self._pace.due(self._recording.end)
+                if await self._until(max(end, soonest)):
+                    continue
+            if not self._again:
+                self._ended = True
+                await self._woken.wait()
+
+    async def _once(self) -> None:
+        if self._kept is None:
+            self._kept = await self._read_kept()
+            self._pace = Pace(self._first, self._now(), self._rate)
+        for recorded in self._kept:
+            self.replay.publish(recorded, self._pace)
+        for recorded in self._recording.messages(self._first):
+            if not await self._until(self._pace.due(recorded.time)):
+                return
+            self.replay.publish(recorded, self._pace)
+
+    async def _read_kept(self) -> list[Recorded]:
+        """Read what is kept of before the begin: in a thread, for it may take long."""
+        reading = asyncio.create_task(asyncio.to_thread(self._kept_of_before))
+        try:
+            return await asyncio.shield(reading)
+        except asyncio.CancelledError:
+            self._over = True
+            await asyncio.wait([reading])  # since the file is closed then
+            raise
+
+    def _kept_of_before(self) -> list[Recorded]:
+        kept = self._recording.kept_until(self._first, lambda: not self._over)
+        return list(kept)
+
+    async def _until(self, due: int) -> bool:
+        """Wait until something is due; return whether it is still to be played."""
+        wait = due - self._now()
+        if wait < -SECOND:
+            self._pace.put_off(-wait)
+            if not self._late:
+                self._late = True
+                log.warning("this computer cannot keep the pace, and plays later")
+        if wait < SOON:
+            await asyncio.sleep(0)  # those who listen have their turn
+            return not self._again
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(wait / SECOND):
+                await self._woken.wait()
+        return not self._again
+
+    async def _say_on(self) -> None:
+        while True:
+            self.replay.say(self.words)
+            await asyncio.sleep(SAY_EVERY)

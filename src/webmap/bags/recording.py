@@ -1,0 +1,276 @@
+"""A recording as it lies on the disk: its topics, and its messages in their order."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from webmap.bags.latching import is_latched, is_static
+from webmap.bags.reading import Messages
+from webmap.bags.shapes import shapes_of
+from webmap.errors import ConfigError
+from webmap.sim.rosbridge.dialect import Dialect, DialectName, canonical, resolve
+from webmap.sim.rosbridge.schema import Schema, UnknownType
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import Connection
+
+SECOND = 1_000_000_000
+
+ROS1, ROS2 = ".bag", (".mcap", ".db3")
+
+
+class Recorded(NamedTuple):
+    """A message as it was recorded, not decoded yet."""
+
+    topic: str
+    time: int
+    """When it came, in nanoseconds since 1970."""
+
+    connection: "Connection"
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTopic:
+    """A topic of a recording."""
+
+    name: str
+    type: str
+    """Canonical: ``nav_msgs/Odometry``."""
+
+    latched: bool
+    """Whether its newest message is for those too who come later."""
+
+
+class Recording:
+    """A bag of ROS 1, or several that are played as one, or one of ROS 2.
+
+    Messages are read as they are asked for, so that memory does not grow with the file;
+    of a bag of ROS 1 the index is kept.
+
+    Args:
+        paths: Files (``.bag``, ``.mcap``, ``.db3``), or the folder of a bag of ROS 2.
+        warn: Told in a sentence what is left out.
+
+    Raises:
+        ConfigError: If there is no such file, or it cannot be read.
+
+    """
+
+    def __init__(
+        self, paths: Sequence[Path], *, warn: Callable[[str], object] = lambda _: None
+    ) -> None:
+        self.name = recording_name(paths)
+        """What people call it."""
+        self.dialect: DialectName = _dialect(paths)
+        self._warn = warn
+        self._failed: set[str] = set()
+        self._closed = False
+        self._reader = _opened(paths, self.name, self.dialect)
+        try:
+            self.begin = self._reader.start_time
+            """When its first message came, in nanoseconds since 1970."""
+            self.end = self._reader.end_time
+            """Right after its last message, likewise."""
+            self.schema = Schema(Dialect(self.dialect))
+            self.topics: dict[str, RecordedTopic] = {}
+            self._names: dict[str, str] = {}
+            self._connections = self._usable()
+        except ConfigError:
+            self.close()
+            raise
+        except Exception as error:
+            self.close()
+            raise unreadable(self.name, error) from None
+        self._messages = Messages(self.schema)
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return (self.end - self.begin) / SECOND
+
+    def close(self) -> None:
+        """Read no more."""
+        if not self._closed:
+            self._closed = True
+            self._reader.close()
+
+    def messages(self, start: int) -> Iterator[Recorded]:
+        """Give the messages from a moment on, in their order.
+
+        Args:
+            start: The moment, in nanoseconds since 1970.
+
+        Raises:
+            ConfigError: If the file is damaged there.
+
+        """
+        return self._read(self._connections, start, None)
+
+    def kept_until(
+        self, start: int, go_on: Callable[[], bool] = lambda: True
+    ) -> Iterator[Recorded]:
+        """Give the messages of before a moment that still count at it.
+
+        Args:
+            start: The moment, in nanoseconds since 1970.
+            go_on: Asked again and again whether they are still wanted.
+
+        Raises:
+            ConfigError: If the file is damaged before it.
+
+        """
+        latched = [
+            connection
+            for connection in self._connections
+            if self.topics[self._names[connection.topic]].latched
+        ]
+        if not latched:
+            return
+        newest: dict[str, Recorded] = {}
+        for recorded in self._read(latched, None, start):
+            if not go_on():
+                return
+            if is_static(recorded.topic):
+                yield recorded
+            else:
+                newest[recorded.topic] = recorded
+        yield from newest.values()
+
+    def message(self, recorded: Recorded) -> dict[str, Any] | None:
+        """Return a message as the rosbridge server publishes it.
+
+        None if its bytes are not of its type, which is said once for each topic.
+        """
+        try:
+            value = self._reader.deserialize(recorded.data, recorded.connection.msgtype)
+            return self._messages.message(self.topics[recorded.topic].type, value)
+        except Exception as error:
+            if recorded.topic not in self._failed:
+                self._failed.add(recorded.topic)
+                self._warn(
+                    f"{self.name}: messages of {recorded.topic} are left out that are "
+                    f"not of the type {recorded.connection.msgtype} ({_words(error)})"
+                )
+            return None
+
+    def _read(
+        self, connections: "Sequence[Connection]", start: int | None, stop: int | None
+    ) -> Iterator[Recorded]:
+        try:
+            for connection, time, data in self._reader.messages(
+                connections, start, stop
+            ):
+                name = self._names[connection.topic]
+                yield Recorded(name, time, connection, data)
+        except Exception as error:
+            raise unreadable(self.name, error) from None
+
+    def _usable(self) -> "list[Connection]":
+        """Return what can be played, and note its topics and types."""
+        if self._reader.message_count == 0:
+            raise ConfigError(f"{self.name}: there is no message in it")
+        _add_defaults(self._reader, self.dialect)
+        usable = []
+        for connection in self._reader.connections:
+            try:
+                shapes = shapes_of(self._reader.typestore, connection.msgtype)
+            except UnknownType as error:
+                self._leave_out(connection, str(error))
+                continue
+            type_name = canonical(connection.msgtype)
+            name = self._names[connection.topic] = resolve(connection.topic)
+            known = self.topics.get(name)
+            if known is not None and known.type != type_name:
+                self._leave_out(connection, f"it is a {known.type} too")
+                continue
+            self.schema.define(type_name, shapes)
+            latched = (known is not None and known.latched) or _said_latched(connection)
+            latched = latched or is_latched(name, type_name)
+            self.topics[name] = RecordedTopic(name, type_name, latched)
+            usable.append(connection)
+        if not usable:
+            raise ConfigError(f"{self.name}: no topic of it can be played")
+        return usable
+
+    def _leave_out(self, connection: "Connection", why: str) -> None:
+        self._warn(
+            f"{self.name}: {connection.topic} ({connection.msgtype}) is left out: {why}"
+        )
+
+
+def recording_name(paths: Sequence[Path]) -> str:
+    """Return what people call a recording: its file, and how many there are more."""
+    first = paths[0].resolve().name or str(paths[0])
+    return first if len(paths) == 1 else f"{first} and {len(paths) - 1} more"
+
+
+def unreadable(name: str, error: Exception) -> ConfigError:
+    """Return what is said of a file that cannot be read."""
+    return ConfigError(f"{name} cannot be read as a recording: {_words(error)}")
+
+
+def _words(error: Exception) -> str:
+    """Return why something could not be read, for people."""
+    said = str(error).strip().partition("\n")[0].rstrip(".")
+    if not said or isinstance(error, AssertionError | LookupError | TypeError):
+        return "it is damaged or cut off"
+    return said[:200]
+
+
+def _dialect(paths: Sequence[Path]) -> DialectName:
+    kinds: set[DialectName] = set()
+    for path in paths:
+        if not path.exists():
+            raise ConfigError(f"{path}: there is no such file or folder")
+        if path.is_dir() and not (path / "metadata.yaml").exists():
+            raise ConfigError(
+                f"{path}: there is no metadata.yaml in this folder, so it is no bag of "
+                f"ROS 2; give the .mcap or .db3 file in it by itself"
+            )
+        if path.is_file() and path.suffix not in (ROS1, *ROS2):
+            raise ConfigError(
+                f"{path} is no recording by its name; expected .bag, .mcap, .db3, or "
+                f"the folder of a bag of ROS 2"
+            )
+        kinds.add("ros1" if path.suffix == ROS1 and path.is_file() else "ros2")
+    if len(kinds) > 1:
+        raise ConfigError("bags of ROS 1 and of ROS 2 cannot be played as one")
+    return kinds.pop()
+
+
+def _opened(paths: Sequence[Path], name: str, dialect: DialectName) -> "AnyReader":
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    # Bags of ROS 2 hold the definitions of their types only since Iron.
+    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
+    try:
+        reader = AnyReader([*paths], default_typestore=get_typestore(default))
+        reader.open()
+    except Exception as error:
+        raise unreadable(name, error) from None
+    return reader
+
+
+def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
+    """Let a reader know the usual types that the file itself does not define."""
+    from rosbags.typesys import Stores, get_typestore
+
+    known = reader.typestore.fielddefs
+    if all(connection.msgtype in known for connection in reader.connections):
+        return
+    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
+    usual = get_typestore(default).fielddefs
+    reader.typestore.register({n: usual[n] for n in usual if n not in known})
+
+
+def _said_latched(connection: "Connection") -> bool:
+    from rosbags.interfaces import ConnectionExtRosbag1, QosDurability
+
+    if isinstance(connection.ext, ConnectionExtRosbag1):
+        return bool(connection.ext.latching)
+    durable = QosDurability.TRANSIENT_LOCAL
+    return any(q.durability == durable for q in connection.ext.offered_qos_profiles)

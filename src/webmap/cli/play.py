@@ -1,0 +1,124 @@
+"""``webmap play FILE``: a recording on the map."""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import click
+
+from webmap.cli.beside import beside
+from webmap.cli.options import PORT, Finite, web_options
+from webmap.errors import ConfigError
+
+
+@click.command(short_help="Show a recording: a bag of ROS 1 or ROS 2.")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--rate",
+    type=Finite(0.001, 1000.0),
+    default=1.0,
+    show_default=True,
+    help="How many seconds of the recording are played in one.",
+)
+@click.option(
+    "--start",
+    type=Finite(0.0),
+    default=0.0,
+    show_default=True,
+    help="Where in the recording the playing begins, in seconds.",
+)
+@click.option("--loop", is_flag=True, help="Begin anew when the recording has ended.")
+@click.option(
+    "--bridge-port",
+    type=PORT,
+    default=0,
+    show_default=True,
+    help="Port of the replay's rosbridge; 0 lets the system choose.",
+)
+@web_options
+def play(
+    files: tuple[Path, ...],
+    rate: float,
+    start: float,
+    loop: bool,
+    bridge_port: int,
+    host: str,
+    port: int,
+    no_browser: bool,
+    insecure_lan: bool,
+) -> None:
+    """Show a recording on the map, at its pace.
+
+    A FILE is a bag of ROS 1 (.bag), the folder of a bag of ROS 2, or one file of it
+    (.mcap, .db3); several bags of ROS 1 are played as one. Nothing in a recording can
+    be driven. It needs rosbags: pip install "webmap[bags]".
+
+    \b
+    webmap play office.bag
+    webmap play rosbag2_2026_05_04/ --rate 4 --loop
+    """
+    import webmap
+    from webmap import console
+    from webmap.bags.needed import need_rosbags
+    from webmap.bags.recording import recording_name
+    from webmap.bags.replay import STATUS
+    from webmap.cli.found_fleet import find_fleet
+    from webmap.cli.found_layers import draw_layers
+    from webmap.cli.recording_line import RecordingLine
+    from webmap.cli.watched import Watched
+
+    need_rosbags()
+    name = recording_name(files)
+    told = ["--rate", rate, "--start", start, "--port", bridge_port]
+    told += ["--loop"] if loop else []
+    with replay(*told, "--", *files) as (url, begin_anew):
+        bridge = webmap.Bridge(url, name=f"recording {name}")
+        watched = Watched(Path(name).stem)
+        fleet = find_fleet(
+            [bridge], [], wait=5.0, stops_within=None, overruling=watched
+        )
+        opened = console.open_console([bridge], [], title=f"Recording {name}")
+        fleet.show(opened, grid=True)
+        draw_layers([bridge], opened.robots, watched, console=opened)
+        opened.add_module(RecordingLine, bridge, STATUS, once(begin_anew))
+        webmap.run(
+            host=host,
+            port=port,
+            open_browser=not no_browser,
+            insecure_lan=insecure_lan,
+        )
+
+
+@contextlib.contextmanager
+def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Run a replay beside this process; give its rosbridge's URL, and what restarts it.
+
+    It ends with this process, however that ends, since its standard input does.
+
+    Raises:
+        ConfigError: If the recording cannot be played.
+
+    """
+    from webmap.bags.__main__ import READY, WRONG
+
+    with beside("-m", "webmap.bags", "--with-parent", *arguments) as started:
+        line = started.line
+        if line.startswith(WRONG):
+            raise ConfigError(line.removeprefix(WRONG).strip())
+        if not line.startswith(READY):
+            raise ConfigError("the replay did not start; what it said is above")
+
+        def begin_anew() -> None:
+            try:  # past the buffer, which would keep it and fail once more at the end
+                os.write(started.told.fileno(), b"again\n")
+            except (OSError, ValueError):
+                click.echo("The replay has ended: nothing is played", err=True)
+
+        yield line.removeprefix(READY).strip(), begin_anew
+
+
+def once(call: Callable[[], None]) -> Callable[[], None]:
+    """Return what calls something the first time that it is called."""
+    left = [call]
+    return lambda: left.pop()() if left else None

@@ -1,0 +1,96 @@
+"""``webmap record URL``: what is behind a rosbridge, in a bag."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from webmap.cli.options import Finite, verbose_option
+from webmap.cli.topic_list import topics_option
+from webmap.errors import ConfigError
+
+
+@click.command(short_help="Record what is behind a bridge into a bag.")
+@click.argument("url")
+@click.option(
+    "--topic",
+    "only",
+    multiple=True,
+    metavar="TOPIC",
+    help="Record this topic and no others but those named likewise.",
+)
+@click.option(
+    "--type",
+    "types",
+    multiple=True,
+    metavar="NAME",
+    help="The type of a --topic where the bridge has no rosapi, once for each of them "
+    "and in the same order: nav_msgs/Odometry, or of ROS 2 nav_msgs/msg/Odometry.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="The bag: a file for ROS 1, a folder for ROS 2. It must not exist. Unless "
+    "said it is called webmap- and the time.",
+)
+@click.option(
+    "--duration",
+    type=Finite(0.0, min_open=True),
+    help="End after so many seconds; without it Ctrl+C ends it.",
+)
+@click.option(
+    "--wait",
+    type=Finite(0.0),
+    default=5.0,
+    show_default=True,
+    help="Seconds to wait for a rosbridge that cannot be reached.",
+)
+@topics_option
+@verbose_option
+def record(
+    url: str,
+    only: tuple[str, ...],
+    types: tuple[str, ...],
+    out: Path | None,
+    duration: float | None,
+    wait: float,
+    topics: dict[str, str] | None,
+) -> None:
+    """Record the topics behind a rosbridge into a bag.
+
+    The bag is one of the ROS that the robot runs: a .bag file, or a folder with an
+    MCAP file. Topics that appear later are recorded too. Nothing is driven. It needs
+    rosbags: pip install "webmap[bags]".
+
+    \b
+    webmap record ws://robot:9090
+    webmap record ws://robot:9090 --topic /tf --topic /scan --duration 60
+    """
+    import asyncio
+
+    from webmap.bags.needed import need_rosbags
+    from webmap.cli.recording_to import record_to, told_types
+    from webmap.ros.names import normalise_topic, normalise_url
+
+    need_rosbags()
+    names = [normalise_topic(topic) for topic in only]
+    told = told_types(names, types, topics)
+    if told is not None:
+        told = {normalise_topic(topic): type_name for topic, type_name in told.items()}
+        if bare := [name for name in names if name not in told]:
+            raise ConfigError(
+                f"nothing says the type of {', '.join(bare)}: name it with --type, or "
+                f"add it to the list of --topics"
+            )
+    failed = asyncio.run(
+        record_to(
+            normalise_url(url),
+            out,
+            only=names,
+            told=told,
+            wait=wait,
+            duration=duration,
+        )
+    )
+    if failed:
+        sys.exit(2)

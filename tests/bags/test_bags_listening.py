@@ -1,0 +1,304 @@
+"""What is listened to while it is recorded, and what is said on the way."""
+
+import asyncio
+import json
+import time as time_module
+from types import SimpleNamespace
+
+import pytest
+
+from webmap.bags import incoming, listening
+from webmap.bags.listening import Listening
+from webmap.bags.replay import STATUS
+from webmap.errors import BridgeClosed
+from webmap.ros.bridge import Bridge
+from webmap.ros.events import Publish
+from webmap.ros.offload import LARGE
+
+ODOMETRY = "nav_msgs/Odometry"
+STRING = "std_msgs/String"
+
+
+class FakeBridge:
+    """A bridge whose topics and messages are the test's."""
+
+    def __init__(self, topics):
+        self.now, self.callbacks, self.state = dict(topics), {}, "open"
+        self.opened = self.closed = self.trouble = None
+        self.opens = True
+
+    def on_open(self, call):
+        self.opened = call
+        return SimpleNamespace(remove=lambda: None)
+
+    def on_close(self, call):
+        self.closed = call
+        return SimpleNamespace(remove=lambda: None)
+
+    def subscribe(self, topic, callback, type, **_):
+        self.callbacks[topic] = callback
+        return SimpleNamespace()
+
+    def says(self, topic, message):
+        operation = {"op": "publish", "topic": topic, "msg": message}
+        self.callbacks[topic](Publish(topic, json.dumps(operation).encode()))
+
+    async def topics(self):
+        if self.state != "open":
+            raise BridgeClosed("away")
+        return dict(self.now)
+
+    def start(self, loop):
+        if self.opens:
+            self.opened()
+
+    async def stop(self):
+        self.state = "closed"
+
+
+class FakeRecorder:
+    """Notes what it gets; it knows no type of ``acme_msgs``."""
+
+    def __init__(self):
+        self.got, self.times, self.dropped = [], [], []
+        self.full, self.pause = False, 0.0
+
+    def add(self, topic, type_name):
+        return not type_name.startswith("acme_msgs/")
+
+    def take(self, topic, message, time):
+        if self.full:
+            raise OSError("No space left on device")
+        time_module.sleep(self.pause)
+        self.times.append(time)
+        self.got.append((topic, message))
+
+    def drop(self, topic, why, error=""):
+        self.dropped.append((topic, why, error))
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(listening, "LOOK", 0.001)
+
+
+class Story:
+    """One recording, and what happens while it goes on."""
+
+    def __init__(self, topics, **options):
+        self.bridge, self.recorder = FakeBridge(topics), FakeRecorder()
+        self.said, self.stop = [], asyncio.Event()
+        self.listening = Listening(
+            self.bridge, self.recorder, say=self.said.append, **options
+        )
+
+    def run(self, happens, **options):
+        async def story():
+            going = asyncio.create_task(
+                self.listening.run(
+                    self.bridge.now,
+                    self.stop,
+                    ready=lambda: None,
+                    show=lambda _: None,
+                    **options,
+                )
+            )
+            while not self.bridge.opened:
+                await asyncio.sleep(0)
+            async with asyncio.timeout(10):
+                await happens()
+                self.stop.set()
+                return await going
+
+        return asyncio.run(story())
+
+
+def test_all_topics_are_recorded_but_what_a_replay_says_of_itself():
+    story = Story({"/odom": ODOMETRY, STATUS: STRING})
+
+    async def happens():
+        story.bridge.says("/odom", {"x": 1})
+
+    story.run(happens)
+    assert story.recorder.got == [("/odom", {"x": 1})]
+    assert set(story.bridge.callbacks) == {"/odom"}
+
+
+def test_topics_that_come_later_are_recorded_too():
+    story = Story({"/odom": ODOMETRY})
+
+    async def happens():
+        story.bridge.now["/scan"] = "sensor_msgs/LaserScan"
+        while "/scan" not in story.bridge.callbacks:
+            await asyncio.sleep(0.001)
+
+    story.run(happens)
+    assert story.said == []
+
+
+def test_of_topics_that_are_named_no_other_is_recorded():
+    story = Story({"/odom": ODOMETRY, "/chat": STRING}, only=["/odom", "/later"])
+
+    async def happens():
+        assert story.listening.missing == ["/later"]
+
+    story.run(happens)
+    assert set(story.bridge.callbacks) == {"/odom"}
+
+
+def test_topics_of_unknown_types_are_named_once():
+    story = Story({"/a": "acme_msgs/Arm", "/b": "acme_msgs/Leg", "/odom": ODOMETRY})
+
+    async def happens():
+        story.bridge.now["/chat"] = STRING
+        while "/chat" not in story.bridge.callbacks:
+            await asyncio.sleep(0.001)
+
+    story.run(happens)
+    assert story.said == [
+        "Left out, since nothing here knows their types: /a (acme_msgs/Arm), "
+        "/b (acme_msgs/Leg)"
+    ]
+
+
+def test_a_link_that_was_lost_and_is_back_is_said_with_the_gap():
+    story = Story({"/odom": ODOMETRY})
+
+    async def happens():
+        story.bridge.closed("the robot went to sleep")
+        story.bridge.opened()
+
+    story.run(happens)
+    lost, back = story.said
+    assert lost.startswith("The link was lost (the robot went to sleep)")
+    assert back == "The link is back after 0.0 s, which are missing in the bag"
+
+
+def test_it_ends_by_itself_after_its_time():
+    story = Story({"/odom": ODOMETRY})
+
+    async def ended():
+        return await story.listening.run(
+            story.bridge.now,
+            story.stop,
+            duration=0.01,
+            ready=lambda: None,
+            show=lambda _: None,
+        )
+
+    assert 0.01 <= asyncio.run(ended()) < 5
+
+
+def test_a_disk_that_is_full_ends_it_with_an_error():
+    story = Story({"/odom": ODOMETRY})
+
+    async def happens():
+        story.recorder.full = True
+        story.bridge.says("/odom", {})
+
+    with pytest.raises(OSError, match="No space left"):
+        story.run(happens)
+
+
+def test_a_link_that_never_opens_is_said_with_the_reason(monkeypatch):
+    monkeypatch.setattr(listening, "OPEN_WITHIN", 0.001)
+    story = Story({"/odom": ODOMETRY})
+    story.bridge.opens, story.bridge.trouble = False, "nothing listens there"
+
+    async def ended():
+        await story.listening.run(
+            story.bridge.now,
+            story.stop,
+            duration=0.05,
+            ready=lambda: None,
+            show=lambda _: None,
+        )
+
+    asyncio.run(ended())
+    assert story.said == [
+        "Nothing is recorded yet: the link is not open (nothing listens there)",
+        "Nothing is recorded: the link was never open (nothing listens there)",
+    ]
+
+
+def test_a_message_has_the_time_at_which_it_came_however_long_writing_takes():
+    story = Story({"/odom": ODOMETRY})
+    story.recorder.pause = 0.2
+
+    async def happens():
+        for x in range(3):
+            story.bridge.says("/odom", {"x": x})
+
+    story.run(happens)
+    assert [message["x"] for _, message in story.recorder.got] == [0, 1, 2]
+    assert story.recorder.times[2] - story.recorder.times[0] < 0.2e9
+
+
+def test_what_cannot_be_read_is_counted():
+    story = Story({"/odom": ODOMETRY})
+
+    async def happens():
+        frame = b'{"op":"publish","topic":"/odom","msg":{"x":'
+        story.bridge.callbacks["/odom"](Publish("/odom", frame))
+
+    story.run(happens)
+    ((topic, why, error),) = story.recorder.dropped
+    assert (topic, why) == ("/odom", "messages are left out that cannot be read")
+    assert "not JSON" in error
+
+
+def test_what_is_too_much_to_wait_is_counted(monkeypatch):
+    monkeypatch.setattr(incoming, "HELD", 3 * incoming.ASIDE)
+    story = Story({"/odom": ODOMETRY})
+    story.recorder.pause = 0.1
+
+    async def happens():
+        for x in range(10):
+            story.bridge.says("/odom", {"x": x})
+
+    story.run(happens)
+    got, dropped = story.recorder.got, story.recorder.dropped
+    assert got[0] == ("/odom", {"x": 0})
+    assert len(got) + len(dropped) == 10
+    assert 7 <= len(dropped) <= 8
+    assert "more come than can be written" in dropped[0][1]
+
+
+class HandFed(Bridge):
+    """A bridge without a link, whose frames are the test's."""
+
+    def start(self, loop):
+        self._fan_out.begin(loop)
+
+    def says(self, topic, message):
+        operation = {"op": "publish", "topic": topic, "msg": message}
+        self._received(json.dumps(operation).encode())
+
+
+def test_no_large_message_is_lost_nor_a_small_one_behind_it():
+    """For whoever shows messages the newest large one is enough; not for a bag."""
+    story = Story({"/map": "nav_msgs/OccupancyGrid"}, told={})
+    story.bridge = HandFed("ws://127.0.0.1:1")
+    story.listening._bridge = story.bridge
+    sent = [
+        {"number": number, "padding": "x" * (LARGE if number % 2 else 1)}
+        for number in range(20)
+    ]
+
+    async def recorded():
+        going = asyncio.create_task(
+            story.listening.run(
+                {"/map": "nav_msgs/OccupancyGrid"},
+                story.stop,
+                ready=lambda: None,
+                show=lambda _: None,
+            )
+        )
+        await asyncio.sleep(0)
+        for message in sent:
+            story.bridge.says("/map", message)
+        story.stop.set()
+        await going
+
+    asyncio.run(recorded())
+    assert story.recorder.got == [("/map", message) for message in sent]

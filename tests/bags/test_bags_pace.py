@@ -1,0 +1,50 @@
+"""When what is recorded is due, and what its stamps say then."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from webmap.bags.pace import LAST, SECOND, Pace
+
+THEN, NOW = 1_500_000_000 * SECOND, 1_700_000_000 * SECOND
+
+
+def test_at_the_rate_of_one_everything_keeps_its_distance():
+    pace = Pace(THEN, NOW)
+    assert pace.due(THEN) == NOW
+    assert pace.due(THEN + 12_345_678_901) == NOW + 12_345_678_901
+    assert pace.moved(THEN - 40_000_001) == NOW - 40_000_001
+
+
+def test_at_the_rate_of_four_all_is_due_in_a_quarter_of_the_time():
+    pace = Pace(THEN, NOW, 4.0)
+    assert pace.due(THEN + 8 * SECOND) == NOW + 2 * SECOND
+    assert pace.moved(THEN + 8 * SECOND) == NOW + 2 * SECOND
+
+
+def test_a_stamp_that_says_no_time_goes_on_saying_none():
+    assert Pace(THEN, NOW).moved(0) == 0
+
+
+@pytest.mark.parametrize("stamp", [5 * SECOND, LAST - 1])
+def test_a_stamp_stays_that_would_leave_what_stamps_can_say(stamp):
+    assert Pace(THEN, NOW, 0.1).moved(stamp) == stamp
+
+
+def test_what_is_put_off_is_played_later_and_from_the_same_moment_on():
+    pace = Pace(THEN, NOW, 2.0)
+    pace.put_off(3 * SECOND)
+    assert pace.at(NOW + 3 * SECOND) == THEN
+
+
+@given(some.floats(0.01, 100.0), some.integers(0, 10**14))
+def test_the_moment_that_is_played_now_is_the_one_that_is_due_now(rate, after):
+    pace = Pace(THEN, NOW, rate)
+    assert pace.at(pace.due(THEN + after)) == pytest.approx(THEN + after, abs=1000)
+
+
+@given(some.floats(0.01, 100.0), some.lists(some.integers(0, 10**14)))
+def test_stamps_keep_their_order_at_every_rate(rate, stamps):
+    pace = Pace(THEN, NOW, rate)
+    moved = [pace.moved(THEN + stamp) for stamp in sorted(stamps)]
+    assert moved == sorted(moved)

@@ -1,0 +1,122 @@
+"""What is written of messages that come, and what is said of those that are not."""
+
+from pathlib import Path
+
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability
+
+from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, Made, types_of
+from webmap.bags.bag_file import new_bag
+from webmap.bags.recorder import Recorder
+from webmap.errors import ConfigError
+
+RANGE = "sensor_msgs/msg/Range"
+
+
+@pytest.fixture
+def recording(made, tmp_path):
+    """A recorder, its bag, and the sentences that it says."""
+    bag, said = new_bag(tmp_path / "office", made.dialect), []
+    return Recorder(bag, types_of(made.dialect), said.append), bag, said
+
+
+def test_what_is_recorded_is_read_by_others(made, recording):
+    recorder, bag, said = recording
+    assert recorder.add("/odom", made.schema.dialect.spell(ODOMETRY))
+    recorder.take("/odom", made.odometry(0.0, 1.25), BEGIN)
+    bag.close()
+    with AnyReader([bag.path]) as reader:
+        ((connection, time, data),) = reader.messages()
+        odometry = reader.deserialize(data, connection.msgtype)
+    assert (connection.topic, time) == ("/odom", BEGIN)
+    assert odometry.pose.pose.position.x == 1.25
+    assert odometry.header.frame_id == "odom"
+    assert (recorder.messages, recorder.topics, recorder.dropped) == (1, 1, 0)
+    assert said == []
+
+
+def test_a_map_and_static_frames_are_marked_as_kept_for_those_who_come_late(
+    made, recording
+):
+    recorder, bag, _ = recording
+    messages = {
+        "/map": (GRID, made.grid([0])),
+        "/tf_static": (FRAMES, made.frame("laser")),
+        "/odom": (ODOMETRY, made.odometry(0.0, 0.0)),
+    }
+    for topic, (type_name, message) in messages.items():
+        recorder.add(topic, type_name)
+        recorder.take(topic, message, BEGIN)
+    bag.close()
+    with AnyReader([bag.path]) as reader:
+        kept = {c.topic for c in reader.connections if is_kept(c.ext)}
+    assert kept == {"/map", "/tf_static"}
+
+
+def is_kept(ext):
+    if hasattr(ext, "latching"):
+        return ext.latching == 1
+    durable = QosDurability.TRANSIENT_LOCAL
+    return any(qos.durability == durable for qos in ext.offered_qos_profiles)
+
+
+def test_a_topic_of_a_type_that_nobody_knows_is_not_taken_in(recording):
+    recorder, bag, _ = recording
+    assert not recorder.add("/arm", "acme_msgs/Arm")
+    bag.close()
+
+
+def test_messages_that_do_not_fit_are_counted_and_said_once(made, recording):
+    recorder, bag, said = recording
+    recorder.add("/odom", ODOMETRY)
+    recorder.take("/odom", {"pose": 3}, BEGIN)
+    recorder.take("/odom", made.odometry(0.0, 1.0) | {"twist": 3}, BEGIN)
+    recorder.take("/odom", made.odometry(0.0, 1.0), BEGIN)
+    bag.close()
+    assert (recorder.messages, recorder.dropped) == (1, 2)
+    (sentence,) = said
+    assert "/odom: messages are left out that do not fit the type" in sentence
+
+
+@pytest.mark.parametrize("fields", [{}, {"variance": 0.5}])
+def test_a_type_is_written_as_the_release_of_the_robot_has_it(tmp_path, fields):
+    """Since Jazzy a Range has a variance, and before it had none."""
+    bag, said = new_bag(tmp_path / "office", "ros2"), []
+    recorder = Recorder(bag, types_of("ros2"), said.append)
+    sonar = Made("ros2").message("sensor_msgs/Range", range=1.5) | fields
+    assert recorder.add("/sonar", RANGE)
+    recorder.take("/sonar", sonar, BEGIN)
+    bag.close()
+    assert said == []
+    with AnyReader([bag.path]) as reader:
+        ((connection, _, data),) = reader.messages()
+        read = reader.deserialize(data, connection.msgtype)
+    assert read.range == 1.5
+    assert getattr(read, "variance", None) == fields.get("variance")
+
+
+def test_a_bag_that_exists_is_not_overwritten(made, tmp_path):
+    first = new_bag(tmp_path / "office", made.dialect)
+    first.close()
+    with pytest.raises(ConfigError, match="exists already, and nothing is overwritten"):
+        new_bag(tmp_path / "office", made.dialect)
+
+
+def test_what_rosbags_refuses_to_make_is_one_sentence(made, tmp_path, monkeypatch):
+    monkeypatch.setattr(Path, "exists", lambda _: False)  # it comes in between
+    (tmp_path / "office").mkdir()
+    (tmp_path / "office.bag").touch()
+    with pytest.raises(ConfigError, match=r"cannot be made: .* exists already"):
+        new_bag(tmp_path / "office", made.dialect)
+
+
+def test_a_bag_of_ros_1_is_called_so_that_others_know_it(tmp_path):
+    bag = new_bag(tmp_path / "office.today", "ros1")
+    bag.close()
+    assert bag.path.name == "office.today.bag"
+
+
+def test_a_bag_of_ros_2_is_not_called_as_a_file(tmp_path):
+    with pytest.raises(ConfigError, match="a bag of ROS 2 is a folder"):
+        new_bag(tmp_path / "office.bag", "ros2")

@@ -1,0 +1,209 @@
+"""What is read of a bag, and what is said of one that cannot be read."""
+
+import re
+
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+
+from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, TWIST, Made, types_of
+from webmap.bags.recording import Recording, recording_name
+from webmap.errors import ConfigError
+
+
+@pytest.fixture(scope="module")
+def bag(made, tmp_path_factory):
+    """A bag of four seconds: odometry, a map said once, a velocity."""
+    return made.bag(
+        tmp_path_factory.mktemp(made.dialect) / "office",
+        ("/map", GRID, 0.0, made.grid([0, 100])),
+        ("/odom", ODOMETRY, 1.0, made.odometry(1.0, 0.5)),
+        ("/cmd_vel", TWIST, 2.0, made.message(TWIST)),
+        ("/odom", ODOMETRY, 4.0, made.odometry(4.0, 2.0)),
+    )
+
+
+def test_a_bag_tells_its_topics_its_types_and_how_long_it_is(made, bag):
+    recording = Recording([bag])
+    types = {topic.name: topic.type for topic in recording.topics.values()}
+    assert types == {"/map": GRID, "/odom": ODOMETRY, "/cmd_vel": TWIST}
+    assert recording.dialect == made.dialect
+    assert recording.begin == BEGIN
+    assert recording.seconds == pytest.approx(4.0)
+    recording.close()
+
+
+def test_messages_come_in_their_order_from_a_moment_on(bag):
+    recording = Recording([bag])
+    heard = [(one.topic, one.time) for one in recording.messages(BEGIN + 10**9)]
+    assert heard == [
+        ("/odom", BEGIN + 10**9),
+        ("/cmd_vel", BEGIN + 2 * 10**9),
+        ("/odom", BEGIN + 4 * 10**9),
+    ]
+    recording.close()
+
+
+def test_a_message_is_decoded_as_the_rosbridge_server_publishes_it(made, bag):
+    recording = Recording([bag])
+    *_, last = recording.messages(BEGIN)
+    message = recording.message(last)
+    assert message["pose"]["pose"]["position"]["x"] == 2.0
+    assert message["header"]["stamp"] == made.time(4.0)
+    recording.close()
+
+
+def test_what_was_latched_before_a_moment_still_counts_at_it(bag):
+    recording = Recording([bag])
+    kept = list(recording.kept_until(BEGIN + 2 * 10**9))
+    assert [one.topic for one in kept] == ["/map"]
+    recording.close()
+
+
+def test_a_topic_is_latched_by_what_the_bag_says_or_by_its_name(made, tmp_path):
+    bag = made.bag(
+        tmp_path / "names",
+        ("/bob/tf_static", FRAMES, 0.0, made.frame("base")),
+        ("/tf", FRAMES, 0.1, made.frame("base")),
+        ("/costmap", GRID, 0.2, made.grid([0])),
+    )
+    recording = Recording([bag])
+    latched = {name for name, topic in recording.topics.items() if topic.latched}
+    assert latched == {"/bob/tf_static", "/costmap"}
+    recording.close()
+
+
+def test_a_lone_mcap_file_is_read_without_its_folder(tmp_path):
+    made = Made("ros2")
+    folder = made.bag(
+        tmp_path / "office", ("/odom", ODOMETRY, 0.0, made.odometry(0.0, 1.0))
+    )
+    recording = Recording([folder / "office.mcap"])
+    assert list(recording.topics) == ["/odom"]
+    recording.close()
+
+
+def test_a_bag_of_sqlite3_is_read_too(tmp_path):
+    made, way = Made("ros2"), next(types_of("ros2").ways(ODOMETRY))
+    with Writer2(
+        tmp_path / "office", version=8, storage_plugin=StoragePlugin.SQLITE3
+    ) as writer:
+        odom = writer.add_connection("/odom", way.type_name, typestore=way.store)
+        writer.write(odom, BEGIN, way.bytes_of(made.odometry(0.0, 1.0)))
+    for path in (tmp_path / "office", tmp_path / "office" / "office.db3"):
+        recording = Recording([path])
+        (only,) = recording.messages(BEGIN)
+        assert recording.message(only)["pose"]["pose"]["position"]["x"] == 1.0
+        recording.close()
+
+
+def test_several_bags_of_ros_1_are_played_as_one(tmp_path):
+    made = Made("ros1")
+    bags = [
+        made.bag(
+            tmp_path / name, (f"/{name}/odom", ODOMETRY, at, made.odometry(at, 1.0))
+        )
+        for name, at in (("late", 1.0), ("early", 0.0))
+    ]
+    recording = Recording(bags)
+    heard = [one.topic for one in recording.messages(recording.begin)]
+    assert heard == ["/early/odom", "/late/odom"]
+    assert recording.name == "late.bag and 1 more"
+    recording.close()
+
+
+def refusal(*paths):
+    with pytest.raises(ConfigError) as refused:
+        Recording(paths)
+    words = str(refused.value)
+    assert "\n" not in words
+    return words
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    assert refusal(tmp_path / "gone.bag").endswith(
+        "gone.bag: there is no such file or folder"
+    )
+
+
+def test_a_file_that_is_no_recording_by_its_name_says_what_would_be(tmp_path):
+    file = tmp_path / "notes.txt"
+    file.write_text("hello")
+    assert "expected .bag, .mcap, .db3, or the folder of a bag" in refusal(file)
+
+
+def test_a_folder_without_its_description_says_what_is_missing(tmp_path):
+    assert "there is no metadata.yaml in this folder" in refusal(tmp_path)
+
+
+def test_bags_of_both_kinds_are_not_played_as_one(tmp_path):
+    for name in ("a.bag", "b.mcap"):
+        (tmp_path / name).touch()
+    words = refusal(tmp_path / "a.bag", tmp_path / "b.mcap")
+    assert words == "bags of ROS 1 and of ROS 2 cannot be played as one"
+
+
+@pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])
+def test_an_empty_file_cannot_be_read(tmp_path, name):
+    (tmp_path / name).touch()
+    assert refusal(tmp_path / name).startswith(f"{name} cannot be read as a recording")
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
+def test_a_file_that_is_cut_off_cannot_be_read(made, bag, tmp_path, share):
+    whole = bag if bag.is_file() else bag / "office.mcap"
+    short = tmp_path / f"short{whole.suffix}"
+    data = whole.read_bytes()
+    short.write_bytes(data[: int(len(data) * share)])
+    assert refusal(short).startswith(f"{short.name} cannot be read as a recording: ")
+
+
+@pytest.mark.parametrize("name", ["noise.bag", "noise.mcap", "noise.db3"])
+def test_a_file_of_something_else_cannot_be_read(tmp_path, name):
+    (tmp_path / name).write_bytes(bytes(range(256)) * 40)
+    assert refusal(tmp_path / name).startswith(f"{name} cannot be read as a recording")
+
+
+def test_a_bag_without_a_message_says_so(made, tmp_path):
+    assert "there is no message in it" in refusal(made.bag(tmp_path / "nothing"))
+
+
+def test_a_topic_of_a_type_without_a_definition_is_named_and_left_out(tmp_path):
+    way = next(types_of("ros2").ways(ODOMETRY))
+    with Writer2(
+        tmp_path / "office", version=8, storage_plugin=StoragePlugin.MCAP
+    ) as writer:
+        lacking = {"msgdef": "acme_msgs/Joint[] joints\n", "rihs01": "RIHS01_0"}
+        arm = writer.add_connection("/arm", "acme_msgs/msg/Arm", **lacking)
+        odom = writer.add_connection("/odom", way.type_name, typestore=way.store)
+        writer.write(arm, BEGIN, bytes(8))
+        writer.write(odom, BEGIN + 1, way.bytes_of(Made("ros2").odometry(0.0, 1.0)))
+    said = []
+    # The file alone, since with its folder rosbags checks the definitions, too.
+    recording = Recording([tmp_path / "office" / "office.mcap"], warn=said.append)
+    assert list(recording.topics) == ["/odom"]
+    assert [one.topic for one in recording.messages(BEGIN)] == ["/odom"]
+    assert said == [
+        "office.mcap: /arm (acme_msgs/msg/Arm) is left out: there is no definition of "
+        "acme_msgs/msg/Joint"
+    ]
+    recording.close()
+
+
+def test_bytes_that_are_not_of_their_type_are_left_out_and_said_once(tmp_path):
+    way = next(types_of("ros1").ways(ODOMETRY))
+    with Writer1(tmp_path / "bad.bag") as writer:
+        odom = writer.add_connection("/odom", way.type_name, typestore=way.store)
+        for moment in range(3):
+            writer.write(odom, BEGIN + moment, b"\x01\x02")
+    said = []
+    recording = Recording([tmp_path / "bad.bag"], warn=said.append)
+    assert [recording.message(one) for one in recording.messages(BEGIN)] == [None] * 3
+    assert len(said) == 1
+    assert re.search(r"messages of /odom are left out", said[0])
+    recording.close()
+
+
+def test_a_recording_is_called_as_its_file(tmp_path):
+    assert recording_name([tmp_path / "office.bag"]) == "office.bag"

@@ -1,0 +1,118 @@
+"""``webmap play``: what is said of files that cannot be played, and without rosbags."""
+
+import signal
+import socket
+import subprocess
+import sys
+
+import psutil
+import pytest
+
+from bag_making import ODOMETRY, TWIST, Made
+from webmap.bags.needed import need_rosbags
+from webmap.cli.play import replay
+from webmap.errors import ConfigError
+
+COMMAND = [sys.executable, "-m", "webmap", "play", "--no-browser", "--port", "0"]
+
+
+@pytest.fixture
+def bag(tmp_path):
+    made = Made("ros1")
+    return made.bag(
+        tmp_path / "office.bag",
+        ("/odom", ODOMETRY, 0.0, made.odometry(0.0, 1.5)),
+        ("/cmd_vel", TWIST, 1.0, made.message(TWIST)),
+        ("/odom", ODOMETRY, 2.0, made.odometry(2.0, 1.5)),
+    )
+
+
+def run(*arguments):
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+
+
+def assert_refused(done, words):
+    assert done.returncode == 2, done.stderr
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_a_file_that_is_not_there_is_one_sentence_and_exit_code_2(tmp_path):
+    done = run(tmp_path / "gone.bag")
+    assert_refused(done, "gone.bag: there is no such file or folder")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_file_that_is_cut_off_is_one_sentence_and_exit_code_2(bag):
+    data = bag.read_bytes()
+    bag.write_bytes(data[: len(data) // 2])
+    done = run(bag)
+    assert_refused(done, "office.bag cannot be read as a recording: ")
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--start", "5"), "is 2.0 s long, so it cannot be played from 5 s on"),
+        (("--rate", "0"), "--rate"),
+        (("--rate", "nan"), "--rate"),
+        (("--rate", "1e9"), "0.001<=x<=1000"),
+    ],
+)
+def test_a_pace_that_makes_no_sense_is_exit_code_2(bag, options, words):
+    assert_refused(run(bag, *options), words)
+
+
+def test_a_replay_that_has_ended_is_said_and_no_error(bag, capfd):
+    with replay("--loop", "--", bag) as (url, begin_anew):
+        assert url.startswith("ws://")
+        (child,) = [
+            p for p in psutil.Process().children() if "webmap.bags" in p.cmdline()
+        ]
+        child.kill()
+        psutil.wait_procs([child], timeout=10)
+        begin_anew()
+    assert "The replay has ended" in capfd.readouterr().err
+
+
+def test_without_rosbags_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(ConfigError) as refused:
+        need_rosbags()
+    assert str(refused.value).endswith('pip install "webmap[bags]"')
+
+
+def test_robots_are_found_without_anything_that_drives_them(bag):
+    with subprocess.Popen(
+        [*COMMAND, str(bag), "--loop"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            assert "WebMap is ready at " in process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+            said = process.stderr.read()
+            assert process.wait(15) == 0, said
+        finally:
+            process.kill()
+    (found,) = [line for line in said.splitlines() if line.startswith("Found ")]
+    assert found.startswith("Found office: odometry /odom")
+    assert "cmd_vel" not in found
+
+
+def test_a_bridge_port_in_use_is_one_sentence_and_exit_code_2(bag):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = run(bag, "--bridge-port", port)
+    assert_refused(done, f"port {port} on 127.0.0.1 is in use")

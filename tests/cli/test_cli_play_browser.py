@@ -1,0 +1,41 @@
+"""A recording in a real browser: it is seen, it says what it is, and nobody drives."""
+
+import re
+
+import pytest
+from cli_shown import shown
+from playwright.sync_api import expect
+
+from bag_making import FRAMES, GRID, ODOMETRY, TWIST, Made
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
+    chromium, tmp_path
+):
+    made = Made("ros2")
+    moments = [step / 10 for step in range(200)]
+    bag = made.bag(
+        tmp_path / "office",
+        ("/map", GRID, 0.0, made.grid([0, 100])),
+        ("/tf_static", FRAMES, 0.0, made.frame("laser")),
+        ("/cmd_vel", TWIST, 0.0, made.message(TWIST)),
+        *(("/odom", ODOMETRY, at, made.odometry(at, 1.5)) for at in moments),
+    )
+    with shown(chromium, "play", bag, "--loop", "--rate", "2") as page:
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(1, timeout=15_000)
+        page.locator("#robots .row").click()
+        card = page.locator("#card")
+        expect(card.locator("h2")).to_have_text("office")
+        expect(card.locator(".facts").first).to_contain_text("1.50")
+        expect(card.locator(".state")).to_contain_text("Watched only")
+        expect(card.locator(".age")).not_to_contain_text(re.compile(r"[1-9]\d+ s"))
+        expect(page.locator("#title")).to_have_text(
+            re.compile(r"Recording office: \d+\.\d of 19\.9 s, 2 times as fast")
+        )
+        expect(page.locator("#bridges")).to_contain_text("Bridge open")
+        page.keyboard.down("w")
+        expect(page.locator("#title")).to_have_text(re.compile("Recording office"))
+        page.keyboard.up("w")
+        expect(card.locator(".state")).to_contain_text("Watched only")

@@ -1,0 +1,178 @@
+"""``webmap record`` and ``webmap play``: what was said once is said again."""
+
+import contextlib
+import json
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from rosbags.highlevel import AnyReader
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from webmap.cli.play import replay
+from webmap_process import simulator
+
+COMMAND = [sys.executable, "-m", "webmap", "record"]
+
+
+class Ear:
+    """Hears topics behind a bridge as any client does, in a thread of its own."""
+
+    def __init__(self, socket, *topics):
+        self.heard = {topic: [] for topic in topics}
+        self._socket = socket
+        for topic in topics:
+            socket.send(json.dumps({"op": "subscribe", "topic": topic}))
+        threading.Thread(target=self._hear, daemon=True).start()
+
+    def _hear(self):
+        with contextlib.suppress(ConnectionClosed):
+            for frame in self._socket:
+                operation = json.loads(frame)
+                if operation["op"] == "publish":
+                    self.heard[operation["topic"]].append(operation["msg"])
+
+    def wait_for(self, topic, number, within=20.0):
+        deadline = time.monotonic() + within
+        while len(self.heard[topic]) < number:
+            assert time.monotonic() < deadline, f"{topic}: {len(self.heard[topic])}"
+            time.sleep(0.02)
+        return self.heard[topic]
+
+
+@contextlib.contextmanager
+def hearing(url, *topics):
+    with connect(url, proxy=None, max_size=None) as socket:
+        yield Ear(socket, *topics)
+
+
+def without_times(message):
+    """A message but for its stamp, and what ROS 1 counts its messages by."""
+    header = {"frame_id": message["header"]["frame_id"]}
+    return json.dumps(message | {"header": header})
+
+
+def age(message):
+    """How many seconds ago a message says that it was."""
+    whole, rest = (
+        message["header"]["stamp"].get(ros1, message["header"]["stamp"].get(ros2))
+        for ros1, ros2 in (("secs", "sec"), ("nsecs", "nanosec"))
+    )
+    return time.time() - whole - rest / 1e9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_a_recording_that_is_played_says_what_the_robot_said(tmp_path, dialect):
+    odom, scan = "/robot_0/odom", "/robot_0/base_scan"
+    told = ("--robots", "1", "--wander", "--dialect", dialect)
+    bag = tmp_path / ("drive.bag" if dialect == "ros1" else "drive")
+    with simulator(*told) as url, hearing(url, odom, scan) as ear:
+        ear.wait_for(scan, 1)
+        done = run(url, "--out", bag, "--duration", "2")
+        assert done.returncode == 0, done.stderr
+        ear.wait_for(scan, len(ear.heard[scan]) + 2)
+        said = {topic: {*map(without_times, ear.heard[topic])} for topic in ear.heard}
+    assert re.search(r"Recorded \d+ messages of \d+ topics in 2\.\d s to ", done.stderr)
+    assert done.stdout == f"Recording {url} to {bag}\n"
+    kept = ("/map", "/tf_static")
+    with (
+        replay("--loop", bag) as (played, _),
+        hearing(played, odom, scan, "/tf", *kept) as again,
+    ):
+        for message in again.wait_for(odom, 5):
+            assert without_times(message) in said[odom]
+        for message in again.wait_for(scan, 3):
+            assert without_times(message) in said[scan]
+        assert 0 <= age(again.wait_for(odom, 6)[-1]) < 2
+        assert len(again.wait_for("/map", 1)[0]["data"]) > 1000
+        assert again.wait_for("/tf_static", 1)
+        assert again.wait_for("/tf", 2)
+
+
+@contextlib.contextmanager
+def killed(process):
+    try:
+        yield
+    finally:
+        process.kill()
+
+
+def test_only_the_topics_that_are_named_are_recorded_until_a_signal(ros2, tmp_path):
+    bag = tmp_path / "office"
+    with (
+        subprocess.Popen(
+            [*COMMAND, ros2, "--topic", "/odom", "--topic", "/later", "--out", bag],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process,
+        killed(process),
+    ):
+        assert process.stdout.readline() == f"Recording {ros2} to {bag}\n"
+        assert "Waiting for: /later" in process.stderr.readline()
+        with hearing(ros2, "/odom") as ear:
+            ear.wait_for("/odom", 10)
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read()
+        assert process.wait(15) == 0, said
+    with AnyReader([bag]) as reader:
+        assert {c.topic for c in reader.connections} == {"/odom"}
+        assert reader.message_count > 3
+    assert re.search(r"Recorded \d+ messages of 1 topics in \d+\.\d s to ", said)
+
+
+def run(*arguments):
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+
+
+def test_a_topic_that_has_no_type_is_not_waited_for(tmp_path):
+    listed = tmp_path / "topics"
+    listed.write_text("/odom nav_msgs/Odometry\n")
+    named = ("--topic", "/odom", "--topic", "/x")
+    done = run("ws://127.0.0.1:1", "--topics", listed, *named, "--duration", "1")
+    assert_refused(done, "nothing says the type of /x: name it with --type")
+
+
+def assert_refused(done, words):
+    assert done.returncode == 2, done.stderr
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_a_bag_that_exists_is_left_as_it_is(ros1, tmp_path):
+    bag = tmp_path / "office.bag"
+    bag.write_text("mine")
+    assert_refused(run(ros1, "--out", bag, "--duration", "1"), "nothing is overwritten")
+    assert bag.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("ws://127.0.0.1:1", "--wait", "0"), "cannot reach the rosbridge"),
+        (("http://robot:9090",), "ws://"),
+        (("ws://robot:9090", "--duration", "0"), "--duration"),
+        (("ws://robot:9090", "--type", "nav_msgs/Odometry"), "1 types for 0 topics"),
+        (
+            ("ws://robot:9090", "--topic", "/odom", "--type", "nonsense"),
+            "'nonsense' is not the name of a type",
+        ),
+        (("ws://robot:9090", "--topic", "a b"), "'a b' is not the name of a topic"),
+    ],
+)
+def test_a_wrong_argument_of_record_is_one_sentence(arguments, words, tmp_path):
+    assert_refused(run(*arguments, "--out", tmp_path / "bag"), words)
+    assert list(tmp_path.iterdir()) == []
