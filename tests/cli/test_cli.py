@@ -11,6 +11,9 @@ import pytest
 
 import webmap
 
+WEB = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
+TOLD = ("--robot", "Bob:/odom::")
+
 
 def run(*arguments, within=30):
     return subprocess.run(
@@ -32,10 +35,24 @@ def start(*arguments):
     )
 
 
+def is_logged(line):
+    """Return whether a line on standard error is one of the log, with its time."""
+    return re.match(r"\d{4}-\d\d-\d\d ", line) is not None
+
+
+@pytest.fixture
+def page(tmp_path):
+    """The file of a page of one's own."""
+    file = tmp_path / "page.py"
+    file.write_text("import webmap\n\n@webmap.page('/')\ndef main(page): pass\n")
+    return file
+
+
 def test_help_names_every_command():
     said = run("--help")
     assert said.returncode == 0
-    for command in ("demo", "view", "discover", "doctor", "run", "check", "sim"):
+    commands = ("demo", "view", "discover", "doctor", "play", "record", "run", "check")
+    for command in (*commands, "sim"):
         assert re.search(rf"^  {command} ", said.stdout, re.M)
         assert run(command, "--help").returncode == 0
 
@@ -60,27 +77,42 @@ def test_version_is_the_packages():
         (("doctor", "http://robot:9090"), "ws://"),
         (("sim", "--map", "nowhere.yaml"), "nowhere.yaml"),
         (("sim", "--flat", "--robots", "2"), "one robot only"),
+        (("sim", "--quirks", "polite,odd"), "no quirk is called 'odd'; there are"),
+        (("sim", "--quirks", "real", "--polite"), "give one"),
         (("demo", "--host", "0.0.0.0"), "--insecure-lan"),
     ],
 )
 def test_a_wrong_argument_is_one_sentence_and_exit_code_2(arguments, said):
     result = run(*arguments)
     assert result.returncode == 2, result.stderr
-    assert said in result.stderr
-    assert "Traceback" not in result.stderr
+    [error] = [line for line in result.stderr.splitlines() if not is_logged(line)]
+    assert error.startswith("Error: ")
+    assert said in error
     assert result.stdout == ""
 
 
-@pytest.mark.parametrize("command", ["demo", "sim"])
-def test_a_port_in_use_is_one_sentence_and_exit_code_2(command):
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("sim", "--port"),
+        ("sim", "--port", "0", "--http-camera"),
+        ("demo", "--no-browser", "--port"),
+        ("demo", "--no-browser", "--port", "0", "--bridge-port"),
+        ("view", "ws://127.0.0.1:1", *TOLD, "--no-browser", "--port"),
+        ("run", "--no-browser", "PAGE", "--port"),
+    ],
+)
+def test_a_port_in_use_is_one_sentence_and_exit_code_2(arguments, page):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        options = () if command == "sim" else ("--no-browser",)
-        result = run(command, "--port", port, *options)
+        command = [page if word == "PAGE" else word for word in arguments]
+        result = run(*command, port)
     assert result.returncode == 2
-    assert str(port) in result.stderr
+    said = result.stderr.splitlines()[-1]
+    assert said.startswith(f"Error: port {port} on 127.0.0.1 is in use: ")
+    assert result.stderr.count("Error") == 1
     assert "Traceback" not in result.stderr
     assert result.stdout == ""
 
@@ -90,16 +122,15 @@ def test_a_port_in_use_is_one_sentence_and_exit_code_2(command):
     ("command", "line"),
     [
         (("sim", "--port", 0), r"rosbridge is ready at ws://127\.0\.0\.1:\d+\n"),
-        (
-            ("demo", "--port", 0, "--no-browser"),
-            r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n",
-        ),
+        (("demo", "--port", 0, "--no-browser"), WEB),
+        (("run", "PAGE", "--port", 0, "--no-browser"), WEB),
+        (("view", "ws://127.0.0.1:1", *TOLD, "--port", 0, "--no-browser"), WEB),
     ],
 )
 def test_one_line_says_it_is_ready_and_a_signal_ends_it_with_exit_code_0(
-    command, line, sig
+    command, line, sig, page
 ):
-    process = start(*command)
+    process = start(*[page if word == "PAGE" else word for word in command])
     try:
         assert re.fullmatch(line, process.stdout.readline())
         process.send_signal(sig)

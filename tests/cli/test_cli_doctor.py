@@ -64,6 +64,34 @@ def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
     assert "robot_0" not in said.stdout
 
 
+def test_robots_are_looked_at_as_they_were_told(ros1):
+    told = ("--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
+    sent = ("--set", "Bob.velocity_type=geometry_msgs/TwistStamped")
+    said = webmap("doctor", ros1, "--seconds", "0.5", *told, *sent)
+    assert said.returncode == 1, said.stdout
+    assert "\nBob\n  WRONG    /robot_0/cmd_vel takes Twist, and WebMap" in said.stdout
+    assert "set to send TwistStamped" in said.stdout
+    assert "/robot_0/odom: " in said.stdout
+    assert "base_scan" not in said.stdout, "it was given no scan"
+    assert "not looked at: robot_1." in said.stdout
+
+
+def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
+    file = tmp_path / "fleet.toml"
+    file.write_text(
+        f'[bridges]\nhall = "{ros1}"\n[[robots]]\nname = "Bob"\nbridge = "hall"\n'
+        'odometry = "/robot_1/odom"\nscan = "/robot_1/base_scan"\n'
+        '[robots.twist]\ntopic = "/robot_1/cmd_vel"\n'
+        'type = "geometry_msgs/TwistStamped"\n'
+    )
+    said = webmap("doctor", str(file), "--seconds", "0.5")
+    assert said.returncode == 1, said.stdout
+    assert said.stdout.startswith(ros1)
+    assert "\nBob\n  WRONG    /robot_1/cmd_vel takes Twist, and WebMap" in said.stdout
+    assert "/robot_1/base_scan: " in said.stdout
+    assert "camera" not in said.stdout, "the file has none"
+
+
 def test_a_call_that_hangs_is_tried_where_that_is_wanted(ros1):
     said = webmap("doctor", ros1, "--seconds", "0.5", "--try-call")
     assert "A service that hangs blocks no socket (tried)" in said.stdout

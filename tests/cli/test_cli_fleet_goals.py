@@ -34,6 +34,13 @@ def test_a_robot_of_a_file_has_its_action_and_its_initial_pose(tmp_path):
     robot.destroy()
 
 
+def test_a_robot_of_a_file_without_goals_is_told_its_place_in_its_own_map(tmp_path):
+    text = 'initial_pose = { topic = "/here", frame = "tb1/map" }\n'
+    robot = ready(tmp_path, text)
+    assert robot.motion.spec().goal_frame == "tb1/map"
+    robot.destroy()
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -47,7 +47,8 @@ def test_scan_assist_is_told_to_the_gate(tmp_path):
         DRIVEN
         + '[robots.scan_assist]\ntopic = "/scan"\n'
         + "footprint = [[0.3, 0.2], [-0.3, 0], [0.3, -0.2]]\n"
-        + 'x = 0.25\nangle = 180\nupside_down = true\nblind = "creep"\ncreep = 0\n',
+        + 'x = 0.25\nangle = 180\nupside_down = true\nframe = "l"\n'
+        + 'blind = "creep"\ncreep = 0\n',
     )
     assist = spec(ready).assist
     assert assist.topic == "/scan"
@@ -55,6 +56,7 @@ def test_scan_assist_is_told_to_the_gate(tmp_path):
     assert assist.sensor == pytest.approx((0.25, 0.0, math.pi))
     assert (assist.blind, assist.creep) == ("creep", 0.0)
     assert assist.upside_down
+    assert assist.frame == "l"
 
 
 def test_a_footprint_may_be_a_radius(tmp_path):

@@ -46,6 +46,11 @@ def found():
         ("robot_1.scan=/a b", "'/a b' is no name of a topic"),
         ("robot_1.scan=/a,/b", "one topic of that role, got 2"),
         ("robot_1.name= ", "at least one character"),
+        (
+            "robot_1.velocity_type=std_msgs/String",
+            "'std_msgs/String' is no type that drives a base; there are "
+            "geometry_msgs/Twist and geometry_msgs/TwistStamped",
+        ),
         ("robot_1.name=a\tb", "a name is one line of 100 characters at the most"),
     ],
 )
@@ -71,6 +76,22 @@ def test_a_robot_gets_another_name_and_is_known_again_by_its_namespace(found):
     for _ in range(2):
         robot = said.apply(URL, found)
         assert (robot.name, robot.base_frame) == ("Bob", "base_footprint")
+
+
+STAMPED = "geometry_msgs/msg/TwistStamped"
+
+
+@pytest.mark.parametrize("last", ["velocity=/robot_1/drive", "velocity=/drive"])
+def test_the_type_of_velocity_is_overruled_whatever_else_is(found, last):
+    said = overruling(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
+    about = describe(said.apply(URL, found), Bridge(URL))
+    assert (about.twist, about.twist_type) == (last.partition("=")[2], STAMPED)
+
+
+def test_a_robot_that_was_told_is_driven_with_the_type_that_was_said():
+    bob = RobotDescription(name="Bob", bridge=Bridge(URL), twist="/cmd_vel")
+    (told,) = overruling(f"Bob.velocity_type={STAMPED}").tell([bob])
+    assert told.twist_type == STAMPED
 
 
 def test_a_robot_without_odometry_is_not_placed_by_another_pose():

@@ -123,6 +123,20 @@ def test_a_bridge_that_is_away_is_said():
     assert "Traceback" not in said.stderr
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_that_is_interrupted_while_it_waits_has_found_nothing_out(number):
+    with subprocess.Popen(
+        command("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "30"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert "Waiting for the rosbridge" in process.stderr.readline()
+        process.send_signal(number)
+        assert "nothing was moved" in process.stdout.read()
+        assert process.wait(10) == UNKNOWN
+
+
 def test_two_addresses_are_one_too_many():
     said = run("ws://127.0.0.1:1", "robot_0", "ws://127.0.0.1:2")
     assert said.returncode == 2

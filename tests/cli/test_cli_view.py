@@ -15,10 +15,12 @@ import pytest
 
 from webmap import Bridge
 from webmap.cli.described import describe, overrules
+from webmap.cli.found_fleet import find_fleet
 from webmap.cli.found_layers import DrawnLayers
 from webmap.cli.latecomers import LateRobots, greet
 from webmap.cli.overruling import Overruling, parse_setting
 from webmap.console import Console, RobotDescription
+from webmap.console.fleet import make_robot
 from webmap.core.layer import Layer
 from webmap.discovery import discover
 from webmap.discovery.found import ROLES
@@ -100,6 +102,19 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later():
         view.wait_for("cannot reach the rosbridge")
         with simulator("--port", str(port), "--robots", "1"):
             view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
+
+
+def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+    told = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
+    with viewing(f"ws://127.0.0.1:{port}", "--wait", "0.5", *told) as view:
+        assert re.fullmatch(READY, view.process.stdout.readline())
+        with simulator("--port", str(port), "--robots", "2"):
+            # Both settle at one look, and are told in the order of their names.
+            view.wait_for(r"A robot appeared behind ws://.*: robot_1: odometry", 40)
+    assert "robot_0: odometry" not in view.said
 
 
 def test_without_rosapi_the_page_opens_and_says_what_to_give():
@@ -300,6 +315,55 @@ def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
     assert not overrules(elsewhere, found)
 
 
+STAMPED = "geometry_msgs/msg/TwistStamped"
+
+
+def fleet_of(bridge, *told, topics, settings=()):
+    """What is shown of a list of topics, where there is no rosapi to ask."""
+    said = Overruling([parse_setting(text) for text in settings])
+    return find_fleet(
+        [bridge], told, wait=0.0, stops_within=None, topics=topics, overruling=said
+    )
+
+
+def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
+    fleet = fleet_of(bridge, topics=TOPICS | {"/cmd_vel": STAMPED})
+    ((_, about),) = fleet.robots
+    robot = make_robot(about)
+    assert robot.motion.spec().twist_type == STAMPED
+    robot.destroy()
+
+
+@pytest.mark.parametrize(
+    ("listed", "type"), [(STAMPED, STAMPED), ("std_msgs/String", "")]
+)
+def test_a_robot_that_is_told_has_the_type_of_a_list_if_that_drives(
+    bridge, listed, type
+):
+    told = RobotDescription(name="Al", bridge=bridge, twist="al/go")
+    fleet = fleet_of(bridge, told, topics=TOPICS | {"/al/go": listed})
+    assert fleet.told[0].twist_type == type
+    assert ("/go  " + type in fleet.table(grid=True, as_told=True)) == bool(type)
+
+
+def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
+    topics = TOPICS | {"/cmd_vel_nav": STAMPED}
+    settings = ["bob.velocity=/cmd_vel_nav"]
+    fleet = fleet_of(bridge, topics=topics, settings=settings)
+    ((_, about),) = fleet.robots
+    assert (about.twist, about.twist_type) == ("/cmd_vel_nav", STAMPED)
+
+
+def test_velocity_that_comes_later_is_sent_in_its_type(bridge):
+    late = LateRobots(Console())
+    came = greet(late, [], 0.25)
+    (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
+    came(News(bare), bridge)
+    came(News(found(**{"/cmd_vel": STAMPED}), ("velocity",)), bridge)
+    assert late.robots[0].motion.spec().twist_type == STAMPED
+    late.robots[0].destroy()
+
+
 SCAN, GRID, PATH = "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "nav_msgs/Path"
 RICH = {
     "/a/odom": "nav_msgs/Odometry",
@@ -352,6 +416,36 @@ def test_what_is_overruled_leaves_all_else_as_it_was_found(bridge):
     assert topics_of(robot, "LaserScanner") == ["/a/other"]
     assert sorted(topics_of(robot, "Path")) == ["/a/plan", "/a/trajectory"]
     assert console.grids == {}
+    robot.destroy()
+
+
+def test_cameras_that_are_left_out_are_said_once(bridge, capsys):
+    def cameras(count):
+        return {f"/a/cam{n}/image_raw/compressed": IMAGE for n in range(count)}
+
+    def said():
+        return [line for line in capsys.readouterr().err.splitlines() if "cam" in line]
+
+    robot, _, layers = drawing_of(bridge, RICH | cameras(6))
+    (line,) = said()
+    assert line == (
+        "a: not drawn, since there are enough of their kind: "
+        "/a/cam4/image_raw/compressed, /a/cam5/image_raw/compressed"
+    )
+    asyncio.run(layers.take(RICH | cameras(6)))
+    assert said() == []
+    asyncio.run(layers.take(RICH | cameras(7)))
+    assert said() == [
+        "a: not drawn, since there are enough of their kind: "
+        "/a/cam6/image_raw/compressed"
+    ], "one that came later"
+    robot.destroy()
+
+
+def test_cameras_that_are_all_shown_are_not_said_to_be_left_out(bridge, capsys):
+    cameras = {f"/a/cam{n}/image_raw/compressed": IMAGE for n in range(4)}
+    robot, _, _ = drawing_of(bridge, RICH | cameras)
+    assert "cam" not in capsys.readouterr().err
     robot.destroy()
 
 

@@ -6,7 +6,7 @@ from webmap.console import RobotDescription
 from webmap.discovery import FoundRobot
 
 if TYPE_CHECKING:
-    from webmap import Bridge
+    from webmap import Bridge, Robot
 
 MOST_CAMERAS = 4
 """Cameras of one robot that are shown; they are only asked while somebody looks."""
@@ -29,6 +29,7 @@ def describe(
         bridge=bridge,
         odometry=robot.topic("odometry") or robot.topic("pose"),
         twist=robot.topic("velocity"),
+        twist_type=robot.type_of("velocity"),
         scan=robot.topic("scan"),
         battery=robot.topic("battery"),
         cameras=tuple(guess.topic for guess in cameras[:MOST_CAMERAS]),
@@ -39,6 +40,23 @@ def describe(
         initial_pose=robot.topic("initialpose"),
         stops_within=stops_within,
     )
+
+
+def cameras_left_out(robot: "Robot", found: FoundRobot) -> list[str]:
+    """Return the topics of cameras that are not shown, since there are enough.
+
+    Args:
+        robot: The robot as it is shown.
+        found: The same as it was found.
+
+    """
+    shown = {
+        getattr(one, "topic", "") for one in robot.modules if hasattr(one, "watch")
+    }
+    if len(shown) < MOST_CAMERAS:
+        return []
+    cameras = found.guesses.get("camera", ())
+    return [guess.topic for guess in cameras if guess.topic not in shown]
 
 
 def overrules(told: RobotDescription, found: RobotDescription) -> bool:

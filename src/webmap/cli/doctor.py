@@ -10,7 +10,22 @@ from webmap.cli.topic_list import one_bridge, topics_option
 
 
 @click.command(short_help="Say what is in the way of driving the robots of a bridge.")
-@click.argument("url", nargs=-1, required=True)
+@click.argument("url", nargs=-1, required=True, metavar="URL...|FILE.toml")
+@click.option(
+    "--robot",
+    "robots",
+    multiple=True,
+    metavar="NAME:ODOM:CMD_VEL:SCAN",
+    help="Look at this robot by these topics, as webmap view shows it, and at no robot "
+    "that is only found. Several times for several robots.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="ROBOT.ROLE=TOPIC",
+    help="Another topic than the one that is guessed, or none, as for webmap view.",
+)
 @click.option(
     "--seconds",
     type=Finite(0.5, 60.0),
@@ -48,6 +63,8 @@ from webmap.cli.topic_list import one_bridge, topics_option
 @verbose_option
 def doctor(
     url: tuple[str, ...],
+    robots: tuple[str, ...],
+    settings: tuple[str, ...],
     seconds: float,
     wait: float,
     ask_parameters: bool,
@@ -58,21 +75,30 @@ def doctor(
 ) -> None:
     """Look at a rosbridge and the robots behind it, and say what to do.
 
+    The robots are those that are found by their topics, unless --robot, --set or a
+    fleet file in place of URL says otherwise.
+
     Nothing is driven, published or changed, unless --stop-test is given. The exit code
     is 1 if anything is wrong.
     """
+    if stop_test is not None and (robots or settings):
+        raise click.UsageError(
+            "--stop-test takes a robot as webmap discover finds it; leave out --robot "
+            "and --set"
+        )
     if stop_test is not None:
         from webmap.cli.stop_test import find_out
 
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
+    from webmap.cli.meant import bridges_of
     from webmap.discovery.doctor import is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report
-    from webmap.ros.names import normalise_url
 
-    one_bridge(url, topics)
+    bridges = bridges_of(url, robots, settings)
+    one_bridge([address for address, _ in bridges], topics)
     ready = True
-    for number, address in enumerate([normalise_url(text) for text in url]):
+    for number, (address, meant) in enumerate(bridges):
 
         def waiting(why: str, address: str = address) -> None:
             click.echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
@@ -85,6 +111,7 @@ def doctor(
                 ask_parameters=ask_parameters,
                 try_call=try_call,
                 topics=topics,
+                meant=meant,
                 waiting=waiting,
             )
         )

@@ -10,15 +10,17 @@ import click
 from webmap.cli.described import describe, overrules
 from webmap.cli.draw_layer import meant, shared_map
 from webmap.cli.finding import Found, find
-from webmap.cli.names import free_name, set_twice
+from webmap.cli.names import set_twice
 from webmap.cli.overruling import TOLD, Overruling
 from webmap.cli.told import offer
 from webmap.console import RobotDescription
 from webmap.discovery import FoundRobot
 from webmap.discovery.layers import FoundLayer
-from webmap.discovery.naming import same_name
+from webmap.discovery.naming import free_name, same_name
+from webmap.discovery.rules import VELOCITY
 from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
 from webmap.errors import BridgeClosed
+from webmap.ros.names import is_topic, is_type, normalise_topic
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -92,7 +94,12 @@ class FoundFleet:
         names = [about.name for about in self.told]
         names += [robot.name for robot, _ in self.robots]
         came = greet(
-            late, names, self.stops_within, grid=grid, overruling=self.overruling
+            late,
+            names,
+            self.stops_within,
+            grid=grid,
+            overruling=self.overruling,
+            told=self.told,
         )
         for bridge, found in self.behind.items():
             robots = found.findings.robots
@@ -137,12 +144,15 @@ def find_fleet(
     for sentence in overruling.check(names, all_known=not missing):
         click.echo(sentence, err=True)
     fleet = FoundFleet([*overruling.tell(told)], stops_within, overruling=overruling)
+    behind = {bridge: one.topics for bridge, one in zip(bridges, found, strict=True)}
+    fleet.told = [_typed(robot, behind[robot.bridge]) for robot in fleet.told]
     taken = {same_name(other.name) for other in fleet.told}
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             click.echo(one.why, err=True)
         for robot in overruling.findings(bridge.url, one.findings).robots:
             about = describe(robot, bridge, stops_within=stops_within)
+            about = _typed(about, one.topics)
             if any(overrules(other, about) for other in fleet.told):
                 continue
             if same_name(robot.name) in taken and overruling.names(robot.name):
@@ -179,12 +189,22 @@ def told_fleet(
     return FoundFleet([*told], behind=dict(zip(bridges, found, strict=True)))
 
 
+def _typed(about: RobotDescription, topics: Mapping[str, str]) -> RobotDescription:
+    """Return a robot with the type of its velocity, if the topics behind it tell it."""
+    if about.twist_type or not is_topic(about.twist):
+        return about
+    type = topics.get(normalise_topic(about.twist), "").strip()
+    return replace(about, twist_type=type) if is_type(type, *VELOCITY) else about
+
+
 def _told_table(about: RobotDescription) -> list[str]:
     """Return what was said of a robot, one role a line."""
     lines = []
     for role, name in TOLD.items():
         said = getattr(about, name)
         topics = [said] if isinstance(said, str) else said
+        if role == "velocity" and said and about.twist_type:
+            topics = [f"{said}  {about.twist_type}"]
         lines += [f"  {role:<11} {topic}" for topic in topics if topic]
     return lines
 

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import click
 
+from webmap.cli.described import cameras_left_out
 from webmap.cli.draw_layer import draw_layer, meant
+from webmap.cli.following import follow
 from webmap.cli.looking import Looking
 from webmap.cli.overruling import Overruling
 from webmap.cli.told import Offer, offer
@@ -13,6 +15,7 @@ from webmap.console import RobotDescription
 from webmap.discovery import Findings, FoundRobot, discover
 from webmap.discovery.late_frames import late_frames
 from webmap.discovery.layers import FoundLayer
+from webmap.discovery.newcomers import leads_further
 from webmap.discovery.robots import host_name
 from webmap.scope import no_scope
 
@@ -86,6 +89,7 @@ class DrawnLayers(Looking):
         self._robots = robots
         self._overruling = overruling
         self._drawn: set[tuple[int, str]] = set()
+        self._placed: dict[int, FoundRobot] = {}
 
     @property
     def period(self) -> float:
@@ -95,7 +99,7 @@ class DrawnLayers(Looking):
     async def take(self, topics: dict[str, str]) -> None:
         """Draw what is new among the topics behind the bridge."""
         frames = late_frames(self.bridge)
-        if any(robot.tf is None for _, robot in self._told):
+        if self._told:  # they hear them anyway, once they are drawn by them
             await frames.listen(topics)
         behind = discover(topics, host_name(self.bridge.url), frames.trees)
         self._take_told(topics, behind)
@@ -109,7 +113,8 @@ class DrawnLayers(Looking):
             space = guessed.namespace
             layers = meant(behind.layers[space], guessed, fixed)
             self._draw(robot, layers, space)
-            self._say(robot, behind.left_out[space])
+            others = [layer.topic for layer in behind.left_out[space]]
+            self._say(robot, [*others, *cameras_left_out(robot, one)])
 
     def _take_told(self, topics: dict[str, str], behind: Findings) -> None:
         """Draw what is new of the robots that were told by hand."""
@@ -122,24 +127,29 @@ class DrawnLayers(Looking):
             taken.add(offered.namespace)
             self._place(about, robot, offered)
             self._draw(robot, offered.layers, offered.namespace)
-            self._say(robot, offered.left_out)
+            self._say(robot, [layer.topic for layer in offered.left_out])
 
     def _place(self, about: RobotDescription, robot: "Robot", offered: Offer) -> None:
         """Draw a robot in the frame of the map, as one that was found is."""
         found = offered.found
         if found is None or found.tf_namespace is None or not about.odometry:
             return
-        if robot.tf is None:
-            options = {**found.tf_options, "quiet": True}
-            options["map_frame"] = found.map_frame
-            with no_scope():
-                robot.set_tf(self.bridge, **options)
+        known = self._placed.get(id(robot))
+        if known is None and robot.tf is not None:
+            return  # somebody else said it
+        if known is not None and not leads_further(found, known):
+            return
+        self._placed[id(robot)] = found
+        options = {**found.tf_options, "quiet": True, "map_frame": found.map_frame}
+        moved = follow(robot, self.bridge, found, options)
+        if moved and known is not None:
+            click.echo(moved, err=True)
 
     def _draw(
         self, robot: "Robot", layers: Sequence[FoundLayer], namespace: str
     ) -> None:
         for layer in layers:
-            if self._is_new(robot, layer):
+            if self._is_new(robot, layer.topic):
                 draw_layer(robot, self.bridge, layer, namespace, self._console)
         if (id(robot), "") not in self._drawn:
             self._drawn.add((id(robot), ""))
@@ -169,15 +179,15 @@ class DrawnLayers(Looking):
         mine = frames["namespace"] == space and frames["base_frame"] in names
         return found.base_frame != "" and mine
 
-    def _is_new(self, robot: "Robot", layer: FoundLayer) -> bool:
-        key = (id(robot), layer.topic)
+    def _is_new(self, robot: "Robot", topic: str) -> bool:
+        key = (id(robot), topic)
         new = key not in self._drawn
         self._drawn.add(key)
         return new
 
-    def _say(self, robot: "Robot", others: Sequence[FoundLayer]) -> None:
+    def _say(self, robot: "Robot", others: Sequence[str]) -> None:
         """Say once what is left out, since it costs the link more than it tells."""
-        new = [layer.topic for layer in others if self._is_new(robot, layer)]
+        new = [topic for topic in others if self._is_new(robot, topic)]
         if new:
             click.echo(
                 f"{robot.name}: not drawn, since there are enough of their kind: "

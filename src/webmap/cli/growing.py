@@ -36,6 +36,15 @@ def grow(
 
     """
 
+    def use_pose() -> bool:
+        topic = found.topic("pose")
+        # A pose may be silent while the robot stands; what else tells its place is not.
+        placed = robot.feed is not None or (robot.tf is not None and found.base_frame)
+        if placed or not topic:
+            return False
+        robot.set_odometry_topic(bridge, topic)
+        return True
+
     def use_scan() -> None:
         if shows(robot, bridge, found.topic("scan")):  # as one of several
             return
@@ -70,13 +79,17 @@ def grow(
 
     uses: dict[Role, Callable[[], object]] = {
         "odometry": lambda: robot.set_odometry_topic(bridge, found.topic("odometry")),
+        "pose": use_pose,
         "velocity": lambda: robot.set_twist_topic(
-            bridge, found.topic("velocity"), stops_within=stops_within
+            bridge,
+            found.topic("velocity"),
+            type=found.type_of("velocity") or None,
+            stops_within=stops_within,
         ),
         "goal": use_goals,
         "action": use_goals,
         "initialpose": lambda: robot.set_initial_pose_topic(
-            bridge, found.topic("initialpose")
+            bridge, found.topic("initialpose"), frame=found.map_frame
         ),
         "scan": use_scan,
         "battery": lambda: robot.add_module("Battery", bridge, found.topic("battery")),
@@ -88,7 +101,6 @@ def grow(
         for role in roles:
             if role == "camera":
                 used += [f"camera {topic}" for topic in use_cameras()]
-            elif role in uses:
-                uses[role]()
+            elif role in uses and uses[role]() is not False:
                 used.append(f"{role} {found.topic(role)}")
     return used

@@ -1,6 +1,6 @@
 """Robots that appear while the console runs."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -8,14 +8,13 @@ import click
 
 from webmap.cli.draw_layer import shared_map
 from webmap.cli.looking import Looking
-from webmap.cli.names import free_name
 from webmap.cli.overruling import Overruling
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
 from webmap.core.alignment_store import store
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.late_frames import late_frames
-from webmap.discovery.naming import same_name
+from webmap.discovery.naming import free_name, same_name
 from webmap.discovery.newcomers import Newcomers, News
 from webmap.discovery.robots import host_name
 from webmap.discovery.words import in_one_line
@@ -112,10 +111,11 @@ def greet(
     *,
     grid: bool = True,
     overruling: Overruling | None = None,
+    told: Sequence[RobotDescription] = (),
 ) -> Callable[[News, "Bridge"], None]:
     """Return what shows news, and says so on standard error.
 
-    A newcomer gets a name that nobody has.
+    A newcomer gets a name that nobody has, and one that was told by hand is no news.
 
     Args:
         late: Where it is shown.
@@ -123,9 +123,11 @@ def greet(
         stops_within: Seconds within which every base stops by itself, if known.
         grid: Whether the robots' own map is shown under them.
         overruling: What was said of robots better than it is guessed.
+        told: Robots that were told by hand; each takes the place of one found.
 
     """
-    from webmap.cli.described import describe
+    from webmap.cli.described import describe, overrules
+    from webmap.cli.following import follow
     from webmap.cli.growing import grow
 
     names = {same_name(name) for name in taken}
@@ -136,7 +138,7 @@ def greet(
         robot = said_of.apply(bridge.url, news.robot)
         if grid:
             late.show_grid(bridge, shared_map(robot))
-        if news.roles:
+        if news.roles or news.moved:
             shown = late.at(bridge, robot.namespace)
             if shown is None:  # it was told by hand, with all that it has
                 return
@@ -144,10 +146,18 @@ def greet(
             used = grow(shown, bridge, robot, roles, stops_within=stops_within)
             if used:
                 click.echo(f"{shown.name} has more now: {', '.join(used)}", err=True)
+            # Who says which frames are a robot's means those.
+            if news.moved and "tf" not in fixed:
+                moved = follow(shown, bridge, robot)
+                if moved:
+                    click.echo(moved, err=True)
+            return
+        about = describe(robot, bridge, stops_within=stops_within)
+        if any(overrules(other, about) for other in told):
             return
         robot = replace(robot, name=free_name(robot.name, names))
         said = in_one_line(robot)
         click.echo(f"A robot appeared behind {bridge.url}: {said}", err=True)
-        late.add(robot, describe(robot, bridge, stops_within=stops_within))
+        late.add(robot, replace(about, name=robot.name))
 
     return came

@@ -9,8 +9,9 @@ from webmap.cli.names import check_name, set_twice
 from webmap.console import RobotDescription
 from webmap.discovery.found import ACTIONS, ROLES, Findings, FoundRobot, Guess, Role
 from webmap.discovery.naming import same_name
+from webmap.discovery.rules import VELOCITY
 from webmap.errors import ConfigError
-from webmap.ros.names import is_topic
+from webmap.ros.names import is_topic, is_type
 
 FORM = "ROBOT.ROLE=TOPIC, as in robot_1.scan=/robot_1/front/scan"
 
@@ -21,8 +22,9 @@ USED: tuple[str, ...] = tuple(
 )
 """Roles of which a robot on the page uses the best topic."""
 
-WORDS = ("name", "base")
-"""What is said of a robot besides its topics: its name, and the frame of its base."""
+WORDS = ("name", "base", "velocity_type")
+"""What is said of a robot besides its topics: its name, the frame of its base, and the
+type of what drives it."""
 
 TOLD = {
     "odometry": "odometry",
@@ -46,7 +48,7 @@ class Setting:
 
     robot: str
     key: str
-    """A role, ``name`` or ``base``."""
+    """A role, or one of ``WORDS``."""
 
     values: tuple[str, ...]
     """Topics, or the one word; none if the robot does without."""
@@ -72,11 +74,16 @@ def parse_setting(text: str) -> Setting:
         hint = f"; did you mean {near[0]!r}?" if near else "."
         raise ConfigError(
             f"--set {text!r}: there is no role {key!r}{hint} The roles are "
-            f"{', '.join(USED)}; and there are {' and '.join(WORDS)}"
+            f"{', '.join(USED)}; and there are {', '.join(WORDS)}"
         )
     if key in WORDS:
         if not value.strip():
             raise ConfigError(f"--set {text!r}: a {key} has at least one character")
+        if key == "velocity_type" and not is_type(value.strip(), *VELOCITY):
+            raise ConfigError(
+                f"--set {text!r}: {value.strip()!r} is no type that drives a base; "
+                f"there are {' and '.join(VELOCITY)}"
+            )
         check_name(value.strip(), f"--set {text!r}")
         return Setting(text, robot, key, (value.strip(),))
     topics = tuple(part.strip() for part in value.split(",") if part.strip())
@@ -149,6 +156,8 @@ class Overruling:
             if setting.key == "base":
                 robot = replace(robot, base_frame=setting.values[0])
                 continue
+            if setting.key == "velocity_type":
+                continue
             role = _role(setting)
             said = _guesses(role, setting.values, guesses.get(role, ()), dialect)
             if said:
@@ -158,6 +167,13 @@ class Overruling:
             if role == "odometry":
                 # No other source of its place is meant then.
                 guesses.pop("pose", None)
+        for setting in settings:
+            # Of the topic that is used in the end, whatever was said first.
+            if setting.key == "velocity_type" and guesses.get("velocity"):
+                first, *others = guesses["velocity"]
+                rule = f"{first.rule}, its type {RULE}"
+                typed = replace(first, type=setting.values[0], rule=rule)
+                guesses["velocity"] = (typed, *others)
         return replace(robot, guesses=guesses)
 
     def fixed(self, url: str, robot: FoundRobot) -> frozenset[str]:
@@ -242,6 +258,8 @@ def _guesses(
 def _described(setting: Setting) -> Mapping[str, Any]:
     if setting.key == "name":
         return {"name": setting.values[0]}
+    if setting.key == "velocity_type":
+        return {"twist_type": setting.values[0]}
     if setting.key not in TOLD:
         raise ConfigError(
             f"--set {setting.text!r}: a robot of --robot has no {setting.key}; leave "

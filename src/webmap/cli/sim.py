@@ -26,6 +26,12 @@ from webmap.cli.sim_options import simulator_options
     help="Port of the rosbridge; 0 lets the system choose.",
 )
 @click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address of the rosbridge; anyone who reaches it can drive what is simulated.",
+)
+@click.option(
     "--map",
     "map_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -73,7 +79,19 @@ from webmap.cli.sim_options import simulator_options
 @click.option(
     "--polite",
     is_flag=True,
-    help="A rosbridge that says what is wrong; real ones are silent.",
+    help="A rosbridge that says what is wrong; short for --quirks polite.",
+)
+@click.option(
+    "--quirks",
+    metavar="TEXT",
+    help="How the rosbridge departs from its protocol's text: 'real' as servers were "
+    "seen to, or 'polite', and then ',NAME' or ',-NAME' for one more or less: "
+    "'polite,bare_nan'. The reference lists the names.",
+)
+@click.option(
+    "--take-nan",
+    is_flag=True,
+    help="Bases that run on a velocity with NaN or infinity; others ignore it.",
 )
 @click.option(
     "--http-camera",
@@ -86,6 +104,7 @@ from webmap.cli.sim_options import simulator_options
 def sim(
     robots: int | None,
     port: int,
+    host: str,
     seed: int,
     map_file: Path | None,
     dialect: Literal["ros1", "ros2"],
@@ -98,6 +117,8 @@ def sim(
     extras: bool,
     tilted: bool,
     polite: bool,
+    quirks: str | None,
+    take_nan: bool,
     http_camera: int | None,
     with_parent: bool,
 ) -> None:
@@ -109,12 +130,15 @@ def sim(
 
     from webmap.sim import run_simulator
 
+    if polite and quirks:
+        raise click.UsageError("--polite and --quirks say the same thing: give one")
     if with_parent:
         threading.Thread(target=_end_with_parent, daemon=True).start()
     asyncio.run(
         run_simulator(
             robots=robots or (1 if flat else 2),
             port=port,
+            host=host,
             seed=seed,
             map=map_file,
             dialect=dialect,
@@ -126,7 +150,8 @@ def sim(
             flat=flat,
             extras=extras,
             tilted=tilted,
-            quirks="polite" if polite else "real",
+            quirks="polite" if polite else quirks or "real",
+            refuse_nan=not take_nan,
             http_camera=http_camera,
             on_http_camera=lambda url: click.echo(f"cameras are at {url}", err=True),
             on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),

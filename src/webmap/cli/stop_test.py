@@ -185,10 +185,13 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
     except (BridgeError, ConfigError) as error:
         click.echo(f"Nothing was found out: {error}", err=True)
         return UNKNOWN
+    except KeyboardInterrupt:
+        click.echo("Ended before anything was found out; nothing was moved.")
+        return UNKNOWN
     client = GateClient()
     client.declare(spec)
-    client.start()
     try:
+        client.start()
         return _lead(client, spec, yes)
     except (KeyboardInterrupt, click.Abort):
         click.echo("Ended before anything was found out; the robot is stopped.")

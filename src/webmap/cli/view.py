@@ -30,7 +30,8 @@ from webmap.cli.topic_list import one_bridge, topics_option
     multiple=True,
     metavar="ROBOT.ROLE=TOPIC",
     help="Another topic than the one that is guessed, or none: robot_1.scan=/scan2, "
-    "robot_1.battery= . The roles are those that webmap discover prints, and name. "
+    "robot_1.battery= . The roles are those that webmap discover prints, and name, "
+    "base and velocity_type. "
     "Several times for several.",
 )
 @click.option(

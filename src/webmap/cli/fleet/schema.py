@@ -62,6 +62,7 @@ MOVE: dict[str, Check] = {
 INITIAL_POSE: dict[str, Check] = {
     "topic": checks.topic,
     "covariance": checks.covariance,
+    "frame": checks.text,
 }
 ROBOT = (
     "name",

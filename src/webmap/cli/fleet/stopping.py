@@ -106,6 +106,7 @@ ASSIST: dict[str, Check] = {
     "y": _any("metres"),
     "angle": _any("degrees"),
     "upside_down": checks.yes_or_no,
+    "frame": checks.text,
     "stop_distance": _from_zero("metres"),
     "brake": checks.above_zero("metres per second squared"),
     "blind": checks.one_of("stop", "creep"),
