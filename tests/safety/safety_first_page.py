@@ -23,6 +23,7 @@ class Promise(NamedTuple):
     figures: str
     """What the names of its figures match as a whole; "" where it has none."""
     shown_by: str
+    """The test of the promise itself, which need not be one of those that measure."""
 
 
 BUSY = "; a map of 16 million cells.*"
@@ -32,13 +33,14 @@ PROMISES = (
     Promise(
         1,
         "a dead page stops the robot",
-        "the (browser|renderer) is (killed|stopped.*)|the (browser's link|page) .*",
+        "the (browser|renderer) is (killed|stopped.*)|the page .*"
+        "|(half of )?the browser's link (is|stalls) .*",
         "test_a_stopped_browser_stops_the_robot",
     ),
     Promise(
         2,
         "no old command moves it",
-        "the browser's link gets 400 ms.*",
+        "the browser's link (gets 400 ms|becomes narrow|comes) .*",
         "test_a_link_slower_than_the_age_limit_moves_nothing",
     ),
     Promise(
@@ -165,18 +167,25 @@ PROMISES = (
 
 
 def worst(promise: Promise, figures: Sequence[Figure]) -> str:
-    """Return the worst that was measured, of what was promised, in words."""
+    """Return the worst that was measured, of what was promised, and what failed then.
+
+    That is said because it need not be what the test beside it does: those of a page in
+    doubt and of a base without a timeout time no robot.
+    """
     own = [f for f in figures if re.fullmatch(promise.figures, f.name)]
     if not own:
         return "shown by the test"
     figure = max(own, key=lambda f: (f.worst / f.promised, f.worst))
     missed = ", **missed**" if figure.worst > figure.promised else ""
-    return f"{figure.worst * 1000:.0f} of {figure.promised * 1000:.0f} ms{missed}"
+    what = figure.name.split(";")[0]  # the load is what the promise says
+    return (
+        f"{figure.worst * 1000:.0f} of {figure.promised * 1000:.0f} ms{missed}: {what}"
+    )
 
 
 def first_page(figures: Sequence[Figure]) -> str:
     """Return the table in Markdown."""
-    lines = ["| | promise | worst measured | test |", "|---|---|---|---|"]
+    lines = ["| | promise | worst measured | shown by |", "|---|---|---|---|"]
     lines += [
         f"| S{p.number} | {p.words} | {worst(p, figures)} | `{p.shown_by}` |"
         for p in PROMISES

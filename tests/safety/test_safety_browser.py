@@ -6,8 +6,11 @@ import time
 
 import pytest
 from safety_bench import NEUTRAL, pass_time, send_only
+from safety_run import FULL
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""
@@ -139,6 +142,7 @@ JUMP = """(() => {
 })()"""
 
 
+@LONG
 @pytest.mark.parametrize(("hours", "way"), [(1, "ahead"), (-1, "back")])
 def test_clocks_of_the_browser_that_jump_stop_the_robot_and_nothing_else(
     bench, hours, way
@@ -166,7 +170,7 @@ def test_stop_on_the_keyboard_stops_the_robot_and_the_reset_moves_nothing(bench)
     )
 
 
-FRENCH = [("z", "KeyW"), ("ArrowUp", "ArrowUp")]
+FRENCH = [("z", "KeyW"), pytest.param("ArrowUp", "ArrowUp", marks=LONG)]
 
 
 @pytest.mark.parametrize(("letter", "place"), FRENCH)

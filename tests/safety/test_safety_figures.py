@@ -1,8 +1,10 @@
 """The table that the documentation shows of a run."""
 
 import json
+import re
 
 from safety_figures import DOCS, Figure, Soak, note, table
+from safety_first_page import BEGIN, END, README, first_page, kept_figures
 from safety_run import TRIALS, is_measured
 
 MACHINE = {"processors": 2, "kernel": "Linux 6.1", "python": "3.11.2"}
@@ -29,6 +31,17 @@ def test_the_table_in_the_documentation_is_that_of_the_figures_beside_it():
     assert (DOCS / "safety-figures.md").read_text() == table(
         figures, soaks, content["machine"]
     )
+
+
+def test_the_table_on_the_first_page_is_that_of_the_figures_and_says_what_failed():
+    table = first_page(kept_figures())
+    assert BEGIN + table + END in README.read_text()
+    doubt = (
+        r"another tab comes in front|the tab is closed|an alert is shown|the page is .*"
+    )
+    assert re.search(rf"ms: ({doubt}) \| `test_doubt", table)
+    gate = r"is killed|is stopped \(SIGSTOP\) for 1\.5 s"
+    assert re.search(rf"ms: the gate ({gate}) \| `test_a_base", table)
 
 
 def test_what_half_an_hour_has_shown_stands_in_a_table_of_its_own():

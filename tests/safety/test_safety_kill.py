@@ -30,7 +30,7 @@ SCRIPT = [(0.0, "take"), (0.05, "x 0"), (0.5, "x 1"), (1.2, "stop"), (1.5, "x 1"
 """What the hand does, and after how many seconds: drive for 0.7 s, then STOP."""
 
 KILLS = range(1, LAST + 1) if FULL else range(5, LAST, 10)
-KILLS_OF_BOTH = KILLS if FULL else KILLS[::4]
+KILLS_OF_BOTH = KILLS if FULL else KILLS[::7]
 
 LANES = 4
 """How many robots are driven side by side: most of the time each only waits."""

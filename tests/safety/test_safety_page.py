@@ -67,7 +67,7 @@ def test_every_pattern_of_the_first_page_finds_a_figure():
 def test_the_first_page_shows_what_comes_nearest_to_its_bound_and_what_misses_it():
     stop = next(p for p in PROMISES if p.number == 8)
     figure = Figure("STOP by the space bar, with W held on", "zero", 0.1, 0.017, 0, 50)
-    assert worst(stop, [figure]) == "17 of 100 ms"
+    assert worst(stop, [figure]) == f"17 of 100 ms: {figure.name}"
     late = Figure(figure.name, "zero", 0.1, 0.203, 0, 50)
-    assert worst(stop, [figure, late]) == "203 of 100 ms, **missed**"
+    assert worst(stop, [figure, late]) == f"203 of 100 ms, **missed**: {figure.name}"
     assert worst(stop, []) == "shown by the test"

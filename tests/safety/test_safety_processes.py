@@ -4,8 +4,11 @@ import signal
 
 import pytest
 from safety_bench import ROBOT_TIMEOUT, pass_time, wait_for
+from safety_run import FULL
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1, S14)."""
@@ -53,6 +56,7 @@ def test_a_stopped_display_stops_the_robot(bench):
     )
 
 
+@LONG
 def test_a_display_whose_user_code_holds_the_interpreter_stops_the_robot(bench):
     bench.prove(
         "user code holds the interpreter for 2 s",

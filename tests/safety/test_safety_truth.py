@@ -8,6 +8,7 @@ import time
 
 import pytest
 from safety_bench import V_MAX, Bench, pass_time, wait_for
+from safety_run import FULL
 
 from webmap.testing import Shape
 
@@ -91,6 +92,16 @@ def test_the_page_says_nothing_of_a_robot_that_obeys(bench):
     released = time.monotonic()
     while time.monotonic() < released + 1.5:
         assert bench.tab.evaluate(ALARM) is None
+
+
+@pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
+def test_after_a_release_and_its_zeros_nothing_is_said_for_ten_seconds(bench):
+    bench.drive_off()
+    bench.let_go()
+    pass_time(1.0)
+    said = len(bench.robot.log.told)
+    pass_time(10.0)
+    assert bench.robot.log.told[said:] == []
 
 
 def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):

@@ -1,0 +1,133 @@
+"""No command older than 300 ms reaches the wheels, by when it truly was said (S2).
+
+A page says another direction every 0.7 seconds and notes when, so each velocity that
+the robot is told betrays the time from which it is. The gate's ticks have no part in
+the verdict: both times are of this machine's clock. A direction lasts 0.4 s and comes
+again after 5.6, which no stall here is as long as.
+"""
+
+import time
+
+import pytest
+from safety_bench import pass_time, wait_for
+from safety_run import FULL
+
+from webmap.testing import Shape
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
+
+MAX_AGE = 0.3
+"""Seconds from which on a command is refused."""
+
+ON_THE_WAY = 0.1
+"""Seconds for the ways to and from the gate, and for both clocks to be compared."""
+
+DRIVE = """(() => {
+    const OFF = [0, 0];
+    const PHASES = [
+        [1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1],
+    ];
+    const said = [];
+    let socket, tick, robot, epoch, seq = 0;
+    const connect = () => {
+        const url = new URL("/_webmap/drive", location.href);
+        url.protocol = "ws:";
+        [tick, robot, epoch] = [null, null, null];
+        socket = new WebSocket(url);
+        socket.onclose = () => setTimeout(connect, 100);
+        socket.onmessage = (event) => {
+            const message = JSON.parse(event.data);
+            if (message.op === "tick") tick = message.tick;
+            if (message.op !== "robot") return;
+            robot = message.robot;
+            epoch = message.mine ? message.epoch : null;
+            if (message.state === "free") {
+                socket.send(JSON.stringify({ op: "take", robot }));
+            }
+        };
+    };
+    connect();
+    setInterval(() => {
+        if (socket.readyState !== WebSocket.OPEN || tick === null) return;
+        const now = performance.timeOrigin + performance.now();
+        const phase = Math.floor(now / 700);
+        const off = now % 700 > 400 || epoch === null;
+        const [x, turn] = off ? OFF : PHASES[phase % PHASES.length];
+        said.push([now / 1000, x, turn]);
+        seq += 1;
+        const stamp = { op: "drive", robot, epoch: epoch ?? 0, seq, tick };
+        socket.send(JSON.stringify({ ...stamp, x, y: 0, turn }));
+    }, 50);
+    window.said = () => said;
+    return true;
+})()"""
+
+
+def sign(number):
+    return (number > 0) - (number < 0)
+
+
+def ages(told, said):
+    """Return how old each velocity is that is not zero, by the newest that says so."""
+    found = []
+    for each in told:
+        way = sign(each.twist.vx), sign(each.twist.wz)
+        if way == (0, 0):
+            continue
+        earlier = [one for one in said if one[0] <= each.at + 0.02]
+        times = [at for at, x, turn in earlier if (x, turn) == way]
+        assert times, f"nobody ever said {each.twist}"
+        found.append(each.at - times[-1])
+    return found
+
+
+def stall(bench, way, seconds):
+    bench.web_hop.hold(way)
+    pass_time(seconds)
+    bench.web_hop.release(way)
+
+
+@pytest.fixture
+def driven(bench):
+    """A robot that a page's own code drives in all directions, in turn."""
+    bench.open_page()
+    assert bench.tab.evaluate(DRIVE)
+    wait_for(lambda: len(moves(bench)) > 20, "motion")
+    yield bench
+    bench.web_hop.shape(Shape())
+    bench.close_page()
+
+
+def moves(bench):
+    return [told for told in bench.robot.log.told if not told.is_zero]
+
+
+def said_by(bench):
+    offset = time.time() - time.monotonic()
+    return [(at - offset, x, turn) for at, x, turn in bench.tab.evaluate("said()")]
+
+
+@LONG
+@pytest.mark.parametrize("way", ["up", "down", "both"])
+def test_no_command_is_older_than_the_limit_whatever_stalls_before_the_gate(
+    driven, way
+):
+    begin, since = len(driven.robot.log.told), time.monotonic()
+    for seconds in (0.2, 0.5, 1.0, 3.0):
+        stall(driven, way, seconds)
+        before = len(moves(driven))
+        wait_for(lambda b=before: len(moves(driven)) > b + 10, "motion after the stall")
+    found = ages(driven.robot.log.told[begin:], said_by(driven))
+    assert len(found) > 40
+    assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)
+
+
+def test_no_command_is_older_than_the_limit_behind_a_slow_and_fitful_link(driven):
+    begin, since = len(driven.robot.log.told), time.monotonic()
+    driven.web_hop.shape(Shape(latency=0.03, jitter=0.12))
+    pass_time(6.0)
+    found = ages(driven.robot.log.told[begin:], said_by(driven))
+    assert found, "a link that is fit to drive by at times"
+    assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)
