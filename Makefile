@@ -71,18 +71,18 @@ test-web: $(NODE)
 
 ## test-gate: every branch of the gate, its sockets and process too, is taken by a test
 .PHONY: test-gate
+# What needs the display too, or numpy, or takes long, is not where branches are counted.
+GATE_BESIDE := $(addprefix tests/gate/test_gate_,client.py assist_road.py machine.py recorded.py)
 test-gate: $(DEV)
-	$(BIN)/pytest -q -n $(JOBS) tests/gate --ignore tests/gate/test_gate_client.py \
-	  --ignore tests/gate/test_gate_assist_road.py \
-	  --ignore tests/gate/test_gate_machine.py \
-	  --ignore tests/gate/test_gate_recorded.py --cov=webmap.gate \
-	  --cov-config=tests/gate/coverage.toml --cov-fail-under=100
+	$(BIN)/pytest -q -n $(JOBS) tests/gate $(addprefix --ignore ,$(GATE_BESIDE)) \
+	  --cov=webmap.gate --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
-## test-python: pytest; what measures time runs alone at the end
+## test-python: pytest but for test-gate; what measures time runs alone at the end
 .PHONY: test-python test-parallel test-serial
+OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
 test-parallel: $(DEV) $(NODE)
-	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not serial"
+	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not serial" $(addprefix --ignore ,$(OF_GATE))
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial
 
@@ -93,7 +93,7 @@ RESUME ?=
 LANES ?= 1
 FIGURES := docs/_build/safety-figures.jsonl
 SAFETY := WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_RESUME=$(RESUME) \
-  WEBMAP_SAFETY_FIGURES=$(abspath $(FIGURES)) $(BIN)/pytest -v --timeout 3600
+  WEBMAP_SAFETY_FIGURES="$(abspath $(FIGURES))" $(BIN)/pytest -v --timeout 3600
 ONE_LANE := tests/safety/test_safety_links.py
 OTHER_LANE := tests/safety/test_safety_browser.py tests/safety/test_safety_processes.py
 test-safety: $(DEV) $(NODE)

@@ -5,7 +5,13 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    ConsoleMessage,
+    Page,
+    sync_playwright,
+)
 
 CHROMIUM_ARGS = [
     "--no-sandbox",
@@ -40,10 +46,12 @@ class Complaints:
         self.allowed: list[str] = []
         self._said: list[str] = []
 
-    def listen(self, page: Page) -> None:
-        """Hear what a page reports from now on."""
-        page.on("pageerror", lambda error: self._said.append(f"exception: {error}"))
-        page.on("console", self._console)
+    def listen(self, context: BrowserContext) -> None:
+        """Hear what the pages of a context report, those it opens later too."""
+        context.on(
+            "weberror", lambda error: self._said.append(f"exception: {error.error}")
+        )
+        context.on("console", self._console)
 
     def _console(self, message: ConsoleMessage) -> None:
         if message.type in {"error", "warning"}:
@@ -61,11 +69,14 @@ class Complaints:
 
 @contextmanager
 def watched_tab(browser: Browser, width: int, height: int) -> Iterator[Page]:
-    """Open a page that fails the test on any complaint not in ``page.allowed``."""
+    """Open a page that fails the test on any complaint not in ``page.allowed``.
+
+    The same holds for all other pages that are opened in its context.
+    """
     context = browser.new_context(viewport={"width": width, "height": height})
-    page = context.new_page()
     complaints = Complaints()
-    complaints.listen(page)
+    complaints.listen(context)
+    page = context.new_page()
     page.allowed = []
     yield page
     context.close()

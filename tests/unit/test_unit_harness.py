@@ -2,6 +2,7 @@
 
 import pytest
 
+from benchmarks import bridge
 from benchmarks.harness import Comparison, Contender, compare
 
 
@@ -41,3 +42,13 @@ def test_the_table_shows_medians_and_ratios() -> None:
 def test_no_rounds_are_refused() -> None:
     with pytest.raises(ValueError, match="got 0 rounds"):
         compare("a title", [], rounds=0)
+
+
+@pytest.mark.serial
+@pytest.mark.slow
+def test_a_bench_still_runs_and_measures_every_contender() -> None:
+    odometry, scans = bridge.bench(rounds=1, quick=True)
+    assert set(odometry.runs) == {"webmap", "roslibpy"}
+    assert set(scans.runs) == {"webmap", "roslibpy", "webmap-json"}
+    for (figures,) in (*odometry.runs.values(), *scans.runs.values()):
+        assert all(value > 0 for value in figures.values()), figures

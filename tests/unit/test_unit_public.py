@@ -38,7 +38,7 @@ def test_every_place_says_the_same_version() -> None:
     assert {webmap.__version__, version("webmap"), newest[1]} == {project["version"]}
 
 
-@pytest.mark.parametrize("command", ["demo", "run", "sim", "view"])
+@pytest.mark.parametrize("command", ["demo", "play", "record", "run", "sim", "view"])
 def test_every_option_stands_in_the_reference(command: str) -> None:
     context = click.Context(cli)
     found = cli.get_command(context, command)
