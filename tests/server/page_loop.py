@@ -1,6 +1,7 @@
 """The model's thread with pages in it, but for sockets: what the server would do."""
 
 import asyncio
+import gc
 import json
 import threading
 import time
@@ -100,3 +101,18 @@ def wait_for(condition):
     while not condition():
         assert time.monotonic() < deadline, "it did not happen"
         time.sleep(0.01)
+
+
+def objects_left(round_of, rounds: int, pages: int) -> list[int]:
+    """Return how many more objects there are after each round of so many pages.
+
+    What leaks does so in every round; what another thread imports, it does once.
+    """
+    left = []
+    gc.collect()
+    for _ in range(rounds):
+        before = len(gc.get_objects())
+        round_of(pages)
+        gc.collect()
+        left.append(len(gc.get_objects()) - before)
+    return left
