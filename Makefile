@@ -82,7 +82,7 @@ test-gate: $(DEV)
 OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
 test-parallel: $(DEV) $(NODE)
-	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not serial" $(addprefix --ignore ,$(OF_GATE))
+	$(PY) tools/pytest_beside.py $(JOBS) -m "not serial" $(addprefix --ignore ,$(OF_GATE))
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial
 

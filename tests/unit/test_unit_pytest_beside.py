@@ -1,0 +1,59 @@
+"""The second look that tests get which failed beside others."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TOOL = Path(__file__).parents[2] / "tools/pytest_beside.py"
+
+ONCE = """
+from pathlib import Path
+
+def test_once():
+    before = Path(__file__).with_name("before")
+    looked = before.exists()
+    before.touch()
+    assert looked
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    def run(source: str) -> tuple[int, str]:
+        (tmp_path / "test_it.py").write_text(source)
+        (tmp_path / "pytest.ini").write_text("[pytest]\n")
+        command = [sys.executable, str(TOOL), "2", "test_it.py"]
+        done = subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        return done.returncode, done.stdout
+
+    return run
+
+
+def test_what_passes_alone_is_named(run):
+    status, said = run(ONCE)
+    assert status == 0
+    assert "Passed alone, and is to be mended:\n  test_it.py::test_once" in said
+
+
+def test_what_fails_alone_too_has_failed(run):
+    status, said = run(ONCE + "\ndef test_never():\n    assert not 1\n")
+    assert status == 1
+    assert "2 failed beside others" in said
+    assert "to be mended" not in said
+
+
+def test_many_failures_get_no_second_look(run):
+    source = "import pytest\n@pytest.mark.parametrize('n', range(6))\n"
+    status, said = run(source + "def test_never(n):\n    assert False\n")
+    assert status == 1
+    assert "now alone" not in said
+
+
+def test_what_cannot_be_collected_has_failed(run):
+    status, said = run("import nothing_of_that_name\n")
+    assert status != 0
+    assert "to be mended" not in said
