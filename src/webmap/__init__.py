@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from webmap import geometry, modules
+    from webmap.core.alignment import align_bridge
     from webmap.core.extendable import Extendable
     from webmap.core.layer import Layer
     from webmap.core.map import Map
@@ -49,6 +50,7 @@ __all__ = [
     "Page",
     "Robot",
     "WebMapError",
+    "align_bridge",
     "asgi_app",
     "call",
     "generate_id",
@@ -75,6 +77,7 @@ _HOMES = {
     "Page": "webmap.core.page:Page",
     "Robot": "webmap.core.robot:Robot",
     "WebMapError": "webmap.errors:WebMapError",
+    "align_bridge": "webmap.core.alignment:align_bridge",
     "asgi_app": "webmap.server.application:asgi_app",
     "call": "webmap.server.application:call",
     "generate_id": "webmap.identifiers:generate_id",
