@@ -3,6 +3,7 @@
 import asyncio
 import json
 
+import pytest
 from link_bench import PONG, frame, in_loop, noting_bridge, raw_bridge, until
 
 from webmap.gate.clock import now
@@ -133,6 +134,46 @@ async def test_pings_are_more_frequent_while_somebody_listens():
         assert not lane.lane.wanted
         await until(lambda: len(bridge.of("unadvertise")) == 2, "the goodbyes")
         assert {t.topic for t in bridge.of("unsubscribe")} == {"/cmd_vel", "/other"}
+
+
+STAMPED = "geometry_msgs/msg/TwistStamped"
+
+
+@in_loop
+@pytest.mark.parametrize("stated_first", [True, False])
+async def test_of_two_robots_on_a_topic_the_type_that_is_known_counts(stated_first):
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        both = [(STAMPED, False), ("geometry_msgs/Twist", True)]
+        for type, assumed in both if stated_first else both[::-1]:
+            lane.attach("/base", type, assumed)
+        assert lane.write("/base", ZERO)
+        (told,) = await until(lambda: bridge.of("publish", "/base"), "the zero")
+        assert "twist" in told.message["msg"]
+        lane.detach("/base", STAMPED, False)
+        assert lane.write("/base", ZERO)
+        await until(lambda: len(bridge.of("publish", "/base")) == 2, "the other zero")
+        assert "linear" in bridge.of("publish", "/base")[1].message["msg"]
+        said = [
+            (t.op, t.message["type"] if t.op == "advertise" else "")
+            for t in bridge.told
+            if t.topic == "/base" and t.op != "publish"
+        ]
+        alone = ("advertise", "geometry_msgs/Twist")
+        known = [("advertise", STAMPED), ("unadvertise", ""), alone]
+        assert said == (known if stated_first else [alone, ("unadvertise", ""), *known])
+
+
+@in_loop
+async def test_where_no_robot_is_any_more_nothing_is_written():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        lane.attach("/base", STAMPED)
+        lane.detach("/base", STAMPED)
+        assert not lane.write("/base", ZERO)
+        assert lane.write("/cmd_vel", ZERO)
+        await until(lambda: bridge.of("publish", "/cmd_vel"), "the other zero")
+        assert bridge.of("publish", "/base") == []
 
 
 @in_loop

@@ -2,6 +2,7 @@
 
 import json
 import math
+import threading
 
 import msgspec
 import pytest
@@ -12,6 +13,7 @@ from webmap.errors import ConfigError, MotionError, NoLease
 from webmap.gate import messages
 from webmap.gate.display import supervisor
 from webmap.gate.display.client import GateClient
+from webmap.gate.display.program import ProgramRoad
 from webmap.gate.messages import PROGRAM, Holder
 from webmap.geometry import Twist
 
@@ -90,6 +92,49 @@ def report(holder=None, epoch=None):
 
 def held():
     return report(Holder(PROGRAM, PROGRAM), 3)
+
+
+class TestQuickProgram:
+    """One that gives velocities without a pause: each STOP would go behind them."""
+
+    @pytest.fixture
+    def road(self):
+        self.now, self.told = 100.0, []
+        road = ProgramRoad(self.told.append, threading.RLock(), lambda: self.now)
+        road.hear_tick(7)
+        road.hear_robot(held())
+        return road
+
+    def speeds(self):
+        return [told.velocity[0] for told in self.told]
+
+    def test_is_heard_every_10_ms(self, road):
+        for _ in range(1000):
+            road.twist("r1", Twist(0.2))
+            self.now += 0.0001
+        assert len(self.told) == 10
+
+    def test_gets_its_zero_through_at_once(self, road):
+        for speed in (0.2, 0.3, 0.0, 0.0, 0.2, 0.0):
+            road.twist("r1", Twist(speed))
+        assert self.speeds() == [0.2, 0.0]
+        self.now += 0.01
+        road.twist("r1", Twist(0.3))
+        road.twist("r1", Twist())
+        assert self.speeds() == [0.2, 0.0, 0.3, 0.0]
+
+    def test_is_refused_as_any_other(self, road):
+        road.twist("r1", Twist(0.2))
+        with pytest.raises(MotionError):
+            road.twist("r1", Twist(math.nan))
+        with pytest.raises(NoLease):
+            road.twist("r2", Twist(0.2))
+        road.hear_robot(report())
+        with pytest.raises(NoLease):
+            road.twist("r1", Twist(0.2))
+        road.hear_robot(held())
+        road.twist("r1", Twist(0.4))
+        assert self.speeds() == [0.2, 0.4], "with another lease it begins anew"
 
 
 class TestProgram:

@@ -8,6 +8,7 @@ from gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.errors import ConfigError
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key
+from webmap.gate.messages import AssistSpec
 from webmap.gate.specs import checked, key_of
 from webmap.geometry import Twist
 
@@ -161,7 +162,38 @@ class TestSharing:
         assert bench.written[-1].twist == Twist(0.4)
         assert {s.robot for s in bench.of(messages.SentTwist)} == {"r1", "r2"}
 
-    def test_forgetting_one_leaves_the_other_driving(self, bench):
+    def test_forgetting_one_that_holds_the_machine_back_stops_it_first(self, bench):
+        bench.drive_off(robot="r1")
+        bench.tell(messages.Forget("r2"))
+        assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
+        at = bench.now
+        assert bench.written[-1].twist == ZERO
+        assert "is gone" in bench.refusals()[-1].why
+        bench.hold(0.5, x=1.0)
+        assert bench.moving_since(at) == []
+        bench.drive_off(robot="r1")
+        assert bench.written[-1].twist == Twist(1.0)
+
+    @pytest.mark.parametrize(
+        "more",
+        [
+            {"stop_hooks": ({"topic": "/lock", "type": "std_msgs/Bool"},)},
+            {"assist": AssistSpec(topic="/scan", footprint=((1, 1), (-1, 1), (0, -1)))},
+            {"odometry_topic": "/odom"},
+            {"stops_within": None},
+            {"a_max": 0.5},
+        ],
+    )
+    def test_whatever_held_for_the_machine_by_the_one_that_leaves_ends_the_lease(
+        self, more
+    ):
+        bench = Bench().begin(spec(), spec(id="r2", **more))
+        assert bench.take("a", "r1")
+        bench.tell(messages.Forget("r2"))
+        assert bench.report().holder is None
+
+    def test_forgetting_one_of_two_that_are_alike_leaves_the_other_driving(self):
+        bench = Bench().begin(spec(), spec(id="r2", name="Bob again"))
         bench.drive_off(robot="r1")
         bench.tell(messages.Forget("r2"))
         bench.hold(0.1, x=1.0)
@@ -179,6 +211,40 @@ class TestSharing:
     def test_stopping_all_stops_it_once(self, bench):
         bench.say("b", op="stop", robot="*")
         assert len(bench.written) == 1
+
+
+class TestTypes:
+    """The type that velocity has on a topic which two robots share."""
+
+    STAMPED = "geometry_msgs/msg/TwistStamped"
+
+    def test_two_types_of_one_topic_are_refused_in_words(self, caplog):
+        bench = Bench().begin(spec(), spec(id="r2", name="Al", twist_type=self.STAMPED))
+        assert [attach.spec.id for attach in bench.did(actions.Attach)] == ["r1"]
+        assert (
+            f"robot 'Al': /cmd_vel carries {self.STAMPED}, but robot 'Bob' has "
+            "geometry_msgs/Twist there"
+        ) in caplog.text
+
+    @pytest.mark.parametrize(
+        ("one", "other"),
+        [
+            ({"twist_type": STAMPED}, {"twist_type_assumed": True}),
+            ({"twist_type_assumed": True}, {"twist_type": STAMPED}),
+            ({"twist_type": STAMPED}, {"twist_type": "geometry_msgs/TwistStamped"}),
+            ({"twist_type": STAMPED}, {"twist_topic": "/other"}),
+            ({"twist_type": STAMPED}, {"twist_topic": None}),
+        ],
+    )
+    def test_what_is_assumed_or_the_same_or_elsewhere_is_not(self, one, other, caplog):
+        bench = Bench().begin(spec(**one), spec(id="r2", **other))
+        assert len(bench.did(actions.Attach)) == 2
+        assert caplog.text == ""
+
+    def test_a_robot_may_be_declared_anew_with_another_type(self):
+        bench = Bench().begin(spec())
+        bench.tell(spec(twist_type=self.STAMPED))
+        assert bench.did(actions.Attach)[-1].spec.twist_type == self.STAMPED
 
 
 class TestSeveral:

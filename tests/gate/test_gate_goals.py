@@ -6,6 +6,8 @@ from gate_harness import URL, ZERO, Bench, spec
 
 from webmap.errors import ConfigError
 from webmap.gate import actions, events, messages
+from webmap.gate.rules.goals import ELSEWHERE, IN_VAIN
+from webmap.gate.rules.goals import MOVE_BASE as MOVE_BASE_TYPE
 from webmap.gate.specs import checked
 from webmap.geometry import Twist
 
@@ -221,6 +223,94 @@ def test_one_that_cannot_be_cancelled_goes_on_whatever_is_set():
     assert cancels(bench) == 0
 
 
+@pytest.mark.parametrize("policy", ["continue", "cancel"])
+def test_when_its_robot_is_removed_a_goal_does_what_was_set(policy):
+    bench = Bench().begin(spec(on_operator_loss=policy))
+    bench.take()
+    bench.goal()
+    bench.tell(messages.Forget("r1"))
+    kept = (actions.CancelGoals, actions.Detach)
+    order = [type(a) for a in bench.done if isinstance(a, kept)]
+    called_off = [actions.CancelGoals] if policy == "cancel" else []
+    assert order == [*called_off, actions.Detach], "before nothing reaches it any more"
+
+
+class TestElsewhere:
+    """What becomes of a goal when the robot is declared with other places for goals."""
+
+    def declare(self, before, after, **goal):
+        bench = Bench().begin(spec(**before))
+        bench.say("a", op="cancel", robot="r1")
+        bench.take()
+        bench.goal(**goal)
+        bench.done.clear()
+        bench.tell(spec(**after))
+        return bench
+
+    @pytest.mark.parametrize(
+        ("before", "after"),
+        [
+            ({}, {"cancel_topic": "/other"}),
+            ({}, {"cancel_topic": None}),
+            ({}, {"goal_topic": "/other"}),
+            ({}, {"goal_topic": None, "cancel_topic": None}),
+            ({}, {"goal_url": "ws://other:9090"}),
+            ({"action": "/go"}, {"action": "/come"}),
+            ({"action": "/go"}, {}),
+            ({"action": "/go"}, {"action": "/go", "action_type": MOVE_BASE_TYPE}),
+        ],
+    )
+    def test_it_is_called_off_where_it_went_before_that_changes(self, before, after):
+        bench = self.declare(before, after)
+        kept = (actions.CancelGoals, actions.Attach)
+        order = [type(a) for a in bench.done if isinstance(a, kept)]
+        assert order == [actions.CancelGoals, actions.Attach]
+        goal = bench.report().goal
+        assert (goal.state, goal.why) == ("failed", ELSEWHERE)
+
+    @pytest.mark.parametrize(
+        "after",
+        [
+            {"v_max": 0.5},
+            {"action": "/go"},
+            {"pose_topic": "/initialpose"},
+            {"on_operator_loss": "cancel"},
+        ],
+    )
+    def test_it_goes_on_where_it_can_be_called_off_afterwards_as_well(self, after):
+        bench = self.declare({}, after)
+        assert cancels(bench) == 0
+        assert bench.report().goal.state == "sent"
+        bench.say("b", op="stop", robot="r1")
+        assert cancels(bench) == 1
+
+    def test_it_is_called_off_too_when_the_robot_goes_by_another_key(self):
+        bench = self.declare({}, {"twist_topic": "/other", "cancel_topic": None})
+        assert cancels(bench) == 1
+
+    def test_one_that_cannot_be_called_off_is_said_to_be_out_of_sight(self):
+        bench = self.declare({"cancel_topic": None}, {"goal_topic": "/other"})
+        assert cancels(bench) == 0
+        assert bench.report().goal.why == ELSEWHERE
+
+    def test_one_that_has_ended_is_left_as_it_is(self):
+        bench = Bench().begin(spec(action="/go"))
+        bench.take()
+        bench.goal()
+        bench.tell(events.GoalEnded("r1", goals(bench)[0].id, "reached"))
+        bench.tell(spec(action="/come"))
+        assert cancels(bench) == 0
+        assert bench.report().goal.state == "reached"
+
+    def test_a_cancel_that_was_owed_there_is_not_said_elsewhere(self):
+        bench = Bench().begin()
+        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.say("a", op="cancel", robot="r1")
+        bench.tell(spec(cancel_topic="/other"))
+        bench.tell(events.LinkUp(URL, "tasks"))
+        assert cancels(bench) == 0
+
+
 MOVE_BASE = {"action": "/move_base", "action_type": "move_base_msgs/MoveBaseAction"}
 
 
@@ -387,6 +477,43 @@ class TestHowItGoes:
         bench.tell(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "reached"
 
+    def test_a_cancel_that_went_to_a_dead_link_is_said_again_on_the_next(self, bench):
+        """The link looked open for some seconds, and so the cancel looked written."""
+        id = goals(bench)[-1].id
+        bench.tell(messages.Disconnect("a"))
+        bench.say("b", op="cancel", robot="r1")
+        bench.run(4.0)
+        assert cancels(bench) == 1
+        bench.break_links()
+        bench.done.clear()
+        bench.tell(events.GoalLost("r1", id, "no link"))
+        assert bench.report().goal.state == "cancelling"
+        bench.done.clear()
+        bench.connect_links()
+        assert cancels(bench) == 1
+        bench.connect_links()
+        assert cancels(bench) == 1
+        bench.tell(events.GoalProgress("r1", id, active=True))
+        assert cancels(bench) == 2, "it goes on, and so it is told again"
+
+    def test_one_that_is_called_off_and_out_of_sight_is_called_off_again(self, bench):
+        """Its socket is lost, and that of the next goals and cancels is not."""
+        bench.say("b", op="cancel", robot="r1")
+        bench.tell(events.GoalLost("r1", goals(bench)[-1].id, "given up"))
+        assert cancels(bench) == 2
+        assert bench.report().goal.state == "cancelling"
+        bench.connect_links()
+        assert cancels(bench) == 2
+
+    @pytest.mark.parametrize("answer", [True, False])
+    def test_a_cancel_that_was_answered_is_not_said_again(self, bench, answer):
+        bench.say("b", op="cancel", robot="r1")
+        if answer:
+            self.end(bench, "cancelled")
+        bench.break_links()
+        bench.connect_links()
+        assert cancels(bench) == (1 if answer else 2)
+
     def test_a_new_link_sends_no_goal_again(self, bench):
         bench.break_links()
         bench.run(0.5)
@@ -404,6 +531,37 @@ class TestHowItGoes:
         assert bench.report().goal.state == "cancelling"
         bench.tell(events.LinkUp(URL, "tasks"))
         assert bench.report().goal.state == "cancelled"
+
+    @pytest.mark.parametrize("late", [False, True])
+    def test_a_cancel_without_an_answer_is_said_again_after_a_link_lost_soon(
+        self, late
+    ):
+        bench = Bench().begin()
+        bench.take()
+        bench.goal()
+        bench.say("b", op="cancel", robot="r1")
+        bench.run((1.1 if late else 0.9) * IN_VAIN)
+        bench.break_links()
+        assert bench.report().goal.state == ("cancelled" if late else "cancelling")
+        bench.connect_links()
+        assert bench.report().goal.state == "cancelled"
+        assert cancels(bench) == (1 if late else 2)
+
+    def test_a_goal_that_was_sent_since_is_not_cancelled_by_that(self):
+        bench = Bench().begin()
+        bench.say("a", op="cancel", robot="r1")
+        bench.take()
+        bench.goal()
+        bench.break_links()
+        bench.connect_links()
+        assert cancels(bench) == 1
+
+    def test_a_link_that_was_spent_on_a_goal_is_not_lost(self):
+        bench = Bench().begin()
+        bench.say("a", op="cancel", robot="r1")
+        bench.tell(events.LinkDown(URL, "tasks", spent=True))
+        bench.tell(events.LinkUp(URL, "tasks"))
+        assert cancels(bench) == 1
 
     def test_words_about_other_goals_and_other_robots_change_nothing(self, bench):
         before = bench.report()

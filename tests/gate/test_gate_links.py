@@ -208,6 +208,45 @@ async def test_goals_poses_and_cancels_go_where_the_robot_takes_them():
 
 
 @in_loop
+async def test_a_cancel_gets_through_though_its_link_is_wanted_no_longer():
+    """By topic and by service: the goals go elsewhere in the same breath."""
+    async with noting_bridge() as old, noting_bridge() as new, Noting() as noting:
+        robot = spec(bridge_url=new.url, goal_url=old.url, action="/go")
+        key = noting.attach(robot)
+        await noting.up("control", "tasks")
+        await until(lambda: len(old.of("advertise")) == 2, "the topics of goals")
+        noting.do(actions.CancelGoals(key, "r1"))
+        noting.attach(spec(**{**_fields(robot), "goal_url": new.url}))
+        await noting.links.settle()
+        (call,) = old.of("call_service")
+        assert call.message["service"] == "/go/_action/cancel_goal"
+        await until(lambda: old.of("publish", "/cancel"), "the cancel")
+        await until(lambda: not old.links, "the end of both links")
+
+
+@in_loop
+async def test_of_each_link_that_is_wanted_no_longer_it_is_told_that_it_is_down():
+    async with noting_bridge() as bridge, Noting() as noting:
+        key = noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
+        await noting.up("control", "witness", "tasks")
+        noting.do(actions.Detach(key, "r1"))
+        lanes = ("control", "witness", "tasks")
+        assert noting.of(LinkDown) == [LinkDown(bridge.url, lane) for lane in lanes]
+
+
+@in_loop
+async def test_what_stays_when_a_robot_is_declared_anew_is_not_announced_again():
+    async with noting_bridge() as bridge, Noting() as noting:
+        robot = spec(bridge_url=bridge.url)
+        noting.attach(robot)
+        await noting.up("control", "tasks")
+        noting.attach(spec(**{**_fields(robot), "goal_topic": "/other"}))
+        await until(lambda: bridge.of("unadvertise", "/goal"), "the end of the old one")
+        assert {t.topic for t in bridge.of("unadvertise")} == {"/goal"}
+        assert len(bridge.of("advertise", "/cmd_vel")) == 1
+
+
+@in_loop
 async def test_a_link_that_carries_nothing_is_cut_and_one_that_is_not_there_is_not():
     async with noting_bridge() as bridge, Noting() as noting:
         noting.do(actions.CutLink(bridge.url))

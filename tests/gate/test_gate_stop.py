@@ -224,6 +224,78 @@ class TestLatch:
         assert bench.written == bench.dropped == []
 
 
+class TestByAnotherKey:
+    """A robot that takes goals only is known by those, else by its velocity topic."""
+
+    ONLY_GOALS = spec(twist_topic=None)
+    GOALS = Key(URL, "goal /goal")
+
+    @pytest.fixture
+    def bench(self):
+        bench = Bench().begin(self.ONLY_GOALS)
+        stop(bench)
+        return bench
+
+    def test_one_that_is_stopped_and_gets_velocity_stays_stopped(self, bench):
+        bench.tell(spec())
+        assert bench.written[-1].twist == ZERO
+        assert bench.disk == {self.GOALS: "B", KEY: "B"}
+        assert bench.report().latched
+        assert bench.report().stop.by == "B"
+        assert bench.take() is None
+        bench.goal()
+        assert bench.did(actions.SendGoal) == []
+        reset(bench)
+        assert not bench.report().latched
+        bench.drive_off()
+        assert bench.written[-1].twist == Twist(1.0)
+
+    def test_one_that_is_stopped_and_loses_velocity_stays_stopped(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        stop(bench)
+        bench.tell(self.ONLY_GOALS)
+        bench.run(1.0)
+        assert bench.report().latched
+        assert bench.take() is None
+        assert bench.did(actions.CancelGoals)[-1].key == self.GOALS
+        reset(bench)
+        assert bench.take()
+
+    def test_its_reset_ends_it_by_every_key_that_it_had(self, bench):
+        bench.tell(spec())
+        bench.tell(spec(twist_topic="/other"))
+        bench.run(1.0)
+        reset(bench)
+        assert bench.disk == {}
+        bench.tell(self.ONLY_GOALS)
+        assert bench.take()
+
+    def test_its_reset_leaves_another_robot_stopped_that_has_its_old_key(self):
+        bench = Bench().begin(self.ONLY_GOALS, spec(id="r2", twist_topic=None))
+        stop(bench)
+        bench.tell(spec())
+        reset(bench)
+        assert not bench.report("r1").latched
+        assert bench.report("r2").latched
+        assert bench.disk == {self.GOALS: "B"}
+
+    def test_one_that_is_reset_where_it_was_before_needs_no_other_reset(self, bench):
+        bench.tell(spec())
+        bench.tell(spec(id="r2", twist_topic=None))
+        reset(bench, robot="r2")
+        bench.tell(messages.Forget("r2"))
+        kept = len(bench.did(actions.KeepLatch))
+        reset(bench)
+        assert len(bench.did(actions.KeepLatch)) == kept + 1
+
+    def test_one_that_is_not_stopped_is_not(self):
+        bench = Bench().begin(self.ONLY_GOALS)
+        bench.tell(spec())
+        assert not bench.report().latched
+        assert bench.take()
+
+
 class TestOnDisk:
     def test_zero_goes_out_before_the_disk_and_the_word_of_it_after(self):
         bench = Bench(slow_disk=True).begin()

@@ -15,6 +15,7 @@ from webmap.gate.events import (
     LinkUp,
 )
 from webmap.gate.lanes import tasks
+from webmap.gate.lanes.calls import Calls
 from webmap.gate.lanes.tasks import TasksLane, goal_topics, hook_topics
 
 MOVE_BASE = spec(
@@ -32,7 +33,8 @@ class Noting:
 
     def __init__(self, url):
         self.events = []
-        self.tasks = TasksLane(url, self.events.append)
+        self.calls = Calls(url)
+        self.tasks = TasksLane(url, self.events.append, self.calls)
         self.tasks.lane.hold("robots")
 
     async def __aenter__(self):
@@ -41,7 +43,8 @@ class Noting:
 
     async def __aexit__(self, *_):
         self.tasks.close()
-        await self.tasks.settle()
+        self.calls.close()
+        await self.calls.settle()
 
     def of(self, type):
         return [event for event in self.events if isinstance(event, type)]
@@ -125,7 +128,7 @@ class TestTopicGoals:
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.cancel(spec(cancel_topic=None))  # it has none
             noting.tasks.cancel(spec(cancel_topic="/stop_it", action="/go"))
-            await noting.tasks.settle()
+            await noting.calls.settle()
             noting.tasks.cancel(
                 spec(
                     cancel_topic="/move_base/cancel",
@@ -153,7 +156,7 @@ class TestTopicGoals:
             noting.tasks.run_hook(flag, False, ended.append)
             trigger = {"service": "/e_stop", "type": "std_srvs/Trigger"}
             noting.tasks.run_hook(trigger, True, ended.append)
-            await noting.tasks.settle()
+            await noting.calls.settle()
             await until(lambda: len(bridge.of("publish", "/lock")) == 2, "both flags")
             flags = [t.message["msg"]["data"] for t in bridge.of("publish", "/lock")]
             assert flags == [True, False]
@@ -171,11 +174,12 @@ class TestActionGoals:
             await noting.send(NAVIGATES, "g1")
             await noting.send(NAVIGATES, "g2")
             noting.tasks.cancel(NAVIGATES)
-            await noting.tasks.settle()
+            await noting.calls.settle()
             await until(lambda: bridge.of("call_service"), "the cancel")
             await until(lambda: len(bridge.of("send_action_goal")) == 2, "both")
             assert len({t.link for t in bridge.told}) == 3
             assert noting.of(GoalLost) == [], "a socket that was spent is not lost"
+            assert all(down.spent for down in noting.of(LinkDown))
             bridge.unblock()
 
     @in_loop
@@ -240,14 +244,16 @@ class TestActionGoals:
             await until(lambda: first not in bridge.links, "the end of its socket")
 
     @in_loop
-    async def test_the_end_of_the_lane_ends_its_goals_sockets_and_its_calls(self):
+    async def test_the_end_of_the_lane_ends_its_goals_sockets_and_no_call(self):
         async with noting_bridge() as bridge:
             bridge.answers_services = False
             async with Noting(bridge.url) as noting:
                 await noting.send(NAVIGATES, "g1")
                 noting.tasks.cancel(NAVIGATES)
-                await until(lambda: bridge.of("call_service"), "the cancel")
+                (call,) = await until(lambda: bridge.of("call_service"), "the cancel")
                 await until(lambda: len(bridge.links) == 3, "three sockets")
+                noting.tasks.close()
+                await until(lambda: bridge.links == {call.link}, "the end of the rest")
             bridge.unblock()
             await until(lambda: not bridge.links, "the end of all of them")
             assert noting.of(GoalLost) == []

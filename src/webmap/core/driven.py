@@ -321,7 +321,8 @@ class Driven(Extendable):
 
         It goes through the gate like every other, so the program needs the lease, and
         the speed in force bounds it. Whoever wants the robot to go on calls again, at
-        20 Hz, say.
+        20 Hz, say. What comes less than 10 ms after the last velocity that went to the
+        gate is left out, but a zero after motion never is.
 
         Args:
             x: Metres per second forward.

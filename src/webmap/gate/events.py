@@ -67,6 +67,8 @@ class LinkDown:
 
     url: str
     lane: Lane
+    spent: bool = False
+    """Whether it goes on for a goal, and what was written before that arrives."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Robots as the gate takes them: names in one spelling, numbers that make sense."""
 
 import math
+from collections.abc import Iterable
 
 import msgspec
 
@@ -8,7 +9,13 @@ from webmap.errors import ConfigError
 from webmap.gate.events import Key
 from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import AssistSpec, RobotSpec
-from webmap.ros.names import is_type, normalise_topic, normalise_url, split_type
+from webmap.ros.names import (
+    is_type,
+    normalise_topic,
+    normalise_url,
+    same_type,
+    split_type,
+)
 
 ACTIONS = ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction")
 """The types of actions that take goals."""
@@ -78,6 +85,28 @@ def checked(spec: RobotSpec) -> RobotSpec:
         assist=spec.assist and checked_assist(spec.name, spec.assist),
         stop_hooks=checked_hooks(spec.name, spec.stop_hooks, spec.twist_topic),
     )
+
+
+def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
+    """Let a checked ``spec`` pass if no other robot has velocity of another type there.
+
+    Raises:
+        ConfigError: If one has: one topic has one type.
+
+    """
+    if spec.twist_topic is None or spec.twist_type_assumed:
+        return
+    for other in others:
+        if (
+            other.id != spec.id
+            and not other.twist_type_assumed
+            and key_of(other) == key_of(spec)
+            and not same_type(other.twist_type, spec.twist_type)
+        ):
+            raise ConfigError(
+                f"robot {spec.name!r}: {spec.twist_topic} carries {spec.twist_type}, "
+                f"but robot {other.name!r} has {other.twist_type} there"
+            )
 
 
 def key_of(spec: RobotSpec) -> Key:

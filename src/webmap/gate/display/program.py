@@ -4,12 +4,17 @@ import concurrent.futures
 import itertools
 import math
 import threading
+import time
 from collections.abc import Callable
 
 from webmap.errors import MotionError, NoLease
 from webmap.gate import messages
 from webmap.gate.messages import PROGRAM
 from webmap.geometry import Twist
+
+LEAST_PAUSE = 0.01
+"""The least time between two velocities for one robot, in seconds; a program that gives
+them without a pause would delay every robot's STOP."""
 
 
 class ProgramRoad:
@@ -18,17 +23,24 @@ class ProgramRoad:
     Args:
         tell: Sends a message to the gate, if it runs.
         lock: Held while anything here changes.
+        clock: Gives the time, in seconds.
 
     """
 
     def __init__(
-        self, tell: Callable[[messages.ToGate], None], lock: "threading.RLock"
+        self,
+        tell: Callable[[messages.ToGate], None],
+        lock: "threading.RLock",
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._tell = tell
         self._lock = lock
+        self._clock = clock
         self._numbers = itertools.count(1)
         self._takes: dict[int, concurrent.futures.Future[int]] = {}
         self._epochs: dict[str, int] = {}
+        self._passed_on: dict[str, tuple[float, messages.Velocity]] = {}
+        """By robot, the last velocity that the gate was told, and when."""
         self._tick: int | None = None
 
     def take(
@@ -65,6 +77,9 @@ class ProgramRoad:
     def twist(self, robot_id: str, twist: Twist) -> None:
         """Send one velocity; without another within 200 ms the robot is stopped.
 
+        One that comes less than 10 ms after the last that was sent is left out, unless
+        it is a zero after motion.
+
         Raises:
             NoLease: If this program does not hold the lease.
             MotionError: If the velocity is not made of finite numbers.
@@ -75,6 +90,11 @@ class ProgramRoad:
         with self._lock:
             epoch, tick = self._licence(robot_id)
             velocity = (float(twist.vx), float(twist.vy), float(twist.wz))
+            now = self._clock()
+            at, last = self._passed_on.get(robot_id, (-math.inf, velocity))
+            if now - at < LEAST_PAUSE and (any(velocity) or not any(last)):
+                return
+            self._passed_on[robot_id] = (now, velocity)
             self._tell(messages.ProgramTwist(robot_id, epoch, tick, velocity))
 
     def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
@@ -127,6 +147,7 @@ class ProgramRoad:
                 self._epochs[report.robot] = report.epoch
             else:
                 self._epochs.pop(report.robot, None)
+                self._passed_on.pop(report.robot, None)
 
     def hear_take(self, reply: messages.TakeReply) -> None:
         """Answer who asked for a lease."""

@@ -30,7 +30,10 @@ class ControlLane:
     def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
         self._url = url
         self._tell = tell
+        self._attached: dict[str, list[tuple[str, bool]]] = {}
+        """For each topic the types that were said, and whether they are assumed."""
         self._types: dict[str, str] = {}
+        """The type that each topic is written as."""
         self._listened: set[str] = set()
         self._unproven = Unproven()
         self.lane = Lane(
@@ -43,17 +46,39 @@ class ControlLane:
         )
         self.lane.hurry(IDLE_PING)
 
-    def attach(self, topic: str, type: str) -> None:
-        """Announce that velocity will be written to ``topic``."""
-        self._types[topic] = type
-        id = f"webmap-gate advertise {topic} {type}"
-        self.lane.hold(
-            id, ops.advertise(topic, type, id=id), ops.unadvertise(topic, id=id)
-        )
+    def attach(self, topic: str, type: str, assumed: bool = False) -> None:
+        """Announce that velocity will be written to ``topic``.
 
-    def detach(self, topic: str, type: str) -> None:
+        Args:
+            topic: The topic.
+            type: Its type.
+            assumed: Whether nobody knows that: the type that somebody does counts.
+
+        """
+        self._attached.setdefault(topic, []).append((type, assumed))
+        self._announce(topic)
+
+    def detach(self, topic: str, type: str, assumed: bool = False) -> None:
         """Undo one :meth:`attach`."""
-        self.lane.let_go(f"webmap-gate advertise {topic} {type}")
+        self._attached[topic].remove((type, assumed))
+        self._announce(topic)
+
+    def _announce(self, topic: str) -> None:
+        """Announce the type of a topic, if it is another than before."""
+        said, attached = self._types.get(topic), self._attached[topic]
+        known = [type for type, assumed in attached if not assumed]
+        types = known or [type for type, _ in attached]
+        type = types[-1] if types else None
+        if type == said:
+            return
+        if said is not None:
+            self.lane.let_go(f"webmap-gate advertise {topic} {said}")
+            del self._types[topic]
+        if type is not None:
+            id = f"webmap-gate advertise {topic} {type}"
+            hello = ops.advertise(topic, type, id=id)
+            self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
+            self._types[topic] = type
 
     def listen(self, topic: str) -> None:
         """Hear what is said on ``topic``, ours and others'."""
@@ -85,9 +110,10 @@ class ControlLane:
             until: When it is too old, by the gate's clock.
 
         """
-        if not (twist.is_zero or self._unproven.room(topic)):
+        type = self._types.get(topic)
+        if type is None or not (twist.is_zero or self._unproven.room(topic)):
             return False
-        data = words.velocity(topic, self._types[topic], twist)
+        data = words.velocity(topic, type, twist)
         if twist.is_zero:
             until = math.inf
         done = self.lane.write(data, only_if_clear=not twist.is_zero, until=until)

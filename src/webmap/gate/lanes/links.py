@@ -4,7 +4,16 @@ import asyncio
 from collections.abc import Callable
 
 from webmap.gate import actions
-from webmap.gate.events import Event, HookEnded, Key, Wrote, WroteGoal, WrotePose
+from webmap.gate.events import (
+    Event,
+    HookEnded,
+    Key,
+    LinkDown,
+    Wrote,
+    WroteGoal,
+    WrotePose,
+)
+from webmap.gate.lanes.calls import Calls
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.tasks import TasksLane, Topic, goal_topics, hook_topics
 from webmap.gate.lanes.witness import WitnessLane
@@ -25,6 +34,8 @@ class Links:
         self._control: dict[str, ControlLane] = {}
         self._witness: dict[str, WitnessLane] = {}
         self._tasks: dict[str, TasksLane] = {}
+        self._calls: dict[str, Calls] = {}
+        """By bridge; a call goes on when the lane of who made it has ended."""
         self._robots: dict[Key, dict[str, RobotSpec]] = {}
         self._watched: dict[Key, list[RobotSpec]] = {}
 
@@ -74,12 +85,14 @@ class Links:
 
     async def settle(self) -> None:
         """Wait until cancels that are under way have arrived, or cannot."""
-        await asyncio.gather(*(tasks.settle() for tasks in self._tasks.values()))
+        await asyncio.gather(*(calls.settle() for calls in self._calls.values()))
 
     def close(self) -> None:
         """End every link for good."""
         for tasks in self._tasks.values():
             tasks.close()
+        for calls in self._calls.values():
+            calls.close()
         for witness in self._witness.values():
             witness.lane.close()
         for control in self._control.values():
@@ -104,32 +117,36 @@ class Links:
         earlier = robots.pop(spec.id, None)
         watched = key in self._watched
         self._unwatch(key)
-        if earlier is not None:
-            if (_goal_url(earlier), earlier.action) != (_goal_url(spec), spec.action):
-                self._tasks[_goal_url(earlier)].forget(spec.id)
-            self._detach(key, earlier)
         robots[spec.id] = spec
         if spec.twist_topic is not None:
             control = self._control.get(spec.bridge_url)
             if control is None:
                 control = ControlLane(spec.bridge_url, self._tell)
                 self._control[spec.bridge_url] = control
-            control.attach(spec.twist_topic, spec.twist_type)
+            control.attach(spec.twist_topic, spec.twist_type, spec.twist_type_assumed)
         for url in _witnesses_of(spec):
             self._witness_at(url).lane.hold("robots")
         for url, topics in _tasks_of(spec).items():
             tasks = self._tasks.get(url)
             if tasks is None:
-                tasks = self._tasks[url] = TasksLane(url, self._tell)
+                calls = self._calls.setdefault(url, Calls(url))
+                tasks = self._tasks[url] = TasksLane(url, self._tell, calls)
             tasks.lane.hold("robots")
             tasks.attach(topics)
+        if earlier is not None:
+            if (_goal_url(earlier), earlier.action) != (_goal_url(spec), spec.action):
+                self._tasks[_goal_url(earlier)].forget(spec.id)
+            # Only now, so that what stays is not taken back and said anew.
+            self._detach(key, earlier)
         if watched:
             self._watch(key)
         self._close_unwanted()
 
     def _detach(self, key: Key, spec: RobotSpec) -> None:
         if spec.twist_topic is not None:
-            self._control[spec.bridge_url].detach(spec.twist_topic, spec.twist_type)
+            self._control[spec.bridge_url].detach(
+                spec.twist_topic, spec.twist_type, spec.twist_type_assumed
+            )
         for url in _witnesses_of(spec):
             self._witness_at(url).lane.let_go("robots")
         for url, topics in _tasks_of(spec).items():
@@ -169,12 +186,15 @@ class Links:
         for url, control in list(self._control.items()):
             if not control.lane.wanted:
                 self._control.pop(url).lane.close()
+                self._tell(LinkDown(url, "control"))
         for url, witness in list(self._witness.items()):
             if not witness.lane.wanted:
                 self._witness.pop(url).lane.close()
+                self._tell(LinkDown(url, "witness"))
         for url, tasks in list(self._tasks.items()):
             if not tasks.lane.wanted:
                 self._tasks.pop(url).close()
+                self._tell(LinkDown(url, "tasks"))
 
 
 def _odometry_url(spec: RobotSpec) -> str:

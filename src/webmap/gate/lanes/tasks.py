@@ -53,15 +53,16 @@ class TasksLane:
     Args:
         url: The bridge's address.
         tell: Takes the events.
+        calls: Calls the services of the bridge.
 
     """
 
-    def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
+    def __init__(self, url: str, tell: Callable[[Event], None], calls: Calls) -> None:
         self._url = url
         self._tell = tell
+        self._calls = calls
         self._spent: dict[Socket, SendGoal] = {}
         """The sockets of action goals that are under way, the oldest first."""
-        self._calls = Calls(url)
         self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
         """The goals of move_base that are under way, by robot."""
         self._spending = False
@@ -138,14 +139,9 @@ class TasksLane:
             log.warning("stop hook %s: %s", hook["topic"], why)
             ended(why)
 
-    async def settle(self) -> None:
-        """Wait until what was to be cancelled is, or cannot be."""
-        await self._calls.settle()
-
     def close(self) -> None:
-        """End for good."""
+        """End for good, but for the calls that are under way."""
         self.lane.close()
-        self._calls.close()
         for link in self._spent:
             link.close()
         self._spent.clear()
@@ -205,7 +201,7 @@ class TasksLane:
                 self._tell(word)
 
     def _down(self) -> None:
-        self._tell(LinkDown(self._url, "tasks"))
+        self._tell(LinkDown(self._url, "tasks", self._spending))
         if self._spending:
             return  # the socket goes on for the goal that it was spent on
         for _, goal in list(self._followed.values()):

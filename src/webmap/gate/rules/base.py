@@ -137,7 +137,7 @@ class Base:
     ) -> None:
         """Take in a robot, or what changed of it; a change ends the lease."""
         self.hands.end("the robot was declared anew", now)
-        self.robots.declare(spec, tasks, hooks)
+        self.robots.declare(spec, tasks, hooks, now)
 
     def attached(self, now: float) -> None:
         """Note that the robot can be spoken to, as soon as there are links."""
@@ -147,8 +147,9 @@ class Base:
     def forget(self, robot: str, now: float) -> None:
         """Drop a robot; the last one stays until its machine has stopped."""
         self.robots.leaving.add(robot)
-        if len(self.robots.specs) == len(self.robots.leaving):
-            self.hands.end("the robot was removed", now)
+        if not self.robots.holds_without(robot):
+            self.hands.end("the robot, or one that is the same machine, is gone", now)
+        self.robots.goals[robot].lost(now)
         self._left_at = now
         self._drop_leaving(now)
 
@@ -166,7 +167,7 @@ class Base:
         """A page is gone: what it drove stops."""
         self.hands.release(connection, now)
         for goals in self.robots.goals.values():
-            goals.lost(connection)
+            goals.lost(now, connection)
 
     # STOP.
 

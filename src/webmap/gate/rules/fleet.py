@@ -15,7 +15,7 @@ from webmap.gate.rules.health import Health, Pulse
 from webmap.gate.rules.latch import Latch
 from webmap.gate.rules.lease import Epochs
 from webmap.gate.rules.reporting import Reporter, report
-from webmap.gate.specs import checked, key_of
+from webmap.gate.specs import check_twist_type, checked, key_of
 
 log = logging.getLogger("webmap.gate")
 
@@ -42,6 +42,8 @@ class Fleet:
         self._refuse = refuse
         self._bases: dict[events.Key, Base] = {}
         self._latches: dict[events.Key, Latch] = {}
+        self._stopped_as: dict[events.Key, set[events.Key]] = {}
+        """By what other keys the STOP of a machine stands, from when it had those."""
         self._by_robot: dict[str, Base] = {}
         self._links: dict[tuple[str, events.Lane], Health] = {}
         self._reporters: dict[str, Reporter] = {}
@@ -101,6 +103,19 @@ class Fleet:
         self._touched.add(base.key)
         return base
 
+    def reset(self, base: Base, now: float) -> None:
+        """End the STOP of a machine, also where it stands by a key that it had before.
+
+        Raises:
+            Refusal: If none stands, or another gate has the machine.
+
+        """
+        base.reset(now)
+        for key in self._stopped_as.pop(base.key, ()):
+            # Where there is a machine still, it stands for another robot, too.
+            if key not in self._bases and self._latches[key].on:
+                self._latches[key].reset()
+
     def step(self, now: float) -> None:
         """Let time pass."""
         for base in list(self._bases.values()):
@@ -139,11 +154,15 @@ class Fleet:
     def _declare(self, spec: RobotSpec, now: float) -> None:
         try:
             spec = checked(spec)
+            check_twist_type(spec, self._staying())
         except ConfigError as error:
             log.error("a robot was declared that makes no sense: %s", error)
             return
         key, earlier = key_of(spec), self._by_robot.get(spec.id)
+        stopped_by = None
         if earlier is not None and earlier.key != key:
+            stopped_by = earlier.latch.by
+            earlier.robots.goals[spec.id].vacate(spec, now)
             self._forget(Forget(spec.id), now)
         elif earlier is not None and earlier.robots.specs[spec.id] == spec:
             return
@@ -153,10 +172,21 @@ class Fleet:
         self._emit(Attach(key, spec))
         if not base.known:
             self._emit(Lock(key))
-        base.attached(now)
+        if earlier is not None and stopped_by is not None:
+            # It is the same robot: by whatever it is known, its STOP stands.
+            others = {earlier.key, *self._stopped_as.get(earlier.key, ())}
+            self._stopped_as.setdefault(key, set()).update(others)
+            base.stop(stopped_by, now)
+        else:
+            base.attached(now)
         self._by_robot[spec.id] = base
         self._reporters.setdefault(spec.id, Reporter())
         self._touched.add(key)
+
+    def _staying(self) -> list[RobotSpec]:
+        """Return the robots that are declared now, under the names they go by."""
+        by_robot = self._by_robot.items()
+        return [base.robots.specs[robot] for robot, base in by_robot]
 
     def _new_base(self, key: events.Key) -> Base:
         if key not in self._latches:
@@ -192,7 +222,7 @@ class Fleet:
         for base in self:
             if base.control is link:
                 base.link_up(now)
-            base.standing.tasks_up(link)
+            base.standing.tasks_up(link, now)
 
     def _link_down(self, event: events.LinkDown, now: float) -> None:
         link = self._link(event.url, event.lane)
@@ -200,6 +230,8 @@ class Fleet:
         for base in self:
             if base.control is link:
                 base.link_down(now)
+            if not event.spent:
+                base.standing.tasks_down(link, now)
 
     def _alive(self, event: events.Alive, now: float) -> None:
         self._link(event.url, "control").answered(event.asked_at, now)
@@ -247,7 +279,7 @@ class Fleet:
 
     def _goal_lost(self, event: events.GoalLost, now: float) -> None:
         if goals := self._goals_of(event.robot):
-            goals.gone_dark(event)
+            goals.gone_dark(event, now)
 
     def _hook_ended(self, event: events.HookEnded, now: float) -> None:
         base = self._by_robot.get(event.robot)

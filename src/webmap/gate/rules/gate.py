@@ -72,7 +72,7 @@ class Gate:
         """Let time pass and return what is to be done, in order."""
         if self._display_there and self._pulse.doubt(now):
             self._display_there = False
-            self._goals_lost()
+            self._goals_lost(now)
         self._fleet.step(now)
         self._program.answer_takes(now)
         self._people.count(now)
@@ -109,13 +109,13 @@ class Gate:
         self._pulse.ended = event.why
         for base in self._fleet:
             base.hands.end(event.why, now)
-        self._goals_lost()
+        self._goals_lost(now)
 
-    def _goals_lost(self) -> None:
+    def _goals_lost(self, now: float) -> None:
         """Nobody is left who could look after a goal."""
         for base in self._fleet:
             for goals in base.robots.goals.values():
-                goals.lost()
+                goals.lost(now)
 
     def _connect(self, message: messages.Connect, now: float) -> None:
         if message.connection != PROGRAM:

@@ -17,11 +17,17 @@ MOVE_BASE = "move_base_msgs/MoveBaseAction"
 LATELY = 2.0
 """Seconds after such a cancel in which another one is not worth it."""
 
+IN_VAIN = 5.0
+"""Seconds within which a cancel may have gone to a link that was dead already, which is
+noticed after 4 s; where nobody answers a cancel it is said once more after that."""
+
 INSIST = 1.0
 """Seconds between two cancels of a goal that is said to go on all the same."""
 
 OVER = ("reached", "failed", "cancelled")
 """The states of a goal that nothing follows any more."""
+
+ELSEWHERE = "its goals go elsewhere now; nobody tells whether it gave this one up"
 
 
 class Goals:
@@ -47,7 +53,7 @@ class Goals:
         # An earlier gate may have sent a goal that still runs.
         self._perhaps = True
         self._cancel_owed = False
-        self._insisted_at = float("-inf")
+        self._cancelled_at = self._insisted_at = float("-inf")
         self._made_way_at: float | None = None
         self._no_actions = False
         """Whether the bridge said that it takes no goals of actions."""
@@ -116,6 +122,7 @@ class Goals:
     def wrote(self, goal: WroteGoal) -> None:
         """Note that a goal went out."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
+        self._cancelled_at = float("-inf")  # that was of the goals before
         way = self.way or "topic"
         self.report = GoalReport(
             id=goal.id,
@@ -152,6 +159,7 @@ class Goals:
         self._no_actions |= end.no_actions
         report = self._about(end.id)
         if report is not None and report.state not in OVER:
+            self._cancelled_at = float("-inf")  # if it was, that is answered now
             why = end.why
             if end.no_actions and self.spec.goal_topic is not None:
                 why = f"{why}; the next one goes to {self.spec.goal_topic}"
@@ -159,16 +167,21 @@ class Goals:
                 why = report.why if report.state == "cancelling" else why
             self._show(end.outcome, why or _OTHERWISE[end.outcome])
 
-    def gone_dark(self, lost: GoalLost) -> None:
+    def gone_dark(self, lost: GoalLost, now: float) -> None:
         """Note that nobody tells any more how a goal goes."""
         report = self._about(lost.id)
-        if report is not None and report.state not in OVER:
+        if report is None or report.state in OVER:
+            return
+        if report.state == "cancelling":  # it may not have heard of that
+            self.cancel(now, report.why)
+        else:
             self._show("unknown", lost.why)
 
-    def cancel(self, why: str = "") -> None:
+    def cancel(self, now: float, why: str = "") -> None:
         """Cancel every goal, now or as soon as there is a link.
 
         Args:
+            now: The time.
             why: Whose doing it is, in words.
 
         Raises:
@@ -178,7 +191,7 @@ class Goals:
         if not self.can_cancel:
             raise Refusal("no cancel topic and no action is known")
         self._running, self._by, self._perhaps = None, None, False
-        self._cancel_owed = not self.link.up
+        self._cancel_owed, self._cancelled_at = not self.link.up, now
         if self.link.up or self._cancels_apart:
             self._emit(CancelGoals(self._key, self.spec.id))
         if self.following:
@@ -214,29 +227,55 @@ class Goals:
         lately = self._made_way_at is not None and now - self._made_way_at < LATELY
         if self.can_cancel and (self._perhaps or not lately):
             self._made_way_at = now
-            self.cancel("somebody drives the robot")
+            self.cancel(now, "somebody drives the robot")
 
-    def stop(self) -> None:
+    def stop(self, now: float) -> None:
         """Cancel every goal if there is a way to."""
         if self.can_cancel:
-            self.cancel("STOP")
+            self.cancel(now, "STOP")
 
-    def lost(self, connection: str | None = None) -> None:
+    def lost(self, now: float, connection: str | None = None) -> None:
         """Do what the robot's settings say when whoever sent its goal is lost.
 
         Args:
+            now: The time.
             connection: Who is lost; ``None`` is everybody.
 
         """
         if self._by is None or connection not in (None, self._by):
             return
         if self.spec.on_operator_loss == "cancel" and self._perhaps and self.can_cancel:
-            self.cancel("who sent it is gone")
+            self.cancel(now, "who sent it is gone")
 
-    def link_up(self) -> None:
-        """Send the cancel that could not be sent before."""
+    def vacate(self, spec: RobotSpec, now: float) -> None:
+        """Call off what is under way, unless that can be done under ``spec`` as well.
+
+        Args:
+            spec: What the robot is from now on.
+            now: The time.
+
+        """
+        if _places(self.spec) <= _places(spec):
+            return
+        if self.following:
+            self.stop(now)
+            self._show("failed", ELSEWHERE)
+        # Of the new place nothing is known.
+        self._perhaps, self._cancel_owed, self._no_actions = True, False, False
+        self._cancelled_at = float("-inf")
+
+    def link_up(self, now: float) -> None:
+        """Send the cancel that could not be sent before, or not be seen to arrive."""
         if self._cancel_owed:
-            self.cancel(self.report.why if self.report is not None else "")
+            self.cancel(now, self.report.why if self.report is not None else "")
+
+    def link_down(self, now: float) -> None:
+        """Owe a cancel again that the link may not have carried any more."""
+        if now - self._cancelled_at >= IN_VAIN:
+            return
+        self._cancel_owed, report = True, self.report
+        if report is not None and (report.state, report.way) == ("cancelled", "topic"):
+            self._show("cancelling", report.why)
 
     def _about(self, id: str) -> GoalReport | None:
         report = self.report
@@ -252,6 +291,13 @@ _OTHERWISE = {
     "failed": "the robot does not say why",
     "cancelled": "by the robot, or by somebody else",
 }
+
+
+def _places(spec: RobotSpec) -> set[tuple[str | None, str, str]]:
+    """Return where the goals of a robot go, and where they are called off."""
+    action = "move_base" if is_move_base(spec) else "action"
+    names = {"goal": spec.goal_topic, "cancel": spec.cancel_topic, action: spec.action}
+    return {(spec.goal_url, kind, name) for kind, name in names.items() if name}
 
 
 def is_move_base(spec: RobotSpec) -> bool:

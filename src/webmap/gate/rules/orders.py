@@ -82,12 +82,12 @@ class Orders:
                     raise Refusal("take it first")
                 base.driving.begin_test(now)
             case _:
-                self.cancel(connection, command.robot)
+                self.cancel(connection, command.robot, now)
 
-    def cancel(self, connection: Connection, robot: str) -> None:
+    def cancel(self, connection: Connection, robot: str, now: float) -> None:
         """Call off a robot's goals; that needs no lease."""
         check_role(connection.role)
-        self._fleet.find(robot).robots.goals[robot].cancel()
+        self._fleet.find(robot).robots.goals[robot].cancel(now)
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
         """STOP a robot or, with ``None``, all."""
@@ -98,11 +98,11 @@ class Orders:
         """End the STOP of a robot or, with ``None``, every one that stands."""
         check_role(by.role)
         if robot is not None:
-            self._fleet.find(robot).reset(now)
+            self._fleet.reset(self._fleet.find(robot), now)
             return
         for base in self._fleet:
             if base.latch.on and not base.arming.lock.elsewhere:
-                base.reset(now)
+                self._fleet.reset(base, now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
         """Give somebody the lease; ``None`` if it comes when the machine stands."""

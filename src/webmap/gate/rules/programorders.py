@@ -154,7 +154,7 @@ class ProgramOrders:
             program.id,
             robot,
             "cancel",
-            lambda: self._orders.cancel(program, robot),
+            lambda: self._orders.cancel(program, robot, now),
             now,
         )
 

@@ -1,11 +1,27 @@
 """The robots of the display that are one machine, and what holds for it by them."""
 
+from operator import attrgetter
+
 from webmap.gate.actions import Detach, Emit, Say
 from webmap.gate.events import Key
 from webmap.gate.messages import Refused, RobotSpec
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.hooks import Hooks
+
+_terms = attrgetter(
+    "twist_type",
+    "holonomic",
+    "stops_within",
+    "v_max",
+    "w_max",
+    "a_max",
+    "odometry_url",
+    "odometry_topic",
+    "assist",
+    "stop_hooks",
+)
+"""What one robot says for the whole machine."""
 
 
 class Robots:
@@ -65,13 +81,22 @@ class Robots:
         said = [words for hooks in self.hooks.values() for words in hooks.failures]
         return tuple(dict.fromkeys(said))
 
-    def declare(self, spec: RobotSpec, tasks: Health, hooks: Health) -> None:
+    def holds_without(self, robot: str) -> bool:
+        """Return whether all that ``robot`` says is said by one that stays, too."""
+        terms = _terms(self.specs[robot])
+        staying = [spec for id, spec in self.specs.items() if id not in self.leaving]
+        return any(_terms(spec) == terms for spec in staying)
+
+    def declare(
+        self, spec: RobotSpec, tasks: Health, hooks: Health, now: float
+    ) -> None:
         """Take in a robot, or what changed of it.
 
         Args:
             spec: The robot.
             tasks: The link that its goals go to.
             hooks: The link that its stop hooks go to.
+            now: The time.
 
         """
         self.leaving.discard(spec.id)
@@ -81,6 +106,7 @@ class Robots:
         if goals is None:
             self.goals[spec.id] = Goals(self._key, spec, tasks, self._emit)
         else:
+            goals.vacate(spec, now)
             goals.spec, goals.link = spec, tasks
         said = self.hooks.get(spec.id)
         if said is None or said.spec.stop_hooks != spec.stop_hooks:

@@ -48,7 +48,7 @@ class StandingStop:
         if self._robots.drivable:
             self._motion.hold(now)
         for goals in self._robots.goals.values():
-            goals.stop()
+            goals.stop(now)
         for hooks in self._robots.hooks.values():
             hooks.say(stopped=True)
         self.confirmation.begin(now)
@@ -100,13 +100,19 @@ class StandingStop:
         self.latch.found(by)
         self.say_all(now)
 
-    def tasks_up(self, link: Health) -> None:
+    def tasks_down(self, link: Health, now: float) -> None:
+        """Note that what was said last may not have arrived: a link is lost."""
+        for goals in self._robots.goals.values():
+            if goals.link is link:
+                goals.link_down(now)
+
+    def tasks_up(self, link: Health, now: float) -> None:
         """Say what could not be said, or may not have arrived, for want of a link."""
         for goals in self._robots.goals.values():
             if goals.link is link and self.latch.on:
-                goals.stop()
+                goals.stop(now)
             elif goals.link is link:
-                goals.link_up()
+                goals.link_up(now)
         for hooks in self._robots.hooks.values():
             if hooks.link is link and self.latch.on:
                 hooks.say(stopped=True)
