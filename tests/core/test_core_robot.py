@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import math
+import subprocess
+import sys
 
 import pytest
 
@@ -110,6 +112,59 @@ def test_a_ros_2_type_name_is_the_same_type():
         robot.set_odometry_topic(link, "/odom")
         await settle()
         assert link.subscribed[0][4] is messages.OdometryMsg
+
+    asyncio.run(scenario())
+
+
+def told_of_odometry(robot: Robot) -> tuple[str | None, str | None]:
+    """Return topic and type of the odometry that the gate is told to look at."""
+    spec = robot.motion.spec()
+    return spec.odometry_topic, spec.odometry_type
+
+
+@pytest.mark.parametrize("type", [None, "nav_msgs/Odometry"])
+def test_the_gate_is_told_of_odometry_that_was_never_heard(type):
+    async def scenario():
+        link = Link()
+        robot = Robot("Bob")
+        robot.set_move_topic(link, "/goal")
+        robot.set_odometry_topic(link, "/odom", type=type)
+        await settle()
+        assert told_of_odometry(robot) == ("/odom", type)
+        robot.unsubscribe_odometry_topic()
+        assert told_of_odometry(robot) == (None, None)
+        robot.destroy()
+
+    asyncio.run(scenario())
+
+
+def test_poses_without_a_velocity_are_no_odometry_for_the_gate():
+    async def scenario():
+        link = Link(pose="geometry_msgs/PoseStamped")
+        robot = Robot("Bob")
+        robot.set_move_topic(link, "/goal")
+        robot.set_odometry_topic(link, "/pose")
+        assert told_of_odometry(robot) == ("/pose", None)
+        await settle()
+        assert told_of_odometry(robot) == (None, None)
+        robot.destroy()
+
+    asyncio.run(scenario())
+
+
+def test_odometry_whose_poses_cannot_be_used_shows_the_gate_motion_all_the_same():
+    async def scenario():
+        link = Link(odom="nav_msgs/Odometry")
+        robot = Robot("Bob")
+        robot.set_move_topic(link, "/goal")
+        robot.set_odometry_topic(link, "/odom")
+        await settle()
+        nowhere = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
+        bad = {**pose(), "orientation": nowhere}
+        link.say("/odom", {**SHAPES["nav_msgs/Odometry"], "pose": {"pose": bad}})
+        assert not robot.valid
+        assert told_of_odometry(robot) == ("/odom", "nav_msgs/Odometry")
+        robot.destroy()
 
     asyncio.run(scenario())
 
@@ -354,3 +409,21 @@ def test_scan_assist_is_told_to_the_gate_and_off_without_a_word():
         robot.set_scan_assist("scan", [(0, 0), (1, 0)])
     robot.clear_scan_assist()
     assert robot.motion.spec().assist is None
+
+
+def test_a_robot_is_called_the_same_whatever_robots_there_are_besides():
+    program = "import sys, webmap; print(*(webmap.Robot(n).id for n in sys.argv[1:]))"
+
+    def ids(*names):
+        command = [sys.executable, "-c", program, *names]
+        said = subprocess.run(command, capture_output=True, text=True, check=True)
+        return dict(zip(names, said.stdout.split(), strict=True))
+
+    before, after = ids("Bob", "Ann"), ids("Cid", "Ann", "Bob")
+    assert before == {name: after[name] for name in before}
+    assert len(set(after.values())) == 3
+
+
+def test_two_robots_of_one_name_are_two():
+    one, other = Robot("Twin"), Robot("Twin")
+    assert one.id != other.id

@@ -1,7 +1,8 @@
 """The road of one robot's commands to the gate, and the gate's word of it."""
 
-import itertools
 import logging
+import zlib
+from collections import Counter
 from concurrent.futures import Future
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,18 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.robot")
 
-_numbers = itertools.count(1)
+_used: Counter[str] = Counter()
+
+
+def _id_of(name: str) -> str:
+    """Return what pages and gate call a robot of that name.
+
+    It is the same after a restart, in whatever order robots are made: a page may still
+    have to say a STOP that it could not get rid of before.
+    """
+    id = f"r{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
+    _used[id] += 1
+    return id if _used[id] == 1 else f"{id}-{_used[id]}"
 
 
 class MotionRoad:
@@ -35,13 +47,13 @@ class MotionRoad:
     """The one gate of this process, once it is started."""
 
     def __init__(self, name: str, complain: Any) -> None:
-        self.id = f"r{next(_numbers)}"
+        self.id = _id_of(name)
         self._name = name
         self._complain = complain
         self._twist: TwistTopic | None = None
         self._move: MoveTopic | None = None
         self._pose: InitialPoseTopic | None = None
-        self._odometry: tuple[Bridge, str, str] | None = None
+        self._odometry: tuple[Bridge, str, str | None] | None = None
         self._assist: AssistSpec | None = None
         self._own_map = Pose()
         self._asking: TypeAsking | None = None
@@ -119,8 +131,15 @@ class MotionRoad:
         self._pose = pose
         self.declare()
 
-    def set_odometry(self, bridge: Bridge, topic: str, type: str) -> None:
-        """Tell where the gate can see for itself how the robot moves."""
+    def set_odometry(self, bridge: Bridge, topic: str, type: str | None) -> None:
+        """Tell where the gate can see for itself how the robot moves.
+
+        Args:
+            bridge: The link to the ROS system that has the topic.
+            topic: The topic.
+            type: Its type; None as long as nobody knows it.
+
+        """
         if self._odometry != (bridge, topic, type):
             self._odometry = (bridge, topic, type)
             self.declare()
@@ -143,8 +162,9 @@ class MotionRoad:
 
     def clear_odometry(self) -> None:
         """Tell that there is no such topic any more."""
-        self._odometry = None
-        self.declare()
+        if self._odometry is not None:
+            self._odometry = None
+            self.declare()
 
     def declare(self) -> None:
         """Tell the gate what it needs to know of this robot, as it is now."""
@@ -202,6 +222,7 @@ class MotionRoad:
             bridge_url=link.bridge.url,
             twist_topic=twist.topic if twist else None,
             twist_type=(twist.type if twist else None) or TWIST_TYPES[0],
+            twist_type_assumed=twist is not None and twist.type is None,
             stops_within=twist.stops_within if twist else None,
             v_max=twist.v_max if twist else None,
             w_max=twist.w_max if twist else None,

@@ -74,6 +74,7 @@ class OdometryFeed:
         listener: Called with each pose, in the model's thread.
         complain: Called with a sentence for people when the topic cannot be used,
             and with None when it can be used again.
+        typed: Called with the type when it is known, which may be at once.
         scope: Is told of messages that cannot be decoded.
 
     Raises:
@@ -89,6 +90,7 @@ class OdometryFeed:
         type: str | None,
         listener: PoseListener,
         complain: Callable[[str | None], None],
+        typed: Callable[[str], None],
         scope: Scope,
     ) -> None:
         self.bridge = bridge
@@ -97,6 +99,7 @@ class OdometryFeed:
         self.type: str | None = None
         self._listener = listener
         self._complain = complain
+        self._typed = typed
         self._scope = scope
         self._opening: Removable | None = None
         self._subscription: Removable | None = None
@@ -148,6 +151,7 @@ class OdometryFeed:
         self.type = next(
             name for name, known in ODOMETRY_VIEWS.items() if known is view
         )
+        self._typed(self.type)
         with self._scope.active():
             self._subscription = self.bridge.subscribe(
                 self.topic, self._hear, self.type, throttle=self.throttle, decode=view
