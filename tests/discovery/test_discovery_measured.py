@@ -1,6 +1,7 @@
 """That each thing the readiness check says is measured, on systems with that fault."""
 
 import asyncio
+import re
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,9 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     camera = "/robot_0/camera/image_raw/compressed"
     assert said(findings, f"{camera}: ") == "good"
     assert said(findings, "/map: 1 message, ") == "good"
-    assert said(findings, "Nothing came on /robot_0/plan in 1 s; it may") == "note"
+    words = r"Nothing came on /robot_0/plan in \d+ s; it may"
+    (plan,) = [each for each in findings if re.match(words, each.words)]
+    assert plan.level == "note"
     assert seen.heard[camera].count <= ENOUGH
     assert seen.heard[camera].every > 0
 
@@ -102,6 +105,7 @@ def test_a_node_that_writes_velocity_too_is_named(dialect):
     assert said(findings, "other writers too: /joy_teleop") == "warning"
 
 
+@pytest.mark.serial  # rates and ages are measured
 @DIALECTS
 @pytest.mark.parametrize(
     ("ahead", "words"),
@@ -142,8 +146,9 @@ def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
     assert said(findings, "Nothing came on /robot_0/odom") == "wrong"
     assert said(findings, "Nothing came on /robot_0/base_scan") == "warning"
     for topic in ("odom", "base_scan"):
-        words = f"Nothing came on /robot_0/{topic} in 0 s, though /robots could publish"
-        assert any(words in each.words for each in findings)
+        words = rf"Nothing came on /robot_0/{topic} in \d+ s, "
+        words += "though /robots could publish"
+        assert any(re.match(words, each.words) for each in findings)
 
 
 def without(*children):
@@ -269,6 +274,7 @@ TOPICS = {
 }
 
 
+@pytest.mark.serial  # rates and ages are measured
 @DIALECTS
 def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     _, findings, seen = looked_at(site(dialect, rosapi=False), topics=TOPICS)

@@ -13,7 +13,7 @@ from webmap import Bridge, Robot
 from webmap.core.frames import frames_of
 from webmap.discovery import discover
 from webmap.discovery.hearing import frame_topics, hear_frames
-from webmap.discovery.tf_robots import Trees, bases
+from webmap.discovery.tf_robots import MOST_FRAMES, Trees, bases
 from webmap.geometry import Pose
 
 ODOM, TWIST = "nav_msgs/Odometry", "geometry_msgs/Twist"
@@ -146,6 +146,26 @@ def test_a_part_of_a_robot_is_no_robot():
 
 def test_a_loop_of_frames_ends():
     assert list(bases({"map": "base_link", "base_link": "odom", "odom": "map"}))
+
+
+def test_a_flood_of_frames_is_forgotten_and_robots_are_not():
+    told = shared("map odom base_link laser", "map bob/odom bob/base_link")
+    for number in range(3 * MOST_FRAMES):
+        told.take("", "map", f"object_{number}")
+    assert len(told.parents[""]) <= MOST_FRAMES
+    assert f"object_{3 * MOST_FRAMES - 1}" in told.parents[""]
+    assert [(base.space, base.above) for base in told.bases()] == [
+        ("", ("odom", "map")),
+        ("/bob", ("bob/odom", "map")),
+    ]
+
+
+def test_a_flood_of_bases_ends_too():
+    told = Trees()
+    for number in range(2 * MOST_FRAMES):
+        told.take("", "map", f"r{number}/base_link")
+    assert len(told.parents[""]) <= MOST_FRAMES
+    assert f"r{2 * MOST_FRAMES - 1}/base_link" in told.parents[""]
 
 
 def test_only_topics_with_frames_are_listened_to():

@@ -10,7 +10,9 @@ from test_modules_markers import CUBE, TEXT, marker
 
 from webmap.core.alignment import align_bridge
 from webmap.core.frames import _heard
+from webmap.errors import ProtocolError
 from webmap.geometry import Affine
+from webmap.modules.map import markers
 
 
 @pytest.fixture(autouse=True)
@@ -60,8 +62,7 @@ def test_each_marker_of_an_array_is_in_its_own_frame(link, layer):
     assert to_root(box).apply(1, 0) == pytest.approx((10.0, 2.0)), "turned as well"
 
 
-def test_a_locked_marker_goes_along_and_others_stay(link, layer, monkeypatch):
-    monkeypatch.setattr("webmap.core.marker_frames.PERIOD", 0.0)
+def test_a_locked_marker_goes_along_and_others_stay(link, layer):
     say(link, cube(9, "odom"))
     drive(link, 5.0, 100.0)
     say(link, cube(1, "base_link", locked=True), cube(2, "base_link"))
@@ -73,8 +74,7 @@ def test_a_locked_marker_goes_along_and_others_stay(link, layer, monkeypatch):
     assert middle(layer, 1) == pytest.approx((10.0, 8.0)), "it is locked no more"
 
 
-def test_a_marker_is_where_its_frame_was_at_the_stamp(link, layer, monkeypatch):
-    monkeypatch.setattr("webmap.core.marker_frames.PERIOD", 0.0)
+def test_a_marker_is_where_its_frame_was_at_the_stamp(link, layer):
     say(link, cube(9, "odom"))
     drive(link, 5.0, 100.0)
     drive(link, 6.0, 100.5)
@@ -86,10 +86,7 @@ def test_a_marker_is_where_its_frame_was_at_the_stamp(link, layer, monkeypatch):
     assert middle(layer, 2) == pytest.approx((10.0, 7.5))
 
 
-def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(
-    link, layer, channel, monkeypatch
-):
-    monkeypatch.setattr("webmap.core.marker_frames.PERIOD", 0.0)
+def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, layer, channel):
     say(link, cube(1, "odom"), cube(2, "map"))
     assert middle(layer, 1) == pytest.approx((1.0, 0.0)), "as it comes"
     (problem,) = layer.problems.values()
@@ -149,11 +146,37 @@ def test_markers_lie_as_their_bridge_is_aligned(link, layer):
     assert middle(layer, 1) == pytest.approx((2.0, 4.0))
 
 
-def test_a_marker_without_sense_does_not_move_with_a_frame(link, layer, monkeypatch):
-    monkeypatch.setattr("webmap.core.marker_frames.PERIOD", 0.0)
+def test_a_marker_without_sense_does_not_move_with_a_frame(link, layer):
     wrong = cube(1, "base_link", locked=True, at=(math.nan, 0.0, 0.0))
     say(link, {**wrong, "pose": {**pose(0, 0), "position": {"x": None, "y": 0}}})
     drive(link, 5.0, 100.0)
     drive(link, 6.0, 101.0)
     assert layer.shapes == {}
     assert to_root(layer.svg) == Affine()
+
+
+def test_a_marker_that_cannot_be_drawn_where_its_frame_gets_is_left_out_and_said(
+    link, layer, robot, monkeypatch
+):
+    def place(shape, marker, frame):
+        if marker.id == 1 and frame.translation.y > 7.5:
+            raise ProtocolError("it is beyond the end of the world")
+        shape_place(shape, marker, frame)
+
+    shape_place = markers.place
+    monkeypatch.setattr(markers, "place", place)
+    say(link, cube(1, "base_link", locked=True), cube(2, "base_link", locked=True))
+    robot.set_tf(link)
+    drive(link, 7.0, 101.0)
+    assert layer.problems == {}
+    drive(link, 8.0, 102.0)
+    assert list(layer.shapes) == [("test", 2)]
+    assert middle(layer, 2) == pytest.approx((10.0, 9.0))
+    assert (robot.position.x, robot.position.y) == pytest.approx((10.0, 8.0))
+    said = ["/markers: marker 1 of 'test': it is beyond the end of the world"]
+    assert list(layer.problems.values()) == said
+    drive(link, 9.0, 103.0)
+    assert middle(layer, 2) == pytest.approx((10.0, 10.0))
+    assert list(layer.problems.values()) == said, "until the next message"
+    say(link, cube(2, "base_link", locked=True))
+    assert layer.problems == {}

@@ -37,7 +37,6 @@ CORNERS = [(1.0, 0.2, 2.0), (-0.5, 0.1, 1.0), (0.3, -1.5, 3.0)]
 def no_patience(monkeypatch):
     monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
-    monkeypatch.setattr("webmap.core.marker_frames.PERIOD", 0.0)
 
 
 @pytest.fixture
@@ -184,6 +183,17 @@ def test_a_marker_that_moves_with_its_frame_is_drawn_anew_as_that_tilts(link, la
         else:
             found = outline(box)
         assert np.ptp(found, axis=0) == pytest.approx(size, abs=2e-3), seconds
+
+
+@pytest.mark.parametrize("type", [CUBE, SPHERE, CYLINDER, CUBES, SPHERES])
+def test_a_marker_too_high_to_be_drawn_tilted_is_refused_while_it_lies_flat(
+    link, layer, type
+):
+    header = {"stamp": stamp(0.0), "frame_id": "gripper"}
+    tall = {"scale": (1.0, 1.0, 1e9), "header": header, "frame_locked": True}
+    say(link, marker(type, [(0, 0)], **tall))
+    assert layer.shapes == {}
+    assert any("scale.z must be 1e+07 m" in said for said in layer.problems.values())
 
 
 def test_a_marker_that_only_drives_about_is_not_drawn_anew(link, layer):

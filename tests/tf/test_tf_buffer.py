@@ -15,7 +15,7 @@ from webmap.tf import (
     Transform,
     TransformError,
 )
-from webmap.tf.buffer import MOST_FRAMES
+from webmap.tf.buffer import MOST_COMPARED, MOST_FRAMES
 
 
 def at(x, y=0.0, yaw=0.0):
@@ -202,13 +202,66 @@ def test_a_wrong_transform_is_refused_with_its_frames():
         Buffer().add("odom", "base", bad, 0.0)
 
 
-def test_a_flood_of_frames_ends():
+def test_a_flood_of_frames_pushes_out_those_heard_of_longest_ago(robot):
+    for number in range(2 * MOST_FRAMES):
+        robot.add("map", f"object_{number}", at(number), 1e6 - number)
+        if number % 100 == 0:
+            robot.add("odom", "base_link", at(2.0), 12.0)
+    assert len(robot.frames) <= MOST_FRAMES + 1, "and the root"
+    assert "object_0" not in robot.frames
+    newest = f"object_{2 * MOST_FRAMES - 1}"
+    assert place(robot.lookup("map", newest)) == (2 * MOST_FRAMES - 1, 0.0)
+    robot.add("map", "late/odom", at(5.0), 13.0)
+    robot.add("late/odom", "late/base_link", at(1.0), 13.0)
+    assert place(robot.lookup("map", "late/base_link")) == (6.0, 0.0)
+    # What others hang from stays, however long ago, and what is told but once.
+    assert place(robot.lookup("map", "laser", 11.8)) == (102.1, 0.0)
+
+
+def test_a_parent_is_not_pushed_out_by_its_own_first_child():
     buffer = Buffer()
     for number in range(MOST_FRAMES):
-        buffer.add("root", f"f{number}", at(0), 0.0)
+        buffer.add("root", f"f{number}", at(1.0), 0.0)
+    buffer.add("f0", "one more", at(1.0), 0.0)
+    assert buffer.chain("one more") == ["one more", "f0", "root"]
+    assert "f1" not in buffer.frames
+
+
+def test_a_flood_of_frames_that_must_all_stay_ends():
+    buffer = Buffer()
+    for number in range(MOST_FRAMES):
+        buffer.add("root", f"f{number}", at(0), 0.0, static=True)
     with pytest.raises(TransformError, match="4096 frames already"):
         buffer.add("root", "one more", at(0), 0.0)
-    buffer.add("root", "f7", at(1), 1.0)
+    buffer.add("root", "f7", at(1), 1.0, static=True)
+
+
+def test_names_are_compared_with_a_missing_one_once_and_not_when_there_are_many(
+    robot, monkeypatch
+):
+    compared = []
+
+    def compare(name, names, n):
+        compared.append(len(names))
+        return []
+
+    monkeypatch.setattr("webmap.tf.buffer.difflib.get_close_matches", compare)
+
+    def miss() -> str:
+        with pytest.raises(FrameMissing) as error:
+            robot.lookup("map", "bas_link")
+        return str(error.value)
+
+    assert miss() == miss()
+    assert compared == [4], "of what has not changed the words are the same"
+    robot.add("odom", "base_link", at(2.0), 12.0)
+    robot.add("base_link", "camera", at(1.0), 0.0)
+    assert "there are: base_link, camera, laser, map, odom" in miss()
+    assert compared == [4, 5]
+    for number in range(MOST_COMPARED):
+        robot.add("map", f"object_{number}", at(0.0), 0.0)
+    assert "and 193 more" in miss()
+    assert compared == [4, 5]
 
 
 POSES = st.builds(

@@ -15,7 +15,8 @@ from real_browser import watched_tab
 from webmap.sim.maps import FLOOR, OCCUPIED, load_map
 from webmap_process import page_of, simulator
 
-pytestmark = pytest.mark.browser
+# How late the simulator stamps its scans is measured.
+pytestmark = [pytest.mark.browser, pytest.mark.serial]
 
 TURN = 1.2
 """Radians a second."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -25,6 +26,10 @@ GRACE = 3.0
 """Seconds since the link first opened in which nobody misses a frame: who tells of it
 is still being found, and static ones come late."""
 
+PERIOD = 0.05
+"""Least seconds between two times that listeners are told: of all that is heard
+meanwhile they are told once, however many nodes share the topic."""
+
 _heard: dict[tuple[Bridge, str], "Frames"] = {}
 
 
@@ -43,10 +48,16 @@ class Frames:
         self.buffer = Buffer()
         self.faults = FrameFaults(self.buffer)
         """What was wrong with transforms of late."""
+        self.heard_at = time.monotonic()
+        """When the first came of what is told now, by :func:`time.monotonic`."""
+        self._untold_since: float | None = None
+        self._told_at = -math.inf
         self._listeners: dict[int, Callable[[], object]] = {}
+        self._raised: set[tuple[int, type[Exception]]] = set()
         self._since = time.monotonic()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._soon: asyncio.TimerHandle | None = None
         with no_scope():
             self._hears_open = bridge.on_open(self._opened)
             self._subscriptions = [
@@ -61,12 +72,16 @@ class Frames:
             ]
 
     def join(self, listener: Callable[[], object]) -> Removal:
-        """Call ``listener`` whenever frames have moved, until the removal."""
+        """Call ``listener`` when frames have moved, until the removal.
+
+        That is at once, or with all that moves within :data:`PERIOD` of the last time.
+        """
         key = id(listener)
         self._listeners[key] = listener
 
         def leave() -> None:
             del self._listeners[key]
+            self._raised = {raised for raised in self._raised if raised[0] != key}
             if not self._listeners:
                 self._end()
 
@@ -103,17 +118,46 @@ class Frames:
         self._timer = None
         self._tell()
 
+    def _tell_in_time(self) -> None:
+        """Call all listeners; later if they have only just been called."""
+        loop = self._loop
+        # Before the link is up there is no time to go by, and nothing to spare.
+        if loop is None or loop.time() >= self._told_at + PERIOD:
+            self._tell()
+        elif self._soon is None:
+            self._soon = loop.call_at(self._told_at + PERIOD, self._tell)
+
     def _tell(self) -> None:
-        for listener in list(self._listeners.values()):
-            listener()
+        if self._soon is not None:
+            self._soon.cancel()
+            self._soon = None
+        since, self._untold_since = self._untold_since, None
+        self.heard_at = time.monotonic() if since is None else since
+        for key, listener in list(self._listeners.items()):
+            try:
+                listener()
+            except Exception as error:  # The others are to hear of it all the same.
+                self._say_raised(key, error)
+        if self._loop is not None:  # What takes long leaves time for the rest.
+            self._told_at = self._loop.time()
+
+    def _say_raised(self, key: int, error: Exception) -> None:
+        """Log what a listener raised, once: it may do so whenever it is called."""
+        raised = (key, type(error))
+        if raised not in self._raised:
+            self._raised.add(raised)
+            log.error(
+                "%s: what goes by frames raised", self.bridge.name, exc_info=error
+            )
 
     def _end(self) -> None:
         _heard.pop((self.bridge, self.namespace), None)
         self._hears_open.remove()
         for subscription in self._subscriptions:
             subscription.remove()
-        if self._timer is not None:
-            self._timer.cancel()
+        for timer in (self._timer, self._soon):
+            if timer is not None:
+                timer.cancel()
 
     def _hear(self, static: bool, message: TFMessage) -> None:
         now = time.monotonic()
@@ -139,7 +183,9 @@ class Frames:
             if note and self.faults.note(parent, child, note, now):
                 log.warning("%s: %s", self.bridge.name, note)
         if not static or self.faults.any:
-            self._tell()
+            if self._untold_since is None:
+                self._untold_since = now
+            self._tell_in_time()
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:

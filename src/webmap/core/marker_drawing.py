@@ -124,31 +124,31 @@ def _arrow(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
 
 
 def _cube(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
-    x, y = sizes(marker, "x", "y")
+    x, y, z = *sizes(marker, "x", "y"), _height(marker)
     style = filled(marker.color)
     if tilt.upright:
         return (svg.rect(x=-x / 2, y=-y / 2, width=x, height=y, **style),)
-    outline = box((x, y, _height(marker)), tilt)
+    outline = box((x, y, z), tilt)
     return (svg.polygon(points=_rounded(outline), **style),)
 
 
 def _sphere(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
-    x, y = sizes(marker, "x", "y")
+    x, y, z = *sizes(marker, "x", "y"), _height(marker)
     style = filled(marker.color)
     if tilt.upright:
         return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
-    rx, ry, yaw = ellipsoid((x, y, _height(marker)), tilt)
+    rx, ry, yaw = ellipsoid((x, y, z), tilt)
     ellipse = svg.ellipse(rx=rounded(rx), ry=rounded(ry), **style)
     ellipse.set_pose(0.0, 0.0, yaw)
     return (ellipse,)
 
 
 def _cylinder(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
-    x, y = sizes(marker, "x", "y")
+    x, y, z = *sizes(marker, "x", "y"), _height(marker)
     style = filled(marker.color)
     if tilt.upright:
         return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
-    outline = cylinder((x, y, _height(marker)), tilt)
+    outline = cylinder((x, y, z), tilt)
     return (svg.polygon(points=_rounded(outline), **style),)
 
 
@@ -205,16 +205,17 @@ def _square_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
 
 
 def _cube_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    size = (*sizes(marker, "x", "y"), _height(marker))
     if tilt.upright:
         return _square_list(marker, tilt)
-    outline = box((*sizes(marker, "x", "y"), _height(marker)), tilt)
+    outline = box(size, tilt)
     return _repeated(outline, marker, tilt)
 
 
 def _sphere_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
-    wide, high = sizes(marker, "x", "y")
+    wide, high, z = *sizes(marker, "x", "y"), _height(marker)
     if not tilt.upright:
-        rx, ry, yaw = ellipsoid((wide, high, _height(marker)), tilt)
+        rx, ry, yaw = ellipsoid((wide, high, z), tilt)
         turn = Affine.rotation(yaw)
         turns = (math.tau * number / 24 for number in range(24))
         outline = [turn.apply(rx * math.cos(a), ry * math.sin(a)) for a in turns]
@@ -241,7 +242,14 @@ def _repeated(
 
 
 def _height(marker: MarkerMsg) -> float:
-    """Return how high a marker is; it only matters where it is tilted."""
+    """Return how high a marker is.
+
+    It only shows where the marker is tilted; and what lies flat may be tilted later.
+
+    Raises:
+        ProtocolError: If it is higher than anything.
+
+    """
     height = marker.scale.z
     if not (math.isfinite(height) and height > 0):
         return 0.0

@@ -1,15 +1,11 @@
 """Where markers are: each in the frame that it names itself."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from webmap.core.layer_frames import LayerFrames, not_known
 from webmap.geometry import Pose
 from webmap.tf import Transform, TransformError
-
-PERIOD = 0.05
-"""Least seconds between two moves of markers that move with their frames."""
 
 Put = Callable[[Transform], object]
 """Puts a marker where its frame is now."""
@@ -29,7 +25,6 @@ class MarkerFrames(LayerFrames):
     def _begin(self) -> None:
         self._moving: dict[object, _Moving] = {}
         self._lost: dict[str, str] = {}
-        self._moved_at = -1.0
 
     def place(
         self, key: object, frame_id: str, stamp: float, locked: bool, put: Put
@@ -70,10 +65,8 @@ class MarkerFrames(LayerFrames):
         self._say(words)
 
     def _news(self) -> None:
-        now = time.monotonic()
-        if not self._moving or now < self._moved_at + PERIOD:
+        if not self._moving:
             return
-        self._moved_at = now
         places: dict[tuple[str, float], tuple[Transform, bool]] = {}
         for key, each in tuple(self._moving.items()):
             asked = (each.frame, each.stamp)
@@ -82,7 +75,7 @@ class MarkerFrames(LayerFrames):
             found, settled = places[asked]
             each.put(found)
             if settled and not each.locked:
-                del self._moving[key]
+                self.forget(key)
         self.say()
 
     def _find(self, source: str, stamp: float) -> tuple[Transform, bool]:
@@ -90,7 +83,8 @@ class MarkerFrames(LayerFrames):
         try:
             found = self._look(source, stamp)
         except TransformError as error:
-            self._lost.setdefault(source, str(error))
+            if source not in self._lost:
+                self._lost[source] = str(error)
             return Transform(), False
         self._lost.pop(source, None)
         return found

@@ -16,8 +16,8 @@ from webmap.geometry import Pose
 from webmap.ros.bridge import Bridge
 from webmap.scope import Removal, Scope, no_scope
 
-TF_PERIOD = 0.05
-"""Least seconds between two poses that are taken from frames alone."""
+ODOMETRY = "nav_msgs/Odometry"
+"""The type of poses that tells velocity too."""
 
 
 class PoseOwner(Owner, Protocol):
@@ -71,10 +71,20 @@ class PoseSource:
         """Take poses from a topic; see :meth:`Robot.set_odometry_topic`."""
         self.unfollow()
         say = self._on_feed_problem
+
+        def typed(type: str | None) -> None:
+            # From the first word on: who drives a robot by odometry that never came
+            # drives blind. Poses without a velocity show no motion in any case.
+            if type in (None, ODOMETRY):
+                self._motion.set_odometry(bridge, topic, type)
+            else:
+                self._motion.clear_odometry()
+
+        typed(None)
         scope = Scope(f"poses of {topic}", self._failed, lambda _: say(None))
         with no_scope():
             self.feed = OdometryFeed(
-                bridge, topic, throttle, type, self._on_pose, say, scope
+                bridge, topic, throttle, type, self._on_pose, say, typed, scope
             )
         self._find_bridge()
 
@@ -136,8 +146,7 @@ class PoseSource:
     def _on_pose(self, reading: PoseReading) -> None:
         feed = self.feed
         now = self._hear(0.0 if feed is None else feed.bridge.lag)
-        if feed is not None and feed.type == "nav_msgs/Odometry":
-            self._motion.set_odometry(feed.bridge, feed.topic, feed.type)
+        if feed is not None and feed.type == ODOMETRY:
             # Other poses may come only while the robot moves.
             self._silence.hear(feed.bridge, feed.topic, feed.throttle / 1000)
         if self._placing is not None:
@@ -147,13 +156,12 @@ class PoseSource:
 
     def _on_frames(self) -> None:
         """Look where the frames have the base, if no topic says where it is."""
-        now = time.monotonic()
-        soon = self.heard_at is not None and now - self.heard_at < TF_PERIOD
         placing, frames = self._placing, self._frames
-        if self.feed is None and placing and frames and not soon:
-            reading = placing.of_base(now)
+        if self.feed is None and placing and frames:
+            reading = placing.of_base(time.monotonic())
             if reading is not None:
-                self._hear(frames.bridge.lag)
+                # It may have waited to be told with others.
+                self._hear(frames.bridge.lag, frames.heard_at)
                 if reading.stamp:  # else it is fixed to the map, and told once
                     self._silence.hear(frames.bridge, f"{frames.namespace}/tf")
                 self._take(reading)
@@ -196,11 +204,12 @@ class PoseSource:
             self._placing, self._frames, self.whereabouts.jumps, quiet=self._quiet
         )
 
-    def _hear(self, lag: float) -> float:
-        self.heard_at = now = time.monotonic()
-        self.stamp = now - lag
+    def _hear(self, lag: float, came: float | None = None) -> float:
+        """Note that a pose came, and return when; that is now if it is not said."""
+        self.heard_at = came = time.monotonic() if came is None else came
+        self.stamp = came - lag
         self._heard()
-        return now
+        return came
 
     def _take(self, reading: PoseReading) -> None:
         """Take the newest pose, in the robot's own map."""

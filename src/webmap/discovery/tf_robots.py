@@ -21,6 +21,11 @@ ODOM = re.compile(r"(?:.*[/_])?odom(?:_[^/]*|etry)?\Z")
 MOST = 200
 """Robots that are taken from the frames of one bridge."""
 
+MOST_FRAMES = 4096
+"""Frames of one namespace that are kept; of more, those heard of longest ago go."""
+
+_AT_ONCE = 512
+
 
 @dataclass(frozen=True, slots=True)
 class Base:
@@ -53,12 +58,21 @@ class Trees:
     """What was told of frames, by the namespace of the topic that told it."""
 
     parents: dict[str, dict[str, str]] = field(default_factory=dict)
+    """Of each namespace; the frame that was heard of longest ago is the first."""
 
     def take(self, namespace: str, parent: str, child: str) -> None:
-        """Note that one frame was told in another."""
+        """Note that one frame was told in another.
+
+        What detects things may name a new frame for each, so there is an end to them:
+        see :data:`MOST_FRAMES`. Bases, and what they hang from, are kept longest.
+        """
         parent, child = parent.strip().strip("/"), child.strip().strip("/")
         if parent and child:
-            self.parents.setdefault(namespace, {})[child] = parent
+            known = self.parents.setdefault(namespace, {})
+            known.pop(child, None)
+            if len(known) >= MOST_FRAMES:
+                _forget_some(known)
+            known[child] = parent
 
     def bases(self) -> tuple[Base, ...]:
         """Return the robots in the trees, sorted by where they are."""
@@ -88,6 +102,19 @@ def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
             root = MAP if MAP in worlds else (worlds or odometry)[-1]
             prefix = (found["prefix"] or found["space"] or "").rstrip("/_")
             yield Base(frame, root, namespace, prefix, tuple(chain))
+
+
+def _forget_some(known: dict[str, str]) -> None:
+    """Forget the frames heard of longest ago; many at once, as this looks at all."""
+    kept: set[str] = set()
+    for frame in known:
+        if BASE.match(frame):
+            kept.update((frame, *_above(frame, known)))
+    others = [frame for frame in known if frame not in kept]
+    if len(others) < _AT_ONCE:
+        others = list(known)  # That many bases are no robots.
+    for frame in others[:_AT_ONCE]:
+        del known[frame]
 
 
 def _above(frame: str, parents: Parents) -> list[str]:

@@ -1,6 +1,7 @@
 """The transforms between all frames, over the last seconds."""
 
 import difflib
+import heapq
 import math
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -27,7 +28,13 @@ SHARED = ("map", "world", "earth")
 """Frames that are the same for all robots, whatever namespace tells of them."""
 
 MOST_FRAMES = 4096
+"""Frames that are known at a time; of more, those heard of longest ago go."""
+
+MOST_COMPARED = 200
+"""Frames up to which it is looked for one whose name is like a missing one."""
+
 _LISTED = 12
+_SENTENCES = 100
 
 
 class Buffer:
@@ -53,7 +60,11 @@ class Buffer:
         self.notes: deque[str] = deque(maxlen=20)
         """What was odd and was dealt with, in sentences, the newest last."""
         self._tracks: dict[str, Track] = {}
+        """By the frame; the one that was heard of longest ago is the first."""
         self._roots: dict[str, int] = {}
+        """How many frames hang from each that any hangs from."""
+        self._missing: dict[str, str] = {}
+        """What is said of frames that are missing, until others come or go."""
 
     @property
     def frames(self) -> list[str]:
@@ -96,7 +107,9 @@ class Buffer:
             What was odd and was dealt with, in a sentence; None if nothing was.
 
         Raises:
-            TransformError: If it is none, or would close a loop; nothing is changed.
+            TransformError: If it is none, would close a loop, or is of one frame too
+                many; nothing is changed. There are too many once all are static, or
+                have others that hang from them.
 
         """
         parent, child = self.name(parent, namespace), self.name(child, namespace)
@@ -174,17 +187,17 @@ class Buffer:
         """Forget everything."""
         self._tracks.clear()
         self._roots.clear()
+        self._missing.clear()
 
     def _track(self, parent: str, child: str, static: bool) -> tuple[Track, str | None]:
         """Return where to keep a transform; parents and kinds may change."""
         track = self._tracks.get(child)
         if track is not None and track.parent == parent and track.static == static:
+            self._tracks[child] = self._tracks.pop(child)
             return track, None
         self._refuse_loop(parent, child)
         if track is None and len(self._tracks) >= MOST_FRAMES:
-            raise TransformError(
-                f"{parent!r} -> {child!r}: there are {MOST_FRAMES} frames already"
-            )
+            self._make_room(parent, child)
         note = None
         if track is not None and track.parent != parent:
             note = (
@@ -192,15 +205,34 @@ class Buffer:
                 f"happens again and again, two nodes tell of it"
             )
             self._let_go(track.parent)
+        if track is None or parent not in self._roots:
+            self._missing.clear()
         if track is None or track.parent != parent:
             self._roots[parent] = self._roots.get(parent, 0) + 1
+        self._tracks.pop(child, None)
         self._tracks[child] = found = Track(parent, static=static)
         return found, note
+
+    def _make_room(self, parent: str, child: str) -> None:
+        """Forget the frame that was heard of longest ago, for one that is new.
+
+        What detects things may name a new frame for each. Static frames stay, as they
+        are told once, and so does whatever others hang from.
+        """
+        for frame, track in self._tracks.items():
+            if not track.static and frame not in self._roots and frame != parent:
+                self._let_go(track.parent)
+                del self._tracks[frame]
+                return
+        raise TransformError(
+            f"{parent!r} -> {child!r}: there are {MOST_FRAMES} frames already"
+        )
 
     def _let_go(self, parent: str) -> None:
         self._roots[parent] -= 1
         if not self._roots[parent]:
             del self._roots[parent]
+            self._missing.clear()
 
     def _refuse_loop(self, parent: str, child: str) -> None:
         way = [parent]
@@ -216,14 +248,23 @@ class Buffer:
         name = self.name(frame)
         if name in self._tracks or name in self._roots:
             return name
-        frames = self.frames
-        near = difflib.get_close_matches(name, frames, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        listed = ", ".join(frames[:_LISTED]) or "none"
+        said = self._missing.get(name)
+        if said is None:  # Robots and modules ask for it at each message.
+            if len(self._missing) >= _SENTENCES:
+                self._missing.clear()
+            self._missing[name] = said = self._sentence(name)
+        raise FrameMissing(said)
+
+    def _sentence(self, name: str) -> str:
+        """Return what is said of a frame that is missing."""
+        frames = {*self._tracks, *self._roots}
+        hint = ""
+        if len(frames) <= MOST_COMPARED:
+            near = difflib.get_close_matches(name, sorted(frames), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+        listed = ", ".join(heapq.nsmallest(_LISTED, frames)) or "none"
         more = f" and {len(frames) - _LISTED} more" if len(frames) > _LISTED else ""
-        raise FrameMissing(
-            f"there is no frame {name!r}{hint}; there are: {listed}{more}"
-        )
+        return f"there is no frame {name!r}{hint}; there are: {listed}{more}"
 
     def _way(self, target: str, source: str) -> tuple[list[str], list[str]]:
         """Return the frames below the common ancestor, on both sides."""

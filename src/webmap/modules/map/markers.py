@@ -65,6 +65,9 @@ VIEWS: dict[str, type[FramedMarkerMsg] | type[FramedMarkerArrayMsg]] = {
 
 Key = tuple[str, int]
 
+_MOVED = "moved"
+"""The problem of markers that cannot be drawn where their frames have got to."""
+
 
 class Markers:
     """Draws ``visualization_msgs/MarkerArray`` or ``Marker`` as it looks from above.
@@ -157,6 +160,7 @@ class MarkerLayer(Layer):
     def start(self) -> None:
         """Subscribe to the markers."""
         keep(Removal(self._forget_timer))
+        keep(Removal(lambda: self.clear_problem(_MOVED)))
         # Every message counts: one may take away what another has put there.
         self.bridge.subscribe(
             self.topic,
@@ -176,11 +180,12 @@ class MarkerLayer(Layer):
         single = isinstance(message, FramedMarkerMsg)
         markers = [message] if isinstance(message, FramedMarkerMsg) else message.markers
         wrong: list[str] = []
+        self.clear_problem(_MOVED)
         for marker in markers:
             try:
                 self._take(marker)
             except WebMapError as error:
-                wrong.append(f"marker {marker.id} of {marker.ns!r}: {error}")
+                wrong.append(_wrong(marker, error))
         self.frames.say()
         self._set_timer()
         self.svg.set_age(self.bridge.lag, limit=self.age_limit)
@@ -212,7 +217,7 @@ class MarkerLayer(Layer):
             marker.frame_id,
             marker.stamp,
             marker.frame_locked,
-            lambda frame: self._show(key, marker, frame),
+            lambda frame: self._move(key, marker, frame),
         )
         try:
             self._show(key, marker, frame)
@@ -223,6 +228,19 @@ class MarkerLayer(Layer):
         self._ends.pop(key, None)
         if lifetime > 0:
             self._ends[key] = time.monotonic() + lifetime
+
+    def _move(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
+        """Put a marker where its frame is by now.
+
+        One that cannot be drawn there is left out, as it is not where it was, and the
+        first is said until the next message.
+        """
+        try:
+            self._show(key, marker, frame)
+        except WebMapError as error:
+            self._drop(key)
+            if _MOVED not in self.problems:
+                self.set_problem(_MOVED, f"{self.topic}: {_wrong(marker, error)}")
 
     def _say_unturned(self, marker: MarkerMsg) -> None:
         """Say once that somebody leaves orientations out; they are drawn as RViz does.
@@ -287,3 +305,7 @@ class MarkerLayer(Layer):
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+
+def _wrong(marker: MarkerMsg, error: WebMapError) -> str:
+    return f"marker {marker.id} of {marker.ns!r}: {error}"
