@@ -32,6 +32,7 @@ class Lifecycle:
         self.loop: asyncio.AbstractEventLoop | None = None
         self._thread: int | None = None
         self._services: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._stopping: set[asyncio.Task[None]] = set()
 
     @property
     def running(self) -> bool:
@@ -47,6 +48,17 @@ class Lifecycle:
     def discard(self, service: Service) -> None:
         """Forget ``service``; it does not start any more."""
         self._services.discard(service)
+
+    def end_service(self, service: Service) -> None:
+        """Forget ``service`` and stop it, soon, if the process has started."""
+        self.discard(service)
+        if self.loop is not None:
+            self.call(self._begin_to_stop, service)
+
+    def _begin_to_stop(self, service: Service) -> None:
+        task = asyncio.get_running_loop().create_task(_stop(service))
+        self._stopping.add(task)
+        task.add_done_callback(self._stopping.discard)
 
     def call(self, fn: Callable[..., object], /, *args: Any) -> None:
         """Call ``fn`` in the model's thread: now if this is it, else soon.
@@ -71,12 +83,15 @@ class Lifecycle:
     async def end(self) -> None:
         """Stop every service, also when one of them raises."""
         services, self.loop = list(self._services), None
-        results = await asyncio.gather(
-            *(service.stop() for service in services), return_exceptions=True
-        )
-        for service, result in zip(services, results, strict=True):
-            if isinstance(result, Exception):
-                log.error("%r did not stop cleanly", service, exc_info=result)
+        stopping = [_stop(service) for service in services]
+        await asyncio.gather(*stopping, *self._stopping, return_exceptions=True)
+
+
+async def _stop(service: Service) -> None:
+    try:
+        await service.stop()
+    except Exception as error:
+        log.error("%r did not stop cleanly", service, exc_info=error)
 
 
 lifecycle = Lifecycle()

@@ -5,6 +5,7 @@ is current (a subscription, a listener, an element's handler) joins it and is re
 when the scope closes, in reverse order, also when one removal raises.
 """
 
+import asyncio
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -123,3 +124,17 @@ def keep(thing: T) -> T:
     if scope is not None:
         scope.add(thing)
     return thing
+
+
+def break_off(task: "asyncio.Future[Any]") -> None:
+    """Cancel what goes on beside the caller for somebody who has ended.
+
+    The task that ends somebody itself, as a handler does that takes itself away, is
+    left alone: it has the rest of its own work to do.
+    """
+    try:
+        current = asyncio.current_task()
+    except RuntimeError:  # no event loop runs in this thread
+        current = None
+    if task is not current:
+        task.cancel()

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from webmap.core.page import Page, PageEntry
+from webmap.errors import ConfigError, WireError
 
 
 @dataclass
@@ -16,10 +17,13 @@ class Channel:
 
     calls: list[tuple[Any, ...]] = field(default_factory=list)
     mounted: dict[int, Any] = field(default_factory=dict)
-    listening: set[tuple[int, int, str]] = field(default_factory=set)
+    flags: dict[tuple[int, int, str], tuple[bool, bool]] = field(default_factory=dict)
+    """What is listened to: whether prevented, whether stopped."""
     numbers: Any = field(default_factory=lambda: itertools.count(1))
 
     def mount(self, fragment, *, under, order=0, within=None):
+        if within is not None and within not in self.mounted:
+            raise WireError(f"mount {within} is not on the page")
         number = next(self.numbers)
         self.mounted[number] = fragment
         return number
@@ -31,10 +35,10 @@ class Channel:
         self.calls.append(("class", self.mounted[mount], name, on))
 
     def listen(self, mount, element, event, *, prevent, stop):
-        self.listening.add((mount, element, event))
+        self.flags[mount, element, event] = (prevent, stop)
 
     def unlisten(self, mount, element, event):
-        self.listening.discard((mount, element, event))
+        self.flags.pop((mount, element, event), None)
 
     def view(self, map_element, operation, *args):
         self.calls.append((operation, *args))
@@ -77,8 +81,6 @@ class Publisher:
         return f"/_webmap/files/{path.name}"
 
     def publish_image(self, image: Path) -> str:
-        from webmap.errors import ConfigError
-
         if not image.is_file():
             raise ConfigError(f"there is no file {str(image)!r}")
         self.images.append(image.name)

@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from webmap import Extendable, Namespace, Robot
-from webmap.errors import ModuleNotFound
+from webmap import Extendable, Map, Namespace, Robot
+from webmap.errors import ConfigError, ModuleNotFound
 from webmap.scope import Removal, current_scope, keep
 
 
@@ -161,6 +161,49 @@ def test_a_coroutine_that_still_waits_ends_with_its_module(namespace):
         assert slow.heard == owner.reported == []
 
     asyncio.run(scenario())
+
+
+def test_a_coroutine_that_removes_its_own_module_goes_on_to_its_end(namespace):
+    class Once:
+        def __init__(self, owner):
+            self.owner, self.done = owner, False
+
+        async def on_ring(self):
+            self.owner.remove_module(self)
+            await asyncio.sleep(0)
+            self.done = True
+
+    async def scenario():
+        owner = Reporting(namespace)
+        once = owner.add_module(Once)
+        owner.notify_modules("on_ring")
+        while len(asyncio.all_tasks()) > 1:
+            await asyncio.sleep(0)
+        assert once.done
+
+    asyncio.run(scenario())
+
+
+def test_a_coroutine_whose_module_ends_before_it_begins_is_no_trouble(namespace):
+    async def scenario():
+        owner = Reporting(namespace)
+        slow = owner.add_module(Slow)
+        owner.notify_modules("on_ring", 5)
+        owner.remove_module(slow)
+        while len(asyncio.all_tasks()) > 1:
+            await asyncio.sleep(0)
+        assert owner.reported == []
+
+    asyncio.run(scenario())
+
+
+def test_an_owner_that_has_ended_takes_no_module(container):
+    made = []
+    for owner in (Robot("Bob"), Map(container, 100, 100)):
+        owner.destroy()
+        with pytest.raises(ConfigError, match="was destroyed, so no module can be"):
+            owner.add_module(made.append)
+    assert made == []
 
 
 def test_a_coroutine_that_raises_later_is_reported_as_any_module(namespace):

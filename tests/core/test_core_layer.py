@@ -1,6 +1,9 @@
 """Layers: drawn once, however many maps show them."""
 
+import pytest
+
 from webmap import Layer, Map, svg
+from webmap.errors import WireError
 from webmap.scope import Removal, keep
 
 
@@ -67,3 +70,13 @@ def test_the_end_of_a_page_gives_its_layers_back(page, container, channel):
     page.close()
     assert Layer._shared == {}
     assert channel.mounted == {}
+
+
+def test_a_layer_that_comes_too_late_for_its_map_is_given_back(page, container):
+    link = Link()
+    map = Map(container, 100, 100)
+    map.destroy()
+    with pytest.raises(WireError, match="not on the page"):
+        map.add_layer(Circles.shared(link, "/circles"))
+    assert link.listeners == []
+    assert Layer._shared == {}

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import re
 import time
 
 import msgspec
@@ -145,17 +146,16 @@ def test_a_robot_whose_odometry_ceases_has_a_line_in_the_log_and_one_when_it_is_
         link.say("/odom", ODOM)
 
     asyncio.run(scenario())
-    assert [(line.levelname, line.getMessage()) for line in log.records] == [
-        (
-            "WARNING",
-            "Bob: no pose for 0 s; they come from /odom on hall, and that link is open",
-        ),
-        ("INFO", "Bob: poses again, after 0 s"),
+    said = [re.sub(r"\d+ s", "N s", message) for message in log.messages]
+    assert [line.levelname for line in log.records] == ["WARNING", "INFO"]
+    assert said == [
+        "Bob: no pose for N s; they come from /odom on hall, and that link is open",
+        "Bob: poses again, after N s",
     ]
 
 
 def test_a_process_that_stood_still_blames_no_robot(robots, link, log, monkeypatch):
-    monkeypatch.setattr(silence, "LATE", 0.02)
+    monkeypatch.setattr(silence, "LATE", 0.1)
 
     async def scenario() -> None:
         follow(robots[1], link)

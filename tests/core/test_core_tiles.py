@@ -254,6 +254,38 @@ def test_an_mbtiles_file_gives_its_tiles_whose_rows_are_counted_from_the_south(m
     assert source.attribution == "© Somebody and more"
 
 
+@pytest.mark.parametrize("made", ["table", "view"])
+def test_the_levels_of_a_large_file_are_found_without_reading_it_all(
+    mbtiles, monkeypatch, made
+):
+    rows = (
+        "WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n WHERE i < 1e5)"
+    )
+    index = "(zoom_level, tile_column, tile_row)"
+    if made == "table":
+        statements = [
+            f"INSERT INTO tiles {rows} SELECT 4 + i % 9, i, i, NULL FROM n",
+            f"CREATE UNIQUE INDEX tile_index ON tiles {index}",
+        ]
+    else:
+        statements = [
+            "CREATE TABLE images (tile_data blob, tile_id integer PRIMARY KEY)",
+            f"INSERT INTO images {rows} SELECT NULL, i FROM n",
+            "CREATE TABLE map (zoom_level integer, tile_column integer, "
+            "tile_row integer, tile_id integer)",
+            f"INSERT INTO map {rows} SELECT 4 + i % 9, i, i, i FROM n",
+            f"CREATE UNIQUE INDEX map_index ON map {index}",
+            "DROP TABLE tiles",
+            "CREATE VIEW tiles AS SELECT map.zoom_level, map.tile_column, "
+            "map.tile_row, images.tile_data FROM map "
+            "JOIN images ON images.tile_id = map.tile_id",
+        ]
+    # The first look at the clock, after so many steps of the database, is too late.
+    monkeypatch.setattr("webmap.core.tile_source.PATIENCE", -1.0)
+    source = mbtiles(*statements, tiles=())
+    assert list(source.zooms) == list(range(4, 13))
+
+
 def test_the_levels_are_those_of_the_metadata_where_there_are_any(mbtiles):
     source = mbtiles(metadata=[("minzoom", "2"), ("maxzoom", "99")])
     assert list(source.zooms) == list(range(2, 25))

@@ -84,9 +84,9 @@ class Outbox:
         self.reason = reason
 
 
-def make_model(loop, function):
+def make_model(loop, function, max_pages=1000):
     entry = PageEntry("/", function, None, Path(), "test")
-    return Model(loop.runtime, {"/": entry}, Published())
+    return Model(loop.runtime, {"/": entry}, Published(), max_pages=max_pages)
 
 
 def open_page(model, page_id="page0001", viewer=ANN):

@@ -18,7 +18,7 @@ from webmap.server.viewer import Viewer
 TOKEN = "t0ken-" + "A" * 43
 
 
-def wait_for(condition: Callable[[], object], *, seconds: float = 5.0) -> None:
+def wait_for(condition: Callable[[], object], *, seconds: float = 20.0) -> None:
     """Return once the condition holds; fail if it does not within the time."""
     deadline = time.monotonic() + seconds
     while not condition():
@@ -85,10 +85,14 @@ class FakeDrive:
     send: Callable[[str], None]
     end: Callable[[str], None]
     received: list[str] = field(default_factory=list)
+    speeds: tuple[float, float] | None = None
     times_closed: int = 0
 
     def receive(self, text: str) -> None:
         self.received.append(text)
+
+    def set_speeds(self, v: float, w: float) -> None:
+        self.speeds = (v, w)
 
     def close(self) -> None:
         self.times_closed += 1
@@ -132,9 +136,9 @@ def running(app: WebApp) -> Iterator[Running]:
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     try:
-        assert ready.wait(5)
+        assert ready.wait(20)
         yield Running(app, port)
     finally:
         server.should_exit = True
-        thread.join(5)
+        thread.join(20)
         assert not thread.is_alive()

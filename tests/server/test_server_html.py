@@ -15,6 +15,10 @@ def test_a_made_page_has_one_container_and_its_title_is_only_text():
     assert prepare_page(text, base_of("")).blocked == []
 
 
+def test_a_keyboard_on_the_screen_makes_a_made_page_lower_and_covers_nothing():
+    assert "interactive-widget=resizes-content" in make_page("A", base_of(""))
+
+
 def test_the_base_follows_the_prefix():
     assert base_of("") == "/_webmap/"
     assert base_of("/robots/") == "/robots/_webmap/"

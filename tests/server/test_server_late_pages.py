@@ -1,6 +1,8 @@
-"""An async page function that takes longer than its viewer stays."""
+"""Pages whose viewers left: how long they are kept, and what goes on meanwhile."""
 
 import asyncio
+import gc
+import weakref
 
 from page_loop import make_model, open_page, wait_for
 
@@ -9,27 +11,88 @@ from webmap.errors import ConfigError
 from webmap.server import page_host as host_module
 
 
-def test_a_page_function_that_is_late_makes_no_map_and_is_no_failure(
-    loop, monkeypatch, caplog
-):
+def test_a_page_function_that_goes_on_for_ever_ends_with_its_page(loop, monkeypatch):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
-    ended, said = [], []
-    robots_told = asyncio.Event()
+    began, ended = [], []
 
     async def build(page):
-        page.on_close(lambda: ended.append(True))
-        await robots_told.wait()
+        began.append(page)
         try:
-            webmap.Map(page.element("webmap_container"))
-        except ConfigError as error:
-            said.append(str(error))
-            raise
+            while True:
+                await asyncio.sleep(0.001)
+        finally:
+            ended.append(page.closed)
 
+    async def others():
+        return len(asyncio.all_tasks())
+
+    before = loop.wait(others())
     handle, _ = open_page(make_model(loop, build))
+    wait_for(lambda: began)
+    assert loop.wait(others()) == before + 1
     handle.closed()
     wait_for(lambda: ended)
-    loop.call(lambda: robots_told.set() or True)
+    assert ended == [True]
+    wait_for(lambda: loop.wait(others()) == before)
+
+
+def test_a_page_function_that_fails_as_it_ends_is_no_failure(loop, monkeypatch, caplog):
+    monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
+    began, said = [], []
+
+    async def build(page):
+        began.append(page)
+        try:
+            await asyncio.Event().wait()
+        except asyncio.CancelledError:
+            try:
+                webmap.Map(page.element("webmap_container"))
+            except ConfigError as error:
+                said.append(str(error))
+                raise
+
+    handle, _ = open_page(make_model(loop, build))
+    wait_for(lambda: began)
+    handle.closed()
     wait_for(lambda: said)
     loop.call(lambda: True)
     assert "page '/' of Ann was closed" in said[0]
     assert "the page function failed" not in caplog.text
+
+
+def test_past_the_limit_the_page_that_was_lost_first_gives_way(loop):
+    model = make_model(loop, lambda page: None, max_pages=3)
+
+    def opened():
+        loop.call(lambda: True)
+        return [page_id for _, page_id, _ in model._hosts]
+
+    handles = [open_page(model, f"page000{number}")[0] for number in (1, 2, 3)]
+    handles[1].closed()
+    handles[0].closed()
+    assert opened() == ["page0001", "page0002", "page0003"]
+    open_page(model, "page0004")
+    assert opened() == ["page0001", "page0003", "page0004"]
+    open_page(model, "page0001")  # its viewer comes back
+    open_page(model, "page0005")
+    assert opened() == ["page0001", "page0003", "page0004", "page0005"]
+    loop.call(lambda: model.close() or True)
+
+
+def test_pages_that_come_under_ever_new_names_are_bounded(loop):
+    built, closed, hosts = [], [], weakref.WeakSet()
+
+    def build(page):
+        built.append(page.viewer.name)
+        webmap.Map(page.element("webmap_container"))
+        page.on_close(lambda: closed.append(True))
+
+    model = make_model(loop, build, max_pages=5)
+    for number in range(100):
+        open_page(model, f"page{number:04}")[0].closed()
+        loop.call(lambda: hosts.update(model._hosts.values()) or True)
+    assert (len(built), len(closed)) == (100, 95)
+    assert len(model._hosts) == 5
+    gc.collect()
+    assert len(hosts) <= 6, "no timer holds the others; the last tick may hold one"
+    loop.call(lambda: model.close() or True)

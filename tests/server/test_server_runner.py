@@ -150,7 +150,7 @@ def serve_in_thread(application, **options):
 
     thread = threading.Thread(target=run)
     thread.start()
-    thread.join(5)
+    thread.join(20)
     assert not thread.is_alive()
     return errors
 

@@ -71,7 +71,7 @@ def open_socket(server):
 async def reason_of(socket):
     """Read until the socket ends; return its close code and reason."""
     with contextlib.suppress(ConnectionClosed):
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(20):
             while True:
                 await socket.recv()
     return socket.close_code, socket.close_reason
@@ -83,8 +83,10 @@ def test_a_scene_carries_both_ways_and_tells_the_model_once_that_it_closed(
     async def scenario():
         async with open_socket("scene?page=lab&id=p1") as socket:
             await socket.send("hello")
-            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes[0].received)
+            # The server opens the scene after it has accepted the socket.
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
             scene = rooms.model.scenes[0]
+            await asyncio.to_thread(wait_for, lambda: scene.received)
             await asyncio.to_thread(scene.outbox.offer, b"frame 1")
             await asyncio.to_thread(scene.outbox.offer, b"frame 2")
             assert [await socket.recv(), await socket.recv()] == [
@@ -106,10 +108,10 @@ def test_a_drive_carries_both_ways_and_its_end_reaches_the_gate(rooms, open_sock
     async def scenario():
         async with open_socket("drive?id=p1") as socket:
             await socket.send('{"op":"take","robot":"r1"}')
-            await asyncio.to_thread(
-                wait_for, lambda: rooms.gate.connections[0].received
-            )
-            rooms.gate.connections[0].send(TICK % 7)
+            await asyncio.to_thread(wait_for, lambda: rooms.gate.connections)
+            connection = rooms.gate.connections[0]
+            await asyncio.to_thread(wait_for, lambda: connection.received)
+            connection.send(TICK % 7)
             assert await socket.recv() == TICK % 7
 
     asyncio.run(scenario())
@@ -124,13 +126,27 @@ def test_a_drive_carries_both_ways_and_its_end_reaches_the_gate(rooms, open_sock
     ]
 
 
+def test_a_page_drives_at_no_speed_before_its_own_limit_is_known(rooms, open_socket):
+    async def scenario():
+        async with open_socket("drive?id=p1"), open_socket("drive"):
+            await asyncio.to_thread(wait_for, lambda: len(rooms.gate.connections) == 2)
+
+    asyncio.run(scenario())
+    # What is no page has no limit of a page; the model tells that of one that is.
+    speeds = [connection.speeds for connection in rooms.gate.connections]
+    assert sorted(speeds, key=str) == [(0.0, 0.0), None]
+    wait_for(lambda: len(rooms.model.drives) == 4)
+
+
 def test_a_drive_without_an_id_is_a_page_of_its_own(rooms, open_socket):
+    said = [["x"], ["x"]]
+
     async def scenario():
         async with open_socket("drive") as first, open_socket("drive") as second:
             await first.send("x")
             await second.send("x")
             await asyncio.to_thread(
-                wait_for, lambda: all(c.received for c in rooms.gate.connections)
+                wait_for, lambda: [c.received for c in rooms.gate.connections] == said
             )
 
     asyncio.run(scenario())
@@ -238,6 +254,7 @@ def test_a_page_that_opens_again_replaces_its_lost_socket(rooms, open_socket, na
                 assert (await reason_of(old))[0] == REPLACED
                 await new.send("new")
                 sides = rooms.model.scenes or rooms.gate.connections
+                await asyncio.to_thread(wait_for, lambda: len(sides) == 2)
                 await asyncio.to_thread(wait_for, lambda: sides[1].received)
                 assert sides[1].times_closed == 0
                 await asyncio.to_thread(wait_for, lambda: sides[0].times_closed)
@@ -306,7 +323,7 @@ def test_a_slow_scene_holds_no_tick_up(rooms, open_socket):
             for number in range(20):
                 rooms.model.scenes[0].outbox.offer(bytes(700_000))
                 rooms.gate.connections[0].send(TICK % number)
-                async with asyncio.timeout(1):
+                async with asyncio.timeout(4):  # less than STALLED_S
                     assert await quick.recv() == TICK % number
             slow.transport.abort()
 

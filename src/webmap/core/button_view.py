@@ -1,11 +1,13 @@
 """A robot's button on one page: pressed, asked back, filled in, and what came of it."""
 
+import asyncio
 import time
 from typing import Any
 
 from webmap.core.form_view import FormView
 from webmap.core.page import page_of
 from webmap.core.robot_button import RobotButton, values_of
+from webmap.core.tasks import spawn
 from webmap.errors import WebMapError
 from webmap.ros.form_fields import UnknownType
 from webmap.ros.message_forms import FormError
@@ -108,7 +110,8 @@ class ButtonView:
         # Whoever is no operator any more, or was never one, has no say.
         if self._barred() is None:
             self._close(self._sheet)
-            await self.button.press(values, by=self._viewer.name)
+            # A press is the robot's: it goes on when the viewer looks elsewhere.
+            await asyncio.shield(spawn(self.button.press(values, by=self._viewer.name)))
 
     def _open_form(self) -> None:
         self._close(self._question)

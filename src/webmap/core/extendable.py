@@ -1,15 +1,16 @@
 """What maps and robots both are: owners of modules."""
 
-import asyncio
 import inspect
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import Namespace
-from webmap.core.tasks import spawn
-from webmap.scope import Removal, Scope, current_scope, no_scope
+from webmap.core.tasks import begin
+from webmap.errors import ConfigError
+from webmap.scope import Scope, no_scope
 
 log = logging.getLogger("webmap.modules")
 
@@ -27,6 +28,8 @@ class Extendable:
         self.modules: list[Any] = []
         self._scopes: dict[int, Scope] = {}
         self._made: dict[int, tuple[str, tuple[Any, ...], dict[str, Any]]] = {}
+        self._destroyed = False
+        """Whether it has ended, so that nobody would ever remove a module of it."""
 
     def add_module(
         self, name: str | Callable[..., Any], /, *args: Any, **kwargs: Any
@@ -44,9 +47,15 @@ class Extendable:
         Raises:
             ModuleNotFound: If there is no module of that name.
             ConfigError: If an argument is not of the kind that the module's
-                annotations name; it is a ``TypeError``, too.
+                annotations name; it is a ``TypeError``, too. Or if the owner was
+                destroyed.
 
         """
+        if self._destroyed:
+            raise ConfigError(
+                f"{self!r} was destroyed, so no module can be added to it: nothing "
+                "would ever end it"
+            )
         factory = self.namespace[name] if isinstance(name, str) else name
         check_arguments(factory, args, kwargs)
         scope = Scope(f"{factory}", self._failed, self.clear_problem)
@@ -121,38 +130,15 @@ class Extendable:
         if method is None:
             return
         scope = self._scopes.get(id(module))
-        what = f"{type(module).__name__}.{name}"
+        report = partial(self._report, f"{type(module).__name__}.{name}")
         with scope.active() if scope is not None else no_scope():
             try:
                 result = method(*args)
                 if inspect.isawaitable(result):
-                    self._begin(result, what)
+                    begin(result, report)
             except Exception as error:
-                self._report(error, what)
+                report(error)
 
-    def _begin(self, work: Awaitable[Any], what: str) -> None:
-        try:
-            asyncio.get_running_loop()
-        except RuntimeError:
-            if inspect.iscoroutine(work):
-                work.close()  # Python would say that nobody waited for it
-            raise RuntimeError(
-                "it is a coroutine, which only WebMap runs: after webmap.start(), and "
-                "in the model's thread"
-            ) from None
-        task, scope = spawn(self._finish(work, what)), current_scope()
-        if scope is not None:  # it ends with the module
-            ending = Removal(task.cancel)
-            scope.add(ending)
-            task.add_done_callback(lambda _: scope.discard(ending))
-
-    async def _finish(self, work: Awaitable[Any], what: str) -> None:
-        """Wait for what a trigger began, in the scope that it began in."""
-        try:
-            await work
-        except Exception as error:
-            self._report(error, what)
-
-    def _report(self, error: Exception, what: str) -> None:
+    def _report(self, what: str, error: Exception) -> None:
         log.error("module %s of %r failed", what, self, exc_info=error)
         self.report_error(f"{what} failed: {type(error).__name__}: {error}")

@@ -39,7 +39,6 @@ class Map(WorldView):
         self.selected: Robot | None = None
         self.marked: list[Robot] = []
         """What is selected besides, for what concerns several; never to be driven."""
-        self._destroyed = False
         self.page.maps.append(self)
         self.page.listen(
             self._mount, self.root, "click", lambda event: self.set_selected(None)
@@ -90,8 +89,15 @@ class Map(WorldView):
             layer: From :meth:`webmap.core.layer.Layer.shared`; given back at the end.
             order: What lies over what: greater is nearer; robots have 100.
 
+        Raises:
+            WireError: If the map has ended; the layer is given back.
+
         """
-        self.mount(layer.fragment, order=order)
+        try:
+            self.mount(layer.fragment, order=order)
+        except BaseException:
+            layer.release()
+            raise
 
         def undo() -> None:
             self.unmount(layer.fragment)

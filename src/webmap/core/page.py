@@ -4,20 +4,20 @@ import inspect
 import logging
 import re
 import weakref
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.hand_speeds import HandSpeeds
 from webmap.core.page_ports import PageChannel, Publisher, Viewer
-from webmap.core.tasks import spawn
+from webmap.core.tasks import begin
 from webmap.errors import ConfigError
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.events import Event, Handler, Listener
 from webmap.scene.fragment import Fragment
-from webmap.scope import Removal, Scope, current_scope, keep
+from webmap.scope import Removal, Scope, current_scope
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -85,11 +85,8 @@ site = Site()
 """The pages of this process."""
 
 
-def _run(work: Awaitable[Any]) -> None:
-    async def wait() -> None:
-        await work
-
-    spawn(wait())
+Key = tuple[int, int, str]
+"""What is listened to: a mount, an element of it and an event."""
 
 
 class Page:
@@ -117,7 +114,7 @@ class Page:
         _pages[self.fragment.id] = self
         self.on_speeds: Callable[[float, float], None] | None = None
         self._speeds = HandSpeeds()
-        self._listening: dict[tuple[int, int, str], list[Listener]] = {}
+        self._listening: dict[Key, tuple[Listener, ...]] = {}
 
     def element(self, id: str) -> Element:
         """Return the page's own element with this ``id``, to fill and to listen to.
@@ -156,9 +153,27 @@ class Page:
                 image.
 
         """
+        return self.publish_image(href)[0]
+
+    def publish_image(self, href: str) -> tuple[str, Removal]:
+        """Return such a URL of an image, and what lets nobody load it any more.
+
+        Args:
+            href: A file of the page's folder, or an absolute path.
+
+        Raises:
+            ConfigError: As :meth:`image` does.
+
+        """
         url = self.publisher.publish_image(self.image_file(href))
-        self.scope.add(Removal(lambda: self.publisher.withdraw_image(url)))
-        return url
+
+        def undo() -> None:
+            self.scope.discard(removal)
+            self.publisher.withdraw_image(url)
+
+        removal = Removal(undo)
+        self.scope.add(removal)
+        return url, removal
 
     def image_file(self, href: str) -> Path:
         """Return the path of an image, which may not exist.
@@ -219,25 +234,45 @@ class Page:
         prevent: bool = False,
         stop: bool = False,
     ) -> Removal:
-        """Call ``handler`` for an event of an element in this page only."""
+        """Call ``handler`` for an event of an element in this page only.
+
+        It ends with the removal that is returned, the current scope or the page.
+        """
         key = (mount, element.id, event)
-        listeners = self._listening.setdefault(key, [])
-        if not listeners:
-            self.channel.listen(mount, element.id, event, prevent=prevent, stop=stop)
-        listener = Listener(handler, current_scope(), prevent=prevent, stop=stop)
-        listeners.append(listener)
+        scope = current_scope()
+        if scope is None:
+            scope = self.scope
+        listener = Listener(handler, scope, prevent=prevent, stop=stop)
+        self._set_listening(key, (*self._listening.get(key, ()), listener))
 
         def undo() -> None:
-            listeners.remove(listener)
-            if not listeners and self._listening.pop(key, None) is not None:
-                self.channel.unlisten(mount, element.id, event)
+            listener.forget()
+            known = self._listening.get(key, ())
+            self._set_listening(key, tuple(i for i in known if i is not listener))
 
-        return keep(Removal(undo))
+        listener.removal = Removal(undo)
+        scope.add(listener.removal)
+        return listener.removal
+
+    def _set_listening(self, key: Key, listeners: tuple[Listener, ...]) -> None:
+        """Note who listens, and tell the browser if it is to do something else."""
+        asked = _flags(listeners)
+        if asked != _flags(self._listening.get(key, ())):
+            if asked is None:
+                self.channel.unlisten(*key)
+            else:
+                prevent, stop = asked
+                self.channel.listen(*key, prevent=prevent, stop=stop)
+        if listeners:
+            self._listening[key] = listeners
+        else:
+            self._listening.pop(key, None)
 
     def forget_mount(self, mount: int) -> None:
         """Let nobody hear of a mount that is taken away."""
         for key in [key for key in self._listening if key[0] == mount]:
-            del self._listening[key]
+            for listener in self._listening.pop(key):
+                listener.forget()
 
     def asset(self, file: str | Path) -> str:
         """Return the URL of an ES module or a style sheet.
@@ -251,13 +286,17 @@ class Page:
 
     def dispatch(self, mount: int, element: Element, event: Event) -> None:
         """Call who listens: the element's owner, then this viewer's own listeners."""
-        element.dispatch(event, self._failed, _run)
-        for listener in tuple(self._listening.get((mount, element.id, event.kind), ())):
-            listener.call(event, self._failed, _run)
+        element.dispatch(event, self._failed, self._begin)
+        for listener in self._listening.get((mount, element.id, event.kind), ()):
+            listener.call(event, self._failed, self._begin)
+
+    def _begin(self, work: Awaitable[Any]) -> None:
+        begin(work, self._failed)
 
     def _failed(self, error: Exception) -> None:
         log.error("a handler of %s failed", self.entry.path, exc_info=error)
-        self.notice(f"A handler failed: {type(error).__name__}: {error}")
+        if not self.closed:
+            self.notice(f"A handler failed: {type(error).__name__}: {error}")
 
     def close(self) -> None:
         """End the page: destroy its maps and release all that was made for it."""
@@ -267,8 +306,16 @@ class Page:
         for map in reversed(tuple(self.maps)):
             map.destroy()
         self.scope.close()
-        self._listening.clear()
+        for mount in {mount for mount, _, _ in self._listening}:
+            self.forget_mount(mount)
         self.channel.unmount(self._mount)
+
+
+def _flags(listeners: Sequence[Listener]) -> tuple[bool, bool] | None:
+    """Return whether any of them prevents, and any stops; None if nobody listens."""
+    if not listeners:
+        return None
+    return any(i.prevent for i in listeners), any(i.stop for i in listeners)
 
 
 _pages: "weakref.WeakValueDictionary[int, Page]" = weakref.WeakValueDictionary()

@@ -28,7 +28,7 @@ class PageChannel(Protocol):
     def listen(
         self, mount: int, element: int, event: str, *, prevent: bool, stop: bool
     ) -> None:
-        """Hear of an event on an element, in this page only."""
+        """Hear of an event on an element, in this page only; again for other flags."""
 
     def unlisten(self, mount: int, element: int, event: str) -> None:
         """Hear of it no more."""

@@ -74,7 +74,6 @@ class Robot(Driven):
         self.orientation = Quaternion()
         self.measured_twist: Twist | None = None
         self.valid = False
-        self._destroyed = False
         self._poses = PoseSource(self, self.motion, self._on_heard, self._show)
         self.whereabouts = self._poses.whereabouts
         """Where it is and was, on its own map and on the common one."""

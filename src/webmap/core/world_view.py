@@ -58,8 +58,8 @@ class WorldView(Extendable):
         if self.page.closed:  # nobody would ever destroy it
             raise ConfigError(
                 f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
-                "so no map can be made on it: what waits in a page function may take "
-                "longer than the viewer stays"
+                "so no map can be made on it: what goes on beside a page function may "
+                "take longer than the viewer stays"
             )
         self.container = container
         width, height = self.page.size_of(container)
@@ -74,6 +74,7 @@ class WorldView(Extendable):
         self.root.set_map(self.world, canvas_width or 0.0, canvas_height or 0.0)
         self.fragment = Fragment(self.root)
         self._halves: dict[int, BrowserHalf] = {}
+        self._published: dict[Element, Removal] = {}
         self._mount = self.page.channel.mount(
             self.fragment, under=container.id, within=self.page.mount
         )
@@ -113,23 +114,25 @@ class WorldView(Extendable):
             The image, to keep for :meth:`remove_image`.
 
         """
-        try:
-            href = self.page.image(str(iri))
-        except ConfigError as error:
-            self.report_error(f"image {Path(str(iri)).name!r} is not shown: {error}")
-            href = None
         image = svg.image(
             x=x, y=y, width=width, height=height, preserveAspectRatio="none"
         )
-        if href is not None:
-            image.set("href", href)
+        try:
+            url, self._published[image] = self.page.publish_image(str(iri))
+        except ConfigError as error:
+            self.report_error(f"image {Path(str(iri)).name!r} is not shown: {error}")
+        else:
+            image.set("href", url)
         image.set_matrix(Affine(1, 0, 0, -1, 0, 2 * y + height))
         self.images.append(image)
         return image
 
     def remove_image(self, img: Element) -> None:
-        """Remove an image that :meth:`add_image` returned."""
+        """Remove an image that :meth:`add_image` returned; nobody can load it then."""
         img.remove()
+        published = self._published.pop(img, None)
+        if published is not None:
+            published.remove()
 
     def mount(self, fragment: Fragment, *, order: float) -> int:
         """Show a fragment in the world."""
@@ -286,7 +289,10 @@ class WorldView(Extendable):
             self.page.notice(text)
 
     def leave_page(self) -> None:
-        """Be on the page no more, with all that is mounted in the world."""
+        """Be on the page no more, with its images and all that is mounted in it."""
+        for published in self._published.values():
+            published.remove()
+        self._published.clear()
         self.page.forget_mount(self._mount)
         self.page.channel.unmount(self._mount)
 

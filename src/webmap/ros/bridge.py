@@ -25,7 +25,7 @@ from webmap.ros.protocol import Protocol
 from webmap.ros.publications import Publications, written_behind
 from webmap.ros.renewal import Renewals
 from webmap.ros.subscriptions import Subscription, Topic, Wish, checked
-from webmap.scope import Removal
+from webmap.scope import Removal, keep
 
 log = logging.getLogger("webmap.ros")
 
@@ -49,6 +49,9 @@ class Bridge:
     Making one only records; the link is opened when WebMap starts and is opened again
     whenever it is lost, with all subscriptions and advertisements. Its methods are
     called in the model's thread.
+
+    One that a page function or a module makes ends with that page or module, also for
+    others who use it: they are told so. What outlives a page needs one made outside.
 
     Args:
         url: Address of the rosbridge, such as ``ws://localhost:9090``.
@@ -78,7 +81,10 @@ class Bridge:
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
         self._protocol = Protocol()
         self._trouble = LinkTrouble(self.name, self._report)
+        self._over: str | None = None
+        """Why nothing comes any more, once what made this bridge has ended."""
         lifecycle.add(self)
+        keep(Removal(self._end))
 
     def __repr__(self) -> str:
         return f"<Bridge {self.url} {self.state}>"
@@ -109,7 +115,13 @@ class Bridge:
         return self._lane.lag if self._lane is not None else 0.0
 
     def on_open(self, fn: Callable[[], Any]) -> Removal:
-        """Call ``fn`` whenever the link opens; soon, if it is open already."""
+        """Call ``fn`` whenever the link opens; soon, if it is open already.
+
+        Raises:
+            BridgeClosed: If the page or the module that made this bridge has ended.
+
+        """
+        self._refuse_if_over()
         callback, removal = self._on_open.add(fn)
         if self.state == "open" and self._loop is not None:
             self._loop.call_soon(callback)
@@ -141,7 +153,8 @@ class Bridge:
 
         Args:
             topic: Name of the topic.
-            callback: Called with each message.
+            callback: Called with each message; what a coroutine function goes on
+                with is cancelled when the subscription ends.
             type: Message type, in either dialect. Without it the bridge can only
                 serve a topic that exists when it is asked.
             throttle: Least time between two messages, in milliseconds.
@@ -156,8 +169,10 @@ class Bridge:
         Raises:
             ConfigError: If an argument makes no sense, or another listener said
                 that the topic has another type.
+            BridgeClosed: If the page or the module that made this bridge has ended.
 
         """
+        self._refuse_if_over()
         name = normalise_topic(topic)
         checked(callback, throttle, queue_length, decode)
         if type is not None:
@@ -253,6 +268,7 @@ class Bridge:
 
         """
         self._publications.refuse_goal_service(service)
+        self._refuse_if_over()
         return await self._calls.call(normalise_topic(service), args, type, timeout)
 
     async def topic_type(self, topic: str) -> str | None:
@@ -275,7 +291,7 @@ class Bridge:
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Open the link, and keep it open; called when WebMap starts."""
-        if self._lane is not None and self._lane.state != "closed":
+        if self._over or (self._lane is not None and self._lane.state != "closed"):
             return
         self._loop = loop
         self._fan_out.begin(loop)
@@ -288,6 +304,18 @@ class Bridge:
         )
         self._lane.start(loop)
 
+    def _end(self) -> None:
+        """End for good: what made this bridge has ended."""
+        self._over = (
+            f"the link to {self.url} has ended with the page or the module that made "
+            "it: a bridge that others use, too, is made outside of both"
+        )
+        lifecycle.end_service(self)
+
+    def _refuse_if_over(self) -> None:
+        if self._over is not None:
+            raise BridgeClosed(self._over)
+
     async def stop(self) -> None:
         """Close every link; listeners stay, for another :meth:`start`."""
         if self._lane is not None:
@@ -296,6 +324,10 @@ class Bridge:
         await self._fan_out.stop()
         await self._doubts.stop()
         await self._renewals.stop()
+        if self._over is not None and self._topics:  # others listen, who outlive it
+            log.warning("%s: nothing more of %s", self._over, ", ".join(self._topics))
+            for topic in tuple(self._topics.values()):
+                topic.over(BridgeClosed(self._over))
 
     def _new_topic(self, name: str) -> Topic:
         return Topic(
@@ -317,6 +349,7 @@ class Bridge:
                 self._report(error)
 
     def _lane_or_raise(self) -> Lane:
+        self._refuse_if_over()
         if self._lane is None:
             raise BridgeClosed(f"the link to {self.url} was never opened")
         return self._lane

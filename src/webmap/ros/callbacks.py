@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from webmap.scope import Removal, current_scope, no_scope
+from webmap.scope import Removal, break_off, current_scope, no_scope
 
 log = logging.getLogger("webmap.ros")
 
@@ -15,7 +15,8 @@ class Callback:
     """One function of somebody else's, which may raise.
 
     Args:
-        fn: The function; where it is a coroutine function it runs as a task.
+        fn: The function; where it is a coroutine function it runs as a task, until
+            :meth:`end` at the latest.
         what: What it is called for, for the log.
         report: Is told of what it raises.
 
@@ -47,6 +48,12 @@ class Callback:
                     task.add_done_callback(self._finished)
         except Exception as error:
             self._failed(error)
+
+    def end(self) -> None:
+        """Let it not be called any more, and break off what still runs of it."""
+        self.removed = True
+        for task in tuple(self._tasks):
+            break_off(task)
 
     def _finished(self, task: "asyncio.Future[Any]") -> None:
         self._tasks.discard(task)
@@ -81,7 +88,7 @@ class Callbacks:
         scope = current_scope()
 
         def undo() -> None:
-            callback.removed = True
+            callback.end()
             self._each.pop(key, None)
             if scope is not None:
                 scope.discard(removal)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from webmap.errors import ConfigError, ProtocolError
+from webmap.errors import BridgeError, ConfigError, ProtocolError
 from webmap.identifiers import generate_id
 from webmap.ros import ops
 from webmap.ros.callbacks import Callback
@@ -68,6 +68,7 @@ class Subscription:
         if self.removed:
             return
         self.removed = True
+        self._callback.end()
         self.hush()
         self.take_back()
         if self._scope is not None:
@@ -90,7 +91,7 @@ class Subscription:
             self._of.understood(self.decode)
         self._callback(value)
 
-    def report(self, fault: ProtocolError) -> None:
+    def report(self, fault: BridgeError) -> None:
         """Show whoever subscribed that the messages cannot be used."""
         if self._scope is not None and self._scope.report is not None:
             self._reported = True
@@ -157,7 +158,7 @@ class Topic:
         self._emptied = emptied
         self.failing: set[object] = set()
         """As what the newest messages could not be decoded."""
-        self._fault: ProtocolError | None = None
+        self._fault: BridgeError | None = None
         self._found: dict[type[ProtocolError], ProtocolError | None] = {}
         """What was found out of each kind of error; None while it is looked for."""
         self._latest: Publish | None = None
@@ -325,6 +326,10 @@ class Topic:
         if self.failing:
             self._show(fault)
 
+    def over(self, fault: BridgeError) -> None:
+        """Show everybody who listens why nothing comes any more."""
+        self._show(fault)
+
     def understood(self, decode: type[msgspec.Struct] | None) -> None:
         """Note that messages decode so, and take back what is true no more."""
         self.failing.discard(_Silence)
@@ -335,7 +340,7 @@ class Topic:
         if not self.failing:
             self._mend()
 
-    def _show(self, fault: ProtocolError) -> None:
+    def _show(self, fault: BridgeError) -> None:
         self._fault = fault
         for listener in tuple(self.listeners):
             listener.report(fault)

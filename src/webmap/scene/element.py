@@ -283,7 +283,8 @@ class Element(Live):
         """Call ``handler`` with every such event, of every viewer.
 
         The handler joins the current scope and is called within it; it goes with
-        the element, too.
+        the element, too. What a coroutine function goes on with is cancelled when
+        that scope closes.
 
         Args:
             event: The browser's name of the event, such as ``"click"``.

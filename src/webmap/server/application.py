@@ -169,7 +169,7 @@ def _make_app(settings: Any, *, with_lifespan: bool) -> "WebApp":
     from webmap.server.published import Published
 
     published = Published()
-    model = Model(runtime, site.pages, published)
+    model = Model(runtime, site.pages, published, max_pages=settings.max_pages)
     runtime.on_stop(model.close)
     lifespan = _live if with_lifespan else None
     return create_app(

@@ -45,13 +45,18 @@ class DriveSockets:
         line = Line(socket, name, self._hops.here(), DRIVE, DriveQueue())
         async with self._seats.taken((viewer.id, page_id), line) as seated:
             if seated:
-                await self._carry(line, page_id, viewer)
+                await self._carry(line, page_id, viewer, limited=named)
             else:
                 await line.refuse_full()
 
-    async def _carry(self, line: Line, page_id: str, viewer: Viewer) -> None:
+    async def _carry(
+        self, line: Line, page_id: str, viewer: Viewer, *, limited: bool
+    ) -> None:
         try:
             connection = self._connect(line, viewer)
+            if limited:
+                # Until the model, which may be busy, has said what the page allows.
+                connection.set_speeds(0.0, 0.0)
         except Exception:
             log.exception("%s cannot reach the gate", viewer.name)
             await line.refuse(FAILED, "the gate cannot be reached; the log says why")

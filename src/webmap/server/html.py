@@ -13,7 +13,8 @@ _MADE = """<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="viewport"
+  content="width=device-width, initial-scale=1, interactive-widget=resizes-content">
 <title>{title}</title>
 <link rel="icon" href="{base}icon.svg" type="image/svg+xml">
 <link rel="stylesheet" href="{base}webmap.css">

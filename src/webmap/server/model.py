@@ -52,17 +52,29 @@ class Handle:
 
 
 class Model:
-    """All open pages of this process."""
+    """All open pages of this process.
+
+    Args:
+        runtime: The model's thread.
+        pages: What is behind each path.
+        publisher: Where the pages' files get URLs.
+        max_pages: How many pages there are at most; of those that are kept for a
+            viewer who may come back, the one that was lost first gives way.
+
+    """
 
     def __init__(
         self,
         runtime: Runtime,
         pages: Mapping[str, PageEntry],
         publisher: Publisher,
+        *,
+        max_pages: int,
     ) -> None:
         self.runtime = runtime
         self.pages = pages
         self.publisher = publisher
+        self._max_pages = max_pages
         self._hosts: dict[tuple[str, str, str], PageHost] = {}
         self._drives: dict[tuple[str, str], Speeds] = {}
 
@@ -97,6 +109,7 @@ class Model:
     def host(self, key: tuple[str, str, str], viewer: Viewer) -> PageHost:
         """Return the page of that key: the one that was kept, or a new one."""
         if key not in self._hosts:
+            self._make_room()
             self._hosts[key] = host = PageHost(self, self.pages[key[0]], key, viewer)
             host.drive = self._drives.get(key[1:])
         return self._hosts[key]
@@ -106,14 +119,21 @@ class Model:
         if self._hosts.get(key) is host:
             del self._hosts[key]
 
+    def _make_room(self) -> None:
+        """End those that were lost longest ago, if there are too many for one more."""
+        lost = [host for host in self._hosts.values() if host.lost_at is not None]
+        lost.sort(key=lambda host: host.lost_at or 0.0)
+        for host in lost[: max(0, len(self._hosts) + 1 - self._max_pages)]:
+            host.close()
+
     def close(self) -> None:
         """End every page."""
         for host in tuple(self._hosts.values()):
             host.close()
 
-    def later(self, delay: float, fn: Callable[..., object], *args: Any) -> None:
+    def later(self, delay: float, fn: Callable[[], object]) -> asyncio.TimerHandle:
         """Call ``fn`` in the model's thread after ``delay`` seconds."""
-        asyncio.get_running_loop().call_later(delay, fn, *args)
+        return asyncio.get_running_loop().call_later(delay, fn)
 
     def _drive_opened(self, key: tuple[str, str], connection: Speeds) -> None:
         self._drives[key] = connection

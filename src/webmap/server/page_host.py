@@ -1,5 +1,6 @@
 """One page of one viewer, through losses of its socket and reloads."""
 
+import asyncio
 import inspect
 import logging
 import time
@@ -9,7 +10,7 @@ from typing import Any, Protocol
 from webmap.core.page import Page, PageEntry
 from webmap.core.page_ports import Publisher
 from webmap.core.runtime import Runtime
-from webmap.core.tasks import spawn
+from webmap.core.tasks import begin
 from webmap.core.view import Rect
 from webmap.errors import WireError
 from webmap.geometry import Affine
@@ -75,7 +76,7 @@ class Keeper(Protocol):
     def forget(self, key: tuple[str, str, str], host: "PageHost") -> None:
         """Note that a page has ended for good."""
 
-    def later(self, delay: float, fn: Callable[..., object], *args: Any) -> None:
+    def later(self, delay: float, fn: Callable[[], object]) -> asyncio.TimerHandle:
         """Call ``fn`` in the model's thread after ``delay`` seconds."""
 
 
@@ -97,7 +98,9 @@ class PageHost:
         self._page: Page | None = None
         self._outbox: Outbox | None = None
         self._watching: Removal | None = None
-        self._lost = 0
+        self._giving_up: asyncio.TimerHandle | None = None
+        self.lost_at: float | None = None
+        """When its socket was lost, on the monotonic clock; None while it has one."""
         self.drive: Speeds | None = None
 
     def __repr__(self) -> str:
@@ -111,6 +114,7 @@ class PageHost:
             self._outbox.close("this page was opened again elsewhere")
         self._outbox = outbox
         self._stop_watching()
+        self._stay()
 
     def receive(self, outbox: Outbox, text: str) -> None:
         """Take one message of the page."""
@@ -146,8 +150,8 @@ class PageHost:
             return
         self._outbox = None
         self._stop_watching()
-        self._lost += 1
-        self._keeper.later(KEPT_FOR, self._give_up, self._lost)
+        self.lost_at = time.monotonic()
+        self._giving_up = self._keeper.later(KEPT_FOR, self.close)
 
     def tick(self, now: float) -> None:
         """Send what changed, if the page keeps up."""
@@ -200,6 +204,7 @@ class PageHost:
     def close(self) -> None:
         """End the page for good."""
         self._stop_watching()
+        self._stay()
         self._keeper.forget(self._key, self)
         if self._page is not None:
             self._page.close()
@@ -222,30 +227,26 @@ class PageHost:
             with page.scope.active():
                 result = self._entry.function(page)
                 if inspect.isawaitable(result):
-                    spawn(self._finish(page, result))
+                    begin(result, self._failed)
         except Exception as error:
             self._failed(error)
         self.tell_speeds()
 
-    async def _finish(self, page: Page, result: Any) -> None:
-        try:
-            with page.scope.active():
-                await result
-        except Exception as error:
-            if page.closed:  # nobody looks any more, and it may well be for that
-                log.info("%r was closed before it was built: %s", self, error)
-            else:
-                self._failed(error)
-
     def _failed(self, error: Exception) -> None:
+        if self._page is None:  # nobody looks any more, and it may well be for that
+            log.info("%r was closed before it was built: %s", self, error)
+            return
         log.error("%r: the page function failed", self, exc_info=error)
         self._session.error(
             f"This page could not be built: {type(error).__name__}: {error}"
         )
 
-    def _give_up(self, lost: int) -> None:
-        if self._outbox is None and self._lost == lost:
-            self.close()
+    def _stay(self) -> None:
+        """Give up no more; a timer would hold what has ended for as long as it runs."""
+        self.lost_at = None
+        if self._giving_up is not None:
+            self._giving_up.cancel()
+            self._giving_up = None
 
     def _stop_watching(self) -> None:
         if self._watching is not None:

@@ -65,6 +65,9 @@ class DriveConnection(Protocol):
     def receive(self, text: str) -> None:
         """Hand one message of the page, of at most 1 KiB, to the gate unread."""
 
+    def set_speeds(self, v: float, w: float) -> None:
+        """Set the most that this connection's hands may ask for, in m/s and rad/s."""
+
     def close(self) -> None:
         """Note that the socket is gone: the leases of this connection end."""
 

@@ -1,0 +1,270 @@
+"""What a page hears of hands: who is told, and what is left when they are not."""
+
+import asyncio
+
+import pytest
+
+from webmap import Map, Robot, html, svg
+from webmap.core import robot_button
+from webmap.core.button_spec import read_button
+from webmap.core.button_view import ButtonView
+from webmap.core.robot_button import RobotButton
+from webmap.lifecycle import lifecycle
+from webmap.scene.events import Event
+from webmap.scope import Scope
+
+
+def click(page, mount, element):
+    page.dispatch(mount, element, Event(kind="click", element=element))
+
+
+async def settled():
+    """Let every task go on until it waits for something that does not come."""
+    for _ in range(20):
+        await asyncio.sleep(0)
+
+
+class Work:
+    """An async handler that goes on until it is cancelled."""
+
+    def __init__(self):
+        self.began = self.cancelled = 0
+
+    async def __call__(self, event):
+        self.began += 1
+        try:
+            await asyncio.Event().wait()
+        except asyncio.CancelledError:
+            self.cancelled += 1
+            raise
+
+
+# Asynchronous handlers.
+
+
+def test_what_a_handler_goes_on_with_ends_with_the_page(page):
+    async def scenario():
+        owners, viewers = Work(), Work()
+        button = html.button()
+        page.element("bar").append(button)
+        with page.scope.active():
+            button.on("click", owners)
+        page.listen(page.mount, button, "click", viewers)
+        click(page, page.mount, button)
+        await settled()
+        assert (owners.began, viewers.began) == (1, 1)
+        assert (owners.cancelled, viewers.cancelled) == (0, 0)
+        page.close()
+        await settled()
+        assert (owners.cancelled, viewers.cancelled) == (1, 1)
+
+    asyncio.run(scenario())
+
+
+def test_a_page_that_closes_before_a_handler_could_begin_is_no_trouble(page):
+    async def scenario():
+        work = Work()
+        page.listen(page.mount, page.element("bar"), "click", work)
+        click(page, page.mount, page.element("bar"))
+        page.close()
+        await settled()
+        assert work.began == 0
+
+    asyncio.run(scenario())
+
+
+def test_a_handler_of_a_module_ends_with_the_module(page, container):
+    async def scenario():
+        work = Work()
+
+        class Button:
+            def __init__(self, map):
+                map.on(map.root, "click", work)
+
+        map = Map(container, 700, 500)
+        button = map.add_module(Button)
+        (mount,) = (n for n, f in page.channel.mounted.items() if f is map.fragment)
+        click(page, mount, map.root)
+        await settled()
+        map.remove_module(button)
+        await settled()
+        assert (work.began, work.cancelled) == (1, 1)
+
+    asyncio.run(scenario())
+
+
+def test_a_handler_that_takes_itself_away_goes_on_to_its_end(page):
+    async def scenario():
+        done, own = [], Scope("own")
+
+        async def once(event):
+            own.close()
+            await asyncio.sleep(0)
+            done.append(event.kind)
+
+        button = html.button()
+        page.element("bar").append(button)
+        with own.active():
+            button.on("click", once)
+        click(page, page.mount, button)
+        await settled()
+        assert done == ["click"]
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_what_an_async_handler_raises_is_said_on_the_page(page, channel, own):
+    async def scenario():
+        async def fail(event):
+            await asyncio.sleep(0)
+            raise RuntimeError("flat battery")
+
+        bar = page.element("bar")
+        if own:
+            page.listen(page.mount, bar, "click", fail)
+        else:
+            bar.on("click", fail)
+        click(page, page.mount, bar)
+        await settled()
+        assert channel.errors == ["A handler failed: RuntimeError: flat battery"]
+
+    asyncio.run(scenario())
+
+
+def test_a_press_goes_on_when_its_button_is_shown_no_more(page, monkeypatch):
+    async def scenario():
+        answer = asyncio.Event()
+
+        async def run(bridge, spec, values):
+            await answer.wait()
+            return "docked"
+
+        monkeypatch.setattr(robot_button, "run", run)
+        bob = Robot("Bob")
+        button = RobotButton(bob, None, read_button({"label": "D", "service": "/d"}))
+        shown = Scope("shown")
+        with shown.active():
+            view = ButtonView(button, page.element("bar"))
+        click(page, page.mount, view._press)
+        await settled()
+        assert button.state == "running"
+        shown.close()
+        page.close()
+        answer.set()
+        await settled()
+        assert (button.state, button.words) == ("done", "docked")
+        bob.destroy()
+
+    asyncio.run(scenario())
+
+
+# What the browser is asked.
+
+
+def test_the_browser_prevents_and_stops_what_any_handler_wants_so(page, channel):
+    bar = page.element("bar")
+    key = (page.mount, bar.id, "click")
+    first = page.listen(page.mount, bar, "click", print)
+    assert channel.flags[key] == (False, False)
+    second = page.listen(page.mount, bar, "click", print, prevent=True)
+    assert channel.flags[key] == (True, False)
+    third = page.listen(page.mount, bar, "click", print, stop=True)
+    assert channel.flags[key] == (True, True)
+    second.remove()
+    assert channel.flags[key] == (False, True)
+    first.remove()
+    assert channel.flags[key] == (False, True)
+    third.remove()
+    assert channel.flags == {}
+
+
+def test_a_click_on_the_map_itself_can_be_prevented(page, container, channel):
+    map = Map(container, 700, 500)
+    map.on(map.root, "click", print, prevent=True)
+    (flags,) = (f for (_, i, _), f in channel.flags.items() if i == map.root.id)
+    assert flags == (True, False)
+
+
+def test_what_the_browser_refuses_to_listen_to_is_not_kept(page, channel, monkeypatch):
+    def refuse(*key, prevent, stop):
+        raise ValueError("no such event")
+
+    monkeypatch.setattr(channel, "listen", refuse)
+    with pytest.raises(ValueError, match="no such event"):
+        page.listen(page.mount, page.element("bar"), "clack", print)
+    assert page._listening == {}
+
+
+# What is left.
+
+
+def test_a_handler_leaves_nothing_in_its_scope_once_it_is_removed(page):
+    scope = Scope("module")
+    with scope.active():
+        page.listen(page.mount, page.element("bar"), "click", print).remove()
+    assert len(scope) == 0
+
+
+def test_handlers_of_a_robot_that_comes_and_goes_leave_nothing_behind(page, container):
+    bob = Robot("Bob")
+    with page.scope.active():
+        map = Map(container, 700, 500)
+        before = len(page.scope)
+        for _ in range(3):
+            map.add_robot(bob)
+            map.on(bob.svg, "dblclick", print)
+            map.remove_robot(bob)
+    assert len(page.scope) == before
+    bob.destroy()
+
+
+def test_a_page_that_closed_is_in_the_scope_of_no_module(page, container):
+    scope = Scope("a robot's module")
+    bar = page.element("bar")
+    with scope.active():
+        page.listen(page.mount, bar, "click", print)
+    page.close()
+    assert len(scope) == 0
+
+
+def test_a_robot_from_plain_data_takes_the_bridges_that_it_made_along(page, caplog):
+    url = "ws://a-robot-of-one-page:9090"
+    data = {
+        "name": "Bob",
+        "odometry": {"bridge": url, "topic": "/odom", "type": "nav_msgs/Odometry"},
+        "tf": {"bridge": url},
+        "twist": {"bridge": url, "topic": "/cmd_vel"},
+        "modules": [{"name": "LaserScanner", "args": [{"bridge": url}, "/scan"]}],
+    }
+    with page.scope.active():
+        bridge = Robot.from_dict(data).feed.bridge
+    assert bridge in lifecycle._services
+    page.close()
+    assert bridge not in lifecycle._services
+    assert bridge._topics == {}
+    assert caplog.text == ""
+    assert len(page.scope) == 0
+
+
+def test_an_image_that_was_removed_can_be_loaded_no_more(container, publisher, page):
+    page.entry.folder.joinpath("floor.png").write_bytes(b"png")
+    map = Map(container, 700, 500)
+    before = len(page.scope)
+    for _ in range(3):
+        image = map.add_image("floor.png", 0, 0, 1, 1)
+        assert publisher.images == ["floor.png"]
+        map.remove_image(image)
+        assert publisher.images == []
+    assert len(page.scope) == before
+    map.remove_image(image)
+    map.remove_image(svg.image())
+
+
+def test_the_images_of_a_map_go_with_it(container, publisher, page):
+    page.entry.folder.joinpath("floor.png").write_bytes(b"png")
+    map = Map(container, 700, 500)
+    map.add_image("floor.png", 0, 0, 1, 1)
+    map.destroy()
+    assert publisher.images == []
+    page.close()

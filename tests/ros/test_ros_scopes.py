@@ -1,0 +1,189 @@
+"""A bridge and what is subscribed on it end with whatever made them."""
+
+import asyncio
+
+import pytest
+from fake_rosbridge import FakeRosbridge, bridged, until
+
+from webmap.errors import BridgeClosed
+from webmap.lifecycle import Lifecycle
+from webmap.ros import bridge as bridge_module
+from webmap.ros.bridge import Bridge
+from webmap.ros.callbacks import Callbacks
+from webmap.scope import Scope
+
+
+def run(scenario):
+    asyncio.run(asyncio.wait_for(scenario(), 30))
+
+
+@pytest.fixture
+def lifecycle(monkeypatch):
+    """A process of its own for the bridges of a test."""
+    lifecycle = Lifecycle()
+    monkeypatch.setattr(bridge_module, "lifecycle", lifecycle)
+    return lifecycle
+
+
+class Work:
+    """An async callback that goes on until it is cancelled."""
+
+    def __init__(self):
+        self.began = self.cancelled = 0
+
+    async def __call__(self, *args):
+        self.began += 1
+        try:
+            await asyncio.Event().wait()
+        except asyncio.CancelledError:
+            self.cancelled += 1
+            raise
+
+
+def test_what_a_callback_goes_on_with_ends_with_its_subscription():
+    async def scenario():
+        by_hand, by_scope, scope = Work(), Work(), Scope("page")
+        async with bridged() as (server, bridge):
+            heard = bridge.subscribe("/a", by_hand)
+            with scope.active():
+                bridge.subscribe("/a", by_scope)
+            await server.heard("subscribe")
+            await server.publish("/a", {"data": 1})
+            await until(lambda: by_hand.began and by_scope.began)
+            heard.remove()
+            await until(lambda: by_hand.cancelled)
+            assert not by_scope.cancelled
+            scope.close()
+            await until(lambda: by_scope.cancelled)
+
+    run(scenario)
+
+
+def test_what_goes_on_for_an_occasion_ends_with_the_removal():
+    async def scenario():
+        work = Work()
+        callbacks = Callbacks("on_close", lambda error: None)
+        _, removal = callbacks.add(work)
+        callbacks.call("the link was lost")
+        await until(lambda: work.began)
+        removal.remove()
+        await until(lambda: work.cancelled)
+
+    run(scenario)
+
+
+def test_a_callback_that_ends_its_own_subscription_goes_on_to_its_end():
+    async def scenario():
+        done = []
+
+        async def once(message):
+            heard.remove()
+            await asyncio.sleep(0)
+            done.append(message["data"])
+
+        async with bridged() as (server, bridge):
+            heard = bridge.subscribe("/a", once)
+            await server.heard("subscribe")
+            await server.publish("/a", {"data": 1})
+            await until(lambda: done)
+            assert done == [1]
+
+    run(scenario)
+
+
+def test_a_bridge_ends_with_the_scope_that_it_was_made_in(lifecycle):
+    async def scenario():
+        server, page, got = FakeRosbridge(), Scope("page"), []
+        await server.start()
+        lifecycle.begin(asyncio.get_running_loop())
+        with page.active():
+            bridge = Bridge(server.url)
+            bridge.subscribe("/a", got.append)
+        await until(lambda: bridge.state == "open")
+        assert len(page) == 2
+        page.close()
+        await until(lambda: bridge.state == "closed" and not server.links)
+        assert list(lifecycle._services) == []
+        bridge.start(asyncio.get_running_loop())
+        assert bridge.state == "closed"
+        await lifecycle.end()
+        await server.stop()
+
+    run(scenario)
+
+
+def test_a_bridge_that_was_made_for_nobody_stays(lifecycle):
+    bridge = Bridge("ws://robot:9090")
+    assert list(lifecycle._services) == [bridge]
+
+
+def test_a_bridge_that_never_began_does_not_begin_after_its_scope(lifecycle):
+    page = Scope("page")
+    with page.active():
+        bridge = Bridge("ws://robot:9090")
+    page.close()
+
+    async def scenario():
+        lifecycle.begin(asyncio.get_running_loop())
+        assert bridge.state == "new"
+        await lifecycle.end()
+
+    run(scenario)
+
+
+def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
+    async def scenario():
+        server, page, told = FakeRosbridge(), Scope("page"), []
+        robot = Scope("robot", lambda text, about: told.append(text))
+        await server.start()
+        lifecycle.begin(asyncio.get_running_loop())
+        with page.active():
+            bridge = Bridge(server.url)
+        with robot.active():
+            bridge.subscribe("/odom", print)
+        page.close()
+        await until(lambda: told)
+        assert "has ended with the page or the module that made it" in told[0]
+        assert "/odom" in caplog.text
+        for use in (
+            lambda: bridge.subscribe("/scan", print),
+            lambda: bridge.publish("/a", {"data": "x"}, "std_msgs/String"),
+            lambda: bridge.on_open(print),
+        ):
+            with pytest.raises(BridgeClosed, match="made outside of both"):
+                use()
+        with pytest.raises(BridgeClosed, match="made outside of both"):
+            await bridge.call_service("/dock")
+        robot.close()
+        await lifecycle.end()
+        await server.stop()
+
+    run(scenario)
+
+
+def test_nobody_is_told_of_a_bridge_that_ends_together_with_its_users(
+    lifecycle, caplog
+):
+    async def scenario():
+        server, page, told = FakeRosbridge(), Scope("page"), []
+        robot = Scope("robot", lambda text, about: told.append(text))
+        await server.start()
+        lifecycle.begin(asyncio.get_running_loop())
+        with page.active():
+            page.add(_Closes(robot))  # older than the bridge, so removed after it
+            bridge = Bridge(server.url)
+        with robot.active():
+            bridge.subscribe("/odom", print)
+        page.close()
+        await until(lambda: bridge.state == "closed")
+        await lifecycle.end()
+        assert told == []
+        assert caplog.text == ""
+        await server.stop()
+
+    run(scenario)
+
+
+class _Closes:
+    def __init__(self, scope):
+        self.remove = scope.close
