@@ -1,6 +1,7 @@
-"""Reading files that people name: whole, small enough, and nothing but files."""
+"""Files that people name are read, and those of this program written, whole."""
 
 import os
+import secrets
 import stat
 from pathlib import Path
 
@@ -34,6 +35,33 @@ def read_file(file: Path, largest: int) -> bytes:
     if len(data) > largest:
         raise ConfigError(f"{file}: the file is larger than {largest >> 20} MiB")
     return data
+
+
+def write_file(file: Path, data: bytes) -> None:
+    """Put bytes in the place of a file, or leave it as it was.
+
+    Several may write one file at once: it holds all that one of them wrote.
+
+    Args:
+        file: The file; its folder is made if there is none.
+        data: All that is to be in it.
+
+    Raises:
+        OSError: If the disk does not take them.
+
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    # A name that nobody else has, or one would put there what another still writes.
+    temporary = file.with_name(f".{file.name}.{secrets.token_hex(8)}.new")
+    try:
+        with temporary.open("xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(file)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def _kind(mode: int) -> str:

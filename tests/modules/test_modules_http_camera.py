@@ -2,6 +2,8 @@
 
 import asyncio
 import io
+import ssl
+import threading
 import time
 
 import pytest
@@ -16,6 +18,7 @@ from webmap.modules.robot import http_camera
 from webmap.modules.robot.http_camera import HttpCamera
 from webmap.ros import image_pull
 from webmap.ros.backoff import Backoff
+from webmap.ros.image_address import parse_address
 from webmap.scope import Scope, current_scope
 
 STREAM = "/stream?topic=/camera/image_raw&type=mjpeg"
@@ -134,8 +137,7 @@ def test_a_stream_is_thinned_out_to_its_newest_pictures():
         camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=200)
         seen = []
         camera.watch(lambda: seen.append(shown(camera).getpixel((8, 6))[0]))
-        await until(lambda: len(seen) >= 3)
-        assert server.pictures > 2 * len(seen)
+        await until(lambda: len(seen) >= 3 and server.pictures > 2 * len(seen))
         newest = server.pictures * 5
         assert newest - seen[-1] < 15 * 5
 
@@ -236,6 +238,65 @@ def test_where_nobody_listens_it_is_said():
         camera.watch(lambda: None)
         await until(lambda: robot.problems)
         assert "nothing listens there" in next(iter(robot.problems.values()))
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("name", ["cam..local", ".local", f"{'c' * 64}.local"])
+def test_a_name_that_no_host_can_have_is_said_and_tried_again(robot, name):
+    async def scenario():
+        said = []
+        pull = image_pull.Pull(
+            parse_address(f"http://{name}/stream"),
+            0.0,
+            lambda picture: None,
+            said.append,
+        )
+        pull.start(asyncio.get_running_loop())
+        await until(lambda: len(said) >= 2)
+        await pull.stop()
+        assert set(said) == {"there is no such host"}
+
+    asyncio.run(scenario())
+
+
+def test_who_may_vouch_for_a_camera_is_read_once_and_in_a_thread(monkeypatch):
+    read_in = []
+    create = ssl.create_default_context
+
+    def reading():
+        read_in.append(threading.current_thread())
+        return create()
+
+    monkeypatch.setattr(ssl, "create_default_context", reading)
+
+    async def scenario(server, robot):
+        said = []
+        address = parse_address(server.at("/snapshot").replace("http:", "https:"))
+        pull = image_pull.Pull(address, 0.0, lambda picture: None, said.append)
+        pull.start(asyncio.get_running_loop())
+        await until(lambda: len(said) >= 3)
+        await pull.stop()
+
+    run(scenario)
+    (thread,) = read_in
+    assert thread is not threading.main_thread()
+
+
+def test_who_watches_after_a_camera_failed_to_begin_has_it_begin_again(monkeypatch):
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
+
+        def failing(*args):
+            raise RuntimeError("not now")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(http_camera, "Pull", failing)
+            with pytest.raises(RuntimeError, match="not now"):
+                camera.watch(lambda: None)
+        assert not camera.watched
+        camera.watch(lambda: None)
+        await until(lambda: camera.url is not None)
 
     run(scenario)
 

@@ -34,7 +34,7 @@ def shown(layer) -> list[str]:
 
 
 async def saved(layer) -> None:
-    while layer._saving is not None:
+    while layer.added._saving is not None:
         await asyncio.sleep(0.005)
 
 
@@ -95,7 +95,7 @@ def test_what_a_page_sends_is_checked(map, page, said, add, words):
         module = map.add_module("Labels")
         module.on_message({"add": add})
         module.on_message({"nonsense": 1})
-        assert module.layer.labels == {}
+        assert module.layer.added.labels == {}
         page.close()
 
     asyncio.run(scenario())
@@ -130,6 +130,69 @@ def test_a_label_is_moved_for_everybody_and_stays_there(map, page, state, said):
     assert kept == {"name": "Dock", "x": -1.5, "y": 7.0, "icon": "charger", "yaw": 1.0}
 
 
+def test_what_is_added_is_kept_also_while_pages_show_other_configured_labels(
+    map, page, state, said
+):
+    async def scenario():
+        one = map.add_module("Labels", [DESK])
+        other = Map(page.element("other"), 100, 100).add_module("Labels")
+        one.on_message({"add": {"name": "Dock", "x": 3, "y": 4}})
+        other.on_message({"add": {"name": "Door", "x": 5, "y": 6}})
+        assert shown(one.layer) == ["Desk", "Dock", "Door"]
+        assert shown(other.layer) == ["Dock", "Door"]
+        dock = other.layer.svg.children[0].get("data-label")
+        one.on_message({"move": dock, "to": {"x": 7, "y": 8}})
+        assert other.layer.svg.children[0]._transform == (7.0, 8.0, 0.0)
+        await saved(one.layer)
+        names = [label["name"] for label in json.loads(state.read_text())["labels"]]
+        assert names == ["Dock", "Door"]
+        other.on_message({"remove": dock})
+        assert shown(one.layer) == ["Desk", "Door"]
+        await saved(one.layer)
+        page.close()
+
+    asyncio.run(scenario())
+    (kept,) = json.loads(state.read_text())["labels"]
+    assert kept["name"] == "Door"
+    assert said == [{"done": True}] * 4
+
+
+def test_the_file_is_read_anew_when_nobody_showed_its_labels(map, page, state, said):
+    async def scenario():
+        module = map.add_module("Labels")
+        module.on_message({"add": {"name": "Dock", "x": 3, "y": 4}})
+        await saved(module.layer)
+        map.remove_module(module)
+        state.write_text('{"labels": [{"name": "Mended", "x": 0, "y": 0}]}')
+        assert shown(map.add_module("Labels").layer) == ["Mended"]
+        page.close()
+
+    asyncio.run(scenario())
+
+
+def test_who_comes_later_is_told_too_that_labels_are_not_kept(
+    map, page, channel, state, said
+):
+    async def scenario():
+        module = map.add_module("Labels")
+        state.parent.parent.mkdir(parents=True)
+        state.parent.write_text("a file where a folder is to be")
+        module.on_message({"add": {"name": "Dock", "x": 3, "y": 4}})
+        await saved(module.layer)
+        later = Map(page.element("other"), 100, 100).add_module("Labels", [DESK])
+        (words,) = later.layer.problems.values()
+        assert "labels are not kept" in words
+        state.parent.unlink()
+        module.on_message({"add": {"name": "Door", "x": 5, "y": 6}})
+        await saved(module.layer)
+        assert not later.layer.problems
+        assert not module.layer.problems
+        page.close()
+
+    asyncio.run(scenario())
+    assert len(json.loads(state.read_text())["labels"]) == 2
+
+
 def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
     page = Page(
@@ -138,7 +201,7 @@ def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
     module = Map(page.element("map"), 700, 500).add_module("Labels")
     module.on_message({"add": DESK})
     assert said == [{"refused": "only an operator adds, moves and deletes labels"}]
-    assert module.layer.labels == {}
+    assert module.layer.added.labels == {}
     page.close()
 
 
@@ -162,8 +225,8 @@ def test_a_disk_that_takes_nothing_is_said(map, page, channel, state, said):
 
     async def scenario():
         module = map.add_module("Labels")
-        assert module.layer.readable is False or module.layer.labels == {}
-        module.layer.readable = True
+        assert module.layer.added.readable is False or module.layer.added.labels == {}
+        module.layer.added.readable = True
         module.on_message({"add": DESK})
         await saved(module.layer)
         page.close()

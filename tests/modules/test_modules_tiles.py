@@ -1,6 +1,7 @@
 """A layer of tiles on a map: what it loads, says and lets go."""
 
 import asyncio
+import threading
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from scene_of_tiles import DATUM, EAST, made_tiles, number
 
 from webmap.core.pictures import pictures
 from webmap.errors import ConfigError
+from webmap.modules.map import tile_layer
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +62,46 @@ def test_a_tile_that_is_none_is_said_once_and_the_others_are_drawn(
     (said,) = channel.errors
     assert "a tile is not shown" in said
     assert "is no PNG, JPEG or WebP" in said
+
+
+class Slow:
+    """Tiles from a disk that takes its time."""
+
+    zooms = range(20)
+    attribution = ""
+
+    def __init__(self):
+        self.reading = threading.Event()
+        self.goes_on = threading.Event()
+        self.closed_in: threading.Thread | None = None
+
+    def read(self, tile):
+        self.reading.set()
+        assert self.goes_on.wait(10)
+        raise ConfigError("the file is closed")
+
+    def close(self):
+        assert self.goes_on.wait(10)
+        self.closed_in = threading.current_thread()
+
+
+def test_a_page_that_closes_does_not_wait_for_a_tile_that_is_read(
+    map, page, channel, monkeypatch
+):
+    slow = Slow()
+    monkeypatch.setattr(tile_layer, "open_tiles", lambda source: slow)
+
+    async def scenario():
+        map.fit(-200, -150, 400, 300)
+        map.add_module("TileLayer", "a.mbtiles", DATUM)
+        await asyncio.to_thread(slow.reading.wait, 10)
+        page.close()
+        assert slow.closed_in is None
+        slow.goes_on.set()
+
+    asyncio.run(scenario())
+    assert slow.closed_in not in (None, threading.main_thread())
+    assert not channel.errors
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,19 @@ from webmap.ros.events import (
 )
 from webmap.ros.fragments import Fragments
 from webmap.ros.protocol import Protocol, topic_in_head
-from webmap.ros.views import ODOMETRY_VIEWS, VIEWS
+from webmap.ros.views import ODOMETRY_VIEWS
 
 CAPTURED = Path(__file__).parent / "captured"
 SERVERS = ["ros1", "ros2", "rs"]
+VIEWS = (
+    *ODOMETRY_VIEWS.values(),
+    messages.TwistMsg,
+    messages.LaserScanMsg,
+    messages.BatteryStateMsg,
+    messages.OccupancyGridMsg,
+    messages.PathMsg,
+    messages.TFMessage,
+)
 
 
 def files(*patterns, servers=SERVERS):
@@ -281,7 +290,7 @@ def try_all(frame):
     """Receive and decode in every way; only a ProtocolError may come out."""
     event = Protocol().receive(frame, 0.0)
     if isinstance(event, Publish):
-        for view in (None, *VIEWS.values()):
+        for view in (None, *VIEWS):
             attempt(event, view)
     return event
 

@@ -13,7 +13,6 @@ from webmap.ros.views import (
     ODOMETRY_VIEWS,
     odometry_view,
     odometry_view_by_shape,
-    view_of,
 )
 
 CAPTURED = Path(__file__).parent / "captured"
@@ -58,9 +57,6 @@ def test_captured_messages_that_say_nothing_of_a_place_are_told(path):
 def test_types_without_a_place_are_refused():
     with pytest.raises(ConfigError, match="nav_msgs/Odometry"):
         odometry_view("sensor_msgs/LaserScan")
-    assert view_of("sensor_msgs/msg/LaserScan") is messages.LaserScanMsg
-    assert view_of("std_msgs/String") is None
-    assert view_of("nonsense") is None
 
 
 def test_stamps_of_both_dialects_are_seconds():

@@ -1,5 +1,6 @@
 """Files that people name, and what is no file though it has a name."""
 
+import errno
 import os
 import socket
 
@@ -7,7 +8,7 @@ import pytest
 
 from webmap.errors import ConfigError
 from webmap.lined_yaml import LinedYaml
-from webmap.plain_files import read_file
+from webmap.plain_files import read_file, write_file
 
 
 def test_a_file_is_read_and_so_is_one_behind_a_link(tmp_path):
@@ -39,6 +40,46 @@ def test_a_file_that_is_too_large_is_refused(tmp_path):
     (tmp_path / "a").write_bytes(b"x" * ((1 << 20) + 1))
     with pytest.raises(ConfigError, match="larger than 1 MiB"):
         read_file(tmp_path / "a", 1 << 20)
+
+
+def test_a_file_is_written_into_a_folder_that_is_made_for_it(tmp_path):
+    file = tmp_path / "new" / "a.json"
+    write_file(file, b"one")
+    write_file(file, b"two")
+    assert file.read_bytes() == b"two"
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_two_who_write_a_file_at_once_do_not_get_in_each_others_way(
+    tmp_path, monkeypatch
+):
+    file = tmp_path / "a.json"
+    written = []
+
+    def while_that_goes_to_the_disk(number):
+        if not written:
+            written.append(number)
+            write_file(file, b"second")
+            assert file.read_bytes() == b"second"
+
+    monkeypatch.setattr(os, "fsync", while_that_goes_to_the_disk)
+    write_file(file, b"the first")
+    assert file.read_bytes() == b"the first"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_disk_that_takes_nothing_leaves_the_file_as_it_was(tmp_path, monkeypatch):
+    file = tmp_path / "a.json"
+    write_file(file, b"before")
+
+    def full(number):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_file(file, b"after")
+    assert file.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_yaml_knows_on_which_line_something_stands(tmp_path):

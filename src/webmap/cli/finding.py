@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import click
 
@@ -103,9 +103,3 @@ async def _ask(
 
 async def _behind(url: str, topics: Mapping[str, str]) -> Findings:
     return discover(topics, host_name(url), await hear_frames(url, topics))
-
-
-def without_named(findings: Findings, names: set[str]) -> Findings:
-    """Return the findings without the robots that were told by hand."""
-    kept = tuple(one for one in findings.robots if one.name not in names)
-    return replace(findings, robots=kept)

@@ -3,12 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-import click
-
 from webmap.cli.described import cameras_left_out
 from webmap.cli.draw_layer import draw_layer, meant
 from webmap.cli.following import follow
-from webmap.cli.looking import Looking
+from webmap.cli.looking import Looking, say
 from webmap.cli.overruling import Overruling
 from webmap.cli.told import Offer, offer
 from webmap.console import RobotDescription
@@ -143,7 +141,7 @@ class DrawnLayers(Looking):
         options = {**found.tf_options, "quiet": True, "map_frame": found.map_frame}
         moved = follow(robot, self.bridge, found, options)
         if moved and known is not None:
-            click.echo(moved, err=True)
+            say(moved)
 
     def _draw(
         self, robot: "Robot", layers: Sequence[FoundLayer], namespace: str
@@ -189,8 +187,7 @@ class DrawnLayers(Looking):
         """Say once what is left out, since it costs the link more than it tells."""
         new = [topic for topic in others if self._is_new(robot, topic)]
         if new:
-            click.echo(
+            say(
                 f"{robot.name}: not drawn, since there are enough of their kind: "
-                f"{', '.join(new)}",
-                err=True,
+                f"{', '.join(new)}"
             )

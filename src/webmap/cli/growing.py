@@ -1,5 +1,6 @@
 """Giving a robot that is shown already what it has more than before."""
 
+import logging
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,8 @@ from webmap.scope import no_scope
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
+
+log = logging.getLogger("webmap.cli")
 
 
 def grow(
@@ -99,8 +102,11 @@ def grow(
     used = []
     with no_scope():
         for role in roles:
-            if role == "camera":
-                used += [f"camera {topic}" for topic in use_cameras()]
-            elif role in uses and uses[role]() is not False:
-                used.append(f"{role} {found.topic(role)}")
+            try:
+                if role == "camera":
+                    used += [f"camera {topic}" for topic in use_cameras()]
+                elif role in uses and uses[role]() is not False:
+                    used.append(f"{role} {found.topic(role)}")
+            except Exception:  # the others are news now and never again
+                log.exception("%s: its %s is not used", robot.name, role)
     return used

@@ -1,13 +1,12 @@
 """Robots that appear while the console runs."""
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import click
-
 from webmap.cli.draw_layer import shared_map
-from webmap.cli.looking import Looking
+from webmap.cli.looking import Looking, say
 from webmap.cli.overruling import Overruling
 from webmap.console import Console, RobotDescription
 from webmap.console.fleet import make_robot
@@ -22,6 +21,8 @@ from webmap.scope import no_scope
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
+
+log = logging.getLogger("webmap.cli")
 
 PERIOD = 5.0
 """Seconds between two looks."""
@@ -101,7 +102,14 @@ class LookingForRobots(Looking):
         trees = await late_frames(self.bridge).listen(topics)
         found = discover(topics, host_name(self.bridge.url), trees)
         for news in self._newcomers.look(found):
-            self._came(news, self.bridge)
+            try:
+                self._came(news, self.bridge)
+            except Exception:  # the others are news now and never again
+                log.exception(
+                    "%s: what is new of %s is not shown",
+                    self.bridge.url,
+                    news.robot.name,
+                )
 
 
 def greet(
@@ -145,19 +153,18 @@ def greet(
             roles = [role for role in news.roles if role not in fixed]
             used = grow(shown, bridge, robot, roles, stops_within=stops_within)
             if used:
-                click.echo(f"{shown.name} has more now: {', '.join(used)}", err=True)
+                say(f"{shown.name} has more now: {', '.join(used)}")
             # Who says which frames are a robot's means those.
             if news.moved and "tf" not in fixed:
                 moved = follow(shown, bridge, robot)
                 if moved:
-                    click.echo(moved, err=True)
+                    say(moved)
             return
         about = describe(robot, bridge, stops_within=stops_within)
         if any(overrules(other, about) for other in told):
             return
         robot = replace(robot, name=free_name(robot.name, names))
-        said = in_one_line(robot)
-        click.echo(f"A robot appeared behind {bridge.url}: {said}", err=True)
         late.add(robot, replace(about, name=robot.name))
+        say(f"A robot appeared behind {bridge.url}: {in_one_line(robot)}")
 
     return came

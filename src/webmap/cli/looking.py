@@ -1,10 +1,13 @@
 """Looking again and again which topics are behind a bridge."""
 
 import asyncio
+import contextlib
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
+
+import click
 
 from webmap.errors import BridgeError
 from webmap.lifecycle import lifecycle
@@ -66,9 +69,18 @@ class Looking(ABC):
                 except BridgeError as error:
                     log.debug("%s: %s", self.bridge.url, error)
                     pause = min(2 * pause, LONGEST)
+                except Exception:
+                    log.exception("%s: a look at the topics failed", self.bridge.url)
+                    pause = min(2 * pause, LONGEST)
             await asyncio.sleep(pause)
 
     async def _topics(self) -> dict[str, str]:
         if self._told_topics is not None:
             return dict(self._told_topics)
         return await self.bridge.topics()
+
+
+def say(text: str) -> None:
+    """Say something on standard error; that nobody hears it is no reason to stop."""
+    with contextlib.suppress(OSError, ValueError):  # a full disk, nobody at the pipe
+        click.echo(text, err=True)

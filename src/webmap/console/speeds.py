@@ -103,11 +103,6 @@ def linear(velocity: Velocity | None) -> str:
     return number(math.copysign(math.hypot(x, y), x))
 
 
-def turn(velocity: Velocity | None) -> str:
-    """Return the rate of turn, counter-clockwise."""
-    return UNKNOWN if velocity is None else number(velocity[2])
-
-
 def cap(v: float, w: float) -> str:
     """Return the speeds in force as people read them."""
     return f"{number(v)} m/s, {number(w)} rad/s"

@@ -10,7 +10,6 @@ import datetime
 import hashlib
 import json
 import logging
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
@@ -19,6 +18,7 @@ from webmap.core.alignment import alignment, alignments, numbers
 from webmap.errors import ConfigError
 from webmap.gate.kept.locks import state_folder
 from webmap.geometry import Pose
+from webmap.plain_files import write_file
 from webmap.ros.bridge import Bridge
 
 if TYPE_CHECKING:
@@ -86,13 +86,7 @@ class AlignmentStore:
             "by": by,
             "date": datetime.datetime.now().astimezone().date().isoformat(),
         }
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(".alignment.new")
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(content, file)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
+        write_file(path, json.dumps(content).encode())
         return str(path)
 
     def forget(self, name: str) -> None:

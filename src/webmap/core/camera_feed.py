@@ -78,8 +78,13 @@ class CameraFeed:
         self._watchers[key] = fn
         if first:
             # Not a thing of the first who watches: it goes on for the others.
-            with no_scope():
-                self.begin()
+            try:
+                with no_scope():
+                    self.begin()
+            except BaseException:
+                # Whoever comes next is the first again, and begins.
+                self._watchers.pop(key, None)
+                raise
         scope = current_scope()
 
         def undo() -> None:

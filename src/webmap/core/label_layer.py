@@ -1,22 +1,17 @@
 """Labels on maps, the same for everybody who sees them."""
 
-import asyncio
-import logging
 from typing import Any
 
-from webmap.core.labels import ICONS, MAX_LABELS, Label, LabelStore, moved_label
+from webmap.core.added_labels import AddedLabels
+from webmap.core.labels import ICONS, MAX_LABELS, Label
 from webmap.core.layer import Layer
-from webmap.core.tasks import spawn
 from webmap.errors import ConfigError
-from webmap.gate.kept.locks import state_folder
 from webmap.scene import svg
 from webmap.scene.element import Element
 
-log = logging.getLogger("webmap.labels")
-
 
 class LabelLayer(Layer):
-    """The labels of one name, of a configuration and of those added on pages.
+    """The labels of a configuration, and those added on pages under one name.
 
     Args:
         name: Of the file that keeps those that are added.
@@ -26,25 +21,16 @@ class LabelLayer(Layer):
 
     def __init__(self, name: str, configured: tuple[Label, ...]) -> None:
         super().__init__()
-        self.store = LabelStore(state_folder(), name)
-        self.labels: dict[str, Label] = {label.id: label for label in configured}
-        self.readable = True
-        """Whether the file was read, so that it may be written again."""
+        self.configured = {label.id: label for label in configured}
+        self.added = AddedLabels.of(name)
         self._drawn: dict[str, Element] = {}
-        self._unsaved = False
-        self._saving: asyncio.Task[None] | None = None
         self.svg.classes.add("labels")
 
     def start(self) -> None:
-        """Draw what is known; what was added before is read from the disk."""
-        try:
-            for label in self.store.load():
-                self.labels[label.id] = label
-        except ConfigError as error:
-            self.readable = False
-            self.set_problem(self, f"added labels are not shown: {error}")
-        for label in self.labels.values():
-            self._draw(label)
+        """Draw what is configured, and what was added before."""
+        for label in self.configured.values():
+            self.draw(label)
+        self.added.show_on(self)
 
     def add(self, label: Label) -> None:
         """Show one more, and keep it.
@@ -53,12 +39,9 @@ class LabelLayer(Layer):
             ConfigError: If it cannot be kept.
 
         """
-        self._check_writable()
-        if len(self.labels) >= MAX_LABELS:
+        if len(self._drawn) >= MAX_LABELS:
             raise ConfigError(f"{MAX_LABELS} labels are the most")
-        self.labels[label.id] = label
-        self._draw(label)
-        self._save()
+        self.added.add(label)
 
     def remove(self, id: str) -> None:
         """Take one away that was added on a page.
@@ -67,10 +50,8 @@ class LabelLayer(Layer):
             ConfigError: If it is in the configuration, or there is none.
 
         """
-        label = self._kept(id)
-        del self.labels[label.id]
-        self._drawn.pop(label.id).remove()
-        self._save()
+        self._check_added(id)
+        self.added.remove(id)
 
     def move(self, id: str, place: Any) -> None:
         """Put one elsewhere that was added on a page.
@@ -84,28 +65,23 @@ class LabelLayer(Layer):
                 makes no sense.
 
         """
-        label = moved_label(self._kept(id), place)
-        self.labels[label.id] = label
-        self._drawn[label.id].set_pose(label.x, label.y, 0.0)
-        self._save()
+        self._check_added(id)
+        self.added.move(id, place)
 
-    def _kept(self, id: str) -> Label:
-        self._check_writable()
-        label = self.labels.get(id)
-        if label is None:
-            raise ConfigError("this label is gone already")
-        if not label.kept:
+    def _check_added(self, id: str) -> None:
+        label = self.configured.get(id)
+        if label is not None:
             raise ConfigError(f"{label.name} is in the configuration and stays")
-        return label
 
-    def _check_writable(self) -> None:
-        if not self.readable:
-            raise ConfigError(
-                f"{self.store.file} could not be read and is left alone: mend or "
-                "remove it, and start again"
-            )
+    def erase(self, id: str) -> None:
+        """Draw a label no more."""
+        self._drawn.pop(id).remove()
 
-    def _draw(self, label: Label) -> None:
+    def draw(self, label: Label) -> None:
+        """Draw a label, also one that is drawn already and is elsewhere now."""
+        if label.id in self._drawn:
+            self._drawn[label.id].set_pose(label.x, label.y, 0.0)
+            return
         name = svg.text(text=label.name, class_="name", y=26)
         icon = svg.path(d=ICONS[label.icon], class_="icon")
         icon.set(transform="translate(-9 -9) scale(0.75)")
@@ -119,22 +95,3 @@ class LabelLayer(Layer):
         drawn.set_pose(label.x, label.y, 0.0)
         self._drawn[label.id] = drawn
         self.svg.append(drawn)
-
-    def _save(self) -> None:
-        self._unsaved = True
-        if self._saving is None:
-            self._saving = spawn(self._save_on())
-
-    async def _save_on(self) -> None:
-        try:
-            while self._unsaved:
-                self._unsaved = False
-                kept = [label for label in self.labels.values() if label.kept]
-                try:
-                    await asyncio.to_thread(self.store.save, kept)
-                    self.clear_problem(self.store)
-                except OSError as error:
-                    words = f"labels are not kept: {self.store.file}: {error.strerror}"
-                    self.set_problem(self.store, words)
-        finally:
-            self._saving = None

@@ -3,7 +3,6 @@
 import difflib
 import json
 import math
-import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ import msgspec
 
 from webmap.errors import ConfigError
 from webmap.identifiers import generate_id
+from webmap.plain_files import write_file
 
 ICONS = {
     "pin": "M12 21c-4-4.4-6-7.7-6-10.800a6 6 0 0 1 12 0c0 3.1-2 6.4-6 10.800z"
@@ -202,13 +202,8 @@ class LabelStore:
             {key: getattr(label, key) for key in _KEYS if getattr(label, key) != ""}
             for label in labels
         ]
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        temporary = self.file.with_suffix(".new")
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump({"labels": plain}, file, ensure_ascii=False, indent=1)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(self.file)
+        text = json.dumps({"labels": plain}, ensure_ascii=False, indent=1)
+        write_file(self.file, text.encode())
 
 
 def _label(data: Any, of: str) -> Label:

@@ -1,9 +1,7 @@
 """Routes that were saved, by name, in a file for each map."""
 
 import hashlib
-import os
 import re
-import tempfile
 import threading
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import msgspec
 
 from webmap.errors import ConfigError
+from webmap.plain_files import write_file
 
 MOST_ROUTES = 200
 MOST_POINTS = 500
@@ -156,16 +155,6 @@ class RouteStore:
     def _write(self, saved: Saved) -> None:
         text = msgspec.json.format(msgspec.json.encode(saved), indent=2)
         try:
-            self.file.parent.mkdir(parents=True, exist_ok=True)
-            number, name = tempfile.mkstemp(dir=self.file.parent)
-            try:
-                with os.fdopen(number, "wb") as file:
-                    file.write(text)
-                    file.flush()
-                    os.fsync(file.fileno())
-                Path(name).replace(self.file)
-            except BaseException:
-                Path(name).unlink(missing_ok=True)
-                raise
+            write_file(self.file, text)
         except OSError as error:
             raise ConfigError(f"{self.file} cannot be written: {error}") from error

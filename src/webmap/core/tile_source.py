@@ -192,8 +192,10 @@ class MBTiles:
         try:
             low, high = (int(str(known[name])) for name in ("minzoom", "maxzoom"))
         except (KeyError, ValueError):
+            # Asked for one by one, the index has them; together, every row is read.
             ((low, high),) = self._ask(
-                "SELECT MIN(zoom_level), MAX(zoom_level) FROM tiles"
+                "SELECT (SELECT MIN(zoom_level) FROM tiles), "
+                "(SELECT MAX(zoom_level) FROM tiles)"
             )
         if not (isinstance(low, int) and isinstance(high, int)) or low > high:
             raise ConfigError(f"tiles {str(self.file)!r}: there are no tiles in it")

@@ -64,7 +64,6 @@ class Lane:
         self._failed = failed
         self._again = again
         self._task: asyncio.Task[None] | None = None
-        self._socket: ClientConnection | None = None
         self._unsent: deque[bytes] = deque()
         self._unsent_size = 0
         self._wake = asyncio.Event()
@@ -107,11 +106,6 @@ class Lane:
         self._unsent_size += len(frame)
         self._wake.set()
 
-    def abort(self) -> None:
-        """Drop the link without a farewell; it is opened again if it should be."""
-        if self._socket is not None:
-            self._socket.transport.abort()
-
     async def _run(self) -> None:
         backoff = Backoff()
         try:
@@ -128,7 +122,7 @@ class Lane:
     async def _one_link(self) -> float:
         """Connect, serve the link until it ends, and return how long it was open."""
         try:
-            self._socket = link = await _connect(self.url)
+            link = await _connect(self.url)
         except Exception as error:  # name lookup, TCP, TLS, handshake: all the same
             self._failed(_not_reached(self.url, error))
             return 0.0
@@ -174,7 +168,7 @@ class Lane:
 
     def _forget_link(self, socket: "ClientConnection") -> None:
         socket.transport.abort()
-        self._socket = self._liveness = None
+        self._liveness = None
         self.state = "connecting" if self._again else "closed"
         self._unsent.clear()
         self._unsent_size = 0

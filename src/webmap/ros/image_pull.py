@@ -52,6 +52,7 @@ class Pull:
         self._shown_at = -float("inf")
         self._newest: bytes | None = None
         self._task: asyncio.Task[None] | None = None
+        self._trust: ssl.SSLContext | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Connect, and pull."""
@@ -76,7 +77,7 @@ class Pull:
             began, words = now(), None
             try:
                 streams = await self._pull()
-            except (ProtocolError, OSError, TimeoutError) as error:
+            except (ProtocolError, OSError, UnicodeError) as error:
                 words = self._words(error)
             else:
                 words = "it hung up" if streams else None
@@ -89,10 +90,12 @@ class Pull:
     async def _pull(self) -> bool:
         """Pull until the answer ends; return whether it was a stream."""
         address, self._newest = self._address, None
-        context = ssl.create_default_context() if address.tls else None
+        if address.tls and self._trust is None:
+            # Reading who may vouch for a name takes 0.1 s: other cameras cannot wait.
+            self._trust = await asyncio.to_thread(ssl.create_default_context)
         async with asyncio.timeout(self._patience):
             reader, writer = await asyncio.open_connection(
-                address.host, address.port, ssl=context
+                address.host, address.port, ssl=self._trust
             )
         try:
             writer.write(address.request)
@@ -139,7 +142,8 @@ class Pull:
             return f"no picture came for {self._patience:g} s"
         if isinstance(error, ConnectionRefusedError):
             return "nothing listens there"
-        if isinstance(error, socket.gaierror):
+        # The latter is how a name fails that no host can have, such as "cam..local".
+        if isinstance(error, socket.gaierror | UnicodeError):
             return "there is no such host"
         if isinstance(error, ssl.SSLCertVerificationError):
             return f"its certificate is not trusted: {error.verify_message}"

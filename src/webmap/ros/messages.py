@@ -231,12 +231,6 @@ class TwistMsg(msgspec.Struct, frozen=True):
         return Twist(self.linear.x, self.linear.y, angular.z)
 
 
-class TwistStampedMsg(Stamped, frozen=True, kw_only=True):
-    """``geometry_msgs/TwistStamped``."""
-
-    twist: TwistMsg
-
-
 class TwistWithCovarianceMsg(msgspec.Struct, frozen=True):
     """``geometry_msgs/TwistWithCovariance`` without the covariance."""
 

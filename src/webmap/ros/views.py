@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-import msgspec
-
 from webmap.errors import ConfigError, ProtocolError
 from webmap.ros import messages
 from webmap.ros.decoding import convert
@@ -28,26 +26,6 @@ ODOMETRY_VIEWS: dict[str, type[OdometryView]] = {
     "geometry_msgs/Pose2D": messages.Pose2DMsg,
 }
 """The views of the types that say where a robot is, by the name in ROS 1."""
-
-VIEWS: dict[str, type[msgspec.Struct]] = {
-    **ODOMETRY_VIEWS,
-    "geometry_msgs/Twist": messages.TwistMsg,
-    "geometry_msgs/TwistStamped": messages.TwistStampedMsg,
-    "sensor_msgs/LaserScan": messages.LaserScanMsg,
-    "sensor_msgs/BatteryState": messages.BatteryStateMsg,
-    "nav_msgs/OccupancyGrid": messages.OccupancyGridMsg,
-    "nav_msgs/Path": messages.PathMsg,
-    "tf2_msgs/TFMessage": messages.TFMessage,
-}
-"""Every view, by the name of its type in ROS 1."""
-
-
-def view_of(type: str) -> type[msgspec.Struct] | None:
-    """Return the view of a message type in either dialect, if there is one."""
-    try:
-        return VIEWS.get(str(split_type(type)))
-    except ConfigError:
-        return None
 
 
 def odometry_view(type: str) -> type[OdometryView]:

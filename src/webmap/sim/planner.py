@@ -41,11 +41,6 @@ class Planner:
         comfort = dilate(self.blocked, 0.35 / self.size)
         self._cost = np.where(comfort, _CLEARANCE_COST, 1.0)
 
-    def is_free(self, x: float, y: float) -> bool:
-        """Whether the base may be sent to a place."""
-        cell = self.cell(x, y)
-        return self._holds(cell) and not bool(self.blocked[cell])
-
     def reachable(self, x: float, y: float) -> NDArray[np.bool_]:
         """Return the cells of the search that a base at a place can get to."""
         rows, columns = self.blocked.shape

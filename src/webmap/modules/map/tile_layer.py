@@ -119,7 +119,8 @@ class TileLayer:
         self.map.unmount(self._fragment)
         close = getattr(self.source, "close", None)
         if close is not None:
-            close()
+            # In a thread, for it waits for one that reads a tile just now.
+            asyncio.get_running_loop().run_in_executor(None, close)
 
     async def _look_on(self) -> None:
         try:
@@ -154,7 +155,8 @@ class TileLayer:
             found = await asyncio.to_thread(self.source.read, tile)
         except (ConfigError, OSError, MemoryError) as error:
             found = None
-            self._complain(str(error))
+            if not self._closed:
+                self._complain(str(error))
         if self._closed:
             return
         if found is None:
