@@ -19,7 +19,7 @@ def robot(state: str | None = "free", *, holder: str | None = None, **changes):
         report = SimpleNamespace(
             state=state,
             holder=holder and SimpleNamespace(name=holder),
-            **{"link": "up", **changes},
+            **{"link": "up", "goal": None, "measured": None, **changes},
         )
     return SimpleNamespace(feed=BRIDGE_OPEN, report=report)
 
@@ -37,6 +37,29 @@ def robot(state: str | None = "free", *, holder: str | None = None, **changes):
 def test_every_drive_state_has_a_word_and_a_shape(state, holder, text, mine, shape):
     words = describe(robot(state, holder=holder))
     assert (words.text, words.mine, words.shape) == (text, mine, shape)
+
+
+@pytest.mark.parametrize(
+    ("measured", "text"),
+    [
+        (None, "Free"),
+        ((0.04, 0.0, -0.09), "Free"),
+        ((-0.03, 0.05, 0.0), "Still moving"),
+        ((0.0, 0.0, -0.1), "Still moving"),
+    ],
+)
+def test_a_robot_that_rolls_is_not_said_to_be_merely_free(measured, text):
+    assert describe(robot(measured=measured)).text == text
+
+
+@pytest.mark.parametrize(
+    ("state", "text"),
+    [("accepted", "On its way"), ("unknown", "On its way"), ("reached", "Free")],
+)
+def test_a_robot_with_a_goal_that_nobody_drives_is_on_its_way(state, text):
+    goal = SimpleNamespace(state=state)
+    assert describe(robot(goal=goal)).text == text
+    assert describe(robot("held", holder="Ann", goal=goal)).text == "Ann holds it"
 
 
 def test_a_robot_that_the_gate_does_not_know_is_only_watched():

@@ -14,6 +14,13 @@ LOW, EMPTY = 0.2, 0.1
 """Charges below which a battery is low, and as good as empty."""
 
 
+MOVES, TURNS = 0.05, 0.1
+"""Speeds in m/s and rad/s from which on a robot moves: the driving panel's too."""
+
+GOING = ("sent", "accepted", "under way", "cancelling", "unknown")
+"""States of a goal that may still move the robot."""
+
+
 @dataclass(frozen=True, slots=True)
 class Words:
     """How a state reads and looks."""
@@ -52,7 +59,19 @@ def describe(robot: "Robot") -> Words:
         return Words(f"{who} drives", "state-driving", "active", "You drive")
     if report.state == "held":
         return Words(f"{who} holds it", "state-held", "active", "You hold it")
+    if report.goal is not None and report.goal.state in GOING:
+        return Words("On its way", "goal-way", "active")
+    if _moves(report.measured):
+        return Words("Still moving", "state-stopping", "warn")
     return Words("Free", "state-free")
+
+
+def _moves(measured: tuple[float, float, float] | None) -> bool:
+    """Return whether odometry that is fresh shows a robot in motion."""
+    if measured is None:
+        return False
+    x, y, turn = measured
+    return math.hypot(x, y) >= MOVES or abs(turn) >= TURNS
 
 
 def is_lost(bridge: "Bridge") -> bool:
