@@ -14,8 +14,6 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-expect.set_options(timeout=10_000)
-
 FIELD = [(14.0, 4.0), (20.0, 4.0), (20.0, 6.9), (14.0, 6.9)]
 """Its corners in metres, to the right of the panel."""
 
@@ -121,3 +119,15 @@ def test_what_is_no_area_is_refused_in_words_and_escape_leaves_it(tab):
     expect(tab.get_by_role("button", name="Area", exact=True)).to_be_visible()
     expect(tab.locator(".webmap-area-outline")).to_have_attribute("d", "")
     expect(tab.locator(".webmap-route-point")).to_have_count(0)
+
+
+def test_points_outlive_a_link_that_breaks_for_a_moment(tab):
+    press(tab, *FIELD, FIELD[0])
+    tab.get_by_role("button", name="Add to route").click()
+    expect(tab.locator(".webmap-route-point")).to_have_count(6)
+    # What is there now goes with the map that is drawn anew.
+    tab.evaluate("document.querySelector('.webmap-route').dataset.old = 'yes'")
+    tab.evaluate("import('/_webmap/page.js').then(({page}) => page._link.renew())")
+    expect(tab.locator(".webmap-route[open]:not([data-old])")).to_be_visible()
+    expect(tab.locator(".webmap-route-point")).to_have_count(6)
+    expect(tab.locator(".webmap-route-list li")).to_have_count(6)

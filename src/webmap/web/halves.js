@@ -1,4 +1,5 @@
 import { BASE, resolve } from "./addresses.js";
+import { importOf } from "./imports.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
@@ -63,7 +64,7 @@ export class Halves {
   async _load(attached, instance, module, options) {
     const url = resolve(module, BASE);
     if (url === null) throw new Error("it is on another server");
-    const [code] = await Promise.all([import(url), this._page.ready()]);
+    const [code] = await Promise.all([importOf(url), this._page.ready()]);
     // It may have been taken away while it was on its way.
     if (this._attached.get(instance) !== attached) return;
     const { send } = this._page;

@@ -22,6 +22,8 @@ export class Link {
     this._address = address;
     this._events = events;
     this._wait = FIRST_WAIT;
+    /** When opening it began. */
+    this._since = 0;
     /** @type {WebSocket | null} */
     this._socket = null;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -32,6 +34,12 @@ export class Link {
 
   get isOpen() {
     return this._socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** For how long it has been tried to open it, in ms; 0 if nothing is being opened. */
+  get opening() {
+    if (this._socket?.readyState !== WebSocket.CONNECTING) return 0;
+    return performance.now() - this._since;
   }
 
   /** @param {object} message Goes out now or not at all. */
@@ -63,6 +71,7 @@ export class Link {
 
   _open() {
     this._timer = undefined;
+    this._since = performance.now();
     const socket = new WebSocket(this._address());
     this._socket = socket;
     socket.binaryType = "arraybuffer";
@@ -101,6 +110,8 @@ export class Link {
   }
 
   _hurry() {
+    // What was begun on another network may never end.
+    if (this.opening > 0) this.renew();
     if (this._timer === undefined) return;
     clearTimeout(this._timer);
     this._open();

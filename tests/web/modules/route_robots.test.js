@@ -183,3 +183,45 @@ test("the robots that go, and no others, are kept for this page", async () => {
   drive.tell("step", null);
   assert.equal(drive.kept, 1);
 });
+
+test("a run goes on by the robots that come after, when the map was drawn anew", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  drive.report(goal("g1"), { name: "Bob" });
+  const runs = before.destroy();
+  const after = new RouteRobots(drive, () => null, () => {}, runs);
+  drive.report(goal("g1", "reached"), { name: "Bob" });
+  await settle();
+  assert.deepEqual(drive.said, [1, 2]);
+  assert.equal(after.of("r1").run.index, 1);
+  assert.equal(before.of("r1"), undefined);
+});
+
+test("what was being sent when the map was drawn anew waits for a person", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  drive.refusal = LINKLESS;
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  const after = new RouteRobots(drive, () => null, () => {}, before.destroy());
+  drive.refusal = null;
+  await pass(20);
+  assert.deepEqual(drive.said, [1]);
+  assert.equal(after.of("r1").run.why, "the map was drawn anew");
+});
+
+test("a robot that is called so by a display that was started anew gets no run", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  const runs = before.destroy();
+  drive.report(null, { name: "Alice" });
+  const after = new RouteRobots(drive, () => null, () => {}, runs);
+  assert.equal(after.of("r1"), undefined);
+});

@@ -21,13 +21,19 @@ export class RouteRobots {
    * @param {Drive} drive
    * @param {(robot: string) => Pose | null} poseOf
    * @param {() => void} changed
+   * @param {Map<string, {name: string, run: RouteRun}>} [runs] Those of the tool before.
    */
-  constructor(drive, poseOf, changed) {
+  constructor(drive, poseOf, changed, runs = new Map()) {
     this._drive = drive;
     this._poseOf = poseOf;
     this._changed = changed;
     /** @type {Map<string, Going>} */
     this._going = new Map();
+    for (const [robot, { name, run }] of runs) {
+      // A display that was started anew may call another robot so.
+      if (drive.robots.get(robot)?.name !== name) continue;
+      this._going.set(robot, { run, order: null, busy: false });
+    }
     this._offs = [
       drive.on("robot", ({ robot }) => this._look(robot)),
       drive.on("step", () => this._keep()),
@@ -36,10 +42,22 @@ export class RouteRobots {
     ];
   }
 
-  /** Nobody is left to send the next goals; those under way stay as they are. */
+  /**
+   * Nobody is left to send the next goals; those under way stay as they are.
+   *
+   * @returns {Map<string, {name: string, run: RouteRun}>} Who may go on by others of its
+   *     kind: what was being sent is not sent again by itself.
+   */
   destroy() {
+    const runs = new Map();
+    for (const [robot, { run, order }] of this._going) {
+      if (order !== null) run.halt("the map was drawn anew");
+      const name = this._drive.robots.get(robot)?.name;
+      if (name !== undefined && run.live) runs.set(robot, { name, run });
+    }
     this._going.clear();
     for (const off of this._offs) off();
+    return runs;
   }
 
   /** @param {string | null} robot */

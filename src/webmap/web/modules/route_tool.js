@@ -3,6 +3,7 @@ import { lay } from "./overlay.js";
 import { PressAim } from "./press_aim.js";
 import { poseOf } from "./robot_places.js";
 import { RouteArea } from "./route_area.js";
+import { keepRoute, keptRoute } from "./route_kept.js";
 import { RoutePoints } from "./route_points.js";
 import { RouteRobots } from "./route_robots.js";
 import { LEAST_LOOP } from "./route_run.js";
@@ -51,8 +52,9 @@ class RouteTool {
     this._map = map;
     /** @type {import('../drive.js').Drive} */
     this._drive = map.drive;
+    const before = keptRoute(map.id, performance.now());
     /** @type {Pose[]} */
-    this._points = [];
+    this._points = before?.points ?? [];
     /** @type {Pose | null} A point that is being aimed. */
     this._aimed = null;
     this._listed = "";
@@ -71,6 +73,7 @@ class RouteTool {
       this._drive,
       (robot) => poseOf(map, robot),
       () => this._show(),
+      before?.runs,
     );
     this._drawing = new RoutePoints(map, (index, pose) => this._change(index, pose));
     this._area = new RouteArea(map, {
@@ -88,7 +91,7 @@ class RouteTool {
     });
     this._clear = button("webmap-route-clear", "Clear", () => this._set([], false));
     this._list = html("ol", "webmap-route-list");
-    this._loops = false;
+    this._loops = before?.loop ?? false;
     this._loop = button("webmap-route-loop", "Loop", () =>
       this._set(this._points, !this._loops),
     );
@@ -120,6 +123,7 @@ class RouteTool {
       this._word,
       this._saved.element,
     );
+    this._details.open = before?.open ?? false;
     this._details.addEventListener("toggle", () => {
       if (!this._details.open) for (const each of [this._aim, this._area]) each.leave();
       this._show();
@@ -137,7 +141,9 @@ class RouteTool {
 
   destroy() {
     clearInterval(this._timer);
-    this._robots.destroy();
+    const [points, loop, open] = [this._points, this._loops, this._details.open];
+    const runs = this._robots.destroy();
+    keepRoute(this._map.id, { points, loop, open, runs }, performance.now());
     this._aim.destroy();
     this._area.destroy();
     this._drawing.destroy();

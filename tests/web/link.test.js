@@ -1,0 +1,60 @@
+import assert from "node:assert/strict";
+import { mock, test } from "node:test";
+
+/** A socket whose network is gone: it is being opened for ever. */
+class Hanging {
+  static CONNECTING = 0;
+  static OPEN = 1;
+  static made = [];
+
+  constructor() {
+    this.readyState = Hanging.CONNECTING;
+    this.closed = false;
+    Hanging.made.push(this);
+  }
+
+  addEventListener() {}
+
+  close() {
+    this.closed = true;
+  }
+}
+
+const online = [];
+globalThis.addEventListener = (_, fn) => online.push(fn);
+globalThis.WebSocket = Hanging;
+const { Link } = await import("../../src/webmap/web/link.js");
+
+function makeLink(t) {
+  Hanging.made = [];
+  mock.timers.enable({ apis: ["setTimeout"] });
+  t.after(() => mock.timers.reset());
+  const said = [];
+  const events = {
+    opened: () => said.push("opened"),
+    received: () => {},
+    closed: (reason) => said.push(reason),
+    refused: () => {},
+  };
+  return { link: new Link(() => new URL("ws://localhost/"), events), said };
+}
+
+test("a link that hangs while it is opened says for how long, and can be tried anew", (t) => {
+  const { link, said } = makeLink(t);
+  const begun = performance.now();
+  while (performance.now() - begun < 2);
+  assert.ok(link.opening > 0);
+  link.renew();
+  assert.equal(link.opening, 0);
+  assert.deepEqual(said, ["no answer"]);
+  assert.ok(Hanging.made[0].closed);
+  mock.timers.tick(1000);
+  assert.equal(Hanging.made.length, 2);
+});
+
+test("a network that is back gives up at once what was begun on another", (t) => {
+  makeLink(t);
+  online.at(-1)();
+  assert.ok(Hanging.made[0].closed);
+  assert.equal(Hanging.made.length, 2);
+});
