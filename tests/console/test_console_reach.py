@@ -65,6 +65,7 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
         assert_free(stop)
     every.click()
     expect(page.locator(".webmap-stop-verdict")).to_have_count(10)
+    expect(page.locator(".webmap-stop-standing")).to_contain_text("10 robots")
     expect(help_).to_be_hidden()
     reset(page)
     # Esc is STOP there, too.
@@ -73,6 +74,39 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     page.keyboard.press("Escape")
     expect(page.locator("#card .state .holder")).to_have_text("Stopped")
     reset(page)
+
+
+@pytest.mark.parametrize(
+    ("size", "keyboard"), [("phone", 300), ("on its side", 160), ("small phone", 250)]
+)
+def test_a_keyboard_on_the_screen_leaves_stop_in_reach(open_console, size, keyboard):
+    page = open_console(size)
+    viewport = page.locator("meta[name=viewport]").get_attribute("content")
+    assert "interactive-widget=resizes-content" in viewport
+    page.locator("#sheet").click()
+    page.locator("#robots .row", has_text="Robot 1").locator("button").first.click()
+    page.locator("#search").focus()
+    # This browser has none; what it would leave of the page is known.
+    left = page.viewport_size["height"] - keyboard
+    page.set_viewport_size({"width": page.viewport_size["width"], "height": left})
+    for name in ("Stop all", "Stop Robot 1"):
+        stop = page.get_by_role("button", name=name, exact=True)
+        assert_free(stop)
+        assert stop.bounding_box()["width"] >= 44
+
+
+def test_two_fingers_beside_the_map_do_not_zoom_the_page(open_console):
+    page = open_console("phone")
+    bar = page.locator("header.bar").bounding_box()
+    y = bar["y"] + bar["height"] / 2
+    touch = page.context.new_cdp_session(page)
+    for way in range(20, 170, 15):
+        kind = "touchStart" if way == 20 else "touchMove"
+        points = [{"x": 195 - way, "y": y, "id": 0}, {"x": 195 + way, "y": y, "id": 1}]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.wait_for_timeout(200)  # in which it would be zoomed
+    assert page.evaluate("visualViewport.scale") == 1
 
 
 def reset(page: Page) -> None:

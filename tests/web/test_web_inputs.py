@@ -4,7 +4,7 @@ import time
 
 import pytest
 from hands_bench import DOUBTS, Bench
-from playwright.sync_api import CDPSession
+from playwright.sync_api import CDPSession, Locator
 
 pytestmark = pytest.mark.browser
 
@@ -32,10 +32,21 @@ class Finger:
         self.x, self.y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         self.size = box["width"]
 
-    def say(self, kind: str, right: float = 0, down: float = 0) -> None:
-        """Say where the finger is, in shares of the pad's radius from its middle."""
+    def say(
+        self, kind: str, right: float = 0, down: float = 0, too: Locator | None = None
+    ) -> None:
+        """Say where the finger is, in shares of the pad's radius from its middle.
+
+        A second finger touches something else, too.
+        """
         x, y = self.x + right * self.size / 2, self.y + down * self.size / 2
-        points = [] if kind in ("touchEnd", "touchCancel") else [{"x": x, "y": y}]
+        points = [{"x": x, "y": y, "id": 0}]
+        if too is not None:
+            box = too.bounding_box()
+            x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            points.append({"x": x, "y": y, "id": 1})
+        if kind in ("touchEnd", "touchCancel"):
+            points = []
         say = {"type": kind, "touchPoints": points}
         self._cdp.send("Input.dispatchTouchEvent", say)
 
@@ -188,6 +199,35 @@ def test_a_finger_that_rests_through_a_doubt_moves_nothing(
     touched.still()
 
 
+@pytest.mark.parametrize(
+    ("name", "robot"), [("Stop all", "*"), ("Stop Robot r1", "r1")]
+)
+def test_one_thumb_stops_while_the_other_holds_the_stick(
+    open_bench, name: str, robot: str
+) -> None:
+    bench = open_bench("?modules=stop,teleop", has_touch=True)
+    bench.gate.latching = True
+    bench.select("r1")
+    bench.page.locator(".webmap-stick").wait_for()
+    finger = drive_by_finger(bench)
+    stop = bench.page.get_by_role("button", name=name)
+    finger.say("touchStart", down=-0.9, too=stop)
+    said = [{"op": "stop", "robot": robot}]
+    bench.until(lambda: bench.gate.of("stop") == said)
+    bench.until(lambda: bench.shown() == "stopped")
+    bench.still()
+    finger.say("touchEnd")
+    bench.still(0.3)
+    assert bench.gate.of("stop") == said
+
+
+def test_a_tap_on_stop_is_one_stop(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop", has_touch=True)
+    bench.page.get_by_role("button", name="Stop all").tap()
+    bench.page.wait_for_timeout(500)
+    assert bench.gate.of("stop") == [{"op": "stop", "robot": "*"}]
+
+
 def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
     bench = open_bench("?holonomic")
     bench.select("r1")
@@ -208,20 +248,39 @@ def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
     assert not stick.is_visible()
 
 
+def test_a_mouse_button_that_goes_up_while_another_is_held_lets_go_of_the_stick(
+    open_bench,
+) -> None:
+    bench = open_bench()
+    mouse = bench.page.mouse
+    bench.select("r1")
+    bench.page.get_by_role("button", name="Stick", exact=True).click()
+    box = bench.page.locator(".webmap-stick").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x, y - 30)
+    bench.until(bench.gate.moves)
+    mouse.down(button="middle")
+    mouse.up()
+    bench.until(lambda: not bench.page.evaluate("bench.drive.status.pressed"))
+    mouse.move(x, y - 40)
+    bench.still()
+    mouse.up(button="middle")
+
+
 def test_q_moves_only_a_robot_whose_base_can_move_sideways(open_bench) -> None:
     bench = open_bench("?holonomic=each")
     keyboard = bench.page.keyboard
     bench.select("r1")
-    keyboard.down("q")
-    bench.until(bench.gate.moves)
+    bench.hold("q", bench.gate.moves)
     keyboard.up("q")
     last = bench.gate.moves()[-1]
     assert (last["robot"], last["x"], last["y"]) == ("r1", 0, 1)
     bench.select("r2")
     since = time.monotonic()
     keyboard.down("q")
-    keyboard.down("w")
-    bench.until(lambda: [m for m in bench.gate.moves(since) if m["robot"] == "r2"])
+    bench.hold("w", lambda: [m for m in bench.gate.moves(since) if m["robot"] == "r2"])
     keyboard.up("w")
     keyboard.up("q")
     assert not any(m["y"] for m in bench.gate.moves(since) if m["robot"] == "r2")

@@ -46,6 +46,28 @@ def test_what_was_sent_echoed_and_measured_stand_side_by_side(bench: Bench) -> N
     bench.until(lambda: figures.nth(4).inner_text().endswith(" ms"))
 
 
+WITHOUT_LINK = """() => {
+    window.shown = [];
+    bench.drive.on("step", () => {
+        if (bench.drive.state !== "lost") return;
+        const figures = document.querySelector(".webmap-teleop-figures");
+        shown.push(figures.checkVisibility(), document.querySelector("HALO") !== null);
+    });
+}""".replace("HALO", HALO)
+"""Notes whether figures and halos are shown while the connection is lost."""
+
+
+def test_no_speed_from_before_is_shown_without_a_connection(bench: Bench) -> None:
+    bench.drive()
+    bench.gate.change("r1", state="driving", measured=[0.4, 0, 0])
+    bench.page.wait_for_selector(HALO)
+    bench.until(bench.page.locator(".webmap-teleop-figures").is_visible)
+    bench.page.evaluate(WITHOUT_LINK)
+    bench.cut()
+    bench.until(lambda: bench.page.evaluate("shown.length") > 1)
+    assert set(bench.page.evaluate("shown")) == {False}
+
+
 def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
     bench.select("r1")
     tested = {"stop_source": "tested", "stop_date": "2026-11-21"}
@@ -102,7 +124,9 @@ def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> Non
     bench.page.wait_for_timeout(200)
     assert alarm.count() == 0, "what was seen does not come again"
     bench.gate.change("r1", alarm=None)
-    bench.page.wait_for_timeout(200)
+    alarm_of_r1 = "bench.drive.robots.get('r1').alarm"
+    bench.until(lambda: bench.page.evaluate(alarm_of_r1) is None)
+    bench.page.evaluate("bench.step()")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.40 m/s")
     alarm.wait_for(timeout=5000)
 

@@ -92,6 +92,61 @@ describe("a STOP", () => {
   });
 });
 
+describe("a STOP for all that no robot is known to", () => {
+  const latched = { state: "stopped", latched: true };
+  const free = { state: "free", latched: false };
+
+  /** Stop all at time 0, and return what is said at `now` of the robots heard of. */
+  function verdicts(heard, now, connected = true) {
+    const stopping = new Stopping();
+    stopping.start("*", new Map(), 0);
+    const robots = new Map();
+    for (const [at, said] of heard) {
+      robots.set(said.robot, said);
+      stopping.report(said, at);
+    }
+    return stopping.verdicts(robots, connected, now);
+  }
+
+  test("is shown all the same", () => {
+    const [unheard, ...others] = verdicts([], 10, false);
+    assert.deepEqual(others, []);
+    assert.equal(unheard.name, "All robots");
+    assert.match(unheard.text, /^NOT CONFIRMED: no connection/);
+    const [silent] = verdicts([], ANSWER_PATIENCE + 1);
+    assert.equal(silent.text, "STOP NOT CONFIRMED: the gate has not answered");
+  });
+
+  test("is that of the robots that are heard of before it is answered", () => {
+    const two = report({ ...free, robot: "r2" });
+    const said = verdicts([[10, report(free)], [11, two]], ANSWER_PATIENCE);
+    assert.deepEqual(
+      said.map(({ robot, state }) => [robot, state]),
+      [["r1", "stopping"], ["r2", "stopping"]],
+    );
+    const later = verdicts([[10, report(free)], [11, two]], ANSWER_PATIENCE + 1);
+    assert.deepEqual(new Set(later.map(({ state }) => state)), new Set(["unconfirmed"]));
+  });
+
+  test("is not that of a robot which comes when it was answered", () => {
+    const later = report({ ...free, robot: "r2" });
+    const stopped = report({ ...latched, stop: { by: "Ann", confirmed: true, why: "" } });
+    const said = verdicts([[10, report(free)], [20, stopped], [30, later]], 40);
+    assert.deepEqual(
+      said.map(({ robot, state }) => [robot, state]),
+      [["r1", "confirmed"]],
+    );
+  });
+
+  test("can be shown no longer", () => {
+    const stopping = new Stopping();
+    stopping.start("*", new Map(), 0);
+    stopping.dismiss();
+    stopping.report(report(free), 10);
+    assert.deepEqual(stopping.verdicts(new Map(), false, 20), []);
+  });
+});
+
 describe("a STOP that latches", () => {
   const word = (confirmed, why = "") => ({ by: "Ann", confirmed, why });
   const latched = (fields) => report({ state: "stopped", latched: true, ...fields });

@@ -38,3 +38,20 @@ test("a first press can be forgotten", () => {
   twice.forget();
   assert.equal(twice.press(SOONEST), false);
 });
+
+test("a second press is said of what the first was said of", () => {
+  const twice = new Twice();
+  twice.press(0, ["r1"]);
+  twice.look(["r1"]);
+  assert.equal(twice.press(SOONEST, ["r1"]), true);
+  assert.deepEqual(twice.meant, ["r1"]);
+});
+
+test("something new that the first press was not said of takes it back", () => {
+  const twice = new Twice();
+  twice.press(0, ["r1", "r2"]);
+  twice.look(["r2"]);
+  assert.equal(twice.waiting(1), true);
+  twice.look(["r2", "r3"]);
+  assert.equal(twice.waiting(1), false);
+});

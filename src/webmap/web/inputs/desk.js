@@ -150,11 +150,25 @@ export class Desk {
     }
     if (driven === null && keepsKey(event)) return false;
     if (driven === null && event.code === "Escape") {
-      for (const leave of this._escapes) if (leave()) return true;
+      for (const leave of this._escapes) if (leaves(leave)) return true;
     }
     // With none to mean they mean all: a STOP too many is harmless.
     this._drive.stop(driven ?? choice ?? "*");
     return true;
+  }
+}
+
+/**
+ * @param {() => boolean} leave
+ * @returns {boolean} Whether it ended something. One that fails did not, as it must never
+ *     keep a STOP from leaving.
+ */
+function leaves(leave) {
+  try {
+    return leave();
+  } catch (error) {
+    reportError(error);
+    return false;
   }
 }
 

@@ -94,6 +94,8 @@ export class Stick {
   /** @param {PointerEvent} event */
   _move(event) {
     if (event.pointerId !== this._pointer) return;
+    // While another mouse button is held, that this one went up is told as a move.
+    if ((event.buttons & 1) === 0) return this.release();
     const { x, y, way } = this._middle;
     const right = (event.clientX - x) / way;
     const down = (event.clientY - y) / way;

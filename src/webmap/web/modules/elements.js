@@ -41,7 +41,7 @@ export function svg(tag, attributes, ...children) {
  *
  * @param {string} className
  * @param {string} label
- * @param {() => void} act
+ * @param {(event: MouseEvent) => void} act
  * @returns {HTMLButtonElement}
  */
 export function button(className, label, act) {
@@ -52,6 +52,33 @@ export function button(className, label, act) {
     label,
   );
   element.addEventListener("click", act);
+  return element;
+}
+
+/**
+ * Make a button that acts as soon as it is touched: STOP waits for no release.
+ *
+ * A finger beside another one, one that rests, and one under which the page is made
+ * anew never make a click. Keyboards and assistive technology make nothing else.
+ *
+ * @param {string} className
+ * @param {string} label
+ * @param {() => void} act
+ * @returns {HTMLButtonElement}
+ */
+export function stopButton(className, label, act) {
+  /** @type {number | null} */
+  let pressed = null;
+  const element = button(`webmap-stop-button ${className}`, label, (event) => {
+    // A press that has acted may end in a click.
+    const { pointerId } = /** @type {PointerEvent} */ (event);
+    if (pointerId !== pressed) act();
+  });
+  element.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0 || element.disabled) return;
+    pressed = event.pointerId;
+    act();
+  });
   return element;
 }
 

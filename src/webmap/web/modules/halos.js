@@ -19,8 +19,12 @@ export class Halos {
     this._frame = 0;
   }
 
-  /** Look again which robots move, and how fast. */
+  /** Look again which robots move, and how fast; without a connection nobody knows. */
   show() {
+    if (this._drive.state === "lost") {
+      this._removeAll();
+      return;
+    }
     for (const report of this._drive.robots.values()) {
       const distance = stoppingDistance(report);
       if (distance === null) this._remove(report.robot);
@@ -34,6 +38,10 @@ export class Halos {
 
   destroy() {
     cancelAnimationFrame(this._frame);
+    this._removeAll();
+  }
+
+  _removeAll() {
     for (const robot of [...this._circles.keys()]) this._remove(robot);
   }
 

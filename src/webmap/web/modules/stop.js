@@ -1,7 +1,7 @@
 import { deskOf } from "../inputs/desk.js";
 import { isLatched } from "../motion/report.js";
 import { Obedience, standingStops } from "../motion/stopping.js";
-import { button, html, say } from "./elements.js";
+import { button, html, say, stopButton } from "./elements.js";
 import { lay } from "./overlay.js";
 import { TwiceButton } from "./twice_button.js";
 
@@ -9,6 +9,12 @@ import { TwiceButton } from "./twice_button.js";
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../halves.js').Half} Half */
 /** @typedef {import('../motion/stopping.js').Verdict} Verdict */
+
+/**
+ * So many robots one reset is for, at most: a page that says more than 120 things at once
+ * loses its connection. The others stay stopped until the next.
+ */
+const RESET_AT_ONCE = 60;
 
 /**
  * A button that stops all robots, always in sight, and what became of every STOP.
@@ -42,9 +48,11 @@ class Stop {
       "webmap-reset",
       "Reset",
       "Press again to reset",
-      () => this._drive.reset("*"),
+      (robots) => {
+        for (const robot of robots.slice(0, RESET_AT_ONCE)) this._drive.reset(robot);
+      },
     );
-    const all = button("webmap-stop-button webmap-stop-all", "Stop all", () => {
+    const all = stopButton("webmap-stop-all", "Stop all", () => {
       this._drive.stop("*");
     });
     all.title = "Key Shift and Escape";
@@ -68,7 +76,7 @@ class Stop {
     this._offs = [
       lay(map, panel, "top-right"),
       deskOf(drive).open(),
-      drive.on("stop", () => this._show()),
+      drive.on("stop", () => this._stopped()),
       drive.on("robot", (report) => this._report(report)),
       drive.on("goal", (robot) => this._obedience.excuse(robot)),
       drive.on("gone", (robot) => this._gone(robot)),
@@ -91,13 +99,20 @@ class Stop {
     this._obedience.excuse(robot);
   }
 
+  _stopped() {
+    // Who says STOP between the two presses takes the first one back.
+    this._reset.forget();
+    this._show();
+  }
+
   _show() {
     this._alarm.show(this._alarms());
     const { robots, verdicts } = this._drive;
     const standing = standingStops(robots.values());
     say(this._standing, standing);
-    const latched = [...robots.values()].filter(isLatched).length;
-    this._reset.show(latched > 0, latched > 1 ? "Reset all" : "Reset");
+    const latched = [...robots.values()].filter(isLatched).map(({ robot }) => robot);
+    const reset = latched.length > 1 ? "Reset all" : "Reset";
+    this._reset.show(latched.length > 0, latched, reset);
     this._close.hidden = verdicts.length === 0;
     this._list.hidden = verdicts.length === 0 && standing === "";
     this._showVerdicts(verdicts.sort(byName));
@@ -160,7 +175,7 @@ class Alarm {
       html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
       html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
       this._names,
-      button("webmap-stop-button webmap-alarm-stop", "Stop all", stopAll),
+      stopButton("webmap-alarm-stop", "Stop all", stopAll),
       button("webmap-alarm-seen", "I have seen this", () => {
         this._seen = new Set(this._current.keys());
         this.show(this._current);

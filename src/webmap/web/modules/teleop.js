@@ -85,6 +85,8 @@ class Teleop {
       ...takes,
       this._desk.sit(this._seat),
       map.onSelect(() => this._select()),
+      // Who says STOP between the two presses of a button takes the first one back.
+      this._drive.on("stop", () => this._panel.forget()),
       this._drive.on("step", show),
       this._drive.on("step", () => this._halos.show()),
       this._drive.on("state", show),
@@ -161,7 +163,9 @@ class Teleop {
     const asking = request?.by === status.connection;
     this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);
     const moving = robot === null ? null : this._drive.motionDelay(robot);
-    this._panel.showFigures(report, status.delay, moving);
+    // What was heard before the connection was lost says nothing of now.
+    const heard = status.link === "lost" ? null : report;
+    this._panel.showFigures(heard, status.delay, moving);
   }
 }
 

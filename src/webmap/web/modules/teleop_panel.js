@@ -1,7 +1,7 @@
 import { isTested, motions, ownStop, testWords, timings } from "../motion/figures.js";
 import { heldByProgram, isLatched } from "../motion/report.js";
 import { capOf } from "../motion/status.js";
-import { button, html, say } from "./elements.js";
+import { button, html, say, stopButton } from "./elements.js";
 import { TwiceButton } from "./twice_button.js";
 
 /** @typedef {import('../motion/report.js').RobotReport} RobotReport */
@@ -24,7 +24,7 @@ export class Panel {
     this._figures = html("dl", "webmap-teleop-figures");
     /** @type {Map<string, HTMLElement>} */
     this._values = new Map();
-    this._stop = button("webmap-stop-button webmap-teleop-stop", "Stop", acts.stop);
+    this._stop = stopButton("webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
     this._reset = new TwiceButton(
       "webmap-reset",
@@ -108,6 +108,12 @@ export class Panel {
     return value;
   }
 
+  /** Forget the first presses of what takes two. */
+  forget() {
+    this._reset.forget();
+    this._tester.forget();
+  }
+
   /**
    * @param {RobotReport | null} report
    * @param {boolean} asking Whether this page has asked for the robot.
@@ -115,14 +121,15 @@ export class Panel {
    */
   showButtons(report, asking, stick) {
     const name = report?.name ?? "";
+    const robots = report === null ? [] : [report.robot];
     const act = actOf(report, asking);
     this._lease.hidden = act === null;
     if (act !== null) {
       say(this._lease, act);
       set(this._lease, "aria-label", act === ASK ? `Ask for ${name}` : `${act} ${name}`);
     }
-    this._reset.show(report !== null && isLatched(report));
-    this._tester.show(report !== null && mayTest(report));
+    this._reset.show(report !== null && isLatched(report), robots);
+    this._tester.show(report !== null && mayTest(report), robots);
     const known = report?.stop_time != null;
     this._tester.element.classList.toggle("known", known);
     this._stick.hidden = stick === null;

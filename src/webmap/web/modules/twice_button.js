@@ -12,30 +12,42 @@ export class TwiceButton {
    * @param {string} className
    * @param {string} label What it says before it is pressed.
    * @param {string} again What it says after the first press.
-   * @param {() => void} act
+   * @param {(robots: readonly string[]) => void} act Called with the robots that the
+   *     first press was said of and that are still there.
    */
   constructor(className, label, again, act) {
     this._twice = new Twice();
+    /** @type {readonly string[]} */
+    this._robots = [];
     this._label = label;
     this._again = again;
     this.element = button(`webmap-twice ${className}`, label, () => {
-      if (this._twice.press(performance.now())) act();
+      if (this._twice.press(performance.now(), this._robots)) act(this._twice.meant);
       this.show(true);
     });
     this.element.addEventListener("blur", () => {
-      this._twice.forget();
+      this.forget();
       this.show(!this.element.hidden);
     });
   }
 
+  /** Forget the first press. */
+  forget() {
+    this._twice.forget();
+  }
+
   /**
    * @param {boolean} visible
+   * @param {readonly string[]} [robots] What a press is said of, by id. The first press
+   *     is forgotten when there is one more, or another.
    * @param {string} [label]
    */
-  show(visible, label = this._label) {
+  show(visible, robots = this._robots, label = this._label) {
+    this._robots = robots;
     this._label = label;
     this.element.hidden = !visible;
-    if (!visible) this._twice.forget();
+    this._twice.look(robots);
+    if (!visible) this.forget();
     const waiting = visible && this._twice.waiting(performance.now());
     this.element.classList.toggle("asking", waiting);
     say(this.element, waiting ? this._again : label);

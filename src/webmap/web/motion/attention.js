@@ -62,6 +62,14 @@ export function watchAttention(onDoubt, onReturn) {
     options,
   );
   window.addEventListener("contextmenu", doubt, options);
+  // While something is dragged out of its place no key is heard, nor its release.
+  window.addEventListener(
+    "dragstart",
+    (event) => {
+      if (!event.defaultPrevented) doubt();
+    },
+    { signal: ending.signal },
+  );
   window.addEventListener(
     "focusin",
     (event) => {

@@ -2,6 +2,9 @@ import { isLatched } from "./report.js";
 
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
+/** Stands for all robots. */
+const ALL = "*";
+
 /** Slower than this a robot stands: m/s and rad/s. */
 const STANDS = { v: 0.02, w: 0.05 };
 
@@ -38,6 +41,7 @@ const SHOWN = 5000;
 export class Stopping {
   constructor() {
     /**
+     * By robot; with that of all if no robot was known to be stopped by it.
      * @type {Map<string, Watch>}
      */
     this._watched = new Map();
@@ -51,7 +55,7 @@ export class Stopping {
    * @param {number} now
    */
   start(robot, known, now) {
-    for (const id of robot === "*" ? known.keys() : [robot]) {
+    for (const id of robot === ALL && known.size > 0 ? known.keys() : [robot]) {
       // Where a STOP stands already there may be no news to answer with.
       const answered = known.get(id)?.latched === true;
       this._watched.set(id, { since: now, answered, stoodAt: null });
@@ -67,9 +71,10 @@ export class Stopping {
    * @param {number} now
    */
   report(report, now) {
+    const stopped = report.latched ?? report.state !== "driving";
+    this._meet(report.robot, stopped);
     const watch = this._watched.get(report.robot);
     if (!watch) return;
-    const stopped = report.latched ?? report.state !== "driving";
     if (!stopped && watch.answered) {
       // It was reset, or somebody drives it again; that is another story.
       this._watched.delete(report.robot);
@@ -79,6 +84,20 @@ export class Stopping {
     const stood = report.stop ? report.stop.confirmed === true : stands(report);
     if (watch.answered && stood) watch.stoodAt ??= now;
     else watch.stoodAt = null;
+  }
+
+  /**
+   * Watch a robot that is heard of after a STOP for all that met none. Others will be,
+   * until the gate says of one that it is stopped.
+   *
+   * @param {string} robot
+   * @param {boolean} stopped
+   */
+  _meet(robot, stopped) {
+    const all = this._watched.get(ALL);
+    if (!all) return;
+    if (!this._watched.has(robot)) this._watched.set(robot, { ...all });
+    if (stopped) this._watched.delete(ALL);
   }
 
   /**
@@ -104,6 +123,7 @@ export class Stopping {
   verdicts(robots, connected, now) {
     const verdicts = [];
     for (const [robot, watch] of this._watched) {
+      if (robot === ALL && robots.size > 0) continue;
       const settled = watch.stoodAt !== null && connected;
       if (settled && now - Number(watch.stoodAt) > SHOWN) this._watched.delete(robot);
       else verdicts.push(judge(robot, robots.get(robot), watch, connected, now));
@@ -178,7 +198,7 @@ export class Obedience {
  * @returns {Verdict}
  */
 function judge(robot, report, watch, connected, now) {
-  const name = report?.name ?? robot;
+  const name = robot === ALL ? "All robots" : (report?.name ?? robot);
   const unsure = (/** @type {string} */ why) => ({
     robot,
     name,

@@ -14,15 +14,22 @@ export class Twice {
   constructor() {
     /** @type {number | null} */
     this._since = null;
+    /**
+     * What the first press was said of, as far as it is still there.
+     * @type {readonly string[]}
+     */
+    this.meant = [];
   }
 
   /**
    * @param {number} now
+   * @param {readonly string[]} [there] What a first press is said of: robots, by id.
    * @returns {boolean} Whether this is a deliberate second press.
    */
-  press(now) {
+  press(now, there = []) {
     if (!this.waiting(now)) {
       this._since = now;
+      this.meant = there;
       return false;
     }
     if (now - Number(this._since) < SOONEST) return false;
@@ -36,6 +43,16 @@ export class Twice {
    */
   waiting(now) {
     return this._since !== null && now >= this._since && now - this._since <= LATEST;
+  }
+
+  /**
+   * Look what is there now: something that the first press was not said of takes it back.
+   *
+   * @param {readonly string[]} there
+   */
+  look(there) {
+    if (there.some((one) => !this.meant.includes(one))) this.forget();
+    else this.meant = there;
   }
 
   /** Forget the first press. */

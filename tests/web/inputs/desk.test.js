@@ -1,0 +1,63 @@
+import assert from "node:assert/strict";
+import { afterEach, beforeEach, test } from "node:test";
+
+import { deskOf } from "../../../src/webmap/web/inputs/desk.js";
+
+let reported = [];
+
+beforeEach(() => {
+  reported = [];
+  globalThis.window = new EventTarget();
+  globalThis.Element = class {};
+  globalThis.reportError = (error) => reported.push(error);
+});
+
+afterEach(() => {
+  for (const name of ["window", "Element", "reportError"]) delete globalThis[name];
+});
+
+/** A desk with these claims on Escape, pressed once; what was stopped. */
+function escapeAt(...claims) {
+  const stopped = [];
+  const desk = deskOf({
+    status: { driven: null, choice: "r1" },
+    on: () => () => {},
+    stop: (robot) => stopped.push(robot),
+    setInput() {},
+  });
+  for (const claim of claims) desk.claimEscape(claim);
+  const close = desk.open();
+  window.dispatchEvent(Object.assign(new Event("keydown"), { code: "Escape" }));
+  close();
+  return stopped;
+}
+
+const fails = () => {
+  throw new Error("a module of somebody's");
+};
+
+test("Escape ends a tool that is in use and is STOP when there is none", () => {
+  assert.deepEqual(
+    escapeAt(() => true),
+    [],
+  );
+  assert.deepEqual(
+    escapeAt(() => false),
+    ["r1"],
+  );
+});
+
+test("a tool that fails keeps no STOP from leaving, and its error is told", () => {
+  assert.deepEqual(escapeAt(fails), ["r1"]);
+  assert.equal(reported[0].message, "a module of somebody's");
+});
+
+test("a tool that fails keeps Escape from no other tool", () => {
+  let left = 0;
+  const leaves = () => {
+    left += 1;
+    return true;
+  };
+  assert.deepEqual(escapeAt(fails, leaves), []);
+  assert.equal(left, 1);
+});

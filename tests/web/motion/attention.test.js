@@ -1,0 +1,37 @@
+import assert from "node:assert/strict";
+import { afterEach, beforeEach, test } from "node:test";
+
+import { watchAttention } from "../../../src/webmap/web/motion/attention.js";
+
+beforeEach(() => {
+  globalThis.window = new EventTarget();
+  globalThis.document = new EventTarget();
+});
+
+afterEach(() => {
+  delete globalThis.window;
+  delete globalThis.document;
+});
+
+/** Watch, and return how often there was doubt while something is dragged. */
+function doubtsOfDrag() {
+  let doubts = 0;
+  const stop = watchAttention(
+    () => (doubts += 1),
+    () => {},
+  );
+  const drag = () => window.dispatchEvent(new Event("dragstart", { cancelable: true }));
+  drag();
+  stop();
+  drag();
+  return doubts;
+}
+
+test("what is dragged out of its place is doubt, as no key is heard meanwhile", () => {
+  assert.equal(doubtsOfDrag(), 1);
+});
+
+test("a drag that somebody prevents, as a map does, is no doubt", () => {
+  window.addEventListener("dragstart", (event) => event.preventDefault());
+  assert.equal(doubtsOfDrag(), 0);
+});
