@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from real_browser import launched
 
@@ -15,6 +15,9 @@ settings.register_profile(
     "webmap", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("webmap")
+
+# Once for all, since it is the whole process that has it.
+expect.set_options(timeout=15_000)
 
 
 @pytest.fixture(scope="session", autouse=True)

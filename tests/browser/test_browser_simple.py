@@ -48,6 +48,7 @@ def opened(server, tab):
     tab.locator(".robot:not(.unplaced)").wait_for(state="attached")
     tab.locator(".dot[d]").wait_for(state="attached")
     tab.get_by_role("button", name="STOP").wait_for()
+    tab.locator("svg.webmap-view-control").wait_for()  # what hears drags and the wheel
     return tab
 
 
@@ -214,7 +215,8 @@ def test_a_hidden_tab_stops_the_robot_and_coming_back_does_not_start_it(
         hold(tab, "w", lambda: witness.speed(ODOM)[0] > 0.2)
         other = browser.new_tab()
         wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
-        assert tab.evaluate("document.visibilityState") == "hidden"
+        # On a busy machine it may have stopped before, since the page was held up.
+        tab.wait("document.visibilityState === 'hidden'")
         browser.activate(tab)
         tab.wait("document.visibilityState === 'visible'")
         # The zeros of the stop end by themselves; after them there is silence.
@@ -264,9 +266,11 @@ def test_nothing_is_sent_to_an_idle_robot(opened, witness):
 
 def test_the_view_and_the_selection_survive_a_reload(opened):
     select(opened)
+    start = view(opened)
     x, y = middle(opened)
     opened.mouse.move(x, y)
     opened.mouse.wheel(0, -240)
+    wait_until(lambda: view(opened)[0] > start[0] * 1.05, what="zooming")
     opened.wait_for_timeout(600)
     before = view(opened)
     opened.reload()

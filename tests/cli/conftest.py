@@ -1,10 +1,21 @@
-"""Simulators that the commands may use."""
+"""Simulators that the commands may use, and a port for one that comes later."""
 
+import socket
 from collections.abc import Iterator
 
 import pytest
 
 from webmap_process import simulator
+
+
+@pytest.fixture
+def later_port() -> Iterator[int]:
+    """A port that nothing listens on yet, and that nobody else is given meanwhile."""
+    with socket.socket() as kept:
+        # With this a server may listen there all the same.
+        kept.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        kept.bind(("127.0.0.1", 0))
+        yield kept.getsockname()[1]
 
 
 @pytest.fixture(scope="session")

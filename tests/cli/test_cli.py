@@ -146,13 +146,17 @@ def test_one_line_says_it_is_ready_and_a_signal_ends_it_with_exit_code_0(
 def test_the_simulator_of_a_demo_that_is_killed_ends_too():
     process = start("demo", "--port", 0, "--no-browser")
     assert process.stdout.readline().startswith("WebMap is ready")
-    listed = subprocess.run(
-        ["ps", "-o", "pid=", "--ppid", str(process.pid)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    children = [int(pid) for pid in listed.stdout.split()]
+    for _ in range(100):
+        listed = subprocess.run(
+            ["ps", "-o", "pid=", "--ppid", str(process.pid)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        children = [int(pid) for pid in listed.stdout.split()]
+        if len(children) == 2:  # the gate comes a moment after the page
+            break
+        time.sleep(0.1)
     assert len(children) == 2, "the gate and the simulator"
     process.kill()
     process.communicate(timeout=10)

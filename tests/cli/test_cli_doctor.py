@@ -4,6 +4,8 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 from webmap_process import simulator
 
 
@@ -17,11 +19,12 @@ def webmap(*arguments):
     )
 
 
+@pytest.mark.serial  # rates and ages are measured
 def test_robots_of_ros_1_are_ready(ros1):
     said = webmap("doctor", ros1, "--seconds", "2")
     assert said.returncode == 0, said.stdout
     assert "0 wrong" in said.stdout
-    assert re.search(r"/robot_1/odom: 1\d\.\d|20\.\d messages a second", said.stdout)
+    assert re.search(r"/robot_1/odom: [12]\d\.\d messages a second", said.stdout)
     assert "Frames lead from map to robot_1/odom" in said.stdout
     assert "each call in a thread of its own" in said.stdout
     assert "/robot_0/cmd_vel takes Twist," in said.stdout
@@ -67,7 +70,7 @@ def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
 def test_robots_are_looked_at_as_they_were_told(ros1):
     told = ("--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
     sent = ("--set", "Bob.velocity_type=geometry_msgs/TwistStamped")
-    said = webmap("doctor", ros1, "--seconds", "0.5", *told, *sent)
+    said = webmap("doctor", ros1, "--seconds", "2", *told, *sent)
     assert said.returncode == 1, said.stdout
     assert "\nBob\n  WRONG    /robot_0/cmd_vel takes Twist, and WebMap" in said.stdout
     assert "set to send TwistStamped" in said.stdout
@@ -84,7 +87,7 @@ def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
         '[robots.twist]\ntopic = "/robot_1/cmd_vel"\n'
         'type = "geometry_msgs/TwistStamped"\n'
     )
-    said = webmap("doctor", str(file), "--seconds", "0.5")
+    said = webmap("doctor", str(file), "--seconds", "2")
     assert said.returncode == 1, said.stdout
     assert said.stdout.startswith(ros1)
     assert "\nBob\n  WRONG    /robot_1/cmd_vel takes Twist, and WebMap" in said.stdout
@@ -92,6 +95,7 @@ def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
     assert "camera" not in said.stdout, "the file has none"
 
 
+@pytest.mark.serial  # how long an answer takes is measured
 def test_a_call_that_hangs_is_tried_where_that_is_wanted(ros1):
     said = webmap("doctor", ros1, "--seconds", "0.5", "--try-call")
     assert "A service that hangs blocks no socket (tried)" in said.stdout

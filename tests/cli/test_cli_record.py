@@ -78,7 +78,8 @@ def test_a_recording_that_is_played_says_what_the_robot_said(tmp_path, dialect):
         assert done.returncode == 0, done.stderr
         ear.wait_for(scan, len(ear.heard[scan]) + 2)
         said = {topic: {*map(without_times, ear.heard[topic])} for topic in ear.heard}
-    assert re.search(r"Recorded \d+ messages of \d+ topics in 2\.\d s to ", done.stderr)
+    lasted = r"Recorded \d+ messages of \d+ topics in [2-9]\.\d s to "
+    assert re.search(lasted, done.stderr)
     assert done.stdout == f"Recording {url} to {bag}\n"
     kept = ("/map", "/tf_static")
     with (
@@ -117,7 +118,7 @@ def test_only_the_topics_that_are_named_are_recorded_until_a_signal(ros2, tmp_pa
         assert process.stdout.readline() == f"Recording {ros2} to {bag}\n"
         assert "Waiting for: /later" in process.stderr.readline()
         with hearing(ros2, "/odom") as ear:
-            ear.wait_for("/odom", 10)
+            ear.wait_for("/odom", 40)  # the recorder's own link may come later
         process.send_signal(signal.SIGINT)
         said = process.stderr.read()
         assert process.wait(15) == 0, said

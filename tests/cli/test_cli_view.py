@@ -3,7 +3,6 @@
 import asyncio
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -38,11 +37,16 @@ class View:
 
     def __init__(self, process):
         self.process, self.said = process, ""
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self):
         for line in self.process.stderr:
             self.said += line
+
+    def read_all(self):
+        """Wait until all is read that it said, before its pipe is closed."""
+        self._reader.join(10)
 
     def wait_for(self, pattern, within=20.0):
         deadline = time.monotonic() + within
@@ -62,9 +66,11 @@ def viewing(*arguments):
         text=True,
     ) as process:
         try:
-            yield View(process)
+            view = View(process)
+            yield view
             process.send_signal(signal.SIGINT)
             assert process.wait(15) == 0
+            view.read_all()
             assert process.stdout.read() == "", "nothing but the one line"
         finally:
             process.kill()
@@ -92,26 +98,22 @@ def test_a_robot_that_is_told_takes_the_place_of_the_one_found(ros1):
     assert "Found robot_0" not in view.said
 
 
-def test_the_page_opens_without_a_bridge_and_its_robots_come_later():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
-    with viewing(f"ws://127.0.0.1:{port}", "--wait", "3") as view:
+def test_the_page_opens_without_a_bridge_and_its_robots_come_later(later_port):
+    with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "3") as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for(r"Waiting for the rosbridge at ws://127\.0\.0\.1")
         view.wait_for("cannot reach the rosbridge")
-        with simulator("--port", str(port), "--robots", "1"):
+        with simulator("--port", str(later_port), "--robots", "1"):
             view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
 
 
-def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
+def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does(
+    later_port,
+):
     told = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
-    with viewing(f"ws://127.0.0.1:{port}", "--wait", "0.5", *told) as view:
+    with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "0.5", *told) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
-        with simulator("--port", str(port), "--robots", "2"):
+        with simulator("--port", str(later_port), "--robots", "2"):
             # Both settle at one look, and are told in the order of their names.
             view.wait_for(r"A robot appeared behind ws://.*: robot_1: odometry", 40)
     assert "robot_0: odometry" not in view.said
@@ -142,6 +144,7 @@ def test_a_signal_ends_the_waiting_with_exit_code_0(sig):
         view.wait_for("Waiting for the rosbridge")
         process.send_signal(sig)
         assert process.wait(15) == 0
+        view.read_all()
         assert process.stdout.read() == ""
     assert "Traceback" not in view.said
 

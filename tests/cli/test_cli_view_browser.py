@@ -1,6 +1,5 @@
 """What was found, and what comes later, in a real browser."""
 
-import socket
 import subprocess
 import sys
 
@@ -60,14 +59,13 @@ def test_a_list_of_topics_says_what_is_drawn_where_there_is_no_rosapi(
             expect(costmap).to_have_count(1, timeout=15_000)
 
 
-def test_a_bridge_that_comes_later_brings_its_robots_to_the_open_page(chromium):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = str(taken.getsockname()[1])
-    url = f"ws://127.0.0.1:{port}"
+def test_a_bridge_that_comes_later_brings_its_robots_to_the_open_page(
+    chromium, later_port
+):
+    url = f"ws://127.0.0.1:{later_port}"
     with shown(chromium, "view", url, "--wait", "0") as page:
         expect(page.locator("#robots .row")).to_have_count(0)
-        with simulator("--port", port):
+        with simulator("--port", str(later_port)):
             expect_two_robots_on_their_map(page, 40_000)
 
 

@@ -10,11 +10,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
+from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import Complaints
-
-expect.set_options(timeout=10_000)
 
 SIZES = {
     "desk": {"viewport": {"width": 1280, "height": 800}},
@@ -54,7 +53,7 @@ def demo() -> Iterator[Demo]:
         finally:
             process.send_signal(signal.SIGINT)
             try:
-                process.wait(10)
+                process.wait(60)  # the machine may be busy
             except subprocess.TimeoutExpired:
                 process.kill()
 
@@ -74,6 +73,7 @@ def open_console(chromium: Browser, demo: Demo):
         expect(page.locator("#robots .row")).to_have_count(10)
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(10)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")
+        wait_until_ready(page)
         return page
 
     yield open_

@@ -65,6 +65,7 @@ def test_stop_is_in_sight_and_large(open_console, size):
         assert stop.bounding_box()["width"] > 300
     stop.click()
     expect(page.locator(".webmap-stop-verdict").first).to_be_visible()
+    expect(page.locator(".webmap-stop-standing")).to_contain_text("10 robots")
     reset = page.get_by_role("button", name="Reset all")
     reset.click()
     page.wait_for_timeout(400)

@@ -8,6 +8,7 @@ import sys
 from contextlib import contextmanager
 
 import pytest
+from console_ready import wait_until_ready
 from playwright.sync_api import Page, expect
 
 from camera_server import CameraServer
@@ -48,7 +49,7 @@ def running(*command: str, says: str):
             yield found[1]
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(10)
+            process.wait(60)  # the machine may be busy
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +95,7 @@ def open_page(chromium, url, camera):
         page.goto(url)
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(1)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")
+        wait_until_ready(page)
         if page.viewport_size["width"] < 900:
             page.locator("#sheet").click()
         page.locator("#robots button").first.click()

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import threading
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -134,6 +135,12 @@ def test_a_topic_that_a_robot_is_moved_by_is_refused_whatever_it_is_called(robot
 # What it does over a rosbridge.
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """Let a busy machine take its time to tell a type."""
+    monkeypatch.setattr("webmap.core.button_run.ROSAPI_PATIENCE", 20.0)
+
+
 @pytest.fixture(scope="module")
 def sim() -> Iterator[dict[str, str]]:
     """The addresses of two simulated rosbridges, by dialect."""
@@ -222,15 +229,24 @@ def test_a_press_publishes_the_message(sim, robot):
 
 
 def test_while_it_runs_it_cannot_be_pressed_again(sim, robot):
+    go_on = threading.Event()
+
+    def wait(args: dict) -> dict:
+        go_on.wait(30)
+        return {"success": False, "message": "no dock in sight"}
+
     async def scenario():
-        services = {"/dock": ("std_srvs/Trigger", lambda args: None)}
+        services = {"/dock": ("std_srvs/Trigger", wait)}
         async with linked(sim["ros1"], services=services) as (bridge, node):
-            module = robot.add_module("Buttons", bridge, [{**DOCK, "timeout": 0.5}])
+            module = robot.add_module("Buttons", bridge, [{**DOCK, "timeout": 60}])
             dock = module["Dock"]
             first = asyncio.create_task(dock.press(by="Ann"))
-            await until(lambda: node.calls)
-            assert dock.barred == "it runs already, for Ann"
-            assert await dock.press(by="Bea") is False
+            try:
+                await until(lambda: node.calls)
+                assert dock.barred == "it runs already, for Ann"
+                assert await dock.press(by="Bea") is False
+            finally:
+                go_on.set()
             assert await first is False
             assert len(node.calls) == 1
             assert dock.by == "Ann"

@@ -2,6 +2,7 @@
 
 import re
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -13,8 +14,6 @@ from real_browser import watched_tab
 from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
-
-expect.set_options(timeout=15_000)
 
 FLEET = """\
 [bridges]
@@ -35,6 +34,7 @@ confirm = "Is the dock free?"
 label = "Wait"
 service = "/wait"
 type = "std_srvs/Trigger"
+timeout = 60
 
 [[robots.buttons]]
 label = "Light"
@@ -57,7 +57,7 @@ def bench(tmp_path_factory) -> Iterator[Bench]:
     waiting = threading.Event()
 
     def wait(args: dict) -> dict:
-        waiting.wait(10)
+        waiting.wait(60)
         return {"success": False, "message": "nobody came"}
 
     services = {
@@ -134,6 +134,9 @@ def test_a_form_takes_what_fits_and_names_the_field_that_does_not(tab, bench):
     light.locator("[data-field=r]").fill("0.25")
     light.locator(".yes").click()
     expect(light.locator(".result")).to_have_text("Published")
+    deadline = time.monotonic() + 15
+    while not bench.node.heard and time.monotonic() < deadline:
+        tab.wait_for_timeout(20)
     assert bench.node.heard == [("/light", {"r": 0.25, "g": 0.5, "b": 0.0, "a": 1.0})]
     expect(light.locator(".sheet")).to_be_hidden()
 

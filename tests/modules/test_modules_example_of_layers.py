@@ -37,7 +37,7 @@ def test_the_tutorial_draws_all_that_a_robot_says(chromium: Browser, tmp_path):
         program = tmp_path / EXAMPLE.name
         program.write_text(text.replace("ws://localhost:9090", found["ros1"].url))
         with page_of(program) as url, watched_tab(chromium, 1000, 700) as tab:
-            tab.set_default_timeout(15_000)
+            tab.set_default_timeout(30_000)
             tab.goto(url)
             for selector in DRAWN:
                 tab.wait_for_selector(selector, state="attached")

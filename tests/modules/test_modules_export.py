@@ -16,8 +16,6 @@ from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
-expect.set_options(timeout=15_000)
-
 HERE = Path(__file__).parent
 SVG = "{http://www.w3.org/2000/svg}"
 SIZE = (900, 700)
@@ -44,7 +42,17 @@ def tab(chromium: Browser, url: str) -> Iterator[Page]:
         page.wait_for_selector(".robot.stale > .path.stale", state="attached")
         page.wait_for_selector(".webmap-export-go")
         page.wait_for_load_state("networkidle")
+        page.evaluate(DECODED)
         yield page
+
+
+DECODED = """() => Promise.all(
+  [...document.querySelectorAll(".world image")].map((image) => {
+    const bitmap = new Image();
+    bitmap.src = image.getAttribute("href");
+    return bitmap.decode();
+  })).then(() => true)"""
+"""That the images have their pixels: addresses they have before."""
 
 
 def saved(tab: Page, kind: str, folder: Path) -> Path:
@@ -228,6 +236,7 @@ def test_the_console_saves_its_map_by_a_button_of_the_view(
         expect(tab.locator(".robot:not(.unplaced)")).to_have_count(2)
         tab.wait_for_selector(".occupancy-grid image[href]", state="attached")
         tab.locator("#robots .row").first.click()
+        expect(tab.locator(".robot.selected")).to_have_count(1)
         tab.locator("#show-all").click()
         expect(tab.locator(".map-tools .webmap-export-go")).to_have_count(1)
         file = saved(tab, "svg", tmp_path)

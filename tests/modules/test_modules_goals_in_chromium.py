@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Locator, Page, expect
 from websockets.sync.client import ClientConnection, connect
 
@@ -21,14 +22,11 @@ from webmap_process import page_of
 # Alone, as the gate takes no goal that is older than 0.3 s when it comes.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]
 
-expect.set_options(timeout=10_000)
-
 HERE = Path(__file__).parent
 OUTSIDE = (1180, 400)
 """A place on the screen that is outside of the house."""
 
 WORDS = ".webmap-goal-word, .webmap-locate-word, .webmap-route > .webmap-route-word"
-SLOW = re.compile("older than|is silent|not hold|does not have the robot")
 
 PLACE = """name => {
   const robot = document.querySelector(`.robot[data-name="${name}"]`);
@@ -129,7 +127,7 @@ def taken(tab: Page, act, said: Locator) -> None:
             arg=WORDS,
             timeout=20_000,
         )
-        if not SLOW.search(said.inner_text()):
+        if not TOO_LATE.search(said.inner_text()):
             return
     raise AssertionError(f"too slow again and again: {said.inner_text()}")
 
@@ -264,7 +262,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     pressed = [(x, y)]
 
     def again():
-        if SLOW.search(word.inner_text()):
+        if TOO_LATE.search(word.inner_text()):
             pressed.append(beside(tab, "Old 0", 5))
             tab.keyboard.press("i")
             press(tab, *pressed[-1], drag=30)
@@ -341,7 +339,7 @@ def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
     taken(tab, tab.locator(".webmap-route-run").click, word)
     for _ in range(10):
         expect(word).to_have_text(re.compile("point 2 of 3|^Halted"), timeout=15_000)
-        if not SLOW.search(word.inner_text()):
+        if not TOO_LATE.search(word.inner_text()):
             break
         tab.locator(".webmap-route-pause").click()  # it says "Go on"
     expect(word).to_have_text("New 1 goes to point 2 of 3.")
@@ -395,7 +393,7 @@ def next_goal(tab: Page, robot: ClientConnection) -> float:
             message = json.loads(robot.recv(timeout=1))["msg"]
         except TimeoutError:
             if word.get_attribute("data-state") == "halted":
-                assert SLOW.search(word.inner_text()), word.inner_text()
+                assert TOO_LATE.search(word.inner_text()), word.inner_text()
                 tab.locator(".webmap-route-pause").click()  # it says "Go on"
         else:
             return message["goal"]["target_pose"]["pose"]["position"]["x"]

@@ -264,7 +264,10 @@ def test_the_age_of_a_map_is_known_but_it_is_old_only_where_that_is_said(map, li
     assert often.layer.svg._age.limit == 2.0
 
 
-def test_a_page_that_is_behind_still_gets_the_pictures_of_a_moment_ago(link, module):
+def test_a_page_that_is_behind_still_gets_the_pictures_of_a_moment_ago(
+    link, module, monkeypatch
+):
+    monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 60.0)
     urls, before = [], len(pictures)
     for value in range(100):
         link.say("/map", grid([[value]]))

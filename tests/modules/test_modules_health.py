@@ -73,6 +73,7 @@ def test_a_level_that_there_is_not_is_said_and_the_other_parts_count(
 
 def test_a_part_that_falls_silent_is_stale(link, module, monkeypatch):
     now = room.time.monotonic()
+    monkeypatch.setattr(room.time, "monotonic", lambda: now)
     link.say("/diagnostics", array(status("one", 0), status("two", 0)))
     monkeypatch.setattr(room.time, "monotonic", lambda: now + 12)
     link.say("/diagnostics", array(status("two", 0)))

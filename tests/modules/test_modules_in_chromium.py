@@ -54,10 +54,7 @@ def tab(chromium: Browser, url: str) -> Iterator[Page]:
         page.goto(url)
         page.wait_for_selector(".occupancy-grid.map > image[href]", state="attached")
         page.wait_for_selector(".path > polyline[points]", state="attached")
-        # An image has its address before it has its pixels.
-        deadline = time.monotonic() + 10
-        while colours(page, floor(0.5, 0.5)) != [WALL]:
-            assert time.monotonic() < deadline, "the map is never drawn"
+        await_colours(page, [WALL, LETHAL], floor(0.5, 0.5), (-0.5, 1.1))
         yield page
 
 
@@ -71,6 +68,13 @@ def colours(tab: Page, *places: tuple[float, float]) -> list[tuple[int, ...]]:
     picture = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
     pixels = [on_screen(tab, x, y) for x, y in places]
     return [picture.getpixel((round(u), round(v))) for u, v in pixels]
+
+
+def await_colours(tab: Page, wanted: list, *places: tuple[float, float]) -> None:
+    """Wait until images are drawn: they have addresses before they have pixels."""
+    deadline = time.monotonic() + 15
+    while (found := colours(tab, *places)) != wanted:
+        assert time.monotonic() < deadline, f"never drawn so: {found}"
 
 
 def floor(x: float, y: float) -> tuple[float, float]:
@@ -128,4 +132,4 @@ def test_costs_that_make_no_sense_are_said_once_and_the_old_ones_stay(tab):
     notice = tab.locator(".webmap-notice")
     expect(notice).to_contain_text("/costs: a grid of 10 x 1 cells came with 3 of them")
     expect(notice).to_have_count(1)
-    assert colours(tab, (-0.5, 1.1)) == [LETHAL]
+    await_colours(tab, [LETHAL], (-0.5, 1.1))

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 
 import pytest
 from button_robot import robot_node
+from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import watched_tab
@@ -15,7 +16,7 @@ from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
-expect.set_options(timeout=15_000)
+"""Why the gate takes no goal from a busy machine; a person presses once more."""
 
 FLEET = """\
 [bridges]
@@ -86,6 +87,9 @@ def opened(tab: Page, url: str) -> None:
     expect(tab.locator(".occupancy-grid image")).to_have_attribute(
         "href", re.compile(".")
     )
+    # Hands move the view and press labels from now on.
+    tab.locator("svg.webmap-view-control").wait_for()
+    expect(tab.locator(".webmap-labels-go")).to_be_visible()
     tab.locator("#show-all").click()
 
 
@@ -247,8 +251,14 @@ def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, brid
         expect(send).to_be_disabled()
         tab.locator("#robots .row").click()
         expect(send).to_have_text("Send the robot here")
-        send.click()
-        expect(tab.locator(".webmap-labels-word")).to_have_text("Sent to Äpfel <b>.")
+        word = tab.locator(".webmap-labels-word")
+        for _ in range(10):
+            send.click()
+            expect(word).to_have_text(re.compile("^Sent to|^Not sent"))
+            if not TOO_LATE.search(word.inner_text()):
+                break
+            label(tab, "Äpfel <b>").press("Enter")  # which takes the words away
+        expect(word).to_have_text("Sent to Äpfel <b>.")
         expect(tab.locator(".robot.selected")).to_have_count(1)
         deadline = time.monotonic() + 10
         while not node.heard and time.monotonic() < deadline:

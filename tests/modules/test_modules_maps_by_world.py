@@ -145,7 +145,10 @@ CORNER = Plan(((0, 255), (128, 255)), origin=(-3.0, 4.0, math.pi / 2), resolutio
 @settings(
     max_examples=60,
     deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[
+        HealthCheck.function_scoped_fixture,
+        HealthCheck.too_slow,
+    ],
 )
 def test_every_cell_is_at_its_place_of_the_world(
     map, link, tmp_path_factory, plan, up, across

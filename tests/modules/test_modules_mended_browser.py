@@ -17,7 +17,8 @@ COUNT = """
 window.most = 0;
 window.words = new Set();
 new MutationObserver(() => {
-  const boxes = document.querySelectorAll(".webmap-notice");
+  // What is said of a link that is held up is another matter.
+  const boxes = document.querySelectorAll(".webmap-notice:not(.status)");
   window.most = Math.max(window.most, boxes.length);
   for (const { textContent } of boxes) window.words.add(textContent);
 }).observe(document, { subtree: true, childList: true, characterData: true });

@@ -57,12 +57,13 @@ def test_frames_that_are_missing_are_said_a_while_after_the_link_is_up(
         )
         await until(lambda: urls)
         bridge = Bridge(urls[0])
+        opened = []
+        # Before the frames, whose time begins when they hear of it.
+        bridge.on_open(lambda: opened.append(time.monotonic()))
         robot.set_tf(bridge, namespace="/ghost")
         grid = map.add_module(
             "OccupancyGrid", bridge, "/map", map_frame="other", namespace="/ghost"
         ).layer
-        opened = []
-        bridge.on_open(lambda: opened.append(time.monotonic()))
         bridge.start(asyncio.get_running_loop())
         try:
             await until(lambda: grid.problems or robot.problems)

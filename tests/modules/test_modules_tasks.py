@@ -151,7 +151,7 @@ class TestRoutes:
                 monkeypatch.setattr(tool.half, "send", sent.append)
                 for number, message in enumerate(messages):
                     tool.on_message(message)
-                    async with asyncio.timeout(5):
+                    async with asyncio.timeout(30):
                         while len(sent) <= number:
                             await asyncio.sleep(0)
                 page.close()

@@ -17,8 +17,6 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-expect.set_options(timeout=15_000)
-
 HERE = Path(__file__).parent
 PLANE = LocalPlane(*DATUM, EAST)
 CTM = """selector => {
@@ -51,14 +49,25 @@ def tab(chromium: Browser, url: str) -> Iterator[Page]:
 
 
 def settled(tab: Page, level: int) -> None:
-    """Wait until all tiles are of one level and drawn."""
+    """Wait until all tiles are of one level, drawn, and wherever there is one."""
     tab.wait_for_function(
-        """level => {
+        """([level, missing]) => {
           const tiles = [...document.querySelectorAll('.tile')];
-          return tiles.length > 5 && tiles.every((tile) =>
-            tile.dataset.tile.startsWith(level + '/') && tile.hasAttribute('href'));
+          if (tiles.length <= 5 || !tiles.every((tile) =>
+            tile.dataset.tile.startsWith(level + '/') && tile.hasAttribute('href')))
+            return false;
+          const there = new Set([missing, ...tiles.map((tile) => tile.dataset.tile)]);
+          const [, x, y] = tiles[0].dataset.tile.split('/').map(Number);
+          const m = tiles[0].getScreenCTM().inverse();
+          for (let u = 20; u < innerWidth; u += 40)
+            for (let v = 20; v < innerHeight; v += 40) {
+              const at = new DOMPoint(u, v).matrixTransform(m);
+              const [column, row] = [x + Math.floor(at.x), y + Math.floor(at.y)];
+              if (!there.has(`${level}/${column}/${row}`)) return false;
+            }
+          return true;
         }""",
-        arg=level,
+        arg=[level, "/".join(map(str, missing()))],
     )
     tab.evaluate(
         """async () => {
@@ -91,8 +100,14 @@ def world(tab: Page) -> Affine:
 def test_tiles_lie_where_the_globe_has_them_and_fixes_where_the_tiles_say(tab, level):
     if level == 18:
         for _ in range(2):
+            before = tab.evaluate(CTM, "svg.webmap .world")[0]
             tab.mouse.move(450, 350)
             tab.mouse.wheel(0, -300)
+            tab.wait_for_function(
+                "before => document.querySelector('svg.webmap .world')"
+                ".getScreenCTM().a !== before",
+                arg=before,
+            )
         settled(tab, 18)
     picture, view = seen(tab), world(tab)
     checked = 0

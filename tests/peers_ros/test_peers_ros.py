@@ -161,7 +161,8 @@ def test_a_bridge_that_is_killed_under_way_says_zero_first_when_it_is_back(opene
     assert all(t.is_zero for t in ros.twists()[killed:]), "the held key drove on"
     opened.keyboard.up("w")
     drawn_now(opened).wait_for(state="attached")
-    expect(opened.locator(f"{BOB} > .laserscan:not(.stale)")).to_be_attached()
+    scan = opened.locator(f"{BOB} > .laserscan:not(.stale)")
+    expect(scan).to_be_attached(timeout=30_000)  # the new bridge has to find it
     expect_drawn_where_it_is(opened, ros)
     drive(opened, ros)
     opened.keyboard.up("w")

@@ -232,7 +232,10 @@ class Deleted:
         return f"{list(kinds)}.includes(event.type)"
 
 
-WINDOW = ("blur", "visibilitychange", "pagehide", "freeze", "contextmenu", "focusin")
+WINDOW = (
+    *("blur", "visibilitychange", "pagehide", "freeze", "contextmenu", "focusin"),
+    "dragstart",
+)
 POINTER = ("pointerup", "pointercancel", "lostpointercapture")
 
 DELETED = {

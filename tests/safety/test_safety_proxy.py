@@ -80,7 +80,7 @@ def test_latency_holds_for_each_way(ends):
 
 def test_a_slice_cuts_what_was_written_at_once(ends):
     proxy, client, server = ends
-    proxy.shape(Shape(slice_size=3, slice_gap=0.05), "up")
+    proxy.shape(Shape(slice_size=3, slice_gap=1.0), "up")
     client.sendall(b"abcdef")
     assert server.recv(100) == b"abc"
     assert read(server, 3) == b"def"

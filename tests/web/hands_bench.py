@@ -14,6 +14,10 @@ DOUBTS = {
     "pagehide": "window.dispatchEvent(new PageTransitionEvent('pagehide'))",
     "freeze": "document.dispatchEvent(new Event('freeze'))",
     "context menu": "document.body.dispatchEvent(new MouseEvent('contextmenu'))",
+    "drag": """
+        const drag = new DragEvent('dragstart', {bubbles: true, cancelable: true});
+        document.body.dispatchEvent(drag);
+    """,
     "text field": "document.getElementById('text').focus()",
     "lost focus": "document.hasFocus = () => false",
     "hidden": """
@@ -47,7 +51,7 @@ class Bench:
     def state(self) -> str:
         return self.page.evaluate("bench.drive.state")
 
-    def until(self, true: Callable[[], object], patience: float = 5.0) -> None:
+    def until(self, true: Callable[[], object], patience: float = 10.0) -> None:
         deadline = time.monotonic() + patience
         while not true():
             assert time.monotonic() < deadline, f"waited in vain; {self.gate.said[-3:]}"
@@ -66,21 +70,40 @@ class Bench:
     def drive(self) -> float:
         """Hold W until the robot moves; return when that was seen."""
         self.select("r1")
+        self.hold("w", self.gate.moves)
+        return time.monotonic()
+
+    def hold(self, key: str, true: Callable[[], object]) -> None:
+        """Press a key until it has its effect, and keep holding it."""
         for _ in range(5):
-            self.page.keyboard.down("w")
+            self.page.keyboard.down(key)
             with suppress(AssertionError):
-                self.until(self.gate.moves, patience=1.5)
-                return time.monotonic()
+                self.until(true, patience=1.5)
+                return
             # On a busy machine the page may sleep for a moment, which is a doubt.
-            self.page.keyboard.up("w")
+            self.page.keyboard.up(key)
             self.page.wait_for_timeout(300)
-        raise AssertionError(f"never drove: {self.gate.said[-3:]}")
+        raise AssertionError(f"{key} never drove: {self.gate.said[-3:]}")
+
+    @property
+    def losses(self) -> int:
+        """How often the connection was lost: it may be open again when one looks."""
+        return self.page.evaluate("bench.losses()")
+
+    def cut(self) -> None:
+        """Cut the page's connection, and see that it has noticed."""
+        before = self.losses
+        self.gate.drop()
+        self.until(lambda: self.losses > before)
 
     def still(self, seconds: float = 0.6, tolerance: float = 0.0) -> None:
-        """Check that nothing moves from now on."""
-        since = time.monotonic() + tolerance
+        """Check that nothing that moves a robot leaves the page from now on.
+
+        What left it before may reach a gate that is busy later.
+        """
+        since = self.page.evaluate("performance.now()") + 1000 * tolerance
         self.page.wait_for_timeout(1000 * (seconds + tolerance))
-        assert self.gate.moves(since) == []
+        assert self.page.evaluate("(since) => bench.moves(since)", since) == []
 
     def neutral_within(self, ms: float) -> None:
         """Check that after the last key, or mark, neutral left the page in time."""

@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from fake_drive import FakeDrive
 from hands_bench import DOUBTS, Bench
 
 pytestmark = pytest.mark.browser
@@ -19,6 +20,7 @@ def test_holding_w_takes_the_robot_and_drives_after_neutral(bench: Bench) -> Non
     bench.until(lambda: bench.shown() == "driving")
 
 
+@pytest.mark.serial
 def test_commands_leave_at_20_hz(bench: Bench) -> None:
     since = bench.drive()
     bench.page.wait_for_timeout(2000)
@@ -31,8 +33,7 @@ def test_letting_go_is_neutral_at_once_and_pressing_again_drives(bench: Bench) -
     bench.neutral_within(50)
     bench.still()
     since = time.monotonic()
-    bench.page.keyboard.down("a")
-    bench.until(lambda: bench.gate.moves(since))
+    bench.hold("a", lambda: bench.gate.moves(since))
     assert bench.gate.moves(since)[0]["turn"] == 1
 
 
@@ -67,11 +68,12 @@ def test_a_hidden_page_gives_the_robot_back(bench: Bench) -> None:
 
 def test_a_silent_gate_is_lost_and_what_is_held_moves_nothing(bench: Bench) -> None:
     bench.drive()
+    losses = bench.losses
     bench.gate.ticking = False
-    bench.until(lambda: bench.state == "late")
-    assert bench.shown() == "late"
+    # It is late for 200 ms, and lost then; tried again, it is late again.
+    bench.until(lambda: bench.shown() == "late")
     bench.still(0.1, tolerance=0.05)
-    bench.until(lambda: bench.state == "lost")
+    bench.until(lambda: bench.losses > losses)
     bench.gate.ticking = True
     bench.until(lambda: bench.state == "open")
     bench.page.keyboard.down("w")
@@ -82,7 +84,7 @@ def test_a_silent_gate_is_lost_and_what_is_held_moves_nothing(bench: Bench) -> N
 def test_commands_that_are_not_acknowledged_turn_the_controls_red(bench: Bench) -> None:
     bench.drive()
     bench.gate.acking = False
-    bench.until(lambda: bench.shown() == "late", patience=1.0)
+    bench.until(lambda: bench.shown() == "late")
     bench.gate.acking = True
     bench.until(lambda: bench.state == "open")
     bench.still()
@@ -90,25 +92,23 @@ def test_commands_that_are_not_acknowledged_turn_the_controls_red(bench: Bench) 
 
 def test_a_cut_connection_moves_nothing_until_a_new_press(bench: Bench) -> None:
     bench.drive()
-    bench.gate.drop()
-    bench.until(lambda: bench.state == "lost")
+    bench.cut()
     bench.until(lambda: bench.state == "open")
     bench.still()
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
-    bench.page.keyboard.down("w")
-    bench.until(lambda: len(bench.gate.of("take")) == 2)
+    bench.hold("w", lambda: len(bench.gate.of("take")) == 2)
 
 
 def test_a_gate_that_was_started_anew_moves_nothing_that_is_held(bench: Bench) -> None:
     bench.drive()
     bench.gate.greet()
-    bench.still(tolerance=0.05)
+    bench.until(lambda: bench.page.evaluate("bench.drive.status.driven") is None)
+    bench.still()
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
     since = time.monotonic()
-    bench.page.keyboard.down("w")
-    bench.until(lambda: bench.gate.moves(since))
+    bench.hold("w", lambda: bench.gate.moves(since))
     assert len(bench.gate.of("take")) == 2
     assert bench.gate.of("drive", since)[0]["seq"] == 0
 
@@ -121,8 +121,7 @@ def test_another_selection_stops_the_old_robot_and_spares_the_new(bench: Bench) 
     bench.still()
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
-    bench.page.keyboard.down("w")
-    bench.until(lambda: bench.gate.moves() and bench.gate.moves()[-1]["robot"] == "r2")
+    bench.hold("w", lambda: bench.gate.moves()[-1]["robot"] == "r2")
 
 
 def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> None:
@@ -154,8 +153,7 @@ def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
     bench.still()
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
-    bench.page.keyboard.down("w")
-    bench.until(bench.gate.moves)
+    bench.hold("w", bench.gate.moves)
     assert bench.gate.of("take") == []
 
 
@@ -237,8 +235,7 @@ def test_the_stop_button_is_large_named_and_stops(bench: Bench) -> None:
 
 def test_a_stop_without_a_connection_is_the_first_thing_said(bench: Bench) -> None:
     bench.select("r1")
-    bench.gate.drop()
-    bench.until(lambda: bench.state == "lost")
+    bench.cut()
     bench.page.keyboard.press("Escape")
     bench.until(lambda: bench.gate.said)
     assert bench.gate.said[0][1] == {"op": "stop", "robot": "r1"}
@@ -255,14 +252,12 @@ def test_two_maps_do_not_both_drive(open_bench) -> None:
     bench = open_bench("?two")
     bench.select("r1", map=0)
     bench.select("r2", map=1)
-    bench.page.keyboard.down("w")
-    bench.until(bench.gate.moves)
+    bench.hold("w", bench.gate.moves)
     bench.page.keyboard.up("w")
     bench.page.locator("#map2").click(position={"x": 360, "y": 110})
     since = time.monotonic()
     bench.page.wait_for_timeout(300)
-    bench.page.keyboard.down("w")
-    bench.until(lambda: bench.gate.moves(since))
+    bench.hold("w", lambda: bench.gate.moves(since))
     assert {said["robot"] for said in bench.gate.moves(since)} == {"r2"}
     assert bench.page.evaluate("bench.maps[1].sent") == [{"active": True}]
 
@@ -418,7 +413,8 @@ def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -
     bench.still()
     assert len(bench.gate.of("take")) == 1
     reset = bench.page.locator(".webmap-teleop .webmap-reset")
-    reset.dblclick()
+    # Both at once: on a busy machine those of a mouse may be far apart.
+    reset.evaluate("e => { e.click(); e.click(); }")
     bench.page.wait_for_timeout(450)
     assert bench.gate.of("reset") == []
     assert reset.inner_text() == "Press again to reset"
@@ -428,8 +424,7 @@ def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
     since = time.monotonic()
-    bench.page.keyboard.down("w")
-    bench.until(lambda: bench.gate.moves(since))
+    bench.hold("w", lambda: bench.gate.moves(since))
 
 
 def test_space_on_the_reset_button_is_stop(open_bench) -> None:
@@ -440,8 +435,8 @@ def test_space_on_the_reset_button_is_stop(open_bench) -> None:
     for _ in range(2):
         reset.press("Space")
         bench.page.wait_for_timeout(450)
+    bench.until(lambda: len(bench.gate.of("stop")) == 2)
     assert bench.gate.of("reset") == []
-    assert len(bench.gate.of("stop")) == 2
 
 
 def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> None:
@@ -459,8 +454,77 @@ def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> Non
     reset.click()
     bench.page.wait_for_timeout(450)
     bench.page.get_by_role("button", name="Press again to reset").click()
-    bench.until(lambda: bench.gate.of("reset") == [{"op": "reset", "robot": "*"}])
+    both = [{"op": "reset", "robot": robot} for robot in ("r1", "r2")]
+    bench.until(lambda: bench.gate.of("reset") == both)
     bench.until(lambda: not bench.page.locator(".webmap-stop-list").is_visible())
+
+
+STANDS = {"latched": True, "state": "stopped", "stop": CONFIRMED}
+
+
+def test_a_robot_that_is_stopped_meanwhile_takes_the_press_on_reset_back(
+    open_bench,
+) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.change("r1", **STANDS)
+    reset = bench.page.locator(".webmap-stop .webmap-reset")
+    reset.click()
+    assert reset.inner_text() == "Press again to reset"
+    bench.gate.change("r2", **STANDS)
+    # Sooner than it is forgotten by itself.
+    bench.until(lambda: reset.inner_text() == "Reset all", patience=3.0)
+    bench.page.wait_for_timeout(450)
+    reset.click()
+    bench.page.wait_for_timeout(100)
+    assert bench.gate.of("reset") == []
+
+
+def test_another_selection_takes_the_press_on_reset_back(bench: Bench) -> None:
+    for robot in ("r1", "r2"):
+        bench.gate.change(robot, **STANDS)
+    bench.select("r1")
+    reset = bench.page.locator(".webmap-teleop .webmap-reset")
+    reset.wait_for()
+    reset.press("Enter")
+    assert reset.inner_text() == "Press again to reset"
+    bench.select("r2")
+    assert reset.inner_text() == "Reset"
+    bench.page.wait_for_timeout(450)
+    reset.press("Enter")
+    bench.page.wait_for_timeout(100)
+    assert bench.gate.of("reset") == []
+
+
+@pytest.mark.parametrize("panel", ["stop", "teleop"])
+def test_a_stop_in_between_takes_the_press_on_reset_back(open_bench, panel) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.select("r1")
+    bench.gate.change("r1", **STANDS)
+    reset = bench.page.locator(f".webmap-{panel} .webmap-reset")
+    reset.wait_for()
+    reset.press("Enter")
+    assert reset.inner_text() == "Press again to reset"
+    bench.page.keyboard.press("Space")
+    bench.until(lambda: reset.inner_text() == "Reset", patience=3.0)
+    bench.page.wait_for_timeout(450)
+    reset.press("Enter")
+    bench.until(lambda: reset.inner_text() == "Press again to reset")
+    assert bench.gate.of("reset") == []
+
+
+def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
+    open_bench, gate: FakeDrive
+) -> None:
+    robots = dict(gate.robots)
+    gate.robots.clear()
+    bench = open_bench("?modules=stop,teleop")
+    bench.page.get_by_role("button", name="Stop all").click()
+    verdicts = bench.page.locator(".webmap-stop-verdict")
+    bench.until(lambda: "All robots: STOP NOT CONFIRMED" in verdicts.inner_text())
+    gate.robots |= robots
+    gate.change("r1", **STANDS)
+    words = "Robot r1: stopped, confirmed by odometry"
+    bench.until(lambda: verdicts.inner_text() == words)
 
 
 def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
@@ -486,7 +550,7 @@ def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> No
     bench.until(lambda: bench.shown() == "free")
     bench.gate.deaf = True
     bench.page.keyboard.press("Space")
-    bench.until(lambda: bench.shown() == "unconfirmed", patience=1.0)
+    bench.until(lambda: bench.shown() == "unconfirmed")
     words = bench.page.inner_text(".webmap-teleop-state")
     assert words == "STOP NOT CONFIRMED The gate has not answered."
     listed = bench.page.inner_text(".webmap-stop-verdict")

@@ -65,9 +65,18 @@ def test_a_page_under_a_prefix_says_its_own_path(host, tab):
 
 
 def test_a_lost_link_is_said_and_comes_back(host, tab, opened):
+    # Written down in the page, as it may be connected again before anybody looks.
+    tab.evaluate(
+        """() => {
+          window.said = "";
+          new MutationObserver(() => {
+            const status = document.querySelector("html.disconnected [role=status]");
+            if (status) window.said = status.textContent;
+          }).observe(document, { attributes: true, childList: true, subtree: true });
+        }"""
+    )
     host.drop()
-    tab.wait_for_selector("html.disconnected [role=status]", state="attached")
-    assert "restarting" in tab.inner_text("[role=status]")
+    assert "restarting" in wait(tab, "window.said")
     wait(tab, "!document.documentElement.classList.contains('disconnected')")
     tab.wait_for_selector("[role=status]", state="detached")
     assert len(host.shown) == 1

@@ -197,9 +197,7 @@ def test_a_view_that_cannot_be_is_not_shown(host, tab, open_map):
 
 
 def test_the_click_that_ends_a_drag_can_be_swallowed(host, tab, open_map):
-    shown = open_map()
-    host.call(shown.root.on, "click", print)
-    tab.wait_for_timeout(100)
+    shown = open_map(build=lambda shown: shown.root.on("click", print))
     on_map(
         tab,
         """

@@ -201,7 +201,7 @@ def test_ages_go_on_by_themselves(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()
         shown.robot, _ = shown.add_robot(world, mount)
-        shown.robot.set_age(0.2, limit=0.5)
+        shown.robot.set_age(0.2, limit=3)
         shown.document.bind("label").append(html.span(class_="age"))
         shown.span = shown.document.bind("label").children[0]
         shown.span.set_age(math.inf, age_text=True)
@@ -210,13 +210,15 @@ def test_ages_go_on_by_themselves(host, tab):
     tab.goto(host.url)
     tab.wait_for_selector(".robot:not(.stale)")
     tab.wait_for_selector(".age.stale:text('no data')")
-    tab.wait_for_selector(".robot.stale", timeout=5000)
-    assert float(tab.get_attribute(".robot", "data-age")) >= 0.5
+    tab.wait_for_selector(".robot.stale", timeout=10_000)
+    assert float(tab.get_attribute(".robot", "data-age")) >= 3
     host.call(host.one.robot.set_age, 0)
     tab.wait_for_selector(".robot:not(.stale)")
     host.call(host.one.span.set_age, 75)
-    tab.wait_for_selector(".age.stale:text('75 s')")
-    tab.wait_for_selector(".age.stale:text('76 s')", timeout=5000)
+    # The page may look late: what it shows then, it counts on from.
+    tab.wait_for_selector(".age.stale:text-matches('^7[5-9] s$')")
+    seconds = tab.inner_text(".age").removesuffix(" s")
+    wait(tab, f"parseInt(document.querySelector('.age').textContent) > {seconds}")
 
 
 def test_ages_go_on_while_the_server_is_gone(host, tab):
@@ -225,13 +227,13 @@ def test_ages_go_on_while_the_server_is_gone(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()
         shown.robot, _ = shown.add_robot(world, mount)
-        shown.robot.set_age(0, limit=0.6)
+        shown.robot.set_age(0, limit=3)
 
     host.build = build
     tab.goto(host.url)
     tab.wait_for_selector(".robot:not(.stale)")
     host.__exit__()
-    tab.wait_for_selector("html.disconnected .robot.stale", timeout=8000)
+    tab.wait_for_selector("html.disconnected .robot.stale", timeout=15_000)
     assert "No connection" in tab.inner_text("[role=status]")
     before = float(tab.get_attribute(".robot", "data-age"))
     wait(
@@ -360,7 +362,7 @@ def test_inputs_and_keys_tell_what_they_hold(host, tab):
     assert (typed.event, typed.value) == ("input", "typed")
     # A hand unticked what Python has ticked: Python can tick it again.
     host.call(host.one.box.set, checked=True)
-    tab.wait_for_timeout(100)
+    tab.wait_for_selector("#box[checked]")
     tab.uncheck("#box")
     host.call(host.one.box.set, checked=True)
     wait(tab, "document.querySelector('#box').checked")
@@ -378,9 +380,9 @@ def test_nobody_hears_any_more_after_the_removal(host, tab):
     tab.goto(host.url)
     tab.click("#go")
     host.until(lambda: host.events(ElementEvent), tab=tab)
-    frames = host.one.frames
-    host.call(host.one.removal.remove)
-    host.until(lambda: host.one.frames > frames, tab=tab)
+    # In one frame with what shows that the page has it.
+    host.call(lambda: (host.one.removal.remove(), host.one.button.set(title="deaf")))
+    tab.wait_for_selector("#go[title=deaf]")
     tab.evaluate(
         """async () => {
           const { page } = await import("/_webmap/page.js");
@@ -389,7 +391,6 @@ def test_nobody_hears_any_more_after_the_removal(host, tab):
           page.send = (message) => { window.sent.push(message.op); send(message); };
         }"""
     )
-    tab.wait_for_timeout(50)
     tab.click("#go")
     tab.wait_for_timeout(100)
     sent = tab.evaluate("window.sent")

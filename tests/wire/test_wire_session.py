@@ -62,9 +62,9 @@ def test_what_did_not_change_is_not_sent_again():
     assert next_frame(session)
     assert session.frame(0.0) is None
     root.set_pose(1, 2, 3)
-    assert len(next_frame(session)) == HEADER.size + 2 + 1 + len(b"i") + 12 + (
-        1 if root.id > 127 else 0
-    ) + (1 if root.fragment.id > 127 else 0)
+    # Seven bits of a number are a byte.
+    ids = [-(-id.bit_length() // 7) for id in (root.id, root.fragment.id)]
+    assert len(next_frame(session)) == HEADER.size + len(b"op") + sum(ids) + 12
     assert session.frame(0.0) is None
 
 

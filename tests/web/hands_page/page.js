@@ -27,6 +27,13 @@ setInterval(() => {
   if (log.to) log.late = Math.max(log.late, now - Math.max(then, log.to) - 10);
   then = now;
 }, 10);
+let stepped = performance.now();
+drive.on("step", () => {
+  const now = performance.now();
+  // What is noticed at a step may wait for that step, as late as it comes.
+  if (log.to) log.late = Math.max(log.late, now - Math.max(stepped, log.to) - 50);
+  stepped = now;
+});
 for (const kind of ["keydown", "keyup"]) {
   addEventListener(kind, (event) => event.repeat || mark(), { capture: true });
 }
@@ -43,6 +50,28 @@ function neutralDelay() {
     ({ op, at, x, turn }) => op === "drive" && at >= log.from && x === 0 && turn === 0,
   );
   return first ? [Math.max(0, first.at - log.to), log.late] : null;
+}
+
+/** What left this page since then and moves a robot. */
+function moves(since) {
+  return log.sent.filter(
+    ({ op, at, x, y, turn }) => op === "drive" && at >= since && (x || y || turn),
+  );
+}
+
+let losses = 0;
+drive.on("state", (state) => {
+  if (state === "lost") losses += 1;
+});
+
+/** Done when the page has looked at everything once more. */
+function step() {
+  return new Promise((resolve) => {
+    const off = drive.on("step", () => {
+      off();
+      resolve();
+    });
+  });
 }
 
 function robot(id, x, y) {
@@ -82,18 +111,21 @@ async function makeMap(number) {
     map.select(event.target.closest(".robot")?.getAttribute("data-robot") ?? null);
   });
   map.halves = [];
+  const styles = [];
   for (const name of modules) {
     const { default: attach } = await import(`/_webmap/modules/${name}.js`);
     const link = document.createElement("link");
     link.rel = "stylesheet";
     link.href = `/_webmap/modules/${name}.css`;
+    styles.push(new Promise((resolve) => link.addEventListener("load", resolve)));
     document.head.append(link);
     map.halves.push(attach(map, options, (message) => map.sent.push(message)));
   }
+  await Promise.all(styles);
   return map;
 }
 
 const maps = [await makeMap(1)];
 if (query.has("two")) maps.push(await makeMap(2));
-window.bench = { drive, maps, mark, neutralDelay };
+window.bench = { drive, maps, mark, neutralDelay, moves, losses: () => losses, step };
 document.body.dataset.ready = "yes";

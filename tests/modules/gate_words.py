@@ -1,0 +1,8 @@
+"""What the gate says to a page that a busy machine held up."""
+
+import re
+
+TOO_LATE = re.compile(
+    "older than|too old|is silent|take it first|held up|have the robot"
+)
+"""Why a goal was not taken that is taken when it is sent again."""
