@@ -14,13 +14,13 @@ hall = "URL"
 
 [[robots]]
 name = "Omni"
-odometry = "/robot_1/odom"
-twist = { topic = "/robot_1/cmd_vel", holonomic = true, stops_within = 0.5 }
+odometry = "/robot_0/odom"
+twist = { topic = "/robot_0/cmd_vel", holonomic = true, stops_within = 0.5 }
 
 [[robots]]
 name = "Plain"
-odometry = "/robot_2/odom"
-twist = { topic = "/robot_2/cmd_vel", stops_within = 0.5 }
+odometry = "/robot_1/odom"
+twist = { topic = "/robot_1/cmd_vel", stops_within = 0.5 }
 """
 
 

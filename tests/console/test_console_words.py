@@ -52,12 +52,30 @@ def test_a_robot_that_rolls_is_not_said_to_be_merely_free(measured, text):
     assert describe(robot(measured=measured)).text == text
 
 
+MOVES = (0.4, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("cancels", "measured", "text"),
+    [
+        (True, MOVES, "On its way"),
+        (True, None, "Free"),
+        (False, MOVES, "Still moving"),
+        (False, None, "Free"),
+    ],
+)
+def test_a_goal_that_nobody_tells_of_is_told_by_motion_alone(cancels, measured, text):
+    goal = SimpleNamespace(state="sent", way="topic")
+    one = robot(goal=goal, cancels=cancels, measured=measured)
+    assert describe(one).text == text
+
+
 @pytest.mark.parametrize(
     ("state", "text"),
     [("accepted", "On its way"), ("unknown", "On its way"), ("reached", "Free")],
 )
 def test_a_robot_with_a_goal_that_nobody_drives_is_on_its_way(state, text):
-    goal = SimpleNamespace(state=state)
+    goal = SimpleNamespace(state=state, way="navigate_to_pose")
     assert describe(robot(goal=goal)).text == text
     assert describe(robot("held", holder="Ann", goal=goal)).text == "Ann holds it"
 

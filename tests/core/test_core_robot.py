@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from webmap import Robot, svg
+from webmap.core import type_asking
 from webmap.core.runtime import goal_message, twist_message
 from webmap.errors import ConfigError, MotionError
 from webmap.gate.messages import SentGoal, SentTwist
@@ -20,6 +21,7 @@ class Link:
     """A bridge that is open at once and says what it is told to say."""
 
     url = "ws://test:9090"
+    state = "open"
     lag = 0.0
 
     def __init__(self, **types: str) -> None:
@@ -150,6 +152,53 @@ def test_poses_without_a_velocity_are_no_odometry_for_the_gate():
         robot.destroy()
 
     asyncio.run(scenario())
+
+
+def test_a_topic_that_tells_no_pose_is_no_odometry_for_the_gate():
+    async def scenario():
+        known, unknown = Link(odom="std_msgs/String"), Link()
+        for link in (known, unknown):
+            robot = Robot("Bob")
+            robot.set_move_topic(link, "/goal")
+            robot.set_odometry_topic(link, "/odom")
+            await settle()
+            link.say("/odom", {"data": "hello"})
+            assert told_of_odometry(robot) == (None, None)
+            robot.destroy()
+
+    asyncio.run(scenario())
+
+
+def test_a_topic_that_is_refused_is_no_odometry_for_the_gate():
+    robot = Robot("Bob")
+    robot.set_move_topic(Link(), "/goal")
+    with pytest.raises(ConfigError):
+        robot.set_odometry_topic(Link(), "/odom", type="std_msgs/String")
+    assert told_of_odometry(robot) == (None, None)
+    robot.destroy()
+
+
+def test_poses_that_come_only_while_a_robot_moves_are_known_by_rosapi_before(
+    monkeypatch,
+):
+    monkeypatch.setattr(type_asking, "SOON", 0.01)
+
+    async def scenario():
+        link = Link()
+        robot = Robot("Bob")
+        robot.set_move_topic(link, "/goal")
+        robot.set_odometry_topic(link, "/pose")
+        await settle()
+        assert told_of_odometry(robot) == ("/pose", None)
+        link.types["/pose"] = "geometry_msgs/PoseStamped"
+        while told_of_odometry(robot) != (None, None):
+            await asyncio.sleep(0.01)
+        (topic, _, type, _, _) = link.subscribed[0]
+        assert (len(link.subscribed), topic, type) == (1, "/pose", link.types["/pose"])
+        robot.destroy()
+        assert link.subscribed == []
+
+    asyncio.run(asyncio.wait_for(scenario(), 20))
 
 
 def test_odometry_whose_poses_cannot_be_used_shows_the_gate_motion_all_the_same():

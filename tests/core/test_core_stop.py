@@ -214,3 +214,12 @@ def test_names_of_stop_hooks_are_resolved_at_once(robot):
 def test_plain_scan_assist_that_is_wrong_is_named(data, said):
     with pytest.raises(ConfigError, match=said):
         Robot.from_dict({"name": "Bob", "scan_assist": data})
+
+
+def test_a_robot_that_is_destroyed_is_never_declared_as_one_with_goals_alone(
+    robot, gate
+):
+    drivable(robot).set_move_topic(robot.motion.twist_topic.bridge, "/goal")
+    gate.spec = None
+    robot.motion.close()
+    assert gate.spec is None

@@ -218,13 +218,35 @@ class TestTypes:
 
     STAMPED = "geometry_msgs/msg/TwistStamped"
 
-    def test_two_types_of_one_topic_are_refused_in_words(self, caplog):
+    def test_of_two_types_of_one_topic_the_first_counts_and_that_is_said(self, caplog):
         bench = Bench().begin(spec(), spec(id="r2", name="Al", twist_type=self.STAMPED))
-        assert [attach.spec.id for attach in bench.did(actions.Attach)] == ["r1"]
+        sure = [not it.spec.twist_type_assumed for it in bench.did(actions.Attach)]
+        assert sure == [True, False]
         assert (
             f"robot 'Al': /cmd_vel carries {self.STAMPED}, but robot 'Bob' has "
             "geometry_msgs/Twist there"
         ) in caplog.text
+        # All else that it says holds for it, then and later.
+        bench.tell(spec(id="r2", name="Al", twist_type=self.STAMPED, v_max=0.2))
+        again = bench.did(actions.Attach)[-1].spec
+        assert (again.v_max, again.twist_type_assumed) == (0.2, True)
+        bench.say("b", op="stop", robot="r2")
+        assert bench.report("r1").latched
+
+    def test_two_robots_whose_base_comes_back_with_another_type_change_theirs(self):
+        bench = Bench().begin(spec(), spec(id="r2"))
+        for robot in ("r1", "r2"):
+            bench.tell(spec(id=robot, twist_type=self.STAMPED))
+            told = bench.did(actions.Attach)[-1].spec
+            assert (told.twist_type, told.twist_type_assumed) == (self.STAMPED, False)
+
+    def test_who_drives_goes_on_when_the_assumed_type_proves_true(self):
+        bench = Bench().begin(spec(twist_type_assumed=True))
+        bench.drive_off()
+        bench.tell(spec())
+        bench.hold(0.1, x=1.0)
+        assert bench.written[-1].twist == Twist(1.0)
+        assert not bench.did(actions.Attach)[-1].spec.twist_type_assumed
 
     @pytest.mark.parametrize(
         ("one", "other"),

@@ -262,6 +262,14 @@ class TestByAnotherKey:
         reset(bench)
         assert bench.take()
 
+    def test_its_reset_ends_it_by_the_key_that_it_is_only_just_leaving(self):
+        bench = Bench().begin()
+        bench.drive_off()
+        stop(bench)
+        bench.tell(self.ONLY_GOALS)
+        reset(bench)
+        assert bench.disk == {}
+
     def test_its_reset_ends_it_by_every_key_that_it_had(self, bench):
         bench.tell(spec())
         bench.tell(spec(twist_topic="/other"))

@@ -3,7 +3,10 @@ import { mock, test } from "node:test";
 
 import { importOf } from "../../src/webmap/web/imports.js";
 
-const URL_OF_STOP = "http://localhost/_webmap/modules/stop.js";
+let modules = 0;
+
+/** The address of a module that was never asked for. */
+const newAddress = () => `http://localhost/_webmap/modules/${(modules += 1)}.js`;
 
 /** What is asked for, where the first so many requests end in an error. */
 function loader(failures, error = new TypeError("Failed to fetch")) {
@@ -32,20 +35,23 @@ test("a module that could not be had is asked for again, by another address", as
   mock.timers.enable({ apis: ["setTimeout"] });
   t.after(() => mock.timers.reset());
   const { asked, load } = loader(2);
-  assert.equal((await pass(importOf(URL_OF_STOP, load))).default, "attach");
-  assert.deepEqual(asked, [URL_OF_STOP, `${URL_OF_STOP}?again=1`, `${URL_OF_STOP}?again=2`]);
+  const url = newAddress();
+  assert.equal((await pass(importOf(url, load))).default, "attach");
+  assert.deepEqual(asked, [url, `${url}?again=1`, `${url}?again=2`]);
+  await importOf(url, load);
+  assert.equal(asked.at(-1), `${url}?again=2`, "or there would be two of it");
 });
 
 test("what cannot be had for good is said in the end", async (t) => {
   mock.timers.enable({ apis: ["setTimeout"] });
   t.after(() => mock.timers.reset());
   const { asked, load } = loader(9);
-  await assert.rejects(pass(importOf(URL_OF_STOP, load)), /Failed to fetch/);
+  await assert.rejects(pass(importOf(newAddress(), load)), /Failed to fetch/);
   assert.equal(asked.length, 3);
 });
 
 test("a module that is wrong is not asked for again", async () => {
   const { asked, load } = loader(9, new SyntaxError("Unexpected token"));
-  await assert.rejects(importOf(URL_OF_STOP, load), SyntaxError);
+  await assert.rejects(importOf(newAddress(), load), SyntaxError);
   assert.equal(asked.length, 1);
 });

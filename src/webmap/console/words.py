@@ -59,11 +59,20 @@ def describe(robot: "Robot") -> Words:
         return Words(f"{who} drives", "state-driving", "active", "You drive")
     if report.state == "held":
         return Words(f"{who} holds it", "state-held", "active", "You hold it")
-    if report.goal is not None and report.goal.state in GOING:
+    moves = _moves(report.measured)
+    if _goes(robot, moves):
         return Words("On its way", "goal-way", "active")
-    if _moves(report.measured):
+    if moves:
         return Words("Still moving", "state-stopping", "warn")
     return Words("Free", "state-free")
+
+
+def _goes(robot: "Robot", moves: bool) -> bool:
+    """Return whether a goal moves a robot; of a plain topic only its motion tells."""
+    report = robot.report
+    if report is None or report.goal is None or report.goal.state not in GOING:
+        return False
+    return report.goal.way != "topic" or (report.cancels and moves)
 
 
 def _moves(measured: tuple[float, float, float] | None) -> bool:

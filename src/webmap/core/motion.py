@@ -252,8 +252,9 @@ class MotionRoad:
 
     def close(self) -> None:
         """Let the gate forget the robot; it stops if it was driven."""
-        self.set_twist(None)
+        # All at once: without velocity it would be another machine, for its goals.
         self._move = self._pose = self._odometry = None
+        self.set_twist(None)
         self.declare()
         roads.discard(self)
 

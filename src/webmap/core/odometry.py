@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from webmap.core.tasks import spawn
+from webmap.core.type_asking import TypeAsking
 from webmap.errors import ConfigError, ProtocolError
 from webmap.geometry import Quaternion, Twist, Vector3
 from webmap.geometry.reach import FARTHEST
@@ -74,7 +75,8 @@ class OdometryFeed:
         listener: Called with each pose, in the model's thread.
         complain: Called with a sentence for people when the topic cannot be used,
             and with None when it can be used again.
-        typed: Called with the type when it is known, which may be at once.
+        typed: Called with the type when it is known, which may be at once; "" is one
+            that tells no pose.
         scope: Is told of messages that cannot be decoded.
 
     Raises:
@@ -103,6 +105,7 @@ class OdometryFeed:
         self._scope = scope
         self._opening: Removable | None = None
         self._subscription: Removable | None = None
+        self._asking: Removable | None = None
         if type is None:
             self._opening = bridge.on_open(self._on_open)
             return
@@ -110,10 +113,10 @@ class OdometryFeed:
 
     def remove(self) -> None:
         """Unsubscribe; the second call does nothing."""
-        for thing in (self._opening, self._subscription):
+        for thing in (self._opening, self._subscription, self._asking):
             if thing is not None:
                 thing.remove()
-        self._opening = self._subscription = None
+        self._opening = self._subscription = self._asking = None
 
     def _on_open(self) -> None:
         if self._subscription is None:
@@ -128,11 +131,31 @@ class OdometryFeed:
                 self._subscription = self.bridge.subscribe(
                     self.topic, self._on_first, throttle=self.throttle
                 )
+            # Who has the topic may start later, and may say nothing before it moves.
+            self._asking = TypeAsking(self.bridge, self.topic, self._told)
+            return
+        self._told(found)
+
+    def _told(self, type: str) -> None:
+        """Take the type that rosapi tells."""
+        if self.type is not None:
             return
         try:
-            self._subscribe(odometry_view(found))
+            view = odometry_view(type)
         except ConfigError as error:
             self._complain(f"topic {self.topic!r}: {error}")
+            self._typed("")
+        else:
+            self._use(view)
+
+    def _use(self, view: type[OdometryView]) -> None:
+        """Listen with the type that is known now."""
+        untyped, asking = self._subscription, self._asking
+        self._subscribe(view)
+        for thing in (untyped, asking):
+            if thing is not None:
+                thing.remove()
+        self._asking = None
 
     def _on_first(self, message: Any) -> None:
         try:
@@ -140,11 +163,9 @@ class OdometryFeed:
             first = convert(message, view)
         except ProtocolError as error:
             self._complain(f"topic {self.topic!r}: {error}; say type=... if one does")
+            self._typed("")
             return
-        untyped = self._subscription
-        self._subscribe(view)
-        if untyped is not None:
-            untyped.remove()
+        self._use(view)
         self._hear(first)
 
     def _subscribe(self, view: type[OdometryView]) -> None:

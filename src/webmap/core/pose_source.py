@@ -82,10 +82,14 @@ class PoseSource:
 
         typed(None)
         scope = Scope(f"poses of {topic}", self._failed, lambda _: say(None))
-        with no_scope():
-            self.feed = OdometryFeed(
-                bridge, topic, throttle, type, self._on_pose, say, typed, scope
-            )
+        try:
+            with no_scope():
+                self.feed = OdometryFeed(
+                    bridge, topic, throttle, type, self._on_pose, say, typed, scope
+                )
+        except BaseException:
+            self._motion.clear_odometry()
+            raise
         self._find_bridge()
 
     def unfollow(self) -> None:

@@ -51,7 +51,9 @@ export class Halves {
     this._attached.set(instance, attached);
     if (css) this._addStyle(css);
     this._load(attached, instance, module, options).catch((error) => {
-      this._page.notice(`Module ${module} does not work: ${error}`);
+      // What a module imports is not asked for again by every browser.
+      const hint = error instanceof TypeError ? " Reload the page to try again." : "";
+      this._page.notice(`Module ${module} does not work: ${error}.${hint}`);
     });
   }
 

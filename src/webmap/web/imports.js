@@ -2,6 +2,12 @@
 const AGAIN = [200, 1000];
 
 /**
+ * By what address each module was had, as by another it would be another module.
+ * @type {Map<string, string>}
+ */
+const had = new Map();
+
+/**
  * Import a module, and ask for it again if it cannot be had: over a bad link a page would
  * otherwise be without its STOP button until it is loaded anew.
  *
@@ -11,16 +17,21 @@ const AGAIN = [200, 1000];
  * @throws {TypeError} If it cannot be had; whatever else it raises itself.
  */
 export async function importOf(url, load = (address) => import(address)) {
-  for (const [tries, wait] of AGAIN.entries()) {
+  const known = had.get(url);
+  if (known !== undefined) return load(known);
+  for (let tries = 0; ; tries++) {
+    const address = asked(url, tries);
     try {
-      return await load(asked(url, tries));
+      const module = await load(address);
+      had.set(url, address);
+      return module;
     } catch (error) {
-      // A module that came and is wrong would be wrong again.
-      if (!(error instanceof TypeError)) throw error;
-      await new Promise((done) => setTimeout(done, wait));
+      // A module that came and is wrong would be wrong again; of a TypeError it cannot
+      // be told whose it is.
+      if (!(error instanceof TypeError) || tries >= AGAIN.length) throw error;
+      await new Promise((done) => setTimeout(done, AGAIN[tries]));
     }
   }
-  return load(asked(url, AGAIN.length));
 }
 
 /**

@@ -1,6 +1,9 @@
 /** Milliseconds before a lost link is tried again: at first, and at the most. */
 const FIRST_WAIT = 250;
 const LONGEST_WAIT = 5000;
+/** Milliseconds for which a link may be opened before it is given up: likewise. */
+const FIRST_PATIENCE = 5000;
+const LONGEST_PATIENCE = 20_000;
 /** Close codes after which another try would end the same way. */
 const FOR_GOOD = new Set([1008, 4001]);
 
@@ -24,6 +27,7 @@ export class Link {
     this._wait = FIRST_WAIT;
     /** When opening it began. */
     this._since = 0;
+    this._patience = FIRST_PATIENCE;
     /** @type {WebSocket | null} */
     this._socket = null;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -36,10 +40,17 @@ export class Link {
     return this._socket?.readyState === WebSocket.OPEN;
   }
 
-  /** For how long it has been tried to open it, in ms; 0 if nothing is being opened. */
-  get opening() {
-    if (this._socket?.readyState !== WebSocket.CONNECTING) return 0;
-    return performance.now() - this._since;
+  /** Whether it is being opened. */
+  get opens() {
+    return this._socket?.readyState === WebSocket.CONNECTING;
+  }
+
+  /** Give up what is being opened for long, as its network may be gone, and try again. */
+  look() {
+    if (!this.opens || performance.now() - this._since < this._patience) return;
+    // A network that is merely slow is given more time each time.
+    this._patience = Math.min(this._patience * 2, LONGEST_PATIENCE);
+    this.renew();
   }
 
   /** @param {object} message Goes out now or not at all. */
@@ -50,6 +61,7 @@ export class Link {
   /** The other side speaks sense, so the next loss is tried again at once. */
   settle() {
     this._wait = FIRST_WAIT;
+    this._patience = FIRST_PATIENCE;
   }
 
   /** Give the link up and try again. */
@@ -111,7 +123,7 @@ export class Link {
 
   _hurry() {
     // What was begun on another network may never end.
-    if (this.opening > 0) this.renew();
+    if (this.opens) this.renew();
     if (this._timer === undefined) return;
     clearTimeout(this._timer);
     this._open();

@@ -14,8 +14,6 @@ import { VersionError } from "./wire.js";
 /** Milliseconds without a word from the server until the page says so, and acts. */
 const SILENT = 3000;
 const DEAD = 10_000;
-/** A link that is not open by then is tried anew: its network may be gone. */
-const OPENING = 5000;
 /** The server says something at least every second, so this is often enough. */
 const LOOK_PERIOD = 500;
 /** Frames in a row that may fail before the page gives up asking for new ones. */
@@ -167,7 +165,7 @@ export class Page {
 
   /** Notice a link that is open and says nothing. */
   _look() {
-    if (this._link.opening > OPENING) this._link.renew();
+    this._link.look();
     // A hidden page draws nothing, so that the server rightly stops talking to it.
     if (document.hidden || this._frames.length > 0) this._heard = performance.now();
     const silent = performance.now() - this._heard;

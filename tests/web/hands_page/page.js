@@ -27,13 +27,13 @@ setInterval(() => {
   if (log.to) log.late = Math.max(log.late, now - Math.max(then, log.to) - 10);
   then = now;
 }, 10);
+// What is noticed at a step may wait for it, so as late as timers of its period are.
 let stepped = performance.now();
-drive.on("step", () => {
+setInterval(() => {
   const now = performance.now();
-  // What is noticed at a step may wait for that step, as late as it comes.
   if (log.to) log.late = Math.max(log.late, now - Math.max(stepped, log.to) - 50);
   stepped = now;
-});
+}, 50);
 for (const kind of ["keydown", "keyup"]) {
   addEventListener(kind, (event) => event.repeat || mark(), { capture: true });
 }

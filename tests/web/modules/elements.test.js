@@ -48,3 +48,17 @@ test("a STOP button that is off, or that another mouse button presses, does noth
   button.fire("pointerdown", { button: 0, pointerId: 1 });
   assert.equal(button.stops, 0);
 });
+
+test("a press that was left, or that no pointerdown tells of, is a STOP when it clicks", () => {
+  const button = makeButton();
+  const mouse = { button: 0, pointerId: 1, pointerType: "mouse" };
+  button.fire("pointerdown", mouse);
+  button.fire("click", mouse);
+  // While another mouse button is held a press is told by its click alone.
+  button.fire("click", mouse);
+  assert.equal(button.stops, 2);
+  button.fire("pointerdown", mouse);
+  button.fire("pointerleave", mouse);
+  button.fire("click", mouse);
+  assert.equal(button.stops, 4);
+});

@@ -225,3 +225,18 @@ test("a robot that is called so by a display that was started anew gets no run",
   const after = new RouteRobots(drive, () => null, () => {}, runs);
   assert.equal(after.of("r1"), undefined);
 });
+
+test("a goal that leaves after the map was drawn anew is called off", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  let take = () => {};
+  drive.taking = new Promise((done) => (take = done));
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  const after = new RouteRobots(drive, () => null, () => {}, before.destroy());
+  take();
+  await pass();
+  assert.deepEqual(drive.said, [1, "cancel"]);
+  assert.equal(after.of("r1").run.state, "halted");
+});

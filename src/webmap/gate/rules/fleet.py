@@ -4,6 +4,8 @@ import logging
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import msgspec
+
 from webmap.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
@@ -113,7 +115,9 @@ class Fleet:
         base.reset(now)
         for key in self._stopped_as.pop(base.key, ()):
             # Where there is a machine still, it stands for another robot, too.
-            if key not in self._bases and self._latches[key].on:
+            there = self._bases.get(key)
+            left = there is None or set(there.robots.specs) <= there.robots.leaving
+            if left and self._latches[key].on:
                 self._latches[key].reset()
 
     def step(self, now: float) -> None:
@@ -154,18 +158,25 @@ class Fleet:
     def _declare(self, spec: RobotSpec, now: float) -> None:
         try:
             spec = checked(spec)
-            check_twist_type(spec, self._staying())
         except ConfigError as error:
             log.error("a robot was declared that makes no sense: %s", error)
             return
         key, earlier = key_of(spec), self._by_robot.get(spec.id)
+        before = earlier.robots.specs[spec.id] if earlier is not None else None
+        spec = self._with_one_type(spec, before)
         stopped_by = None
         if earlier is not None and earlier.key != key:
             stopped_by = earlier.latch.by
             earlier.robots.goals[spec.id].vacate(spec, now)
             self._forget(Forget(spec.id), now)
-        elif earlier is not None and earlier.robots.specs[spec.id] == spec:
-            return
+        elif earlier is not None and before is not None:
+            if before == spec:
+                return
+            if before == _assumed(spec, before.twist_type_assumed):
+                # What was assumed is true, which changes nothing for who drives.
+                earlier.robots.specs[spec.id] = spec
+                self._emit(Attach(key, spec))
+                return
         base = self._bases.get(key) or self._new_base(key)
         tasks = self._link(spec.goal_url or key.url, "tasks")
         base.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
@@ -182,6 +193,23 @@ class Fleet:
         self._by_robot[spec.id] = base
         self._reporters.setdefault(spec.id, Reporter())
         self._touched.add(key)
+
+    def _with_one_type(self, spec: RobotSpec, before: RobotSpec | None) -> RobotSpec:
+        """Return a robot with a type of velocity that goes with those of others.
+
+        Where another robot is known to have another type on that topic, what this one
+        says is taken for an assumption, so that it can be stopped all the same. One
+        whose type was known may have changed it, as the other then will.
+        """
+        known = before is not None and not before.twist_type_assumed
+        if before is not None and known and key_of(before) == key_of(spec):
+            return spec
+        try:
+            check_twist_type(spec, self._staying())
+        except ConfigError as error:
+            log.error("%s; that one counts", error)
+            return _assumed(spec, True)
+        return spec
 
     def _staying(self) -> list[RobotSpec]:
         """Return the robots that are declared now, under the names they go by."""
@@ -336,3 +364,8 @@ class Fleet:
         """Return a machine, which may change by that; it may be gone meanwhile."""
         self._touched.add(key)
         return self._bases.get(key)
+
+
+def _assumed(spec: RobotSpec, assumed: bool) -> RobotSpec:
+    """Return a robot whose type of velocity is assumed, or known."""
+    return msgspec.structs.replace(spec, twist_type_assumed=assumed)

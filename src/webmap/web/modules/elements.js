@@ -72,12 +72,18 @@ export function stopButton(className, label, act) {
   const element = button(`webmap-stop-button ${className}`, label, (event) => {
     // A press that has acted may end in a click.
     const { pointerId } = /** @type {PointerEvent} */ (event);
-    if (pointerId !== pressed) act();
+    const acted = pointerId === pressed;
+    pressed = null;
+    if (!acted) act();
   });
   element.addEventListener("pointerdown", (event) => {
     if (event.button !== 0 || element.disabled) return;
     pressed = event.pointerId;
     act();
+  });
+  // A mouse is one pointer for ever: what is pressed and left is no click that comes.
+  element.addEventListener("pointerleave", (event) => {
+    if (event.pointerType === "mouse") pressed = null;
   });
   return element;
 }

@@ -100,7 +100,9 @@ export class RouteRobots {
       run.state === "going" && going.order === order && this._going.get(robot) === going;
     try {
       const accepted = await sendGoal(() => this._offer(robot, going, order), wanted);
-      if (accepted) run.accepted(performance.now());
+      const given = this._going.get(robot) !== going;
+      if (accepted && given && run.state !== "going") this._drive.cancel(robot);
+      else if (accepted) run.accepted(performance.now());
     } catch (error) {
       run.halt(error instanceof Error ? error.message : String(error));
     }
