@@ -80,7 +80,8 @@ class PoseSource:
             else:
                 self._motion.clear_odometry()
 
-        typed(None)
+        if type is None:
+            typed(None)  # else the feed says it at once
         scope = Scope(f"poses of {topic}", self._failed, lambda _: say(None))
         try:
             with no_scope():
