@@ -9,7 +9,9 @@ from playwright.sync_api import (
     Browser,
     BrowserContext,
     ConsoleMessage,
+    Locator,
     Page,
+    expect,
     sync_playwright,
 )
 
@@ -37,6 +39,39 @@ def launched() -> Iterator[Browser]:
         )
         yield browser
         browser.close()
+
+
+def press_twice(button: Locator) -> None:
+    """Press a button that is to be pressed deliberately, by two presses.
+
+    They are apart by the clock of the page: a busy machine may take seconds between
+    two of Playwright's, and the first is forgotten by then.
+    """
+    button.evaluate(
+        """async (e) => {
+          e.click();
+          await new Promise((done) => setTimeout(done, 450));
+          e.click();
+        }"""
+    )
+
+
+def end_stops(button: Locator) -> None:
+    """End every STOP with the button that does, wherever on the page it lies.
+
+    A robot whose STOP comes to be known between the two presses takes the first one
+    back. Like a person, this presses again.
+    """
+    for _ in range(5):
+        # There is none to press before the gate has said that it stopped a robot.
+        expect(button).not_to_have_attribute("hidden", "")
+        press_twice(button)
+        try:
+            expect(button).to_have_attribute("hidden", "", timeout=3000)
+        except AssertionError:
+            continue
+        return
+    raise AssertionError(button.page.locator(".webmap-stop-standing").inner_text())
 
 
 class Complaints:

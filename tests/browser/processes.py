@@ -13,7 +13,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page
+
+from real_browser import end_stops
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -150,11 +152,7 @@ def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
 
 def reset(tab: Page) -> None:
     """End the STOP of the selected robot, by two presses as a person does."""
-    button = tab.locator(".webmap-teleop .webmap-reset")
-    button.click()
-    tab.wait_for_timeout(400)
-    button.click()
-    expect(button).to_be_hidden()
+    end_stops(tab.locator(".webmap-teleop .webmap-reset"))
 
 
 def hold(keyboard, key: str, condition, within: float = 30.0) -> None:

@@ -3,7 +3,9 @@
 import re
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, expect
+
+from real_browser import end_stops
 
 pytestmark = pytest.mark.browser
 
@@ -63,17 +65,22 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     expect(help_).to_be_visible()
     for stop in stops:
         assert_free(stop)
+
+    def reset() -> None:
+        end_stops(page.locator(".webmap-stop-list .webmap-reset"))
+        expect(page.locator("#card .state .holder")).to_have_text("Free")
+
     every.click()
     expect(page.locator(".webmap-stop-verdict")).to_have_count(10)
     expect(page.locator(".webmap-stop-standing")).to_contain_text("10 robots")
     expect(help_).to_be_hidden()
-    reset(page)
+    reset()
     # Esc is STOP there, too.
     page.keyboard.press("?")
     expect(help_).to_be_visible()
     page.keyboard.press("Escape")
     expect(page.locator("#card .state .holder")).to_have_text("Stopped")
-    reset(page)
+    reset()
 
 
 @pytest.mark.parametrize(
@@ -107,18 +114,6 @@ def test_two_fingers_beside_the_map_do_not_zoom_the_page(open_console):
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     page.wait_for_timeout(200)  # in which it would be zoomed
     assert page.evaluate("visualViewport.scale") == 1
-
-
-def reset(page: Page) -> None:
-    """End every STOP, wherever on the page the button lies."""
-    button = page.locator(".webmap-stop-list .webmap-reset")
-    # There is none to press before the gate has said that it stopped a robot.
-    expect(button).not_to_have_attribute("hidden", re.compile(""))
-    button.dispatch_event("click")
-    expect(button).to_have_class(re.compile("asking"))
-    page.wait_for_timeout(450)
-    button.dispatch_event("click")
-    expect(page.locator("#card .state .holder")).to_have_text("Free")
 
 
 @pytest.mark.serial  # a late command ends the stop test

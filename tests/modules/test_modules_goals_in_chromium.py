@@ -15,7 +15,7 @@ from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Locator, Page, expect
 from websockets.sync.client import ClientConnection, connect
 
-from real_browser import watched_tab
+from real_browser import end_stops, watched_tab
 from webmap.cli.demo import simulator
 from webmap_process import page_of
 
@@ -186,12 +186,8 @@ def test_stop_cancels_a_goal_and_says_so(tab):
 
 
 def reset(tab: Page) -> None:
-    """End every STOP, by two presses that are too far apart for a double click."""
-    button = tab.locator(".webmap-stop .webmap-reset")
-    button.click()
-    tab.wait_for_timeout(500)
-    button.click()
-    expect(button).to_be_hidden()
+    """End every STOP."""
+    end_stops(tab.locator(".webmap-stop .webmap-reset"))
 
 
 def send_elsewhere(bridge: str) -> None:
