@@ -34,15 +34,16 @@ def main(jobs: str, *arguments: str) -> int:
     """
     with tempfile.TemporaryDirectory() as folder:
         pytest = [sys.executable, "-m", "pytest", "-q", "-o", f"cache_dir={folder}"]
-        beside = [*pytest, "-n", jobs, "--dist", "loadfile", *arguments]
+        beside = [*pytest, "-rN", "-n", jobs, "--dist", "loadfile", *arguments]
         status = subprocess.call(beside)
         cached = Path(folder, "v/cache/lastfailed")
         if status != FAILED or not cached.exists():
             return status
         failed = list(json.loads(cached.read_text()))
+        print(f"\n{len(failed)} failed beside others:", *failed, sep="\n  ", flush=True)
         if len(failed) > MOST:
             return status
-        print(f"\n{len(failed)} failed beside others; now alone:", flush=True)
+        print("\nNow alone:", flush=True)
         status = subprocess.call([*pytest, "-rA", *failed])
         if status == 0:
             print("Passed alone, and is to be mended:", *failed, sep="\n  ", flush=True)

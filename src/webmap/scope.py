@@ -87,11 +87,6 @@ class Scope:
         finally:
             _current.reset(token)
 
-    def run(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
-        """Call ``fn`` with this scope active and return what it returns."""
-        with self.active():
-            return fn(*args, **kwargs)
-
     def close(self) -> None:
         """Remove everything, newest first, also when one removal raises."""
         self.closed = True

@@ -120,14 +120,6 @@ def test_listening_is_a_change():
     assert fragment.changes_since(since) == [Changed(root, "events")]
 
 
-def test_a_closed_fragment_has_no_listeners():
-    child = svg.g()
-    fragment = Fragment(svg.g(child))
-    child.on("click", print)
-    fragment.close()
-    assert child.handlers("click") == ()
-
-
 class Mirror:
     """Does what a viewer does with changes, without any encoding."""
 

@@ -50,7 +50,7 @@ def test_many_failures_get_no_second_look(run):
     source = "import pytest\n@pytest.mark.parametrize('n', range(6))\n"
     status, said = run(source + "def test_never(n):\n    assert False\n")
     assert status == 1
-    assert "now alone" not in said
+    assert "Now alone" not in said
 
 
 def test_what_cannot_be_collected_has_failed(run):

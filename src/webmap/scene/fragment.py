@@ -73,10 +73,6 @@ class Fragment:
         """Return the node of that id, or None if it is not in this fragment."""
         return self._nodes.get(node_id)
 
-    def close(self) -> None:
-        """Release every listener; for a fragment that is not shown any more."""
-        self.root._release()
-
     # What nodes tell ------------------------------------------------------------
 
     def touch(self, node: Node, slot: str) -> None:

@@ -42,11 +42,6 @@ class Track:
         """The newest stamp; None if there is none, or all times are alike."""
         return self._stamps[-1] if self._stamps and not self.static else None
 
-    @property
-    def oldest(self) -> float | None:
-        """The oldest stamp; None if there is none, or all times are alike."""
-        return self._stamps[0] if self._stamps and not self.static else None
-
     def clear(self) -> None:
         """Forget all transforms."""
         self._stamps.clear()
