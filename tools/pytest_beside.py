@@ -8,17 +8,36 @@ little, which is to be mended.
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
 """
 
-import json
 import subprocess
 import sys
-import tempfile
-from pathlib import Path
+
+import pytest
 
 MOST = 5
 """More failures than that are no accident and get no second look."""
 
-FAILED = 1
-"""pytest's exit status if tests were run and some failed."""
+
+class Failed:
+    """A plugin of pytest that notes which tests have failed.
+
+    Attributes:
+        tests: Their ids, each once.
+        uncollected: Whether there is anything that could not be collected.
+
+    """
+
+    def __init__(self) -> None:
+        self.tests: dict[str, None] = {}
+        self.uncollected = False
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Take what became of a part of a test."""
+        if report.failed:
+            self.tests[report.nodeid] = None
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Take what became of a file."""
+        self.uncollected = self.uncollected or report.failed
 
 
 def main(jobs: str, *arguments: str) -> int:
@@ -32,22 +51,20 @@ def main(jobs: str, *arguments: str) -> int:
         pytest's exit status: of the first run, or of the second look.
 
     """
-    with tempfile.TemporaryDirectory() as folder:
-        pytest = [sys.executable, "-m", "pytest", "-q", "-o", f"cache_dir={folder}"]
-        beside = [*pytest, "-rN", "-n", jobs, "--dist", "loadfile", *arguments]
-        status = subprocess.call(beside)
-        cached = Path(folder, "v/cache/lastfailed")
-        if status != FAILED or not cached.exists():
-            return status
-        failed = list(json.loads(cached.read_text()))
-        print(f"\n{len(failed)} failed beside others:", *failed, sep="\n  ", flush=True)
-        if len(failed) > MOST:
-            return status
-        print("\nNow alone:", flush=True)
-        status = subprocess.call([*pytest, "-rA", *failed])
-        if status == 0:
-            print("Passed alone, and is to be mended:", *failed, sep="\n  ", flush=True)
+    failed = Failed()
+    beside = ["-q", "-rN", "-n", jobs, "--dist", "loadfile", *arguments]
+    status = int(pytest.main(beside, plugins=[failed]))
+    if status != pytest.ExitCode.TESTS_FAILED or failed.uncollected:
         return status
+    tests = list(failed.tests)
+    print(f"\n{len(tests)} failed beside others:", *tests, sep="\n  ", flush=True)
+    if not 0 < len(tests) <= MOST:
+        return status
+    print("\nNow alone:", flush=True)
+    status = subprocess.call([sys.executable, "-m", "pytest", "-q", "-rA", *tests])
+    if status == 0:
+        print("Passed alone, and is to be mended:", *tests, sep="\n  ", flush=True)
+    return status
 
 
 if __name__ == "__main__":
