@@ -77,14 +77,18 @@ test-gate: $(DEV)
 	$(BIN)/pytest -q -n $(JOBS) tests/gate $(addprefix --ignore ,$(GATE_BESIDE)) \
 	  --cov=webmap.gate --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
-## test-python: pytest but for test-gate; what measures time runs alone at the end
+## test-python: pytest but for test-gate; what measures time runs at the end
 .PHONY: test-python test-parallel test-serial
 OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
 test-parallel: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) -m "not serial" $(addprefix --ignore ,$(OF_GATE))
+# The trials of motion wait most of the time and grant what the machine was late by: two
+# files of them run side by side. Under load, and whatever else measures time, alone.
+BESIDE := $(filter-out %_load.py %_soak.py,$(wildcard tests/safety/test_*.py))
 test-serial: $(DEV) $(NODE)
-	$(BIN)/pytest -q -m serial
+	$(BIN)/pytest -q -m serial -n $(JOBS) --dist loadfile $(BESIDE)
+	$(BIN)/pytest -q -m serial $(addprefix --ignore ,$(BESIDE))
 
 ## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety
