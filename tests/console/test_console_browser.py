@@ -223,6 +223,7 @@ def driven(page: Page):
     raise AssertionError(page.locator(".webmap-teleop").inner_text())
 
 
+@pytest.mark.serial  # a late command stops the robot
 def test_follow_keeps_a_robot_that_drives_in_the_middle_until_pressed_again(
     open_console,
 ):
