@@ -1,0 +1,53 @@
+"""What the scheduler lets a process wait."""
+
+import os
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from safety_waiting import Waiting
+
+pytestmark = [
+    pytest.mark.safety,
+    pytest.mark.skipif(
+        not Path("/proc/self/schedstat").exists(), reason="nobody counts it here"
+    ),
+]
+
+BUSY = "import os; os.sched_setaffinity(0, {%d}); print(flush=True)\nwhile True: pass"
+
+
+def test_of_three_that_share_a_processor_each_waits_for_it():
+    script = BUSY % min(os.sched_getaffinity(0))
+    with ExitStack() as stack:
+        busy = []
+        for _ in range(3):
+            process = stack.enter_context(
+                subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+            )
+            stack.callback(process.kill)
+            busy.append(process)
+        for process in busy:
+            process.stdout.readline()
+        one, all_ = Waiting([busy[0].pid]), Waiting([each.pid for each in busy])
+        begin = time.monotonic()
+        while one.seconds() < 0.1:
+            assert time.monotonic() < begin + 20
+            time.sleep(0.05)
+        passed = time.monotonic() - begin
+        assert one.seconds() <= passed + 1
+        assert all_.seconds() > one.seconds()
+
+
+def test_who_has_ended_or_sleeps_waits_for_nothing():
+    with subprocess.Popen(["sleep", "60"]) as process:
+        asleep = Waiting([process.pid])
+        time.sleep(0.2)
+        assert asleep.seconds() < 0.1
+        process.kill()
+        process.wait()
+        assert asleep.seconds() == 0
+        assert Waiting([process.pid]).seconds() == 0
