@@ -84,10 +84,11 @@ test-python: test-parallel test-serial
 test-parallel: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) -m "not serial" $(addprefix --ignore ,$(OF_GATE))
 # The trials of motion wait most of the time and grant what the machine was late by: two
-# files of them run side by side. Under load, and whatever else measures time, alone.
+# files of them run side by side, on any machine. Under load, and whatever else measures
+# time, alone.
 BESIDE := $(filter-out %_load.py %_soak.py,$(wildcard tests/safety/test_*.py))
 test-serial: $(DEV) $(NODE)
-	$(BIN)/pytest -q -m serial -n $(JOBS) --dist loadfile $(BESIDE)
+	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(BESIDE)
 	$(BIN)/pytest -q -m serial $(addprefix --ignore ,$(BESIDE))
 
 ## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)

@@ -41,37 +41,27 @@ def launched() -> Iterator[Browser]:
         browser.close()
 
 
-def press_twice(button: Locator) -> None:
-    """Press a button that is to be pressed deliberately, by two presses.
-
-    They are apart by the clock of the page: a busy machine may take seconds between
-    two of Playwright's, and the first is forgotten by then.
-    """
-    button.evaluate(
-        """async (e) => {
-          e.click();
-          await new Promise((done) => setTimeout(done, 450));
-          e.click();
-        }"""
-    )
-
-
 def end_stops(button: Locator) -> None:
     """End every STOP with the button that does, wherever on the page it lies.
 
-    A robot whose STOP comes to be known between the two presses takes the first one
-    back. Like a person, this presses again.
+    All of them have to be known to the page: a robot that comes to be stopped between
+    the two presses takes the first one back. The presses are apart by the clock of the
+    page, as a busy machine may take seconds between two of Playwright's, and the first
+    is forgotten by then.
     """
-    for _ in range(5):
-        # There is none to press before the gate has said that it stopped a robot.
-        expect(button).not_to_have_attribute("hidden", "")
-        press_twice(button)
-        try:
-            expect(button).to_have_attribute("hidden", "", timeout=3000)
-        except AssertionError:
-            continue
-        return
-    raise AssertionError(button.page.locator(".webmap-stop-standing").inner_text())
+    # There is none to press before the gate has said that it stopped a robot.
+    expect(button).not_to_have_attribute("hidden", "")
+    asked = button.evaluate(
+        """async (e) => {
+          e.click();
+          await new Promise((done) => setTimeout(done, 450));
+          const asked = e.textContent;
+          e.click();
+          return asked;
+        }"""
+    )
+    assert asked == "Press again to reset"
+    expect(button).to_have_attribute("hidden", "")
 
 
 class Complaints:

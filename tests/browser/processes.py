@@ -152,7 +152,9 @@ def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
 
 def reset(tab: Page) -> None:
     """End the STOP of the selected robot, by two presses as a person does."""
-    end_stops(tab.locator(".webmap-teleop .webmap-reset"))
+    button = tab.locator(".webmap-teleop .webmap-reset")
+    button.click(trial=True)  # a person could
+    end_stops(button)
 
 
 def hold(keyboard, key: str, condition, within: float = 30.0) -> None:

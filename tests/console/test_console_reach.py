@@ -80,6 +80,7 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     expect(help_).to_be_visible()
     page.keyboard.press("Escape")
     expect(page.locator("#card .state .holder")).to_have_text("Stopped")
+    expect(page.locator(".webmap-stop-standing")).to_contain_text("Robot 1 stays")
     reset()
 
 

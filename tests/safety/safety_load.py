@@ -94,8 +94,10 @@ def under_load(bench):
             with crowd(bench.url), busy_processor():
                 wait_for(lambda: bench.tab.evaluate(DOTS) == SCANNERS, "scans", 30)
                 wait_for(lambda: bench.tab.evaluate(PICTURE), "a map", 30)
+                bench.crowded = True
                 yield
         finally:
+            bench.crowded = False
             del os.environ["SAFETY_FLOOD"]
             bench.end_display()
 

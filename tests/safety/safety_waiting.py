@@ -26,15 +26,14 @@ class Waiting:
         self._before = self._delays()
 
     def seconds(self) -> float:
-        """Return the time since then: of each process its worst thread, in all.
-
-        A key passes the processes one after another, and one thread of each or more.
-        """
-        worst: dict[int, float] = {}
-        for (pid, thread), delay in self._delays().items():
-            more = delay - self._before.get((pid, thread), 0.0)
-            worst[pid] = max(worst.get(pid, 0.0), more)
-        return sum(worst.values())
+        """Return how long since then the thread waited that waited longest."""
+        return max(
+            (
+                delay - self._before.get(thread, 0.0)
+                for thread, delay in self._delays().items()
+            ),
+            default=0.0,
+        )
 
     def _delays(self) -> dict[tuple[int, str], float]:
         delays = {}

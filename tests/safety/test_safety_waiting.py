@@ -39,7 +39,7 @@ def test_of_three_that_share_a_processor_each_waits_for_it():
             time.sleep(0.05)
         passed = time.monotonic() - begin
         assert one.seconds() <= passed + 1
-        assert all_.seconds() > one.seconds()
+        assert all_.seconds() >= 0.1
 
 
 def test_who_has_ended_or_sleeps_waits_for_nothing():

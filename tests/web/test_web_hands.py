@@ -6,8 +6,6 @@ import pytest
 from fake_drive import FakeDrive
 from hands_bench import DOUBTS, Bench
 
-from real_browser import press_twice
-
 pytestmark = pytest.mark.browser
 
 
@@ -453,7 +451,9 @@ def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> Non
     said = bench.page.inner_text(".webmap-teleop-state")
     assert said == "STOP By Ann, NOT CONFIRMED: no link to ws://bob."
     reset = bench.page.get_by_role("button", name="Reset all")
-    press_twice(reset)
+    reset.click()
+    bench.page.wait_for_timeout(450)
+    bench.page.get_by_role("button", name="Press again to reset").click()
     both = [{"op": "reset", "robot": robot} for robot in ("r1", "r2")]
     bench.until(lambda: bench.gate.of("reset") == both)
     bench.until(lambda: not bench.page.locator(".webmap-stop-list").is_visible())
