@@ -120,11 +120,18 @@ class Bench:
         self.end_browser()
         self.open_page()
 
-    def open_page(self):
-        """Open the page in a new tab of a browser that runs."""
+    def open_page(self, before=""):
+        """Open the page in a new tab of a browser that runs.
+
+        Args:
+            before: A script that runs in the page before its own.
+
+        """
         if self.browser is None:
             self.start_browser()
         self.tab = self.browser.new_tab()
+        if before:
+            self.tab.call("Page.addScriptToEvaluateOnNewDocument", source=before)
         self.tab.go(self.url.replace(str(self.display_port), str(self.web_hop.port)))
         self.tab.wait("document.querySelector('.robot.selected') !== null")
 

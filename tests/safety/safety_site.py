@@ -1,7 +1,8 @@
 """A page with one robot, and code of its user that blocks when the robot says so.
 
 The addresses come from the environment: SAFETY_BRIDGE, where the robot is, and
-SAFETY_FLOOD, if there is more to show: where robots that scan are, and where maps are.
+SAFETY_FLOOD, if there is more to show: where robots that scan are, and where maps are;
+SAFETY_HOSTILE, where robots are whose bridges do what they like.
 """
 
 import asyncio
@@ -58,6 +59,13 @@ if flood := os.environ.get("SAFETY_FLOOD"):
         one.add_module("LaserScanner", robots, topic, max_dots=None, throttle=0)
         scanners.append(one)
 
+hostile = []
+for url in os.environ.get("SAFETY_HOSTILE", "").split():
+    one = webmap.Robot(f"h{len(hostile)}", webmap.svg.circle(cx=0, cy=0, r=0.2))
+    one.set_odometry_topic(webmap.Bridge(url), "/odom")
+    one.set_twist_topic(webmap.Bridge(url), "/cmd_vel", stops_within=0.5)
+    hostile.append(one)
+
 
 @webmap.page("/")
 def main(page):
@@ -68,7 +76,7 @@ def main(page):
     map.scale(40, map.canvas_width * 0.5, map.canvas_height * 0.5)
     if maps is not None:
         map.add_module("OccupancyGrid", maps, "/huge")
-    for one in scanners:
+    for one in [*scanners, *hostile]:
         map.add_robot(one)
     map.add_robot(bob)
     map.set_selected(bob)

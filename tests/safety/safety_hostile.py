@@ -1,0 +1,148 @@
+"""A good robot that a person drives in Chromium, beside robots of hostile bridges.
+
+::
+
+    Chromium ── display ── gate ── witness robot
+                   │         │
+                   └─────────┴──── hostile bridges, each a process of its own
+
+``with beside(bench, "safety_hostile_peers:pings"): ...`` shows one more robot on the
+page for each name. Its bridge is the peer of that name, an async function that is given
+each link and does what it likes. ``drive(bench)`` drives the good robot and measures.
+"""
+
+import contextlib
+import itertools
+import os
+import time
+from typing import NamedTuple
+
+from safety_bench import pass_time, wait_for
+from safety_load import helper
+
+SETTLE = 2.0
+"""Seconds for which a peer may do its worst before the good robot is driven."""
+
+DRIVE = 3.0
+"""Seconds for which the good robot is driven."""
+
+HEAR_TICKS = """{
+    const Native = WebSocket;
+    window.ticks = [];
+    window.WebSocket = class extends Native {
+        constructor(...about) {
+            super(...about);
+            this.addEventListener("message", (event) => {
+                const text = event.data;
+                if (typeof text === "string" && text.startsWith('{"op":"tick"')) {
+                    window.ticks.push(performance.now());
+                }
+            });
+        }
+    };
+}"""
+"""Notes when each tick of the gate comes to the page, on the page's own socket."""
+
+
+class Driven(NamedTuple):
+    """What was measured of the good robot; all times in seconds."""
+
+    refused: int
+    """How often W was pressed without the robot driving."""
+
+    zeros: int
+    """Zeros at the robot while W was held."""
+
+    velocity_gap: float
+    """The longest time between two velocities at the robot while W was held."""
+
+    tick_gap: float
+    """The longest time between two ticks of the gate at the page."""
+
+    driving_jitter: float
+    """The longest time that the machine kept a thread waiting while W was held."""
+
+    stop: float
+    """From the space bar to the first zero at the robot."""
+
+    moved_after: int
+    """Velocities that move, of the half second after that zero, with W held on."""
+
+    stop_jitter: float
+    """How long the machine kept a thread waiting from the space bar to that zero."""
+
+
+@contextlib.contextmanager
+def beside(bench, *peers):
+    """Show one more robot for each peer, on a bridge that the peer plays.
+
+    Args:
+        bench: The bench of the good robot.
+        peers: Each ``module:function``, a module of this folder.
+
+    """
+    with contextlib.ExitStack() as open:
+        helpers = [
+            open.enter_context(helper("safety_hostile_peers.py", peer))
+            for peer in peers
+        ]
+        urls = [process.stdout.readline().strip() for process in helpers]
+        os.environ["SAFETY_HOSTILE"] = " ".join(urls)
+        try:
+            bench.close_page()
+            bench.end_display()
+            bench.start_display()
+            bench.open_page(before=HEAR_TICKS)
+            pass_time(SETTLE)
+            yield urls
+        finally:
+            del os.environ["SAFETY_HOSTILE"]
+            bench.close_page()
+            bench.end_display()
+
+
+def drive(bench, seconds=DRIVE):
+    """Hold W, then press STOP with W held on; return what was measured."""
+    refused = 0
+    while True:
+        try:
+            bench.drive_off(within=3.0)
+            break
+        except AssertionError:
+            refused += 1
+            assert refused < 5, "W never drives the good robot"
+    begun = time.monotonic()
+    pass_time(seconds)
+    ended = time.monotonic()
+    driven = [told for told in bench.robot.log.told if begun <= told.at <= ended]
+    ticks = bench.tab.evaluate(
+        f"ticks.filter((t) => t > performance.now() - {seconds * 1000})"
+    )
+    driving_jitter = bench.sentinel.worst(begun, ended)
+    pressed = time.monotonic()
+    bench.space("keyDown")
+    zero = wait_for(lambda: bench.robot.log.first_zero(pressed), "a zero")
+    pass_time(0.5)
+    moved_after = len(bench.robot.log.moving_since(zero))
+    bench.space("keyUp")
+    bench.let_go()
+    pass_time(0.5)
+    bench.reset_stop()
+    return Driven(
+        refused=refused,
+        zeros=sum(told.is_zero for told in driven),
+        velocity_gap=gap([begun, *(told.at for told in driven), ended]),
+        tick_gap=gap([tick / 1000 for tick in ticks]),
+        driving_jitter=driving_jitter,
+        stop=zero - pressed,
+        moved_after=moved_after,
+        stop_jitter=bench.sentinel.stolen(pressed - 0.1, zero),
+    )
+
+
+def gap(times):
+    """Return the longest time between two of several times; infinity of fewer."""
+    return max(
+        (after - before for before, after in itertools.pairwise(times)),
+        default=float("inf"),
+    )
