@@ -11,7 +11,7 @@ import time
 import pytest
 
 from webmap.cli.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
-from webmap.gate.events import Key, StopRecord
+from webmap.gate.events import Key, Press, StopRecord
 from webmap.gate.kept.records import Records
 from webmap.gate.rules.stoptest import MOVES_ON
 from webmap.testing import WitnessRobot
@@ -102,7 +102,9 @@ def test_it_creeps_and_ends_with_zero_when_it_is_interrupted(folder):
 
 def test_a_robot_whose_stop_stands_is_not_moved(folder):
     with WitnessRobot() as robot:
-        Records(folder).keep_latch(Key(robot.url, "/cmd_vel"), "Ann")
+        Records(folder).keep_latch(
+            Key(robot.url, "/cmd_vel"), Press("Ann", "a1"), frozenset()
+        )
         said = run(robot.url, "127.0.0.1", "--yes")
         assert robot.log.moving_since(0.0) == []
     assert said.returncode == 2

@@ -12,6 +12,7 @@ from webmap import Bridge, Robot
 from webmap.core.motion import MotionRoad
 from webmap.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
 from webmap.gate import framing
+from webmap.gate.messages import StopReport
 from webmap.gate.specs import checked
 from webmap.lifecycle import lifecycle
 
@@ -50,8 +51,8 @@ class Gate:
     def stop_robot(self, robot_id):
         self.asked.append(("stop", robot_id))
 
-    def reset(self, robot_id):
-        self.asked.append(("reset", robot_id))
+    def reset(self, robot_id, stop):
+        self.asked.append(("reset", robot_id, stop))
 
 
 @pytest.fixture
@@ -77,8 +78,21 @@ def drivable(robot, **options):
 def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
     drivable(robot)
     robot.stop()
+    stop = StopReport("Ann", True, "", "s1")
+    robot.on_gate_report(SimpleNamespace(stop=stop))
     robot.reset_stop()
-    assert gate.asked == [("stop", robot.motion.id), ("reset", robot.motion.id)]
+    reset = ("reset", robot.motion.id, "s1")
+    assert gate.asked == [("stop", robot.motion.id), reset]
+
+
+def test_a_program_resets_no_stop_that_it_was_not_told_of(robot, gate):
+    drivable(robot)
+    robot.stop()
+    for report in (None, SimpleNamespace(stop=None)):
+        robot.report = report
+        with pytest.raises(MotionError, match=r"until report\.stop is there"):
+            robot.reset_stop()
+    assert gate.asked == [("stop", robot.motion.id)]
 
 
 def test_a_lease_waits_for_the_word_of_a_gate_that_was_started_anew(robot, gate):

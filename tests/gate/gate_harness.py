@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass, field
 
 from webmap.gate import actions, events, messages
-from webmap.gate.events import Key
+from webmap.gate.events import Key, Press
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.lease import Epochs
@@ -60,8 +60,8 @@ class Bench:
     up: bool = True
     lock_held: bool = True
     was_driven: bool = False
-    disk: dict[Key, str] = field(default_factory=dict)
-    """Whose STOP stands, as the disk has it."""
+    disk: dict[Key, Press] = field(default_factory=dict)
+    """The STOPs that stand, as the disk has it."""
     tests: dict[Key, events.StopRecord] = field(default_factory=dict)
     slow_disk: bool = False
     """Whether the disk says nothing by itself."""
@@ -153,10 +153,12 @@ class Bench:
             self.tell(events.StopTestKept(latch.key, record))
             return
         error = "the disk is full" if self.full_disk else None
-        if not self.full_disk and latch.by is not None:
-            self.disk[latch.key] = latch.by
-        elif not self.full_disk:
-            self.disk.pop(latch.key, None)
+        if not self.full_disk and latch.press is not None:
+            self.disk[latch.key] = latch.press
+        elif not self.full_disk and latch.key in self.disk:
+            ours = self.disk[latch.key].id in latch.ids
+            if ours:
+                del self.disk[latch.key]
         self.tell(events.LatchKept(latch.key, latch.number, error))
 
     # What happens outside.
@@ -184,6 +186,8 @@ class Bench:
         self.tell(messages.Connect(who, who.upper(), role))
 
     def say(self, who, **command):
+        if command["op"] == "reset":
+            command.setdefault("stop", self.stop_of(command["robot"]))
         self.tell(messages.FromBrowser(who, json.dumps(command).encode()))
 
     def take(self, who="a", robot="r1"):
@@ -246,6 +250,19 @@ class Bench:
 
     def refusals(self, who="a"):
         return [r for r in self.of(messages.Refused) if r.connection == who]
+
+    def stop_of(self, robot="r1"):
+        """Return the identity of the STOP that a page shows for a robot."""
+        try:
+            stop = self.report(robot).stop
+        except (StopIteration, KeyError):
+            stop = None
+        return "none" if stop is None else stop.id
+
+    @property
+    def stops(self):
+        """Whose STOPs stand, as the disk has it."""
+        return {key: press.by for key, press in self.disk.items()}
 
     @property
     def state(self):

@@ -34,6 +34,9 @@ class Page:
                 self.heard.append(message)
 
     def say(self, **command):
+        if command["op"] == "reset" and "stop" not in command:
+            shown = self.robot(command["robot"]).get("stop") or {"id": "none"}
+            command["stop"] = shown["id"]
         self.connection.receive(json.dumps(command))
 
     def drive(self, x, robot="r1"):

@@ -10,11 +10,17 @@ import signal
 import sys
 from pathlib import Path
 
-from webmap.gate.events import Key
+from webmap.gate.events import Key, Press
 from webmap.gate.kept import records
 from webmap.gate.kept.records import Records
 
 KEY = Key("ws://127.0.0.1:9090", "/cmd_vel")
+IDS = frozenset({"a1"})
+
+
+def press(by: str | None) -> Press | None:
+    """Return the STOP of somebody."""
+    return None if by is None else Press(by, "a1")
 
 
 def die_after(lines: int) -> None:
@@ -40,7 +46,7 @@ def keep(folder: Path, by: str | None, lines: int) -> tuple[bool, bool]:
     child = os.fork()
     if not child:
         die_after(lines)
-        problem = Records(folder).keep_latch(KEY, by)
+        problem = Records(folder).keep_latch(KEY, press(by), IDS)
         sys.settrace(None)
         os.write(said, b"ack" if problem is None else b"no")
         os._exit(0)
@@ -57,9 +63,10 @@ def main() -> None:
     for by, before in (("Ann", None), (None, "Ann")):
         lines, lived = 0, False
         while not lived:
-            assert Records(folder).keep_latch(KEY, before) is None
+            assert Records(folder).keep_latch(KEY, press(before), IDS) is None
             acknowledged, lived = keep(folder, by, lines)
-            stands = Records(folder).latch_of(KEY)
+            left = Records(folder).latch_of(KEY)
+            stands = None if left is None else left.by
             print(json.dumps([by, lines, acknowledged, lived, stands]))
             lines += 1
 

@@ -555,7 +555,7 @@ class TestStopStands:
         heard.clear()
         client.start()
         eventually(latched, "the STOP of before")
-        client.reset("r1")
+        client.reset("r1", latched()[-1].stop.id)
         eventually(lambda: not of(heard, messages.RobotReport)[-1].latched, "reset")
 
     def test_it_is_confirmed_by_odometry_or_it_is_not(self, page, client, fake):
@@ -589,7 +589,7 @@ class TestStopStands:
         assert client.pid == pid
 
     def test_a_gate_that_does_not_run_resets_nothing(self):
-        GateClient().reset(None)
+        GateClient().reset("r1", "s1")
 
     def test_hooks_are_said_and_taken_back(self, client, robot_spec, fake):
         hooks = (

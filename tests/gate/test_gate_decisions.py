@@ -418,13 +418,13 @@ class TestStop:
         bench.drive_off()
         bench.tell(messages.Stop(None))
         assert bench.written[-1].twist == ZERO
-        bench.tell(messages.Reset("r1"))
+        bench.tell(messages.Reset("r1", bench.stop_of()))
         bench.drive_off()
         assert bench.written[-1].twist != ZERO
         bench.tell(messages.Stop("r1"))
         assert bench.written[-1].twist == ZERO
         bench.tell(messages.Stop("r9"))
-        bench.tell(messages.Reset(None))
+        bench.tell(messages.Reset("r1", bench.stop_of()))
         assert bench.state == "stopping"
 
     def test_without_a_link_it_is_the_first_thing_sent_when_there_is_one(self, bench):

@@ -6,11 +6,12 @@ import datetime
 import pytest
 
 from webmap.gate.actions import KeepLatch, KeepStopTest
-from webmap.gate.events import Key, LatchKept, LockState, StopTestKept
+from webmap.gate.events import Key, LatchKept, LockState, Press, StopTestKept
 from webmap.gate.kept.disk import Disk
 from webmap.gate.kept.records import Records
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
+ANN = Press("Ann", "a1")
 
 
 @pytest.fixture
@@ -22,7 +23,7 @@ def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
     told = []
 
     async def scenario():
-        disk.keep(KeepLatch(KEY, 1, "Ann"), told.append)
+        disk.keep(KeepLatch(KEY, 1, ANN, frozenset()), told.append)
         disk.keep(KeepStopTest(KEY, 0.4), told.append)
         assert told == []
         await disk.settle()
@@ -35,7 +36,7 @@ def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
     assert tested.record.seconds == 0.4
     assert datetime.date.fromisoformat(tested.record.date)
     again = Disk(Records(tmp_path)).recall(LockState(KEY, held=True))
-    assert (again.latched_by, again.tested) == ("Ann", tested.record)
+    assert (again.latched, again.tested) == (ANN, tested.record)
 
 
 def test_with_nothing_under_way_it_is_settled_at_once(disk):
@@ -46,7 +47,7 @@ def test_what_was_given_up_tells_nothing(disk):
     told = []
 
     async def scenario():
-        disk.keep(KeepLatch(KEY, 1, "Ann"), told.append)
+        disk.keep(KeepLatch(KEY, 1, ANN, frozenset()), told.append)
         (work,) = disk._under_way
         work.cancel()
         await disk.settle()

@@ -183,7 +183,7 @@ class TestProgram:
         client = GateClient()
         with pytest.raises(NoLease, match=r"does not run \(yet\)"):
             client.take("r1").result(1)
-        client.reset("r1")
+        client.reset("r1", "s1")
         client.stop()
         assert made == []
 
@@ -290,11 +290,13 @@ class TestLife:
         gate.say(messages.Ready(1))  # it is dead, and counts no more
         assert not client.ready
 
-    def test_a_reset_forgets_a_stop(self, client, gate):
+    def test_a_reset_names_a_stop_and_forgets_none_that_was_not_heard(
+        self, client, gate
+    ):
         client.stop_robot("r1")
-        client.reset("r1")
-        assert gate.told[-1] == messages.Reset("r1")
-        assert list(client._unheard) == []
+        client.reset("r1", "s1")
+        assert gate.told[-1] == messages.Reset("r1", "s1")
+        assert list(client._unheard) == [(None, "r1")]
 
     def test_a_gate_that_says_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)

@@ -8,7 +8,8 @@
 4. No velocity exceeds the limit in force.
 5. After half a second of zeros there is silence, unless STOP stands.
 6. After a STOP nothing but zero is written, no goal is sent, and nobody has the robot,
-   until a reset; not even when the gate is killed and started anew meanwhile.
+   until a reset that names the newest STOP; not even when the gate is
+   killed and started anew meanwhile.
 7. A reset writes nothing.
 8. While a robot changes hands and its odometry shows motion, nobody has it.
 
@@ -35,6 +36,7 @@ from hypothesis.stateful import (
 from machine_bench import PacedBench
 
 from webmap.gate import actions, events, messages
+from webmap.gate.events import Press
 from webmap.gate.messages import PROGRAM
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.lease import Epochs
@@ -235,13 +237,29 @@ class Motion(RuleBasedStateMachine):
         assert zeros, "STOP is zero at once"
         assert len(self._attempts()) <= before + 1
 
-    @rule(who=st.sampled_from(PEOPLE), robot=st.sampled_from(["r1", "*"]))
-    def reset(self, who, robot):
-        before = len(self._attempts())
-        self.bench.say(who, op="reset", robot=robot)
+    @rule()
+    def looks_at_the_stop(self):
+        self.seen = self.bench.stop_of()
+
+    @rule(who=st.sampled_from(PEOPLE), late=st.booleans())
+    def reset(self, who, late):
+        """End the STOP that is seen now, or (late) that was seen a while ago."""
+        before, newest = len(self._attempts()), self.bench.stop_of()
+        named = self.seen if late else newest
+        self.bench.say(who, op="reset", robot="r1", stop=named)
         assert len(self._attempts()) == before, "reset moves nothing"
         assert self.bench.report().holder is None or not self.stands
-        self.stands = False
+        if named == newest:
+            self.stands = False
+
+    @rule(by=st.sampled_from(["Ann", "Ben"]))
+    def another_gate_is_told_stop(self, by):
+        """Its file is found where this gate's own STOP may be."""
+        self.others += 1
+        self.bench.disk[KEY] = Press(by, f"other-{self.others}")
+        self.bench.tell(events.LatchSeen(KEY, self.bench.disk[KEY]))
+        self.stands = True
+        self._doubt()
 
     @rule()
     def gate_is_killed_and_started_anew(self):
@@ -348,6 +366,10 @@ class Motion(RuleBasedStateMachine):
     """The newest epoch that was seen."""
     stands = False
     """Whether somebody said STOP, and nobody has reset it since."""
+    seen = "none"
+    """The identity of the STOP that somebody looked at a while ago."""
+    others = 0
+    """How many STOPs other gates were told."""
     moved_by, zero_since = None, True
     """The epoch that the robot was moved by last, and whether a zero came since."""
     parted = 0

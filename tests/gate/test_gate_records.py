@@ -1,14 +1,17 @@
 """The files that outlive the gate: whatever befalls them, nothing moves by it."""
 
 import hashlib
+import json
 import os
 
 import pytest
 
-from webmap.gate.events import Key, StopRecord
+from webmap.gate.events import Key, Press, StopRecord
 from webmap.gate.kept.records import UNKNOWN, Records, path_of
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
+ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")
+IDS = frozenset({"a1"})
 OTHER = Key("ws://robot:9090", "/other")
 HERE = [
     Key(f"ws://{host}:9090", "/cmd_vel") for host in ("localhost", "127.0.0.1", "[::1]")
@@ -28,22 +31,22 @@ def records(folder):
 class TestLatch:
     def test_stands_on_disk_until_it_is_taken_away(self, records, folder):
         assert records.latch_of(KEY) is None
-        assert records.keep_latch(KEY, "Ann") is None
-        assert Records(folder).latch_of(KEY) == "Ann"
+        assert records.keep_latch(KEY, ANN, IDS) is None
+        assert Records(folder).latch_of(KEY) == ANN
         assert Records(folder).latch_of(OTHER) is None
-        assert records.keep_latch(KEY, None) is None
+        assert records.keep_latch(KEY, None, IDS) is None
         assert Records(folder).latch_of(KEY) is None
-        assert records.keep_latch(KEY, None) is None
+        assert records.keep_latch(KEY, None, IDS) is None
 
     @pytest.mark.parametrize("said", HERE)
     @pytest.mark.parametrize("asked", HERE)
     def test_of_this_computer_is_one_however_that_is_spelled(
         self, records, said, asked
     ):
-        records.keep_latch(said, "Ann")
-        assert records.latch_of(asked) == "Ann"
+        records.keep_latch(said, ANN, IDS)
+        assert records.latch_of(asked) == ANN
         assert records.stamp_of(asked) == records.stamp_of(said) is not None
-        records.keep_latch(asked, None)
+        records.keep_latch(asked, None, IDS)
         assert records.latch_of(said) is None
 
     @pytest.mark.parametrize("old", HERE)
@@ -53,9 +56,11 @@ class TestLatch:
         name = hashlib.sha256("\n".join(old).encode()).hexdigest()[:24]
         folder.mkdir(parents=True)
         (folder / f"{name}.stop").write_text('{"by": "Ann"}')
-        assert [records.latch_of(key) for key in HERE] == ["Ann"] * 3
+        press = records.latch_of(HERE[0])
+        assert press.by == "Ann"
+        assert [records.latch_of(key) for key in HERE] == [press] * 3
         assert records.stamp_of(HERE[0]) is not None
-        records.keep_latch(HERE[1], None)
+        records.keep_latch(HERE[1], None, frozenset({press.id}))
         assert [records.latch_of(key) for key in HERE] == [None] * 3
         assert list(folder.iterdir()) == []
 
@@ -70,10 +75,10 @@ class TestLatch:
             real(file)
 
         monkeypatch.setattr(os, "fsync", fsync)
-        records.keep_latch(KEY, "Ann")
+        records.keep_latch(KEY, ANN, IDS)
         assert flushed[0].startswith(str(folder / path_of(folder, KEY, "stop").stem))
         assert flushed[1] == str(folder)
-        records.keep_latch(KEY, None)
+        records.keep_latch(KEY, None, IDS)
         assert flushed[2:] == [str(folder)]
 
     @pytest.mark.parametrize(
@@ -94,29 +99,68 @@ class TestLatch:
     def test_that_cannot_be_read_stands(self, records, folder, content):
         folder.mkdir(parents=True)
         path_of(folder, KEY, "stop").write_bytes(content)
-        assert records.latch_of(KEY) == UNKNOWN
+        assert records.latch_of(KEY).by == UNKNOWN
 
     def test_that_is_no_file_stands(self, records, folder):
         path_of(folder, KEY, "stop").mkdir(parents=True)
-        assert records.latch_of(KEY) == UNKNOWN
-        assert "cannot be written" in records.keep_latch(KEY, "Ann")
+        assert records.latch_of(KEY).by == UNKNOWN
+        assert "cannot be written" in records.keep_latch(KEY, ANN, IDS)
 
     def test_a_name_that_is_too_long_is_cut(self, records):
-        records.keep_latch(KEY, "x" * 500)
-        assert len(records.latch_of(KEY)) == 80
+        records.keep_latch(KEY, Press("x" * 500, "a1"), IDS)
+        assert len(records.latch_of(KEY).by) == 80
 
     def test_a_folder_that_cannot_be_made_is_said(self, tmp_path):
         (tmp_path / "file").write_text("")
         records = Records(tmp_path / "file" / "state")
-        assert "cannot be written" in records.keep_latch(KEY, "Ann")
+        assert "cannot be written" in records.keep_latch(KEY, ANN, IDS)
         records.keep_stop_test(KEY, StopRecord(0.3, "2026-11-21"))
 
     def test_what_a_crash_left_half_written_does_no_harm(self, records, folder):
         folder.mkdir(parents=True)
         path_of(folder, KEY, "stop.new").write_text('{"by": "A')
         assert records.latch_of(KEY) is None
-        records.keep_latch(KEY, "Ben")
-        assert records.latch_of(KEY) == "Ben"
+        records.keep_latch(KEY, BEN, IDS)
+        assert records.latch_of(KEY) == BEN
+
+    def test_keeps_its_identity_and_an_earlier_version_s_file_gets_one(
+        self, records, folder
+    ):
+        records.keep_latch(KEY, ANN, IDS)
+        assert records.latch_of(KEY) == ANN
+        path = path_of(folder, KEY, "stop")
+        found = []
+        for by in ("Ann", "Ben"):
+            path.write_text(json.dumps({"by": by, "bridge": "", "topic": ""}))
+            os.utime(path, ns=(len(found), len(found) + 1))
+            found.append(records.latch_of(KEY))
+            assert records.latch_of(KEY) == found[-1] == Records(folder).latch_of(KEY)
+        assert [press.by for press in found] == ["Ann", "Ben"]
+        assert len({ANN.id, *(press.id for press in found)}) == 3
+        for id in ("", 7, "x" * 65, "\x1b[31m"):
+            path.write_text(json.dumps({"by": "Ann", "id": id}))
+            assert records.latch_of(KEY).id.startswith("file-")
+
+    def test_a_reset_takes_no_file_away_that_another_gate_wrote(self, records, folder):
+        records.keep_latch(KEY, ANN, IDS)
+        Records(folder).keep_latch(KEY, BEN, frozenset({"b1"}))
+        stamp = records.stamp_of(KEY)
+        assert records.keep_latch(KEY, None, IDS) is None
+        assert (records.latch_of(KEY), records.stamp_of(KEY)) == (BEN, stamp)
+        records.keep_latch(KEY, None, frozenset({"b1"}))
+        assert list(folder.iterdir()) == []
+
+    def test_one_that_was_being_ended_when_a_gate_died_stands(self, records, folder):
+        records.keep_latch(KEY, ANN, IDS)
+        path = path_of(folder, KEY, "stop")
+        path.rename(path.with_suffix(".stop.lifted"))
+        assert records.latch_of(KEY) == ANN
+        assert records.stamp_of(KEY) is not None
+        records.keep_latch(KEY, None, frozenset({"b1"}))
+        assert (path.exists(), records.latch_of(KEY)) == (True, ANN)
+        path.rename(path.with_suffix(".stop.lifted"))
+        records.keep_latch(KEY, None, IDS)
+        assert list(folder.iterdir()) == []
 
 
 class TestStopTest:

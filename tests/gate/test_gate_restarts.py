@@ -83,12 +83,3 @@ class TestUnheard:
         unheard.told(50.0)
         unheard.lives(50.0 + HEEDED - 0.1)
         assert len(list(unheard)) == 2
-
-    def test_a_reset_forgets_the_stop_of_that_robot_alone(self, unheard):
-        unheard.say(None, "r2", 10.6)
-        unheard.reset("r1")
-        assert list(unheard) == [("c1", None), (None, "r2")]
-
-    def test_a_reset_of_all_forgets_every_stop(self, unheard):
-        unheard.reset(None)
-        assert list(unheard) == []

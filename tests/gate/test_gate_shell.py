@@ -9,7 +9,7 @@ from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.gate import actions, events, messages, shell
-from webmap.gate.events import Key
+from webmap.gate.events import Key, Press
 from webmap.gate.kept.disk import Disk
 from webmap.gate.kept.locks import Locks
 from webmap.gate.kept.records import UNKNOWN, Records, path_of
@@ -317,7 +317,7 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
         await gate.reported(lambda r: r.latched, "the STOP")
         assert gate.report().stop.by == UNKNOWN
         assert "cannot be read" in caplog.text
-        gate.shell.tell(messages.Reset("r1"))
+        gate.shell.tell(messages.Reset("r1", gate.report().stop.id))
         await gate.reported(lambda r: r.armable, "a robot to be had")
         await until(lambda: not path.exists(), "no file")
         assert not any(speeds(bridge))
@@ -327,15 +327,16 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
 async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         key = Key(bridge.url, "/cmd_vel")
-        Records(tmp_path).keep_latch(key, "Ben")
+        Records(tmp_path).keep_latch(key, Press("Ben", "b1"), frozenset())
         await gate.reported(lambda r: r.latched and r.stop.by == "Ben", "the STOP")
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         gate.x = None
-        gate.shell.tell(messages.Reset("r1"))
+        gate.shell.tell(messages.Reset("r1", gate.report().stop.id))
         await gate.reported(lambda r: not r.latched, "the reset")
         await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
         gate.say(op="stop", robot="r1")
-        await until(lambda: Records(tmp_path).latch_of(key) == "Ann", "the file")
+        await until(lambda: Records(tmp_path).latch_of(key), "the file")
+        assert Records(tmp_path).latch_of(key).by == "Ann"
 
 
 @in_loop

@@ -1,12 +1,14 @@
 """STOP: it stands until a reset, outlives the gate, and is confirmed or it is not."""
 
+import json
+
 import pytest
 from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.errors import ConfigError
 from webmap.gate import actions, events, messages
-from webmap.gate.events import Key
-from webmap.gate.messages import PROGRAM, StopReport
+from webmap.gate.events import Key, Press
+from webmap.gate.messages import PROGRAM
 from webmap.gate.specs import checked
 from webmap.geometry import Twist
 
@@ -28,6 +30,12 @@ def stop(bench, who="b", robot="r1"):
 
 def reset(bench, who="b", robot="r1"):
     bench.say(who, op="reset", robot=robot)
+
+
+def verdict(bench):
+    """Return what a page is told of the STOP that stands: by whom, confirmed, why."""
+    stop = bench.report().stop
+    return stop.by, stop.confirmed, stop.why
 
 
 def watch_it(bench, seconds, *speeds):
@@ -153,7 +161,7 @@ class TestLatch:
         reset(bench, "b", "r9")
         assert "'r9'" in bench.refusals("b")[-1].why
 
-    def test_stop_for_all_latches_all_and_reset_for_all_ends_what_stands(self):
+    def test_stop_for_all_latches_all_and_each_has_its_own_reset(self):
         other = "/r2/cmd_vel"
         bench = Bench().begin(spec(), spec(id="r2", twist_topic=other))
         stop(bench, robot="*")
@@ -162,16 +170,16 @@ class TestLatch:
         reset(bench, robot="r1")
         assert not bench.report("r1").latched
         assert bench.report("r2").latched
-        reset(bench, robot="*")
+        reset(bench, robot="r2")
         assert not bench.report("r2").latched
         assert bench.refusals("b") == []
 
     def test_python_stops_and_resets(self, bench):
         bench.tell(messages.Stop("r1"))
         assert bench.report().stop.by == PROGRAM
-        bench.tell(messages.Reset("r1"))
+        bench.tell(messages.Reset("r1", bench.stop_of()))
         assert not bench.report().latched
-        bench.tell(messages.Reset("r1"))
+        bench.tell(messages.Reset("r1", bench.stop_of()))
         assert bench.refusals(PROGRAM)[-1].what == "reset"
 
     def test_a_robot_that_is_declared_anew_is_still_stopped(self, bench):
@@ -239,7 +247,7 @@ class TestByAnotherKey:
     def test_one_that_is_stopped_and_gets_velocity_stays_stopped(self, bench):
         bench.tell(spec())
         assert bench.written[-1].twist == ZERO
-        assert bench.disk == {self.GOALS: "B", KEY: "B"}
+        assert bench.stops == {self.GOALS: "B", KEY: "B"}
         assert bench.report().latched
         assert bench.report().stop.by == "B"
         assert bench.take() is None
@@ -268,14 +276,14 @@ class TestByAnotherKey:
         stop(bench)
         bench.tell(self.ONLY_GOALS)
         reset(bench)
-        assert bench.disk == {}
+        assert bench.stops == {}
 
     def test_its_reset_ends_it_by_every_key_that_it_had(self, bench):
         bench.tell(spec())
         bench.tell(spec(twist_topic="/other"))
         bench.run(1.0)
         reset(bench)
-        assert bench.disk == {}
+        assert bench.stops == {}
         bench.tell(self.ONLY_GOALS)
         assert bench.take()
 
@@ -286,7 +294,7 @@ class TestByAnotherKey:
         reset(bench)
         assert not bench.report("r1").latched
         assert bench.report("r2").latched
-        assert bench.disk == {self.GOALS: "B"}
+        assert bench.stops == {self.GOALS: "B"}
 
     def test_one_that_is_reset_where_it_was_before_needs_no_other_reset(self, bench):
         bench.tell(spec())
@@ -312,7 +320,7 @@ class TestOnDisk:
         kept = (actions.WriteTwist, actions.KeepLatch)
         last = [a for a in bench.done if isinstance(a, kept)][-2:]
         assert last[0].twist == ZERO
-        assert last[1] == actions.KeepLatch(KEY, 1, "B")
+        assert (last[1].number, last[1].press.by) == (1, "B")
         bench.run(1.0)
         assert not bench.report().latched
         assert bench.report().stop is None
@@ -320,16 +328,34 @@ class TestOnDisk:
         bench.keep(last[1])
         assert bench.report().latched
 
-    def test_it_is_written_once_however_often_it_is_pressed(self, bench):
-        stop(bench, "b")
-        stop(bench, "a")
-        assert len(bench.did(actions.KeepLatch)) == 1
+    def test_pressed_often_it_is_written_as_quickly_as_the_disk_goes(self):
+        bench = Bench(slow_disk=True).begin()
+        for who in "babab":
+            stop(bench, who)
+        (first,) = bench.did(actions.KeepLatch)
+        bench.keep(first)
         assert bench.report().stop.by == "B"
+        _, newest = bench.did(actions.KeepLatch)
+        bench.keep(newest)
+        assert len(bench.did(actions.KeepLatch)) == 2
+        assert bench.report().stop.id == newest.press.id
+        assert newest.press.id != first.press.id
+
+    def test_while_it_is_written_again_the_earlier_one_is_shown_and_not_reset(self):
+        bench = Bench().begin()
+        stop(bench, "b")
+        bench.slow_disk = True
+        stop(bench, "a")
+        assert (bench.report().latched, bench.report().stop.by) == (True, "B")
+        reset(bench)
+        assert "A pressed STOP meanwhile" in bench.refusals("b")[-1].why
+        assert bench.report().latched
 
     def test_an_answer_of_the_disk_that_was_overtaken_does_not_count(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
-        reset(bench)
+        (only,) = bench.did(actions.KeepLatch)
+        bench.say("b", op="reset", robot="r1", stop=only.press.id)
         stop(bench)
         first, second, third = bench.did(actions.KeepLatch)
         bench.keep(first)
@@ -355,7 +381,7 @@ class TestOnDisk:
         assert "the disk is full" in bench.report().stop.why
         bench.full_disk = False
         stop(bench)
-        assert bench.disk == {KEY: "B"}
+        assert bench.stops == {KEY: "B"}
         assert "disk" not in bench.report().stop.why
 
     def test_a_new_gate_finds_it_and_says_it_all_again(self):
@@ -371,28 +397,28 @@ class TestOnDisk:
         assert bench.drive_off() is None
         assert bench.moving_since(0) == []
         reset(bench)
-        assert bench.disk == {}
+        assert bench.stops == {}
         assert bench.drive_off()
         assert bench.moving_since(0)
 
     def test_no_report_says_before_it_is_known_that_none_stands(self):
-        bench = Bench(disk={KEY: "B"}).begin()
+        bench = Bench(disk={KEY: Press("B", "b1")}).begin()
         assert all(r.latched for r in bench.of(messages.RobotReport))
 
     def test_a_machine_that_another_gate_has_gets_no_zeros_from_the_disk(self):
-        bench = Bench(disk={KEY: "B"}, lock_held=False).begin()
+        bench = Bench(disk={KEY: Press("B", "b1")}, lock_held=False).begin()
         bench.run(1.0)
         assert bench.written == []
-        bench.tell(events.LockState(KEY, held=True, latched_by="B"))
+        bench.tell(events.LockState(KEY, held=True, latched=Press("B", "b1")))
         assert bench.written[0].twist == ZERO
-        bench.tell(events.LockState(KEY, held=True, latched_by="Z"))
-        assert bench.report().stop.by == "B"
+        bench.tell(events.LockState(KEY, held=True, latched=Press("Z", "z1")))
+        assert bench.report().stop.by == "Z", "another gate was told it meanwhile"
 
 
 class TestConfirmation:
     def test_300_ms_of_standstill_confirm_it(self, seen):
         stop(seen)
-        assert seen.report().stop == StopReport("B", None, "")
+        assert verdict(seen) == ("B", None, "")
         watch_it(seen, 0.4, 0.4, 0.2)
         assert seen.report().stop.confirmed is None
         watch_it(seen, 0.4, 0.01)
@@ -427,7 +453,7 @@ class TestConfirmation:
             watch_it(seen, 0.01, 0.0)
             seen.run(0.99)
         too_seldom = "odometry comes too seldom to tell"
-        assert seen.report().stop == StopReport("B", False, too_seldom)
+        assert verdict(seen) == ("B", False, too_seldom)
 
     def test_one_that_moves_again_is_confirmed_no_longer_however_late(self, seen):
         """By a goal that begins late, by a ramp, or by another that publishes."""
@@ -436,9 +462,9 @@ class TestConfirmation:
         seen.run(60.0)
         assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, True)
         since = "it stood, but since then no odometry"
-        assert seen.report().stop == StopReport("B", False, since)
+        assert verdict(seen) == ("B", False, since)
         watch_it(seen, 0.2, 0.4)
-        assert seen.report().stop == StopReport("B", False, "still moving at 0.40 m/s")
+        assert verdict(seen) == ("B", False, "still moving at 0.40 m/s")
         watch_it(seen, 0.4, 0.0)
         assert seen.report().stop.confirmed is True
         reset(seen)
@@ -448,7 +474,7 @@ class TestConfirmation:
     def test_one_that_moves_on_is_not_confirmed_until_it_stands(self, seen):
         stop(seen)
         watch_it(seen, 2.1, 0.31)
-        assert seen.report().stop == StopReport("B", False, "still moving at 0.31 m/s")
+        assert verdict(seen) == ("B", False, "still moving at 0.31 m/s")
         watch_it(seen, 0.5, 0.0)
         assert seen.report().stop.confirmed is True
 
@@ -479,7 +505,7 @@ class TestConfirmation:
         for twist in told:
             seen.tell(events.Measured(KEY, twist))
         seen.run(2.2)
-        assert seen.report().stop == StopReport("B", False, "no odometry")
+        assert verdict(seen) == ("B", False, "no odometry")
 
     def test_odometry_that_fell_silent_says_so(self, seen):
         stop(seen)
@@ -489,14 +515,14 @@ class TestConfirmation:
 
     def test_without_odometry_nothing_is_confirmed(self, bench):
         stop(bench)
-        assert bench.report().stop == StopReport("B", False, "no odometry")
+        assert verdict(bench) == ("B", False, "no odometry")
 
     def test_without_a_link_it_is_not_confirmed_and_with_one_it_is_looked_at(
         self, seen
     ):
         seen.break_links()
         stop(seen)
-        assert seen.report().stop == StopReport("B", False, f"no link to {URL}")
+        assert verdict(seen) == ("B", False, f"no link to {URL}")
         seen.connect_links()
         assert seen.report().stop.confirmed is None
         watch_it(seen, 0.6, 0.0)
@@ -604,3 +630,107 @@ def test_a_robots_stop_leaves_other_machines_alone():
     assert not bench.report("r2").latched
     assert {w.key for w in bench.written} == {KEY}
     assert Key(URL, other) not in bench.disk
+
+
+class TestResetNamesAStop:
+    def test_one_in_flight_does_not_end_the_newer_stop_of_somebody_else(self, bench):
+        stop(bench, "a")
+        seen = bench.stop_of()
+        stop(bench, "b")
+        bench.say("a", op="reset", robot="r1", stop=seen)
+        assert bench.report().latched
+        assert bench.refusals("a")[-1].why == (
+            "B pressed STOP meanwhile; look at the robot, then press Reset again"
+        )
+        reset(bench, "a")
+        assert not bench.report().latched
+
+    def test_pressed_again_by_the_same_person_it_is_another_stop(self, bench):
+        stop(bench)
+        seen = bench.stop_of()
+        stop(bench)
+        bench.say("b", op="reset", robot="r1", stop=seen)
+        assert bench.report().latched
+
+    def test_nor_one_that_came_after_a_reset(self, bench):
+        stop(bench)
+        seen = bench.stop_of()
+        reset(bench)
+        stop(bench, "a")
+        bench.say("b", op="reset", robot="r1", stop=seen)
+        assert bench.report().latched
+
+    def test_nor_one_of_another_gate_that_was_found_in_the_file(self, bench):
+        stop(bench)
+        seen = bench.stop_of()
+        bench.disk[KEY] = Press("Ann", "a1")
+        bench.tell(events.LatchSeen(KEY, Press("Ann", "a1")))
+        assert bench.report().stop.by == "Ann"
+        bench.say("b", op="reset", robot="r1", stop=seen)
+        assert bench.report().latched
+        reset(bench)
+        assert not bench.report().latched
+        assert bench.disk == {}
+
+    def test_nor_one_of_another_gate_that_is_in_the_file_unseen(self, bench):
+        stop(bench)
+        bench.disk[KEY] = Press("Ann", "a1")
+        reset(bench)
+        assert bench.stops == {KEY: "Ann"}, "its file is not taken away"
+        bench.tell(events.LatchSeen(KEY, Press("Ann", "a1")))
+        assert bench.report().latched
+
+    def test_of_a_python_program_likewise(self, bench):
+        bench.tell(messages.Stop("r1"))
+        seen = bench.stop_of()
+        stop(bench)
+        bench.tell(messages.Reset("r1", seen))
+        assert bench.report().latched
+        assert "B pressed STOP" in bench.refusals(PROGRAM)[-1].why
+
+    def test_it_is_known_by_its_name_after_a_restart(self):
+        old = Bench().begin()
+        stop(old)
+        seen = old.stop_of()
+        bench = Bench(disk=old.disk).begin()
+        assert bench.stop_of() == seen
+        bench.say("b", op="reset", robot="r1", stop=seen)
+        assert not bench.report().latched
+
+    def test_one_that_names_none_is_garbage(self, bench):
+        stop(bench)
+        for stated in ({}, {"stop": ""}, {"stop": 7}, {"stop": "x" * 65}):
+            command = {"op": "reset", "robot": "r1", **stated}
+            bench.tell(messages.FromBrowser("b", json.dumps(command).encode()))
+            bench.run(1.1)
+        assert len(bench.refusals("b")) == 4
+        assert bench.report().latched
+
+    def test_a_stop_for_all_while_its_file_is_written_is_not_overlooked(self):
+        bench = Bench(slow_disk=True).begin()
+        stop(bench)
+        stop(bench, "a")
+        bench.tell(events.LatchSeen(KEY, bench.did(actions.KeepLatch)[0].press))
+        assert len(bench.did(actions.KeepLatch)) == 1
+        bench.keep(bench.did(actions.KeepLatch)[0])
+        bench.keep(bench.did(actions.KeepLatch)[1])
+        assert bench.report().stop.by == "A"
+
+    def test_of_a_robot_that_has_another_topic_now_the_newer_stop_stands(self, bench):
+        stop(bench)
+        bench.tell(spec(twist_topic="/other/cmd_vel"))
+        seen = bench.stop_of()
+        stop(bench, "a", "*")
+        bench.say("b", op="reset", robot="r1", stop=seen)
+        assert bench.report().latched
+        reset(bench)
+        assert not bench.report().latched
+        assert bench.disk == {}, "by either topic"
+
+    def test_and_one_of_another_gate_by_the_topic_it_had_stands(self, bench):
+        stop(bench)
+        bench.tell(spec(twist_topic="/other/cmd_vel"))
+        bench.run(1.0)
+        bench.disk[KEY] = Press("Ann", "a1")
+        reset(bench)
+        assert bench.stops == {KEY: "Ann"}

@@ -10,9 +10,12 @@ from gate_robot import eventually
 
 from webmap.gate import actions
 from webmap.gate.display.client import GateClient
-from webmap.gate.events import Key, LatchKept, LatchSeen, LockState
+from webmap.gate.events import Key, LatchKept, LatchSeen, LockState, Press
 from webmap.gate.kept.disk import Disk
 from webmap.gate.kept.records import Records
+
+ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")
+IDS = frozenset({"a1", "b1"})
 
 
 @pytest.fixture
@@ -34,7 +37,7 @@ class TestTheOneThatHasIt:
     def test_takes_over_a_stop_that_was_said_to_the_other(self, owner):
         owner.drive_off()
         at = owner.now
-        owner.tell(LatchSeen(KEY, "Ann"))
+        owner.tell(LatchSeen(KEY, ANN))
         assert owner.written[-1].twist == ZERO
         assert (owner.state, owner.report().holder) == ("stopped", None)
         assert owner.report().stop.by == "Ann"
@@ -45,52 +48,53 @@ class TestTheOneThatHasIt:
     def test_cancels_goals_and_says_hooks_then_too(self):
         hook = {"topic": "/lock", "type": "std_msgs/Bool"}
         bench = Bench().begin(spec(stop_hooks=(hook,)))
-        bench.tell(LatchSeen(KEY, "Ann"))
+        bench.tell(LatchSeen(KEY, ANN))
         assert bench.did(actions.CancelGoals)
         assert [hook.stopped for hook in bench.did(actions.RunHook)] == [True]
 
     def test_stops_what_takes_goals_only(self):
         bench = Bench().begin(spec(twist_topic=None, cancel_topic=None))
-        bench.tell(LatchSeen(Key(URL, "goal /goal"), "Ann"))
+        bench.tell(LatchSeen(Key(URL, "goal /goal"), ANN))
         assert bench.state == "stopped"
 
     def test_hears_its_own_stop_without_a_stir(self, owner):
         owner.say("a", op="stop", robot="r1")
         before = len(owner.done)
-        owner.tell(LatchSeen(KEY, "A"))
+        owner.tell(LatchSeen(KEY, owner.disk[KEY]))
         assert owner.done[before:] == []
 
     def test_keeps_a_stop_whose_file_is_gone(self, owner):
         owner.say("a", op="stop", robot="r1")
         owner.disk.clear()
         owner.tell(LatchSeen(KEY, None))
-        assert owner.disk == {KEY: "A"}
+        assert owner.stops == {KEY: "A"}
         assert owner.state == "stopped"
 
     def test_trusts_no_look_at_what_it_is_writing(self, owner):
         owner.say("a", op="stop", robot="r1")
         owner.slow_disk = True
         owner.say("a", op="reset", robot="r1")
-        owner.tell(LatchSeen(KEY, "A"))  # looked at before it was taken away
+        owner.tell(
+            LatchSeen(KEY, owner.disk[KEY])
+        )  # looked at before it was taken away
         owner.run(0.1)
         assert not owner.report().latched
 
     def test_hears_of_a_machine_that_is_gone(self, owner):
-        owner.tell(LatchSeen(Key(URL, "/gone"), "Ann"))
+        owner.tell(LatchSeen(Key(URL, "/gone"), ANN))
         assert owner.state == "free"
 
 
 class TestTheOther:
     def test_stops_it_and_leaves_the_reset_to_the_one_that_has_it(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
-        assert onlooker.disk == {KEY: "A"}
+        assert onlooker.stops == {KEY: "A"}
         assert onlooker.written[-1].twist == ZERO
         onlooker.say("a", op="reset", robot="r1")
         assert onlooker.refusals()[-1].why == (
             "another WebMap on this computer has it: reset its STOP there"
         )
-        onlooker.say("a", op="reset", robot="*")
-        assert onlooker.disk == {KEY: "A"}
+        assert onlooker.stops == {KEY: "A"}
 
     def test_writes_zero_no_more_when_it_was_reset_there(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
@@ -100,17 +104,17 @@ class TestTheOther:
         at = onlooker.now
         onlooker.run(1.0)
         assert onlooker.since(at) == []
-        assert onlooker.disk == {}
+        assert onlooker.stops == {}
         assert not onlooker.report().latched
 
     def test_writes_nothing_for_a_stop_that_was_said_there(self, onlooker):
-        onlooker.tell(LatchSeen(KEY, "Ann"))
+        onlooker.tell(LatchSeen(KEY, ANN))
         onlooker.run(0.2)
         assert onlooker.written == []
 
     def test_has_a_stop_of_its_own_stand_when_it_gets_the_machine(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
-        onlooker.tell(LockState(KEY, held=True, latched_by="A"))
+        onlooker.tell(LockState(KEY, held=True, latched=onlooker.disk[KEY]))
         assert onlooker.state == "stopped"
         onlooker.say("a", op="reset", robot="r1")
         onlooker.run(1.0)
@@ -122,17 +126,17 @@ def test_a_disk_tells_of_each_file_that_changed_once(tmp_path):
         mine, theirs = Disk(Records(tmp_path)), Records(tmp_path)
         mine.recall(LockState(KEY, held=True))
         assert await mine.look() == []
-        theirs.keep_latch(KEY, "Ann")
+        theirs.keep_latch(KEY, ANN, IDS)
         # Recalled again, it is news all the same.
-        assert mine.recall(LockState(KEY, held=False)).latched_by == "Ann"
-        assert await mine.look() == [LatchSeen(KEY, "Ann")]
+        assert mine.recall(LockState(KEY, held=False)).latched == ANN
+        assert await mine.look() == [LatchSeen(KEY, ANN)]
         assert await mine.look() == []
-        theirs.keep_latch(KEY, "Ben")
-        assert await mine.look() == [LatchSeen(KEY, "Ben")]
-        theirs.keep_latch(KEY, None)
+        theirs.keep_latch(KEY, BEN, IDS)
+        assert await mine.look() == [LatchSeen(KEY, BEN)]
+        theirs.keep_latch(KEY, None, IDS)
         assert await mine.look() == [LatchSeen(KEY, None)]
         mine.forget(KEY)
-        theirs.keep_latch(KEY, "Ann")
+        theirs.keep_latch(KEY, ANN, IDS)
         assert await mine.look() == []
 
     asyncio.run(scenario())
@@ -143,16 +147,16 @@ def test_a_stop_that_is_said_while_another_is_reset_is_not_overlooked(tmp_path):
         theirs = Records(tmp_path)
 
         class Slow(Records):
-            def keep_latch(self, key, by):
-                result = super().keep_latch(key, by)
-                theirs.keep_latch(key, "Ben")
+            def keep_latch(self, key, press, ids):
+                result = super().keep_latch(key, press, ids)
+                theirs.keep_latch(key, BEN, ids)
                 return result
 
         disk, told = Disk(Slow(tmp_path)), []
         disk.recall(LockState(KEY, held=True))
-        disk.keep(actions.KeepLatch(KEY, 1, None), told.append)
+        disk.keep(actions.KeepLatch(KEY, 1, None, IDS), told.append)
         await disk.settle()
-        assert await disk.look() == [LatchSeen(KEY, "Ben")]
+        assert await disk.look() == [LatchSeen(KEY, BEN)]
         assert told == [LatchKept(KEY, 1, None)]
 
     asyncio.run(scenario())
@@ -162,9 +166,9 @@ def test_what_comes_and_goes_between_two_looks_is_seen_by_who_wrote_it(tmp_path)
     async def scenario():
         disk = Disk(Records(tmp_path))
         disk.recall(LockState(KEY, held=False))
-        disk.keep(actions.KeepLatch(KEY, 1, "Ann"), lambda event: None)
+        disk.keep(actions.KeepLatch(KEY, 1, ANN, IDS), lambda event: None)
         await disk.settle()
-        Records(tmp_path).keep_latch(KEY, None)
+        Records(tmp_path).keep_latch(KEY, None, IDS)
         assert await disk.look() == [LatchSeen(KEY, None)]
 
     asyncio.run(scenario())

@@ -51,7 +51,8 @@ RESET = """new Promise((done) => {
         const message = JSON.parse(event.data);
         if (message.op !== "robot") return;
         if (message.latched) {
-            socket.send(JSON.stringify({ op: "reset", robot: message.robot }));
+            const { robot, stop } = message;
+            socket.send(JSON.stringify({ op: "reset", robot, stop: stop.id }));
         } else {
             socket.close();
             done(message.state);

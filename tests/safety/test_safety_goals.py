@@ -115,12 +115,12 @@ class Page:
         self.client.take("r1").result(10)
         self.client.move("r1", x, y, yaw)
 
-    def say(self, op):
-        self._socket.receive(json.dumps({"op": op, "robot": "r1"}))
+    def say(self, op, **fields):
+        self._socket.receive(json.dumps({"op": op, "robot": "r1", **fields}))
 
     def reset(self):
         wait_for(lambda: self.reports[-1]["latched"], "STOP on the disk")
-        self.say("reset")
+        self.say("reset", stop=self.reports[-1]["stop"]["id"])
         wait_for(lambda: not self.reports[-1]["latched"], "the reset")
 
     def _hear(self, text):

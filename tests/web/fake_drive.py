@@ -36,6 +36,7 @@ class FakeDrive:
         """Whether what is said is noted and not obeyed."""
         self.port = 0
         self._epoch = 40
+        self._presses = 0
         self._open: list[ServerConnection] = []
         self._states: list[dict] = []
         self._ended = asyncio.Event()
@@ -59,6 +60,11 @@ class FakeDrive:
         """Report a robot anew to every page."""
         self.robots[robot] |= fields
         self._loop.call_soon_threadsafe(self._tell_all, dict(self.robots[robot]))
+
+    def refuse(self, robot: str, what: str, why: str) -> None:
+        """Refuse something to every page."""
+        refused = {"op": "refused", "robot": robot, "what": what, "why": why}
+        self._loop.call_soon_threadsafe(self._tell_all, refused)
 
     def drop(self) -> None:
         """Cut every connection."""
@@ -198,9 +204,9 @@ class FakeDrive:
         nobody = {"holder": None, "mine": False, "epoch": None}
         return nobody | {"armed": False, "state": "free"}
 
-    @staticmethod
-    def _stopped() -> dict:
-        stop = {"by": "me", "confirmed": None, "why": ""}
+    def _stopped(self) -> dict:
+        self._presses += 1
+        stop = {"by": "me", "confirmed": None, "why": "", "id": f"s{self._presses}"}
         words = {"armable": False, "reason": "stopped by me"}
         return words | {"state": "stopped", "latched": True, "stop": stop}
 

@@ -394,8 +394,8 @@ def test_stop_all_says_what_became_of_it(open_bench) -> None:
     assert verdicts.nth(0).inner_text().endswith("stopped, confirmed by odometry")
 
 
-CONFIRMED = {"by": "Ann", "confirmed": True, "why": ""}
-UNCONFIRMED = {"by": "Ann", "confirmed": False, "why": "no link to ws://bob"}
+CONFIRMED = {"by": "Ann", "confirmed": True, "why": "", "id": "s8"}
+UNCONFIRMED = CONFIRMED | {"confirmed": False, "why": "no link to ws://bob", "id": "s9"}
 
 
 def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -> None:
@@ -419,7 +419,8 @@ def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -
     assert bench.gate.of("reset") == []
     assert reset.inner_text() == "Press again to reset"
     reset.press("Enter")
-    bench.until(lambda: bench.gate.of("reset") == [{"op": "reset", "robot": "r1"}])
+    said = [{"op": "reset", "robot": "r1", "stop": "s8"}]
+    bench.until(lambda: bench.gate.of("reset") == said)
     bench.still()
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
@@ -454,7 +455,8 @@ def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> Non
     reset.click()
     bench.page.wait_for_timeout(450)
     bench.page.get_by_role("button", name="Press again to reset").click()
-    both = [{"op": "reset", "robot": robot} for robot in ("r1", "r2")]
+    stops = {"r1": "s9", "r2": "s8"}
+    both = [{"op": "reset", "robot": r, "stop": s} for r, s in stops.items()]
     bench.until(lambda: bench.gate.of("reset") == both)
     bench.until(lambda: not bench.page.locator(".webmap-stop-list").is_visible())
 
@@ -477,6 +479,33 @@ def test_a_robot_that_is_stopped_meanwhile_takes_the_press_on_reset_back(
     reset.click()
     bench.page.wait_for_timeout(100)
     assert bench.gate.of("reset") == []
+
+
+@pytest.mark.parametrize("panel", ["stop", "teleop"])
+def test_a_newer_stop_of_somebody_else_takes_the_press_on_reset_back(
+    open_bench, panel
+) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.select("r1")
+    bench.gate.change("r1", **STANDS)
+    reset = bench.page.locator(f".webmap-{panel} .webmap-reset")
+    reset.wait_for()
+    reset.press("Enter")
+    assert reset.inner_text() == "Press again to reset"
+    bench.gate.change("r1", stop=CONFIRMED | {"by": "Ben", "id": "s10"})
+    bench.until(lambda: reset.inner_text() == "Reset", patience=3.0)
+    assert bench.gate.of("reset") == []
+
+
+def test_a_reset_that_the_gate_refuses_is_said_beside_the_button(open_bench) -> None:
+    bench = open_bench("?modules=stop,teleop")
+    bench.gate.change("r1", **STANDS)
+    why = "Ben pressed STOP meanwhile; look at the robot, then press Reset again"
+    bench.gate.refuse("r1", "reset", why)
+    standing = bench.page.locator(".webmap-stop-standing")
+    bench.until(lambda: standing.inner_text().endswith(f"was not reset: {why}."))
+    bench.gate.change("r1", latched=False, state="free", stop=None)
+    bench.until(lambda: why not in standing.inner_text())
 
 
 def test_another_selection_takes_the_press_on_reset_back(bench: Bench) -> None:

@@ -380,8 +380,17 @@ class Driven(Extendable):
         self.motion.stop()
 
     def reset_stop(self) -> None:
-        """End a STOP that stands; moves nothing and gives nobody the robot."""
-        self.motion.reset_stop()
+        """End the STOP that ``report`` tells of; moves nothing, gives nobody the robot.
+
+        The gate refuses that if somebody pressed STOP since then: look at ``report``,
+        which tells of the newer STOP, and call this again.
+
+        Raises:
+            MotionError: If ``report`` tells of no STOP. After :meth:`stop`, wait until
+                ``report.stop`` is there.
+
+        """
+        self.motion.reset_stop(self.report)
 
     # What the gate says.
 

@@ -12,7 +12,7 @@ from webmap.core.twist_topic import TWIST_TYPES, TwistTopic, check_twist_type
 from webmap.core.type_asking import TypeAsking
 from webmap.errors import ConfigError, MotionError
 from webmap.gate.hookspecs import checked_hooks
-from webmap.gate.messages import AssistSpec, RobotSpec
+from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.specs import checked, checked_assist
 from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
@@ -286,9 +286,16 @@ class MotionRoad:
         """Have the gate stop the robot, whoever drives it."""
         self._gate().stop_robot(self.id)
 
-    def reset_stop(self) -> None:
-        """Have the gate end a STOP that stands."""
-        self._gate().reset(self.id)
+    def reset_stop(self, report: RobotReport | None) -> None:
+        """Have the gate end the STOP that a report tells of."""
+        gate = self._gate()
+        stop = None if report is None else report.stop
+        if stop is None:
+            raise MotionError(
+                f"robot {self._name!r}: its report tells of no STOP that could be "
+                "reset; after stop() wait until report.stop is there"
+            )
+        gate.reset(self.id, stop.id)
 
     def _gate(self) -> "GateClient":
         if self.gate is None or not lifecycle.running:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from webmap.gate.events import Key
+from webmap.gate.events import Key, Press
 from webmap.gate.messages import FromGate, RobotSpec, Way
 from webmap.geometry import Twist
 
@@ -119,14 +119,17 @@ class MarkDriven:
 
 @dataclass(frozen=True, slots=True)
 class KeepLatch:
-    """Keep on disk that STOP stands, or (``by`` is ``None``) that it does not.
+    """Keep on disk that STOP stands, or (``press`` is ``None``) that it does not.
 
     Answered by ``LatchKept`` when the disk has it; nothing waits for that.
     """
 
     key: Key
     number: int
-    by: str | None
+    press: Press | None
+    ids: frozenset[str]
+    """The presses that may be in the file by this gate's doing. If another one is
+    there, another gate was told STOP meanwhile, and the file is not taken away."""
 
 
 @dataclass(frozen=True, slots=True)

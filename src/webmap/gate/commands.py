@@ -12,7 +12,7 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
      "x": 1.0, "y": 2.0, "yaw": 0.5}
     {"op": "cancel", "robot": "r1"}
     {"op": "stop", "robot": "r1"}        or "*" for all
-    {"op": "reset", "robot": "r1"}       or "*" for all
+    {"op": "reset", "robot": "r1", "stop": "5f0c"}
     {"op": "ask", "robot": "r1"}
     {"op": "grant", "robot": "r1"}
     {"op": "deny", "robot": "r1"}
@@ -25,8 +25,9 @@ left and ``turn`` counter-clockwise, as parts of the speed in force, each in
 ``epoch`` is the lease's, ``tick`` the newest one that came, and ``seq`` grows with
 every ``drive``, ``goal`` and ``locate`` of the connection. ``goal`` is a pose in the
 robot's goal frame, in metres and radians, that it is to drive to, and ``locate`` one
-that it is at. ``reset`` ends a
-STOP that stands; it moves nothing and gives no lease. ``ask`` asks the holder of the
+that it is at. ``reset`` ends the
+STOP with the identity ``stop``, as the gate reported it; if a newer STOP stands, the
+reset is refused. It moves nothing and gives no lease. ``ask`` asks the holder of the
 lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
 10 s; ``release`` also takes the question back. ``stop-test`` creeps, stops sending and
 measures whether the base stops by itself; it needs the lease, released inputs, and a
@@ -46,6 +47,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn, TypeVar
 
+from webmap.gate.events import MAX_ID
 from webmap.gate.refusal import Refusal
 
 MAX_BYTES = 1024
@@ -153,9 +155,10 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """The STOP of the robot, or of every robot (``None``), should stand no longer."""
+    """The STOP of the robot that has this identity should stand no longer."""
 
-    robot: str | None
+    robot: str
+    stop: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,6 +285,12 @@ class _Fields:
             _refuse(f"'robot' is {_short(value)}, which is not plain text")
         return value
 
+    def identity(self, name: str) -> str:
+        value = self._take(name)
+        if not (isinstance(value, str) and 0 < len(value) <= MAX_ID):
+            _refuse(f"{name!r} is {_short(value)}, expected the identity of a STOP")
+        return value
+
     def whole(self, name: str) -> int:
         value = self._take(name)
         # A bool is an int to Python, but not to whoever wrote it.
@@ -345,7 +354,7 @@ _READERS: dict[str, Callable[[_Fields], Command]] = {
     "deny": lambda fields: Deny(fields.robot()),
     "stop-test": lambda fields: StopTest(fields.robot()),
     "stop": lambda fields: Stop(_one_or_all(fields)),
-    "reset": lambda fields: Reset(_one_or_all(fields)),
+    "reset": lambda fields: Reset(fields.robot(), fields.identity("stop")),
 }
 
 

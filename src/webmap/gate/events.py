@@ -19,6 +19,19 @@ class Key(NamedTuple):
     topic: str
 
 
+MAX_ID = 64
+"""The longest identity of a press, in characters."""
+
+
+class Press(NamedTuple):
+    """One press of STOP. Every press has an identity that no other one has."""
+
+    by: str
+    """Who pressed it, for people."""
+    id: str
+    """The identity, which a reset must name."""
+
+
 class Fold(msgspec.Struct, frozen=True):
     """What a scan that was folded to fewer beams was before."""
 
@@ -214,8 +227,8 @@ class LockState:
     driven: bool = False
     """Whether an earlier gate died while it drove the machine (S13)."""
     why: str | None = None
-    latched_by: str | None = None
-    """Whose STOP stands on disk, if one does (S7)."""
+    latched: Press | None = None
+    """The STOP that stands on disk, if one does (S7)."""
     tested: StopRecord | None = None
     """What the last stop test found, if there was one."""
     elsewhere: bool = False
@@ -227,8 +240,8 @@ class LatchSeen:
     """The file of a STOP is another than before, or there is none any more."""
 
     key: Key
-    by: str | None
-    """Whose STOP stands on disk now, if one does."""
+    press: Press | None
+    """The STOP that stands on disk now, if one does."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,8 @@ and after it every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest accepte
 ``seq`` of this connection, -1 at first. ``robot`` comes when something changed,
 velocities (``[forward, left, counter-clockwise]``) at 10 Hz at most. While STOP stands
 ``latched`` is true, ``state`` is ``"stopped"``, and ``stop`` tells what is known of it:
-``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by odometry"}``, where
+``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by odometry", "id":
+"5f0c"}``, with the identity that a reset must name and that is new with each press;
 ``confirmed`` is null while nobody knows yet and false, with the reason, when nobody
 could tell or the robot still moves. ``asker`` is who asks the holder for the lease:
 ``{"connection": "c6", "name": "Ben", "left": 7.5}`` with the seconds until it is

@@ -255,13 +255,17 @@ export class Drive {
   }
 
   /**
-   * End the STOP of a robot, or all: "*". Moves nothing, and gives nobody the robot.
+   * End a STOP. Moves nothing, and gives nobody the robot.
+   *
+   * The gate refuses it if somebody pressed STOP since then.
    *
    * @param {string} robot
+   * @param {string} stop The identity of the STOP that the operator saw: `stop.id` of
+   *     the robot's report.
    */
-  reset(robot) {
+  reset(robot, stop) {
     this._pilot.reset(robot, performance.now());
-    this._send([{ op: "reset", robot }]);
+    this._send([{ op: "reset", robot, stop }]);
   }
 
   /**

@@ -113,12 +113,33 @@ describe("a STOP", () => {
     session.receive(HELLO, 0);
     session.receive(REPORT, 0);
     session.receive({ ...REPORT, robot: "r2" }, 0);
-    session.receive({ ...REPORT, robot: "r3", latched: true }, 0);
+    const third = { ...REPORT, robot: "r3", latched: true };
+    session.receive({ ...third, stop: { id: "s1" } }, 0);
     session.stopped("*", true, 10);
     session.receive({ ...REPORT, latched: true }, 20);
+    session.receive({ ...third, stop: { id: "s2" } }, 20);
     session.lost(500);
     assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "*" }]);
+    session.receive({ ...REPORT, latched: true, stop: { id: "s3" } }, 650);
+    session.receive({ ...third, stop: { id: "s3" } }, 650);
     session.receive({ op: "gone", robot: "r2" }, 650);
+    session.lost(700);
+    assert.deepEqual(session.receive(HELLO, 800).say, []);
+  });
+
+  test("pressed while one stands is answered by another STOP, not by the same", () => {
+    const stands = (/** @type {string} */ id) => ({
+      ...{ ...REPORT, state: "stopped", latched: true },
+      stop: { by: "Ann", confirmed: true, why: "", id },
+    });
+    session.receive(HELLO, 0);
+    session.receive(stands("s1"), 0);
+    session.stopped("r1", true, 10);
+    session.receive(stands("s1"), 20);
+    session.receive(REPORT, 30); // somebody else's reset was quicker
+    session.lost(500);
+    assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "r1" }]);
+    session.receive(stands("s2"), 650);
     session.lost(700);
     assert.deepEqual(session.receive(HELLO, 800).say, []);
   });

@@ -178,14 +178,19 @@ class GateClient:
             self._keep_stop(None, robot_id)
             self.tell(messages.Stop(robot_id))
 
-    def reset(self, robot_id: str | None) -> None:
-        """End the STOP of a robot or, with ``None``, of all; moves nothing."""
-        with self._lock:
-            if self.ready:
-                self._unheard.reset(robot_id)
-                self.tell(messages.Reset(robot_id))
-            else:
-                log.error("the gate does not run: reset is not kept for later")
+    def reset(self, robot_id: str, stop: str) -> None:
+        """End the STOP of a robot that has this identity; moves nothing.
+
+        Args:
+            robot_id: The robot.
+            stop: The identity, as the robot's report tells it. The gate refuses the
+                reset if a newer STOP stands.
+
+        """
+        if self.ready:
+            self.tell(messages.Reset(robot_id, stop))
+        else:
+            log.error("the gate does not run: reset is not kept for later")
 
     def tell(self, message: messages.ToGate) -> None:
         """Send a message to the gate, if it runs."""

@@ -42,11 +42,3 @@ class Unheard:
             self._said = {
                 who: at for who, at in self._said.items() if now - at < HEEDED
             }
-
-    def reset(self, robot: str | None) -> None:
-        """Forget those of a robot, or all with ``None``: they shall stand no longer."""
-        self._said = {
-            who: at
-            for who, at in self._said.items()
-            if robot is not None and who[1] != robot
-        }

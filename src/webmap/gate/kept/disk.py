@@ -45,7 +45,7 @@ class Disk:
             self._stamps[state.key] = self._records.stamp_of(state.key)
         return dataclasses.replace(
             state,
-            latched_by=self._records.latch_of(state.key),
+            latched=self._records.latch_of(state.key),
             tested=self._records.stop_test_of(state.key),
         )
 
@@ -93,11 +93,12 @@ class Disk:
 
     def _do(self, action: KeepLatch | KeepStopTest) -> Event:
         if isinstance(action, KeepLatch):
-            error = self._records.keep_latch(action.key, action.by)
+            error = self._records.keep_latch(action.key, action.press, action.ids)
             if action.key in self._stamps:
                 # What another gate does from here on is news, also what it did while
                 # the disk took its time to take the file away.
-                kept = None if action.by is None else self._records.stamp_of(action.key)
+                stands = action.press is not None
+                kept = self._records.stamp_of(action.key) if stands else None
                 self._stamps[action.key] = kept
             return LatchKept(action.key, action.number, error)
         today = datetime.datetime.now().astimezone().date().isoformat()

@@ -13,7 +13,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from webmap.gate.events import Key, StopRecord
+from webmap.gate.events import MAX_ID, Key, Press, StopRecord
 from webmap.ros.names import spellings_of
 
 log = logging.getLogger("webmap.gate")
@@ -43,7 +43,12 @@ def _paths_of(folder: Path, key: Key, kind: str) -> list[Path]:
 def _found(folder: Path, key: Key, kind: str) -> Path:
     """Return the file that there is, or else where it would be."""
     paths = _paths_of(folder, key, kind)
-    return next(filter(os.path.lexists, paths), paths[0])
+    # One that was being lifted when a gate died has not been lifted.
+    return next(filter(os.path.lexists, [*paths, *map(_aside, paths)]), paths[0])
+
+
+def _aside(path: Path) -> Path:
+    return path.with_suffix(f"{path.suffix}.lifted")
 
 
 class Records:
@@ -57,40 +62,39 @@ class Records:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def latch_of(self, key: Key) -> str | None:
-        """Return who said the STOP that stands for a machine, if one does."""
-        path = _found(self._folder, key, "stop")
-        try:
-            by = json.loads(path.read_text("utf-8"))["by"]
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-            log.warning("%s cannot be read (%s): STOP stands", path, error)
-            return UNKNOWN
-        sound = isinstance(by, str) and by and by.isprintable()
-        return by[:MAX_NAME] if sound else UNKNOWN
+    def latch_of(self, key: Key) -> Press | None:
+        """Return the STOP that stands for a machine, if one does."""
+        return _press_in(_found(self._folder, key, "stop"))
 
     def stamp_of(self, key: Key) -> tuple[int, int] | None:
         """Return what changes with the file of a STOP; ``None`` if there is none."""
-        try:
-            found = _found(self._folder, key, "stop").stat()
-        except OSError:
-            return None
-        return found.st_mtime_ns, found.st_ino
+        return _stamp(_found(self._folder, key, "stop"))
 
-    def keep_latch(self, key: Key, by: str | None) -> str | None:
+    def keep_latch(
+        self, key: Key, press: Press | None, ids: frozenset[str]
+    ) -> str | None:
         """Have STOP stand on disk, or not; return what went wrong, in words.
 
         When this returns, the disk has it: the file and its place in the folder.
+
+        Args:
+            key: The machine.
+            press: The STOP; ``None`` if it stands no longer.
+            ids: The STOPs that this gate may have left in the file. A file with
+                another one is of another gate, and is not taken away.
+
         """
-        path = path_of(self._folder, key, "stop")
+        path, *others = _paths_of(self._folder, key, "stop")
         try:
-            if by is None:
-                for each in _paths_of(self._folder, key, "stop"):
-                    each.unlink(missing_ok=True)
+            if press is None:
+                for each in (path, *others):
+                    _lift(each, ids)
                 _flush_folder(self._folder)
             else:
-                self._write(path, {"by": by, "bridge": key.url, "topic": key.topic})
+                who = {"by": press.by, "id": press.id}
+                self._write(path, {**who, "bridge": key.url, "topic": key.topic})
+                for each in others:  # or it would be found when this one is lifted
+                    each.unlink(missing_ok=True)
         except OSError as error:
             log.error("%s: %s", path, error)
             return f"{path} cannot be written to ({error.strerror})"
@@ -132,6 +136,46 @@ class Records:
             os.fsync(file.fileno())
         temporary.replace(path)
         _flush_folder(self._folder)
+
+
+def _press_in(path: Path) -> Press | None:
+    """Return the STOP that a file tells of; ``None`` if there is no such file."""
+    try:
+        found = json.loads(path.read_text("utf-8"))
+        by, id = found["by"], found.get("id")
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        log.warning("%s cannot be read (%s): STOP stands", path, error)
+        by = id = None
+    if not (isinstance(by, str) and by and by.isprintable()):
+        by = UNKNOWN
+    if not (isinstance(id, str) and id and id.isprintable() and len(id) <= MAX_ID):
+        # Earlier versions wrote none. This one changes when they write the file anew.
+        id = "file-" + "-".join(f"{part:x}" for part in _stamp(path) or (0,))
+    return Press(by[:MAX_NAME], id)
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ino
+
+
+def _lift(path: Path, ids: frozenset[str]) -> None:
+    """Take the file of a STOP away, unless it tells of another one than these."""
+    aside = _aside(path)
+    with contextlib.suppress(FileNotFoundError):
+        path.replace(aside)  # from here on nobody else changes it
+    press = _press_in(aside)
+    if press is None:
+        return
+    if press.id in ids:
+        aside.unlink()
+    else:
+        aside.replace(path)
 
 
 def _odd(seconds: float) -> bool:

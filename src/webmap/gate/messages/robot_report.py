@@ -32,6 +32,8 @@ class StopReport(msgspec.Struct, frozen=True):
     """Whether odometry shows standstill; ``None`` while that is not known yet."""
     why: str
     """The reason in words."""
+    id: str
+    """Its identity, which a reset must name. Each press of STOP has its own."""
 
 
 class TestReport(msgspec.Struct, frozen=True):

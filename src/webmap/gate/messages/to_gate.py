@@ -52,9 +52,11 @@ class Stop(msgspec.Struct, frozen=True, tag="stop"):
 
 
 class Reset(msgspec.Struct, frozen=True, tag="reset"):
-    """From Python: STOP stands no longer, for one robot or (``None``) for all."""
+    """From Python: the STOP of a robot that has this identity stands no longer."""
 
-    robot: str | None = None
+    robot: str
+    stop: str
+    """As :class:`StopReport` tells it."""
 
 
 class ProgramTake(msgspec.Struct, frozen=True, tag="program-take"):

@@ -19,7 +19,7 @@ until a reset, which leads to *free*.
 from typing import Literal
 
 from webmap.gate.actions import Emit, Say
-from webmap.gate.events import Key, LockState, Wrote, WroteGoal
+from webmap.gate.events import Key, LockState, Press, Wrote, WroteGoal
 from webmap.gate.messages import RobotSpec, SentTwist
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.arming import Arming
@@ -171,18 +171,18 @@ class Base:
 
     # STOP.
 
-    def stop(self, by: str, now: float) -> None:
+    def stop(self, press: Press, now: float) -> None:
         """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
-        self.hands.end(f"STOP by {by}", now)
-        self.standing.press(by, now)
+        self.hands.end(f"STOP by {press.by}", now)
+        self.standing.press(press, now)
         self._expect_standstill(now)
 
-    def saw_stop_file(self, by: str | None, now: float) -> None:
+    def saw_stop_file(self, press: Press | None, now: float) -> None:
         """Note that the file of its STOP changed by another hand."""
         lock = self.arming.lock
-        if self.standing.saw_file(by, lock.elsewhere) and by is not None:
-            self.hands.end(f"STOP by {by}", now)
-            self.standing.take_over(by, now)
+        if self.standing.saw_file(press, lock.elsewhere) and press is not None:
+            self.hands.end(f"STOP by {press.by}", now)
+            self.standing.take_over(press, now)
             self._expect_standstill(now)
 
     def _say_stop(self, now: float) -> None:
@@ -193,16 +193,20 @@ class Base:
         self.obedience.expect(now, firmly=True)
         self._update_watch(now)
 
-    def reset(self, now: float) -> None:
+    def reset(self, stop: str, now: float) -> None:
         """End the STOP that stands; nothing moves by that, and nobody has it.
 
+        Args:
+            stop: The identity of the STOP that is to be ended.
+            now: The time.
+
         Raises:
-            Refusal: If none stands, or another gate has the machine.
+            Refusal: If none stands, a newer one does, or another gate has the machine.
 
         """
         if self.arming.lock.elsewhere:
             raise Refusal(f"{self.arming.lock.why}: reset its STOP there")
-        self.standing.reset()
+        self.standing.reset(stop)
         self._update_watch(now)
 
     def step(self, now: float) -> None:
@@ -259,8 +263,8 @@ class Base:
         if lock.driven:
             self.motion.owe_from_before()
             self.link_up(now)
-        if lock.held and lock.latched_by is not None and not self.latch.on:
-            self.latch.found(lock.latched_by)
+        if lock.held and lock.latched is not None and self.latch.is_news(lock.latched):
+            self.latch.found(lock.latched)
             self._say_stop(now)
 
     def link_up(self, now: float) -> None:

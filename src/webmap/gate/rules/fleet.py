@@ -44,8 +44,9 @@ class Fleet:
         self._refuse = refuse
         self._bases: dict[events.Key, Base] = {}
         self._latches: dict[events.Key, Latch] = {}
-        self._stopped_as: dict[events.Key, set[events.Key]] = {}
-        """By what other keys the STOP of a machine stands, from when it had those."""
+        self._stopped_as: dict[events.Key, dict[events.Key, str]] = {}
+        """By what other keys the STOP of a machine stands, from when it had those, and
+        the identity of the STOP that stood by each."""
         self._by_robot: dict[str, Base] = {}
         self._links: dict[tuple[str, events.Lane], Health] = {}
         self._reporters: dict[str, Reporter] = {}
@@ -105,20 +106,26 @@ class Fleet:
         self._touched.add(base.key)
         return base
 
-    def reset(self, base: Base, now: float) -> None:
+    def reset(self, base: Base, stop: str, now: float) -> None:
         """End the STOP of a machine, also where it stands by a key that it had before.
 
+        Args:
+            base: The machine.
+            stop: The identity of the STOP that is to be ended.
+            now: The time.
+
         Raises:
-            Refusal: If none stands, or another gate has the machine.
+            Refusal: If none stands, a newer one does, or another gate has the machine.
 
         """
-        base.reset(now)
-        for key in self._stopped_as.pop(base.key, ()):
+        base.reset(stop, now)
+        for key, earlier in self._stopped_as.pop(base.key, {}).items():
             # Where there is a machine still, it stands for another robot, too.
-            there = self._bases.get(key)
+            there, latch = self._bases.get(key), self._latches[key]
             left = there is None or set(there.robots.specs) <= there.robots.leaving
-            if left and self._latches[key].on:
-                self._latches[key].reset()
+            same = latch.press is not None and latch.press.id in (earlier, stop)
+            if left and same:
+                latch.reset()
 
     def step(self, now: float) -> None:
         """Let time pass."""
@@ -164,9 +171,9 @@ class Fleet:
         key, earlier = key_of(spec), self._by_robot.get(spec.id)
         before = earlier.robots.specs[spec.id] if earlier is not None else None
         spec = self._with_one_type(spec, before)
-        stopped_by = None
+        stopped = None
         if earlier is not None and earlier.key != key:
-            stopped_by = earlier.latch.by
+            stopped = earlier.latch.press
             earlier.robots.goals[spec.id].vacate(spec, now)
             self._forget(Forget(spec.id), now)
         elif earlier is not None and before is not None:
@@ -183,11 +190,11 @@ class Fleet:
         self._emit(Attach(key, spec))
         if not base.known:
             self._emit(Lock(key))
-        if earlier is not None and stopped_by is not None:
+        if earlier is not None and stopped is not None:
             # It is the same robot: by whatever it is known, its STOP stands.
-            others = {earlier.key, *self._stopped_as.get(earlier.key, ())}
-            self._stopped_as.setdefault(key, set()).update(others)
-            base.stop(stopped_by, now)
+            others = {**self._stopped_as.get(earlier.key, {}), earlier.key: stopped.id}
+            self._stopped_as.setdefault(key, {}).update(others)
+            base.stop(stopped, now)
         else:
             base.attached(now)
         self._by_robot[spec.id] = base
@@ -353,7 +360,7 @@ class Fleet:
     def _latch_seen(self, event: events.LatchSeen, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.saw_stop_file(event.by, now)
+            base.saw_stop_file(event.press, now)
 
     def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
         base = self._of_key(event.key)

@@ -21,6 +21,7 @@ from webmap.gate.refusal import Refusal
 from webmap.gate.rules.base import Base
 from webmap.gate.rules.connection import Connection
 from webmap.gate.rules.fleet import Fleet
+from webmap.gate.rules.latch import new_press
 from webmap.gate.rules.lease import check_lease, check_role, check_take
 from webmap.gate.rules.ticks import Ticks
 from webmap.geometry import Twist
@@ -52,8 +53,8 @@ class Orders:
             case Stop(robot):
                 # Before any check: a stop is always allowed.
                 self.stop(robot, connection, now)
-            case Reset(robot):
-                self.reset(robot, connection, now)
+            case Reset(robot, stop):
+                self.reset(robot, stop, connection, now)
             case Drive():
                 self._drive(connection, command, now)
             case Goal(robot):
@@ -91,18 +92,14 @@ class Orders:
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
         """STOP a robot or, with ``None``, all."""
+        press = new_press(by.name or by.id)
         for base in self._fleet if robot is None else [self._fleet.find(robot)]:
-            base.stop(by.name or by.id, now)
+            base.stop(press, now)
 
-    def reset(self, robot: str | None, by: Connection, now: float) -> None:
-        """End the STOP of a robot or, with ``None``, every one that stands."""
+    def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
+        """End the STOP of a robot that has this identity."""
         check_role(by.role)
-        if robot is not None:
-            self._fleet.reset(self._fleet.find(robot), now)
-            return
-        for base in self._fleet:
-            if base.latch.on and not base.arming.lock.elsewhere:
-                self._fleet.reset(base, now)
+        self._fleet.reset(self._fleet.find(robot), stop, now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
         """Give somebody the lease; ``None`` if it comes when the machine stands."""

@@ -64,7 +64,7 @@ class ProgramOrders:
             program.id,
             robot,
             "reset",
-            lambda: self._orders.reset(robot, program, now),
+            lambda: self._orders.reset(robot, message.stop, program, now),
             now,
         )
 

@@ -86,13 +86,14 @@ def _asker(base: Base, now: float) -> AskerReport | None:
 
 
 def _stop(base: Base) -> StopReport | None:
-    if not base.latch.acknowledged:
+    press = base.latch.shown
+    if press is None:
         return None
     seen = base.standing.confirmation
     why = seen.why
     if base.latch.trouble is not None:
         why = f"{why}; a restart would forget this STOP: {base.latch.trouble}"
-    return StopReport(base.latch.by or "", seen.confirmed, why)
+    return StopReport(press.by, seen.confirmed, why, press.id)
 
 
 def _velocity(twist: Twist | None) -> Velocity | None:

@@ -1,7 +1,6 @@
 """A STOP that stands: what is said because of it, and what is known of it. No I/O."""
 
-from webmap.gate.events import Key
-from webmap.gate.refusal import Refusal
+from webmap.gate.events import Key, Press
 from webmap.gate.rules.confirm import Confirmation
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.latch import Latch
@@ -36,11 +35,11 @@ class StandingStop:
         self._control = control
         self._motion = motion
 
-    def press(self, by: str, now: float) -> None:
+    def press(self, press: Press, now: float) -> None:
         """Have it stand from now on; zero goes before everything else."""
         if self._robots.drivable:
             self._motion.zero(now)
-        self.latch.set(by)
+        self.latch.set(press)
         self.say_all(now)
 
     def say_all(self, now: float) -> None:
@@ -54,25 +53,27 @@ class StandingStop:
         self.confirmation.begin(now)
         self.confirm(now)
 
-    def reset(self) -> None:
+    def reset(self, stop: str) -> None:
         """Have it stand no longer; nothing moves by that.
 
+        Args:
+            stop: The identity of the STOP that is to be ended.
+
         Raises:
-            Refusal: If none stands.
+            Refusal: If none stands, or a newer one does.
 
         """
-        if not self.latch.on:
-            raise Refusal("no STOP stands")
+        self.latch.check(stop)
         self.latch.reset()
         self._motion.let_go()
         for hooks in self._robots.hooks.values():
             hooks.say(stopped=False)
 
-    def saw_file(self, by: str | None, elsewhere: bool) -> bool:
+    def saw_file(self, press: Press | None, elsewhere: bool) -> bool:
         """Note that the file of the STOP changed, by another hand than this gate's.
 
         Args:
-            by: Whose STOP it says that stands, if one does.
+            press: The STOP that it says stands, if one does.
             elsewhere: Whether another gate has the machine.
 
         Returns:
@@ -80,10 +81,13 @@ class StandingStop:
 
         """
         latch = self.latch
-        if not latch.settled or (by is None) == (not latch.on):
+        if press is not None:
+            news = latch.is_news(press)
+            if news and elsewhere and latch.on:
+                latch.found(press)
+            return news and not elsewhere
+        if not latch.settled or not latch.on:
             return False
-        if by is not None:
-            return not elsewhere
         if elsewhere:  # it was reset where the machine is, and this is an onlooker
             latch.drop()
             self._motion.let_go()
@@ -93,11 +97,11 @@ class StandingStop:
             latch.keep_again()  # a file that is gone is no reset
         return False
 
-    def take_over(self, by: str, now: float) -> None:
+    def take_over(self, press: Press, now: float) -> None:
         """Have it stand because another gate was told so; zero goes first."""
         if self._robots.drivable:
             self._motion.zero(now)
-        self.latch.found(by)
+        self.latch.found(press)
         self.say_all(now)
 
     def tasks_down(self, link: Health, now: float) -> None:

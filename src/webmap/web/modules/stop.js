@@ -1,5 +1,5 @@
 import { deskOf } from "../inputs/desk.js";
-import { isLatched } from "../motion/report.js";
+import { isLatched, stopKey, stopOf } from "../motion/report.js";
 import { Obedience, standingStops } from "../motion/stopping.js";
 import { button, html, say, stopButton } from "./elements.js";
 import { lay } from "./overlay.js";
@@ -37,6 +37,11 @@ class Stop {
     /** @type {Drive} */
     this._drive = map.drive;
     this._obedience = new Obedience();
+    /**
+     * Why the gate refused the last reset, by robot.
+     * @type {Map<string, string>}
+     */
+    this._refused = new Map();
     this._alarm = new Alarm(() => this._drive.stop("*"));
     this._verdicts = html("ul", "webmap-stop-verdicts", { role: "status" });
     this._close = button("webmap-stop-close", "Close", () => {
@@ -48,8 +53,9 @@ class Stop {
       "webmap-reset",
       "Reset",
       "Press again to reset",
-      (robots) => {
-        for (const robot of robots.slice(0, RESET_AT_ONCE)) this._drive.reset(robot);
+      (stops) => {
+        this._refused.clear();
+        for (const each of stops.slice(0, RESET_AT_ONCE)) this._drive.reset(...stopOf(each));
       },
     );
     const all = stopButton("webmap-stop-all", "Stop all", () => {
@@ -80,6 +86,9 @@ class Stop {
       drive.on("robot", (report) => this._report(report)),
       drive.on("goal", (robot) => this._obedience.excuse(robot)),
       drive.on("gone", (robot) => this._gone(robot)),
+      drive.on("refused", ({ robot, what, why }) => {
+        if (what === "reset" && robot !== null) this._refused.set(robot, why);
+      }),
       drive.on("step", () => this._show()),
     ];
   }
@@ -92,11 +101,13 @@ class Stop {
   /** @param {import('../motion/report.js').RobotReport} report */
   _report(report) {
     this._obedience.report(report, performance.now());
+    if (!isLatched(report)) this._refused.delete(report.robot);
   }
 
   /** @param {string} robot */
   _gone(robot) {
     this._obedience.excuse(robot);
+    this._refused.delete(robot);
   }
 
   _stopped() {
@@ -109,13 +120,21 @@ class Stop {
     this._alarm.show(this._alarms());
     const { robots, verdicts } = this._drive;
     const standing = standingStops(robots.values());
-    say(this._standing, standing);
-    const latched = [...robots.values()].filter(isLatched).map(({ robot }) => robot);
+    say(this._standing, [standing, ...this._refusals()].join(" "));
+    const latched = [...robots.values()].filter(isLatched).map(stopKey);
     const reset = latched.length > 1 ? "Reset all" : "Reset";
     this._reset.show(latched.length > 0, latched, reset);
     this._close.hidden = verdicts.length === 0;
     this._list.hidden = verdicts.length === 0 && standing === "";
     this._showVerdicts(verdicts.sort(byName));
+  }
+
+  /** @returns {string[]} Which resets the gate refused, and why. */
+  _refusals() {
+    const { robots } = this._drive;
+    return [...this._refused].map(
+      ([robot, why]) => `${robots.get(robot)?.name ?? robot} was not reset: ${why}.`,
+    );
   }
 
   /**

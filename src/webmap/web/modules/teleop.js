@@ -1,5 +1,5 @@
 import { deskOf } from "../inputs/desk.js";
-import { heldByAnother, isLatched, mayReach } from "../motion/report.js";
+import { heldByAnother, isLatched, mayReach, stopOf } from "../motion/report.js";
 import { describe, inputsOf } from "../motion/status.js";
 import { Halos } from "./halos.js";
 import { lay, overlayOf } from "./overlay.js";
@@ -46,7 +46,7 @@ class Teleop {
     this._panel = new Panel({
       stop: () => this._stop(),
       lease: () => this._lease(),
-      reset: () => this._reset(),
+      reset: (stops) => this._reset(stops),
       stick: () => this._toggleStick(),
       test: () => this._test(),
     });
@@ -118,9 +118,9 @@ class Teleop {
     if (robot !== null) this._drive.stop(robot);
   }
 
-  _reset() {
-    const robot = this._map.selected;
-    if (robot !== null) this._drive.reset(robot);
+  /** @param {readonly string[]} stops */
+  _reset(stops) {
+    for (const each of stops) this._drive.reset(...stopOf(each));
   }
 
   _test() {

@@ -1,5 +1,5 @@
 import { isTested, motions, ownStop, testWords, timings } from "../motion/figures.js";
-import { heldByProgram, isLatched } from "../motion/report.js";
+import { heldByProgram, isLatched, stopKey } from "../motion/report.js";
 import { capOf } from "../motion/status.js";
 import { button, html, say, stopButton } from "./elements.js";
 import { TwiceButton } from "./twice_button.js";
@@ -13,7 +13,10 @@ const ASK = "Ask for it";
 
 /** The words, the shape and the buttons in the corner of the map. */
 export class Panel {
-  /** @param {Record<'stop' | 'lease' | 'reset' | 'stick' | 'test', () => void>} acts */
+  /**
+   * @param {Record<'stop' | 'lease' | 'stick' | 'test', () => void> &
+   *     {reset: (stops: readonly string[]) => void}} acts
+   */
   constructor(acts) {
     this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
     this._title = html("strong", "webmap-teleop-title");
@@ -128,7 +131,8 @@ export class Panel {
       say(this._lease, act);
       set(this._lease, "aria-label", act === ASK ? `Ask for ${name}` : `${act} ${name}`);
     }
-    this._reset.show(report !== null && isLatched(report), robots);
+    const stops = report === null ? [] : [stopKey(report)];
+    this._reset.show(report !== null && isLatched(report), stops);
     this._tester.show(report !== null && mayTest(report), robots);
     const known = report?.stop_time != null;
     this._tester.element.classList.toggle("known", known);

@@ -12,8 +12,8 @@ export class TwiceButton {
    * @param {string} className
    * @param {string} label What it says before it is pressed.
    * @param {string} again What it says after the first press.
-   * @param {(robots: readonly string[]) => void} act Called with the robots that the
-   *     first press was said of and that are still there.
+   * @param {(meant: readonly string[]) => void} act Called with the robots, or their
+   *     STOPs, that the first press was said of and that are still there.
    */
   constructor(className, label, again, act) {
     this._twice = new Twice();
@@ -38,8 +38,8 @@ export class TwiceButton {
 
   /**
    * @param {boolean} visible
-   * @param {readonly string[]} [robots] What a press is said of, by id. The first press
-   *     is forgotten when there is one more, or another.
+   * @param {readonly string[]} [robots] What a press is said of: robots by id, or their
+   *     STOPs. The first press is forgotten when there is one more, or another.
    * @param {string} [label]
    */
   show(visible, robots = this._robots, label = this._label) {

@@ -63,6 +63,7 @@
  * @property {boolean | null} confirmed Whether odometry says that the robot stands; null
  *     while that is looked for.
  * @property {string} why Why it is not confirmed.
+ * @property {string} [id] Its identity, which a reset must name. Each press has its own.
  */
 
 /**
@@ -96,6 +97,23 @@ export function heldByProgram(report) {
 /** @param {RobotReport} report */
 export function isLatched(report) {
   return report.latched ?? report.state === "stopped";
+}
+
+/**
+ * @param {RobotReport} report
+ * @returns {string} The STOP of a robot in one text. Another press of STOP makes another
+ *     text.
+ */
+export function stopKey({ robot, stop }) {
+  return JSON.stringify([robot, stop?.id ?? ""]);
+}
+
+/**
+ * @param {string} key Of {@link stopKey}.
+ * @returns {[robot: string, stop: string]} The robot, and the identity of its STOP.
+ */
+export function stopOf(key) {
+  return JSON.parse(key);
 }
 
 /**

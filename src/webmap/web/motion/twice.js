@@ -23,7 +23,8 @@ export class Twice {
 
   /**
    * @param {number} now
-   * @param {readonly string[]} [there] What a first press is said of: robots, by id.
+   * @param {readonly string[]} [there] What a first press is said of: robots by id, or
+   *     their STOPs.
    * @returns {boolean} Whether this is a deliberate second press.
    */
   press(now, there = []) {

@@ -13,8 +13,9 @@ import { isLatched } from "./report.js";
 export class Unanswered {
   constructor() {
     /**
-     * What was said, "*" for all, and the robots that are not known to be stopped.
-     * @type {Map<string, Set<string>>}
+     * What was said, "*" for all, and the robots that have not answered: with the STOP
+     * that stood for each, if one did.
+     * @type {Map<string, Map<string, string>>}
      */
     this._said = new Map();
     /** Whether the STOP for all met no robot known, and none stopped was reported since. */
@@ -29,11 +30,9 @@ export class Unanswered {
    */
   said(robot, known) {
     const meant = robot === "*" ? [...known.keys()] : [robot];
-    const standing = [...known.values()].filter(isLatched).map((each) => each.robot);
-    const waiting = new Set(meant.filter((id) => !standing.includes(id)));
+    const before = (/** @type {string} */ id) => known.get(id)?.stop?.id ?? "";
     if (robot === "*") this._metNone = known.size === 0;
-    if (waiting.size > 0 || known.size === 0) this._said.set(robot, waiting);
-    else this._said.delete(robot);
+    this._said.set(robot, new Map(meant.map((id) => [id, before(id)])));
   }
 
   /**
@@ -44,22 +43,33 @@ export class Unanswered {
   report(report) {
     if (!isLatched(report)) {
       // It may have been told before the STOP arrived, which may never arrive: no answer.
-      if (this._metNone) this._said.get("*")?.add(report.robot);
+      if (this._metNone) this._said.get("*")?.set(report.robot, "");
       return;
     }
-    this.gone(report.robot);
+    this._answered(report.robot, report.stop?.id);
     if (this._metNone && this._said.get("*")?.size === 0) this._said.delete("*");
     this._metNone = false;
   }
 
   /**
-   * A robot is stopped, or gone.
+   * A robot is gone.
    *
    * @param {string} robot
    */
   gone(robot) {
+    this._answered(robot, undefined);
+  }
+
+  /**
+   * @param {string} robot
+   * @param {string | undefined} stop The STOP that stands for it. The one that stood
+   *     when STOP was said here is no answer, as somebody may be resetting it.
+   */
+  _answered(robot, stop) {
     for (const [said, waiting] of this._said) {
-      if (waiting.delete(robot) && waiting.size === 0) this._said.delete(said);
+      if (!waiting.has(robot) || waiting.get(robot) === (stop ?? null)) continue;
+      waiting.delete(robot);
+      if (waiting.size === 0) this._said.delete(said);
     }
   }
 
