@@ -11,8 +11,8 @@ import threading
 import pytest
 from gate_robot import eventually
 
+from webmap.children import python_command
 from webmap.gate import framing, process
-from webmap.gate.display.child import gate_command
 from webmap.gate.events import Shutdown
 from webmap.gate.messages import FromGate, Heartbeat, Ready
 from webmap.gate.outbox import Outbox
@@ -28,7 +28,7 @@ def not_measured():
 def gate():
     """A gate's process."""
     started = subprocess.Popen(
-        gate_command(),
+        python_command("webmap.gate"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -2,18 +2,14 @@
 
 import argparse
 import asyncio
-import contextlib
 import logging
-import os
 import sys
-import threading
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from webmap.bags.needed import need_rosbags
 from webmap.bags.player import Player
 from webmap.bags.recording import Recording
+from webmap.children import end_with_parent
 from webmap.errors import ConfigError, WebMapError
 from webmap.not_listening import why_not_listening
 from webmap.sim.process import signals_set
@@ -57,20 +53,30 @@ async def _run(
     with_parent: bool,
 ) -> None:
     need_rosbags()
+    running = asyncio.get_running_loop()
+    stop = asyncio.Event()
+    player: Player | None = None
+
+    def begin_anew() -> None:
+        if player is not None:
+            player.begin_anew()
+
+    if with_parent:  # before the files are opened, which may take long
+        end_with_parent(
+            lambda: running.call_soon_threadsafe(stop.set),
+            lambda: running.call_soon_threadsafe(begin_anew),
+        )
     recording = Recording(paths, warn=log.warning)
     try:
         player = Player(recording, rate=rate, start=start, loop=loop)
         player.replay.start()
         server = RosbridgeServer(player.replay.graph, Encoder(recording.schema, POLITE))
-        stop = asyncio.Event()
         with signals_set(stop):
             try:
                 url = await server.start(HOST, port)
             except OSError as error:
                 raise ConfigError(why_not_listening(HOST, port, error)) from error
             print(f"{READY}{url}", flush=True)
-            if with_parent:
-                _hear_parent(player.begin_anew, stop.set)
             playing = asyncio.create_task(player.run())
             stopped = asyncio.create_task(stop.wait())
             try:
@@ -86,20 +92,6 @@ async def _run(
                 await server.stop()
     finally:
         recording.close()
-
-
-def _hear_parent(again: Callable[[], Any], end: Callable[[], Any]) -> None:
-    """Begin anew at each line on standard input, and end when that does."""
-    loop = asyncio.get_running_loop()
-
-    def hear() -> None:
-        # Not through sys.stdin, whose lock would be held while the interpreter ends.
-        with contextlib.suppress(OSError, RuntimeError):  # all has ended already
-            while os.read(0, 4096):
-                loop.call_soon_threadsafe(again)
-            loop.call_soon_threadsafe(end)
-
-    threading.Thread(target=hear, name="stdin", daemon=True).start()
 
 
 def _parser() -> argparse.ArgumentParser:

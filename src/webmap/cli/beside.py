@@ -1,13 +1,11 @@
 """A process that runs beside a command, and ends with it however that ends."""
 
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, NamedTuple
 
-GRACE = 3.0
-"""Seconds that it is given to end by itself."""
+from webmap.children import GRACE, python_command
 
 
 class Beside(NamedTuple):
@@ -21,10 +19,10 @@ class Beside(NamedTuple):
 
 
 @contextmanager
-def beside(*arguments: object) -> Iterator[Beside]:
-    """Run Python with ``arguments`` beside this process, until the block ends."""
+def beside(module: str, *arguments: object) -> Iterator[Beside]:
+    """Run a module as a process beside this one, until the block ends."""
     with subprocess.Popen(
-        [sys.executable, *map(str, arguments)],
+        python_command(module, *arguments),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

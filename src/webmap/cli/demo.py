@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from webmap.cli.beside import GRACE, beside
+from webmap.children import GRACE
+from webmap.cli.beside import beside
 from webmap.cli.options import PORT, web_options
 from webmap.cli.sim_options import simulator_options
 from webmap.errors import ConfigError
@@ -134,7 +135,7 @@ def simulator(*arguments: object) -> Iterator[str]:
         ConfigError: If it does not come up.
 
     """
-    with beside("-m", "webmap", "sim", "--with-parent", *arguments) as started:
+    with beside("webmap", "sim", "--with-parent", *arguments) as started:
         if not started.line.startswith(READY):
             _give_up(started.process.wait(GRACE))
         yield started.line.removeprefix(READY).strip()

@@ -102,7 +102,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
     """
     from webmap.bags.__main__ import READY, WRONG
 
-    with beside("-m", "webmap.bags", "--with-parent", *arguments) as started:
+    with beside("webmap.bags", "--with-parent", *arguments) as started:
         line = started.line
         if line.startswith(WRONG):
             raise ConfigError(line.removeprefix(WRONG).strip())

@@ -2,12 +2,12 @@
 
 import os
 import signal
-import threading
 from pathlib import Path
 from typing import Literal
 
 import click
 
+from webmap.children import end_with_parent
 from webmap.cli.options import PORT, Finite, verbose_option
 from webmap.cli.sim_options import simulator_options
 
@@ -133,7 +133,7 @@ def sim(
     if polite and quirks:
         raise click.UsageError("--polite and --quirks say the same thing: give one")
     if with_parent:
-        threading.Thread(target=_end_with_parent, daemon=True).start()
+        end_with_parent(lambda: os.kill(os.getpid(), signal.SIGTERM))
     asyncio.run(
         run_simulator(
             robots=robots or (1 if flat else 2),
@@ -157,11 +157,3 @@ def sim(
             on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),
         )
     )
-
-
-def _end_with_parent() -> None:
-    """End when standard input does: the parent holds its other end while it lives."""
-    # Not through sys.stdin, whose lock would be held while the interpreter ends.
-    while os.read(0, 4096):
-        pass
-    os.kill(os.getpid(), signal.SIGTERM)

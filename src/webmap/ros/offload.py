@@ -3,13 +3,13 @@
 import asyncio
 import contextlib
 import logging
-import sys
 from array import array
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import msgspec
 
+from webmap.children import python_command
 from webmap.errors import ProtocolError
 from webmap.ros.arrays import dec_hook
 from webmap.ros.decoding import convert
@@ -81,9 +81,7 @@ class _Worker:
 
 async def _start() -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "webmap.ros.worker",
+        *python_command("webmap.ros.worker"),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
     )

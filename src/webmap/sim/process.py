@@ -4,12 +4,12 @@ import asyncio
 import contextlib
 import logging
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from webmap.children import end_with_parent
 from webmap.errors import ConfigError
 from webmap.not_listening import why_not_listening
 
@@ -191,12 +191,4 @@ def signals_set(stop: asyncio.Event) -> Iterator[None]:
 def end_with_stdin(stop: asyncio.Event) -> None:
     """Set ``stop`` when standard input ends: whoever started this process is gone."""
     loop = asyncio.get_running_loop()
-
-    def watch() -> None:
-        with contextlib.suppress(OSError, ValueError):
-            while sys.stdin.buffer.read(4096):
-                pass
-        with contextlib.suppress(RuntimeError):
-            loop.call_soon_threadsafe(stop.set)
-
-    threading.Thread(target=watch, name="stdin", daemon=True).start()
+    end_with_parent(lambda: loop.call_soon_threadsafe(stop.set))

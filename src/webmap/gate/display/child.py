@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
+from webmap.children import python_command
 from webmap.errors import WireError
 from webmap.gate import framing
 from webmap.gate.messages import FromGate
@@ -25,12 +26,6 @@ END_PATIENCE = 2.0
 
 MAX_WORDS = 300
 """The longest line of a gate that is kept as its last words, in characters."""
-
-
-def gate_command() -> list[str]:
-    """Return what starts a gate."""
-    # -P: no file that lies about in the working folder is taken for a module.
-    return [sys.executable, "-P", "-m", "webmap.gate"]
 
 
 class Child:
@@ -56,7 +51,7 @@ class Child:
         # A session of its own: Ctrl-C in the terminal reaches the display, which
         # lets the gate stop the robots in order.
         self._process = subprocess.Popen(
-            command or gate_command(),
+            command or python_command("webmap.gate"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -1,0 +1,57 @@
+"""Child processes that run Python: how they are started, and what ends them."""
+
+import contextlib
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+GRACE = 3.0
+"""Seconds that a process has to end in order when its parent has ended."""
+
+
+def python_command(module: str, *arguments: object) -> list[str]:
+    """Return the command line that runs a module in another Python.
+
+    ``-P`` keeps the working folder out of the module search path. Without it, a file
+    such as ``msgspec.py`` in that folder would run in place of the real module. The
+    variable ``PYTHONPATH`` counts as before.
+
+    Args:
+        module: Its name, such as ``webmap.gate``.
+        arguments: What follows on the command line.
+
+    """
+    return [sys.executable, "-P", "-m", module, *map(str, arguments)]
+
+
+def end_with_parent(
+    end: Callable[[], object],
+    on_data: Callable[[], object] = lambda: None,
+    grace: float = GRACE,
+) -> None:
+    """End this process when its standard input ends.
+
+    The parent holds the other end of that pipe, so the pipe ends with the parent, also
+    when the parent is killed. A process that is still there after ``grace`` seconds,
+    because it hangs, exits at once.
+
+    Args:
+        end: Called once when the input ends, in a thread of its own.
+        on_data: Called each time that data arrives, in the same thread.
+        grace: Seconds between ``end`` and the exit.
+
+    """
+
+    def watch() -> None:
+        # Not through sys.stdin: its lock would be held while the interpreter ends.
+        with contextlib.suppress(OSError, RuntimeError):
+            while os.read(0, 4096):
+                on_data()
+        with contextlib.suppress(RuntimeError):  # the event loop is closed already
+            end()
+        time.sleep(grace)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent", daemon=True).start()
