@@ -9,6 +9,7 @@ from webmap.errors import ConfigError
 from webmap.geometry import Pose
 from webmap.geometry.reach import FARTHEST
 from webmap.lined_yaml import LinedYaml
+from webmap.plain_files import resolved
 
 if TYPE_CHECKING:
     import numpy as np
@@ -155,8 +156,11 @@ def _image_path(said: LinedYaml, name: object) -> Path:
     way = ("image",)
     if not isinstance(name, str) or not name or "\0" in name:
         raise said.wrong(way, f"image must be the name of a file, got {name!r}")
-    folder = said.file.resolve().parent
-    image = (folder / name).resolve()
+    try:
+        folder = resolved(said.file).parent
+        image = resolved(folder / name)
+    except ConfigError as error:
+        raise said.wrong(way, str(error)) from None
     if Path(name).is_absolute() or not image.is_relative_to(folder):
         raise said.wrong(
             way,

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from webmap.errors import ConfigError
 
+LARGEST_STATE = 16 << 20
+"""Bytes that a file may have which WebMap keeps for itself."""
+
 
 def read_file(file: Path, largest: int) -> bytes:
     """Return what is in a file.
@@ -25,7 +28,10 @@ def read_file(file: Path, largest: int) -> bytes:
     """
     # Opened without waiting for anybody at the other end, and then looked at, so that
     # nothing can be put in its place between the two.
-    number = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    try:
+        number = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    except ValueError:
+        raise _no_path(file) from None
     mode = os.fstat(number).st_mode
     if not stat.S_ISREG(mode):
         os.close(number)
@@ -35,6 +41,36 @@ def read_file(file: Path, largest: int) -> bytes:
     if len(data) > largest:
         raise ConfigError(f"{file}: the file is larger than {largest >> 20} MiB")
     return data
+
+
+def resolved(path: Path) -> Path:
+    """Return an absolute path without symbolic links.
+
+    Raises:
+        ConfigError: If the links lead in a circle, or the text is no path.
+
+    """
+    try:
+        return path.resolve()
+    except RuntimeError:  # up to Python 3.12; later versions leave it to the open
+        raise ConfigError(
+            f"{path}: the symbolic links lead in a circle; expected a file"
+        ) from None
+    except ValueError:
+        raise _no_path(path) from None
+
+
+def refuse_special(path: Path) -> None:
+    """Refuse a pipe, a device or a socket, which a reader may wait for without end.
+
+    Raises:
+        ConfigError: If the path leads to one of them.
+        OSError: If the path leads nowhere.
+
+    """
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        raise ConfigError(f"{path}: expected a file or a folder, got {_kind(mode)}")
 
 
 def write_file(file: Path, data: bytes) -> None:
@@ -67,4 +103,10 @@ def write_file(file: Path, data: bytes) -> None:
 def _kind(mode: int) -> str:
     if stat.S_ISDIR(mode):
         return "a folder"
+    if stat.S_ISSOCK(mode):
+        return "a socket"
     return "a pipe" if stat.S_ISFIFO(mode) else "a device"
+
+
+def _no_path(path: Path) -> ConfigError:
+    return ConfigError(f"{str(path)!r} is no path: expected a text without a NUL")

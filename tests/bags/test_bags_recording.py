@@ -1,5 +1,6 @@
 """What is read of a bag, and what is said of one that cannot be read."""
 
+import os
 import re
 
 import pytest
@@ -142,6 +143,28 @@ def test_bags_of_both_kinds_are_not_played_as_one(tmp_path):
         (tmp_path / name).touch()
     words = refusal(tmp_path / "a.bag", tmp_path / "b.mcap")
     assert words == "bags of ROS 1 and of ROS 2 cannot be played as one"
+
+
+@pytest.mark.parametrize("name", ["a.bag", "a.mcap", "folder"])
+def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path, name):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "metadata.yaml").touch()
+    os.mkfifo((folder if name == "folder" else tmp_path) / "a.mcap")
+    (tmp_path / "a.bag").symlink_to("/dev/zero")
+    kind = "a device" if name == "a.bag" else "a pipe"
+    assert f"expected a file or a folder, got {kind}" in refusal(tmp_path / name)
+
+
+def test_links_in_a_circle_are_no_recording(tmp_path):
+    (tmp_path / "a.bag").symlink_to("a.bag")
+    assert "a.bag: the symbolic links lead in a circle" in refusal(tmp_path / "a.bag")
+
+
+def test_a_description_of_a_bag_that_is_too_large_is_not_read(tmp_path):
+    with (tmp_path / "metadata.yaml").open("wb") as file:
+        file.truncate(5 << 20)
+    assert "5242880 bytes are no description of a bag" in refusal(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])

@@ -45,3 +45,22 @@ def test_a_list_is_of_one_bridge(tmp_path):
 def test_help_shows_each_example_on_a_line_of_its_own():
     lines = webmap("discover", "--help").stdout.splitlines()
     assert "  webmap discover ws://robot:9090 --toml > fleet.toml" in lines
+
+
+def test_a_list_without_an_end_is_refused():
+    said = webmap("discover", "ws://127.0.0.1:1", "--topics", "/dev/zero")
+    assert said.returncode == 2
+    assert "has more than 4194304 characters, so it is no list of topics" in said.stderr
+
+
+def test_a_list_that_is_not_utf_8_is_refused_with_a_sentence(tmp_path):
+    (tmp_path / "list").write_bytes(b"/odom \xff")
+    said = webmap("discover", "ws://127.0.0.1:1", "--topics", str(tmp_path / "list"))
+    assert said.returncode == 2
+    assert "list is not UTF-8" in said.stderr
+
+
+def test_a_program_without_an_end_is_refused():
+    said = webmap("run", "/dev/zero", "--no-browser")
+    assert said.returncode == 2
+    assert "/dev/zero: expected a file or a folder, got a device" in said.stderr

@@ -1,6 +1,7 @@
 """Places with a name: what is taken, and how they are kept."""
 
 import json
+import os
 
 import pytest
 
@@ -111,12 +112,22 @@ def test_labels_that_are_kept_are_read_again(tmp_path):
     assert [file.name for file in (tmp_path / "labels").iterdir()] == ["hall.json"]
 
 
-@pytest.mark.parametrize("data", [b"", b"{", b'{"labels": [{"name": 1}]}', b"\xff"])
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b'{"labels": [{"name": 1}]}', b"\xff", b"[" * 100_000]
+)
 def test_a_file_of_kept_labels_that_is_broken_is_said(tmp_path, data):
     store = LabelStore(tmp_path, "hall")
     store.file.parent.mkdir()
     store.file.write_bytes(data)
     with pytest.raises(ConfigError):
+        store.load()
+
+
+def test_a_pipe_in_place_of_kept_labels_is_not_waited_for(tmp_path):
+    store = LabelStore(tmp_path, "hall")
+    store.file.parent.mkdir()
+    os.mkfifo(store.file)
+    with pytest.raises(ConfigError, match="got a pipe"):
         store.load()
 
 

@@ -1,6 +1,7 @@
 """Routes on disk: what is kept, what is refused, and what becomes of a broken file."""
 
 import math
+import os
 
 import pytest
 
@@ -104,3 +105,14 @@ def test_what_is_no_name_is_refused(value):
 
 def test_a_name_loses_the_room_around_it():
     assert read_name("  Round ") == "Round"
+
+
+def test_a_file_of_routes_that_is_nested_deep_or_a_pipe_is_refused(store):
+    store.file.parent.mkdir(parents=True)
+    store.file.write_bytes(b'{"map":"Hall 1","routes":' + b"[" * 100_000)
+    with pytest.raises(ConfigError, match="cannot be read"):
+        store.names()
+    store.file.unlink()
+    os.mkfifo(store.file)
+    with pytest.raises(ConfigError, match="got a pipe"):
+        store.names()

@@ -1,9 +1,11 @@
 """Tiles: where each lies on the map, which are wanted, and what is refused."""
 
+import errno
 import io
 import math
 import os
 import sqlite3
+from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -358,3 +360,12 @@ def test_a_file_is_opened_to_be_read_only_and_nothing_is_written_beside_it(
 def test_an_attribution_is_one_short_line_of_plain_text():
     assert plain("a\x00<script>b</script>\n c &lt;d") == "a b c <d"
     assert len(plain("x" * 5000)) == 300
+
+
+def test_tiles_that_cannot_be_read_are_refused_with_their_name(tmp_path, monkeypatch):
+    def unreadable(self):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", unreadable)
+    with pytest.raises(ConfigError, match=r"tiles '.*' cannot be read: Permission"):
+        open_tiles(tmp_path)

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import math
+import os
 from types import SimpleNamespace
 
 import pytest
@@ -227,3 +228,17 @@ def test_a_robot_that_comes_later_is_aligned_as_it_was_saved(tool, robot, store,
     link.say("/eve/odom", {"header": {}, "pose": pose(1.0, 0.0)})
     assert eve.position.x == pytest.approx(5.0)
     eve.destroy()
+
+
+@pytest.mark.parametrize("kind", ["deep", "pipe"])
+def test_an_alignment_that_cannot_be_read_is_as_if_nothing_was_saved(
+    store, robot, caplog, kind
+):
+    file = store.path(NAME)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if kind == "pipe":
+        os.mkfifo(file)
+    else:
+        file.write_bytes(b"[" * 100_000)
+    AlignmentStore(store._folder).restore(robot)
+    assert "as if nothing was saved" in caplog.text

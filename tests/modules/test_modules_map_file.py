@@ -200,6 +200,7 @@ WRONG = {
     "no image file 'http://x/map.pgm'": {"image": "http://x/map.pgm"},
     "no image file 'folder'": {"image": "folder"},
     "no image file 'pipe.pgm'": {"image": "pipe.pgm"},
+    "the symbolic links lead in a circle": {"image": "circle.pgm"},
     "the image must be PGM, PNG, BMP or JPEG": {"image": "map.yaml"},
 }
 
@@ -232,6 +233,7 @@ def test_a_description_that_makes_no_sense_is_refused(tmp_path, why):
     pgm(folder, ROWS)
     (folder / "out.pgm").symlink_to(tmp_path / "map.pgm")
     os.mkfifo(folder / "pipe.pgm")
+    (folder / "circle.pgm").symlink_to("circle.pgm")
     file = described(folder, **WRONG[why])
     with pytest.raises(ConfigError) as refused:
         read_map(file)

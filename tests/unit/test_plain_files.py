@@ -8,7 +8,7 @@ import pytest
 
 from webmap.errors import ConfigError
 from webmap.lined_yaml import LinedYaml
-from webmap.plain_files import read_file, write_file
+from webmap.plain_files import read_file, refuse_special, resolved, write_file
 
 
 def test_a_file_is_read_and_so_is_one_behind_a_link(tmp_path):
@@ -116,3 +116,25 @@ def test_what_a_file_holds_does_not_steer_a_terminal(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("a: 1\n")
     assert str(LinedYaml(file).wrong(("a",), "\x1b[2J")) == f"{file}:1: ?[2J"
+
+
+def test_links_in_a_circle_are_refused_with_a_sentence(tmp_path):
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises((ConfigError, OSError), match="symbolic links"):
+        read_file(resolved(tmp_path / "a"), 10)
+
+
+def test_a_path_with_a_nul_is_refused_with_a_sentence(tmp_path):
+    for look in (resolved, lambda path: read_file(path, 10)):
+        with pytest.raises(ConfigError, match="is no path: expected a text without"):
+            look(tmp_path / "a\0b")
+
+
+def test_what_has_no_end_is_refused_and_files_and_folders_are_not(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    for name, kind in (("pipe", "a pipe"), ("zero", "a device")):
+        with pytest.raises(ConfigError, match=f"a file or a folder, got {kind}"):
+            refuse_special(tmp_path / name)
+    refuse_special(tmp_path)

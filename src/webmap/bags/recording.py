@@ -9,6 +9,7 @@ from webmap.bags.latching import is_latched, is_static
 from webmap.bags.reading import Messages
 from webmap.bags.shapes import shapes_of
 from webmap.errors import ConfigError
+from webmap.plain_files import refuse_special, resolved
 from webmap.sim.rosbridge.dialect import Dialect, DialectName, canonical, resolve
 from webmap.sim.rosbridge.schema import Schema, UnknownType
 
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 SECOND = 1_000_000_000
 
 ROS1, ROS2 = ".bag", (".mcap", ".db3")
+
+METADATA = "metadata.yaml"
+
+LARGEST_METADATA = 4 << 20
+"""Bytes of the description of a bag, which is read as a whole."""
 
 
 class Recorded(NamedTuple):
@@ -203,7 +209,7 @@ class Recording:
 
 def recording_name(paths: Sequence[Path]) -> str:
     """Return what people call a recording: its file, and how many there are more."""
-    first = paths[0].resolve().name or str(paths[0])
+    first = resolved(paths[0]).name or str(paths[0])
     return first if len(paths) == 1 else f"{first} and {len(paths) - 1} more"
 
 
@@ -225,7 +231,8 @@ def _dialect(paths: Sequence[Path]) -> DialectName:
     for path in paths:
         if not path.exists():
             raise ConfigError(f"{path}: there is no such file or folder")
-        if path.is_dir() and not (path / "metadata.yaml").exists():
+        _refuse_endless(path)
+        if path.is_dir() and not (path / METADATA).exists():
             raise ConfigError(
                 f"{path}: there is no metadata.yaml in this folder, so it is no bag of "
                 f"ROS 2; give the .mcap or .db3 file in it by itself"
@@ -239,6 +246,23 @@ def _dialect(paths: Sequence[Path]) -> DialectName:
     if len(kinds) > 1:
         raise ConfigError("bags of ROS 1 and of ROS 2 cannot be played as one")
     return kinds.pop()
+
+
+def _refuse_endless(path: Path) -> None:
+    """Refuse what a reader would wait for, or read without end."""
+    refuse_special(path)
+    if not path.is_dir():
+        return
+    for entry in path.iterdir():
+        if entry.exists():  # a link that leads nowhere is left to the reader
+            refuse_special(entry)
+    about = path / METADATA
+    size = about.stat().st_size if about.is_file() else 0
+    if size > LARGEST_METADATA:
+        raise ConfigError(
+            f"{about}: {size} bytes are no description of a bag, which has "
+            f"{LARGEST_METADATA} at the most"
+        )
 
 
 def _opened(paths: Sequence[Path], name: str, dialect: DialectName) -> "AnyReader":

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from webmap.cli.options import web_options
+from webmap.plain_files import refuse_special
 
 
 @click.command(short_help="Serve your own pages, or the robots of a fleet file.")
@@ -29,6 +30,7 @@ def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) 
             host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
         )
         return
+    refuse_special(file)
     application.command_line.update(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -5,6 +5,9 @@ from typing import IO
 
 import click
 
+LARGEST = 4 << 20
+"""Characters of a list of topics; it may come through a pipe, which may have no end."""
+
 
 def _read(
     ctx: click.Context, param: click.Parameter, value: IO[str] | None
@@ -13,7 +16,18 @@ def _read(
 
     if value is None:
         return None
-    return parse_topics(value.read(), getattr(value, "name", "the list"))
+    name = getattr(value, "name", "the list")
+    try:
+        text = value.read(LARGEST + 1)
+    except UnicodeDecodeError:
+        raise click.BadParameter(f"{name} is not UTF-8", ctx, param) from None
+    if len(text) > LARGEST:
+        raise click.BadParameter(
+            f"{name} has more than {LARGEST} characters, so it is no list of topics",
+            ctx,
+            param,
+        )
+    return parse_topics(text, name)
 
 
 topics_option = click.option(

@@ -18,7 +18,7 @@ from webmap.core.alignment import alignment, alignments, numbers
 from webmap.errors import ConfigError
 from webmap.gate.kept.locks import state_folder
 from webmap.geometry import Pose
-from webmap.plain_files import write_file
+from webmap.plain_files import LARGEST_STATE, read_file, write_file
 from webmap.ros.bridge import Bridge
 
 if TYPE_CHECKING:
@@ -100,12 +100,19 @@ class AlignmentStore:
             return None  # it holds already, or was refused
         path = self.path(name)
         try:
-            content = json.loads(path.read_text("utf-8"))
+            content = json.loads(read_file(path, LARGEST_STATE))
             saved = alignment(*content["alignment"])
             instead_of = content["instead_of"]
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, KeyError, TypeError, ConfigError) as error:
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            RecursionError,
+            ConfigError,
+        ) as error:
             log.warning("%s cannot be read (%s): as if nothing was saved", path, error)
             return None
         self._stated[name] = _of(stated)

@@ -12,7 +12,7 @@ import msgspec
 
 from webmap.errors import ConfigError
 from webmap.identifiers import generate_id
-from webmap.plain_files import write_file
+from webmap.plain_files import LARGEST_STATE, read_file, write_file
 
 ICONS = {
     "pin": "M12 21c-4-4.4-6-7.7-6-10.800a6 6 0 0 1 12 0c0 3.1-2 6.4-6 10.800z"
@@ -180,7 +180,7 @@ class LabelStore:
 
         """
         try:
-            data = json.loads(self.file.read_bytes())
+            data = json.loads(read_file(self.file, LARGEST_STATE))
         except FileNotFoundError:
             return ()
         except (OSError, ValueError, RecursionError) as error:

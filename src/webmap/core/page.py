@@ -13,6 +13,7 @@ from webmap.core.hand_speeds import HandSpeeds
 from webmap.core.page_ports import PageChannel, Publisher, Viewer
 from webmap.core.tasks import begin
 from webmap.errors import ConfigError
+from webmap.plain_files import resolved
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.events import Event, Handler, Listener
@@ -71,7 +72,7 @@ class Site:
             folder = Path(source).resolve().parent if source else Path.cwd()
             file = None
             if html is not None:
-                file = (folder / html).resolve()
+                file = resolved(folder / html)
                 if not file.is_file():
                     raise ConfigError(f"page {path!r}: there is no file {file}")
                 folder = file.parent
@@ -188,7 +189,7 @@ class Page:
         file = Path(href)
         if not file.is_absolute():
             file = self.entry.folder / file
-            if not file.resolve().is_relative_to(self.entry.folder):
+            if not resolved(file).is_relative_to(self.entry.folder):
                 raise ConfigError(f"{href!r} lies outside {self.entry.folder}")
         return file
 

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from webmap.errors import ConfigError
-from webmap.plain_files import write_file
+from webmap.plain_files import LARGEST_STATE, read_file, write_file
 
 MOST_ROUTES = 200
 MOST_POINTS = 500
@@ -145,10 +145,10 @@ class RouteStore:
 
     def _read(self) -> Saved:
         try:
-            return msgspec.json.decode(self.file.read_bytes(), type=Saved)
+            return msgspec.json.decode(read_file(self.file, LARGEST_STATE), type=Saved)
         except FileNotFoundError:
             return Saved(self._map)
-        except (OSError, msgspec.DecodeError) as error:
+        except (OSError, msgspec.DecodeError, RecursionError) as error:
             # It is left as it is: somebody may be able to mend it.
             raise ConfigError(f"{self.file} cannot be read: {error}") from error
 

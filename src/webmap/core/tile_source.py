@@ -66,10 +66,15 @@ def open_tiles(source: str | Path) -> Source:
             "give a folder with z/x/y.png, or an MBTiles file"
         )
     path = Path(source).absolute()
-    if path.is_dir():
-        return FolderTiles(path)
-    if path.is_file():
-        return MBTiles(path)
+    try:
+        if path.is_dir():
+            return FolderTiles(path)
+        if path.is_file():
+            return MBTiles(path)
+    except OSError as error:
+        raise ConfigError(
+            f"tiles {str(source)!r} cannot be read: {error.strerror}"
+        ) from None
     raise ConfigError(
         f"tiles {str(source)!r}: there is no such folder and no such file"
     )
