@@ -266,10 +266,40 @@ class TestPages:
 
     def test_a_stop_is_kept_and_what_looks_like_one_is_not(self, page, client, gate):
         page.receive('{"op": "stop-test", "robot": "r1"}')
-        page.receive('{"op": "stop"')
+        page.receive('{"op": "stop-test"')
         assert list(client._unheard) == []
         page.receive('{"op": "stop", "robot": "*"}')
         assert list(client._unheard) == [(page.id, None)]
+
+    @pytest.mark.parametrize(
+        ("text", "robot"),
+        [
+            ('{"op":"stop","robot":"r1"}', "r1"),
+            ('{"op":"stop","robot":"r1"', "r1"),
+            ('{"op":"stop","robot":"r9"}', None),
+            ('{"op":"stop","robot":"r9"', None),
+            ('{"op":"stop"', None),
+            (b'{"op":"stop"\xff', None),
+        ],
+    )
+    def test_a_malformed_stop_is_kept_for_what_it_stops(
+        self, page, client, made, gate, text, robot
+    ):
+        page.receive(text)
+        assert list(client._unheard) == [(page.id, robot)]
+        gate.die()
+        second = eventually(lambda: client.pid and made[1], "a second gate")
+        (again,) = second.of(messages.FromBrowser)
+        assert json.loads(again.text) == {"op": "stop", "robot": robot or "*"}
+
+    def test_a_stop_of_a_robot_that_is_gone_is_not_said_to_the_next_gate(
+        self, page, client, made, gate
+    ):
+        page.receive('{"op":"stop","robot":"r1"}')
+        client.forget("r1")
+        gate.die()
+        second = eventually(lambda: client.pid and made[1], "a second gate")
+        assert second.of(messages.FromBrowser) == []
 
 
 class TestLife:

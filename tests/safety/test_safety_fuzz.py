@@ -126,6 +126,16 @@ def test_bytes_and_texts_never_move_it(texts):
     assert moved(bench) == []
 
 
+@settings(deadline=None, max_examples=300)
+@given(st.binary(max_size=1200) | st.text(max_size=200) | values.map(json.dumps))
+def test_whatever_follows_the_beginning_of_a_stop_it_stops(rest):
+    bench = armed()
+    rest = rest if isinstance(rest, bytes) else rest.encode(errors="surrogatepass")
+    say(bench, b'{"op":"stop"' + rest)
+    assert bench.report().latched
+    assert bench.written[-1].twist.is_zero
+
+
 @settings(deadline=None, max_examples=150)
 @given(st.lists(values, max_size=15))
 def test_json_of_any_form_never_moves_it(whole):

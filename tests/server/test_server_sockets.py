@@ -9,6 +9,7 @@ import pytest
 from server_fakes import TOKEN, running, wait_for
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.frames import Frame, Opcode
 
 from webmap.server.app import create_app
 from webmap.server.seats import REPLACED
@@ -210,6 +211,77 @@ def test_a_message_far_above_the_bound_is_not_even_read(rooms, open_socket):
             return (await reason_of(socket))[0]
 
     assert asyncio.run(scenario()) == 1009
+
+
+STOPS = {
+    "oversized": '{"op":"stop","robot":"r1","x":"' + "x" * 20_000 + '"}',
+    "binary": b'{"op":"stop","robot":"r1"}',
+    "binary nonsense": b' { "op" : "stop" \xff',
+}
+
+
+@pytest.mark.parametrize("message", STOPS.values(), ids=STOPS)
+def test_a_stop_that_ends_the_socket_reaches_the_gate_first(
+    rooms, open_socket, message
+):
+    async def scenario():
+        async with open_socket("drive?id=p") as socket:
+            await socket.send(message)
+            return await reason_of(socket)
+
+    assert asyncio.run(scenario())[0] == 1008
+    (connection,) = rooms.gate.connections
+    assert connection.received == [message]
+    assert rooms.model.refusals
+
+
+def test_a_stop_in_text_that_is_not_utf_8_reaches_the_gate_first(
+    rooms, open_socket, caplog
+):
+    async def scenario(*frames):
+        async with open_socket("drive?id=p") as socket:
+            for n, (fin, data) in enumerate(frames):
+                opcode = Opcode.CONT if n else Opcode.TEXT
+                socket.protocol.send_frame(Frame(opcode, data, fin))
+            socket.send_data()
+            return await reason_of(socket)
+
+    whole = b'{"op":"stop","robot":"\xff"}'
+    assert asyncio.run(scenario((True, whole)))[0] == 1008
+    assert asyncio.run(scenario((False, whole[:8]), (True, whole[8:])))[0] == 1008
+    said = [each for one in rooms.gate.connections for each in one.received]
+    assert said == [whole, whole]
+    assert "Traceback" not in caplog.text
+
+
+def test_a_stop_behind_what_ends_the_socket_reaches_the_gate(rooms, open_socket):
+    stop, drive = '{"op":"stop","robot":"r1"}', '{"op":"drive"}'
+
+    async def scenario():
+        async with open_socket("drive?id=p") as socket:
+            for text in ("x" * 1025, drive, stop, drive):
+                socket.protocol.send_text(text.encode())
+            socket.send_data()
+            return await reason_of(socket)
+
+    assert asyncio.run(scenario())[0] == 1008
+    (connection,) = rooms.gate.connections
+    assert connection.received == [stop]
+
+
+def test_a_stop_in_a_flood_reaches_the_gate(rooms, open_socket):
+    stop = '{"op":"stop","robot":"*"}'
+
+    async def scenario():
+        async with open_socket("drive?id=p") as socket:
+            for text in (*["x"] * 200, stop, *[stop] * 500):
+                socket.protocol.send_text(text.encode())
+            socket.send_data()
+            return await reason_of(socket)
+
+    assert asyncio.run(scenario())[0] == 1008
+    (connection,) = rooms.gate.connections
+    assert connection.received.count(stop) in range(1, 62)
 
 
 @pytest.mark.parametrize(("name", "rate"), [("scene?id=p", 120), ("drive?id=p", 60)])

@@ -36,8 +36,9 @@ page that goes on sending ``drive``.
 A page whose driver goes by a camera adds ``"video"`` to each ``drive``: for how many
 milliseconds the newest picture that the page showed had been there.
 
-Whatever is not one of these is refused whole. What the gate says back stands in
-:mod:`webmap.gate.reports`.
+Whatever is not one of these is refused whole, but what begins with ``{"op":"stop"``
+stops robots first (:mod:`webmap.gate.malformed_stop`). What the gate says back stands
+in :mod:`webmap.gate.reports`.
 """
 
 import json

@@ -9,6 +9,7 @@ import secrets
 
 from starlette.websockets import WebSocket
 
+from webmap.gate.malformed_stop import begins_like_stop
 from webmap.server.bounds import DRIVE
 from webmap.server.hop import Hops
 from webmap.server.line import BROKEN_RULE, FAILED, Line
@@ -20,6 +21,9 @@ from webmap.server.security import VIEWER
 from webmap.server.viewer import Viewer
 
 log = logging.getLogger("webmap.server")
+
+MOST_LAST_STOPS = 60
+"""So many STOPs are served of a page that is disconnected: a second's worth."""
 
 
 class DriveSockets:
@@ -63,8 +67,20 @@ class DriveSockets:
             return
         try:
             self._model.drive_opened(page_id, viewer, connection)
+
+            last_stops = iter(range(MOST_LAST_STOPS))
+
+            def rest(message: str | bytes) -> None:
+                # A page that is disconnected has its STOP served first (S10).
+                if isinstance(message, str):
+                    data = message.encode(errors="replace")
+                else:
+                    data = message
+                if begins_like_stop(data) and next(last_stops, None) is not None:
+                    connection.receive(message)
+
             await line.run(
-                connection.receive, lambda why: self._model.refused(viewer, why)
+                connection.receive, lambda why: self._model.refused(viewer, why), rest
             )
         finally:
             # The gate first: with the connection its leases end and robots stop.

@@ -23,6 +23,12 @@ STALLED_S = 5.0
 
 _GOODBYE_S = 0.5
 
+_REST_S = 0.05
+"""How long messages that had come before the socket was ended are read."""
+
+_REST_PAUSE_S = 0.01
+"""How long the next of them is waited for."""
+
 
 class Line:
     """A socket that has been accepted.
@@ -69,18 +75,23 @@ class Line:
         )
 
     async def run(
-        self, on_text: Callable[[str], None], on_broken: Callable[[str], None]
+        self,
+        on_text: Callable[[str], None],
+        on_broken: Callable[[str], None],
+        on_rest: Callable[[str | bytes], None] | None = None,
     ) -> None:
         """Carry messages both ways until either side ends the socket.
 
         Args:
             on_text: Called with each text message that is within the bounds.
             on_broken: Called with what is wrong with one that is not; it is the last.
+            on_rest: Called with the message that was not within the bounds, and with
+                those that had come behind it when this side ends the socket.
 
         """
         # The third waits for an end that comes while the other two are stuck.
         tasks = [
-            asyncio.create_task(self._read(on_text, on_broken)),
+            asyncio.create_task(self._read(on_text, on_broken, on_rest)),
             asyncio.create_task(self._write()),
             asyncio.create_task(self._over.wait()),
         ]
@@ -95,6 +106,8 @@ class Line:
                     self._end(
                         FAILED, "the server failed on this page; its log says why"
                     )
+        if on_rest is not None and not self._gone:
+            await self._read_rest(on_rest)
         await self._say_goodbye()
 
     def _put(self, item: bytes | str) -> None:
@@ -109,7 +122,10 @@ class Line:
             self._over.set()
 
     async def _read(
-        self, on_text: Callable[[str], None], on_broken: Callable[[str], None]
+        self,
+        on_text: Callable[[str], None],
+        on_broken: Callable[[str], None],
+        on_rest: Callable[[str | bytes], None] | None,
     ) -> None:
         while self._ended is None:
             message = await self._socket.receive()
@@ -122,10 +138,26 @@ class Line:
             else:
                 broken = self._allowance.spend(text, time.monotonic())
             if broken is not None:
+                if on_rest is not None:
+                    on_rest(message.get("bytes") or "" if text is None else text)
                 on_broken(broken)
                 self._end(BROKEN_RULE, broken)
                 return
             on_text(text or "")
+
+    async def _read_rest(self, on_rest: Callable[[str | bytes], None]) -> None:
+        """Read what has come already; a page that goes on sending is not waited for."""
+        until = time.monotonic() + _REST_S
+        while time.monotonic() < until:
+            try:
+                async with asyncio.timeout(_REST_PAUSE_S):
+                    message = await self._socket.receive()
+            except (TimeoutError, RuntimeError):
+                return
+            if message["type"] == "websocket.disconnect":
+                self._gone = True
+                return
+            on_rest(message.get("text") or message.get("bytes") or "")
 
     async def _write(self) -> None:
         while True:

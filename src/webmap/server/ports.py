@@ -62,8 +62,12 @@ class SceneHandle(Protocol):
 class DriveConnection(Protocol):
     """The gate's side of one open ``/drive`` socket."""
 
-    def receive(self, text: str) -> None:
-        """Hand one message of the page, of at most 1 KiB, to the gate unread."""
+    def receive(self, text: str | bytes) -> None:
+        """Hand one message of the page to the gate unread.
+
+        It has at most 1 KiB, unless it is a STOP that breaks a rule: bytes are one
+        that came in a binary frame or is not UTF-8.
+        """
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the most that this connection's hands may ask for, in m/s and rad/s."""

@@ -13,6 +13,7 @@ from webmap.errors import WebMapError
 from webmap.memory import return_large_pieces
 from webmap.server.listening import check_exposure, listen, url_of
 from webmap.server.settings import Settings
+from webmap.server.websocket_protocol import WebSocketProtocol
 
 log = logging.getLogger("webmap.server")
 
@@ -85,7 +86,7 @@ def make_server(app: Application, on_ready: Callable[[], object]) -> "Server":
     config = uvicorn.Config(
         app,
         interface="asgi3",
-        ws="websockets-sansio",
+        ws=WebSocketProtocol,
         ws_max_size=_MAX_MESSAGE,
         ws_ping_interval=PING_EVERY_S,
         ws_ping_timeout=PONG_WITHIN_S,

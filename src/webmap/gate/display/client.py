@@ -5,7 +5,6 @@ in a thread of the client's own and must be quick.
 """
 
 import concurrent.futures
-import contextlib
 import itertools
 import json
 import logging
@@ -19,6 +18,7 @@ from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramRoad
 from webmap.gate.display.supervisor import Supervisor
 from webmap.gate.display.unheard import Unheard
+from webmap.gate.malformed_stop import begins_like_stop, robot_in
 from webmap.gate.messages import FromGate, Report, RobotSpec, Role
 from webmap.gate.refusal import Refusal
 from webmap.gate.specs import checked
@@ -202,10 +202,19 @@ class GateClient:
         """Keep a page's STOP, in case that no gate hears it."""
         if b"stop" not in message.text:
             return
-        with contextlib.suppress(Refusal):
+        try:
             command = commands.parse(message.text)
-            if isinstance(command, commands.Stop):
-                self._keep_stop(message.connection, command.robot)
+        except Refusal:
+            if not begins_like_stop(message.text):
+                return
+            robot = robot_in(message.text)
+        else:
+            if not isinstance(command, commands.Stop):
+                return
+            robot = command.robot
+        # As the gate does: what names no robot that is known is for all.
+        known = robot in self._specs
+        self._keep_stop(message.connection, robot if known else None)
 
     def _keep_stop(self, by: str | None, robot: str | None) -> None:
         if not self.ready:
@@ -222,7 +231,11 @@ class GateClient:
 
     def introduction(self) -> list[messages.ToGate]:
         """Return what a new gate must hear first."""
-        stops = [self._stop_again(by, robot) for by, robot in self._unheard]
+        stops = [
+            self._stop_again(by, robot)
+            for by, robot in self._unheard
+            if robot is None or robot in self._specs  # or it is gone since
+        ]
         return [*self._specs.values(), *self._pages.introduction, *stops]
 
     def hear(self, message: FromGate) -> None:

@@ -100,11 +100,20 @@ class Fleet:
             Refusal: If there is no such robot.
 
         """
-        base = self._by_robot.get(robot)
-        if base is None:
-            raise Refusal(f"there is no robot {robot!r}")
+        self.check_known(robot)
+        base = self._by_robot[robot]
         self._touched.add(base.key)
         return base
+
+    def check_known(self, robot: str | None) -> None:
+        """Let pass what names a robot that is declared, or all (``None``).
+
+        Raises:
+            Refusal: If there is no such robot.
+
+        """
+        if robot is not None and robot not in self._by_robot:
+            raise Refusal(f"there is no robot {robot!r}")
 
     def reset(self, base: Base, stop: str, now: float) -> None:
         """End the STOP of a machine, also where it stands by a key that it had before.

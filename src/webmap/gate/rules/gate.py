@@ -11,12 +11,11 @@ from typing import Any
 
 from webmap.gate import events, messages
 from webmap.gate.actions import Action, Say
-from webmap.gate.commands import (
-    op_of,
-    parse,
-)
+from webmap.gate.commands import Stop, op_of, parse
+from webmap.gate.malformed_stop import begins_like_stop, robot_in
 from webmap.gate.messages import PROGRAM
 from webmap.gate.refusal import Refusal
+from webmap.gate.rules.connection import Connection
 from webmap.gate.rules.fleet import Fleet
 from webmap.gate.rules.health import Pulse
 from webmap.gate.rules.lease import Epochs
@@ -143,10 +142,10 @@ class Gate:
             return
         try:
             command = parse(message.text)
+            if isinstance(command, Stop):
+                self._fleet.check_known(command.robot)
         except Refusal as refusal:
-            self._people.refuse(connection.id, None, "command", refusal.why, now)
-            if connection.garbage.too_often(now):
-                self._people.close(connection, "too many messages that make no sense")
+            self._take_garbage(connection, message.text, refusal.why, now)
         else:
             what = op_of(command)
             self._people.attempt(
@@ -158,3 +157,14 @@ class Gate:
             )
         if connection.messages.too_often(now):
             self._people.close(connection, "too many messages")
+
+    def _take_garbage(
+        self, connection: Connection, text: bytes, why: str, now: float
+    ) -> None:
+        what = "command"
+        if begins_like_stop(text):  # before it is counted: STOP is served first (S10)
+            stopped = self._orders.stop_meant(robot_in(text), connection, now)
+            what, why = "stop", f"this STOP is not valid ({why}): {stopped}"
+        self._people.refuse(connection.id, None, what, why, now)
+        if connection.garbage.too_often(now):
+            self._people.close(connection, "too many messages that make no sense")

@@ -96,6 +96,25 @@ class Orders:
         for base in self._fleet if robot is None else [self._fleet.find(robot)]:
             base.stop(press, now)
 
+    def stop_meant(self, robot: str | None, by: Connection, now: float) -> str:
+        """STOP what a malformed STOP names, or all if that is not known.
+
+        Args:
+            robot: The robot that it names, if that could be read.
+            by: Who sent it.
+            now: The time.
+
+        Returns:
+            What is stopped, in words.
+
+        """
+        try:
+            self._fleet.check_known(robot)
+        except Refusal:
+            robot = None
+        self.stop(robot, by, now)
+        return "all robots are stopped" if robot is None else f"{robot!r} is stopped"
+
     def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
         """End the STOP of a robot that has this identity."""
         check_role(by.role)

@@ -1,0 +1,181 @@
+"""A STOP that is no valid command stops robots, whatever is wrong with it (S10)."""
+
+import json
+
+import pytest
+from gate_harness import Bench, spec
+
+from webmap.gate import messages
+from webmap.gate.malformed_stop import begins_like_stop, robot_in
+
+START = b'{"op":"stop"'
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        START,
+        START + b"}",
+        b' \t\r\n{ "op"\n:\t"stop" , ',
+        START + b"\xff\xfe",
+        START + b"[" * 5000,
+        START + b"x" * 5000,
+    ],
+)
+def test_what_begins_like_a_stop_is_one(frame):
+    assert begins_like_stop(frame)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"",
+        b'{"op":"sto',
+        b'{"op":"stop-test"}',
+        b'{"op":"stop2"',
+        b'{"op":"drive","robot":"r1"}',
+        b'{"robot":"r1","op":"stop",}',
+        b'[{"op":"stop"}]',
+        b'\x0b{"op":"stop"',
+        b"stop",
+    ],
+)
+def test_what_begins_otherwise_is_none(frame):
+    assert not begins_like_stop(frame)
+
+
+@pytest.mark.parametrize(
+    ("rest", "robot"),
+    [
+        (b',"robot":"r1"}', "r1"),
+        (b' , "robot" :\t"r1" , "why":1}', "r1"),
+        (b',"why":1,"robot":"r1"}', "r1"),
+        (b',"robot":"r1"', "r1"),
+        (b',"robot":"r1",', "r1"),
+        (b',"robot":"r1","x":' + b"[" * 5000, "r1"),
+        (b',"robot":"r1","x":"\xff"}', "r1"),
+        (b',"robot":"r\\u0031"', "r1"),
+        (b',"x":NaN,"robot":"r1"}', "r1"),
+        (b',"robot":"r1"}}', "r1"),
+        (b',"robot":"r1"}' + b" " * 2000 + b"{", "r1"),
+        (b"}", None),
+        (b"", None),
+        (b',"robot":"r1', None),
+        (b',"robot":"r\\', None),
+        (b',"robot":"\\x"', None),
+        (b',"robot":"\xff"', None),
+        (b',"robot":1}', None),
+        (b',"robot":["r1"]}', None),
+        (b',"robot":"r1","robot":"r2"}', None),
+        (b',"robot":"r1","robot" : "r2"', None),
+        (b',"x":{"robot":"r1"}}', None),
+        (b',"x":{"robot":"r1"}', None),
+        (b',"x":1,"robot":"r1"', None),
+        (b',"x":' + b"1" * 5000 + b"}", None),
+    ],
+)
+def test_its_robot_is_read_where_that_leaves_no_doubt(rest, robot):
+    assert robot_in(START + rest) == robot
+
+
+@pytest.fixture
+def two():
+    """A page that drives one of two robots."""
+    bench = Bench().begin(spec(), spec(id="r2", twist_topic="/r2/cmd_vel"))
+    bench.drive_off()
+    return bench
+
+
+def send(bench, data, who="b"):
+    bench.tell(messages.FromBrowser(who, data))
+
+
+NAMES_ONE = [
+    b'{"op":"stop","robot":"r1","why":"fire"}',
+    b'{"op":"stop","robot":"r1"',
+    b'{"op":"stop","robot":"r1","x":"\xff"}',
+    b'{"op":"stop","robot":"r1","x":' + b"[" * 900,
+    b'{"op":"stop","robot":"r1","x":"' + b"x" * 1024 + b'"}',
+]
+NAMES_NONE = [
+    b'{"op":"stop"',
+    b'{"op":"stop"}',
+    b'{"op":"stop","robot":7}',
+    b'{"op":"stop","robot":"r9"}',
+    b'{"op":"stop","robot":"r9"',
+    b'{"op":"stop","robot":""}',
+    b'{"op":"stop","robot":"r1","robot":"r2"}',
+    b' {\n"op" : "stop" \xff',
+    b'{"op":"stop","x":"' + b"x" * 2000,
+]
+
+
+@pytest.mark.parametrize("frame", NAMES_ONE, ids=range(len(NAMES_ONE)))
+def test_a_malformed_stop_stops_the_robot_that_it_names(two, frame):
+    send(two, frame)
+    assert two.written[-1].twist.is_zero
+    assert (two.report("r1").latched, two.report("r2").latched) == (True, False)
+    (refused,) = two.refusals("b")
+    assert (refused.robot, refused.what) == (None, "stop")
+    assert refused.why.startswith("this STOP is not valid (")
+    assert refused.why.endswith("): 'r1' is stopped")
+
+
+@pytest.mark.parametrize("frame", NAMES_NONE, ids=range(len(NAMES_NONE)))
+def test_one_that_names_none_that_is_known_stops_all(two, frame):
+    send(two, frame)
+    assert two.report("r1").latched
+    assert two.report("r2").latched
+    assert two.refusals("b")[-1].why.endswith("): all robots are stopped")
+    at = two.now
+    two.hold(1.0, x=1.0)
+    assert [w for w in two.moving_since(at) if w.at > at] == []
+
+
+def test_a_viewer_stops_by_it_too_and_a_stranger_does_not(two):
+    send(two, b'{"op":"stop"', "nobody")
+    assert not two.report("r1").latched
+    two.join("v", "viewer")
+    send(two, b'{"op":"stop"', "v")
+    assert two.report("r1").latched
+
+
+def test_it_counts_as_garbage_and_is_served_before_the_page_is_closed(two):
+    for _ in range(19):
+        send(two, b"{")
+    assert two.of(messages.CloseConnection) == []
+    send(two, b'{"op":"stop"')
+    assert two.of(messages.CloseConnection)
+    said = [
+        message
+        for message in two.said
+        if isinstance(message, messages.CloseConnection)
+        or (isinstance(message, messages.SentTwist) and message.by is None)
+    ]
+    assert isinstance(said[-1], messages.CloseConnection), "zero goes first"
+    assert two.report("r1").latched
+    two.run(1.1)
+    send(two, b'{"op":"stop"', "b")
+    assert two.report("r2").latched, "also of a page that is being closed"
+
+
+def test_it_feeds_no_dead_man_of_another_robot(two):
+    since = two.now
+    frame = b'{"op":"stop","robot":"r2",'
+    two.run(0.5, lambda: send(two, frame, "a"))
+    assert two.moving_since(since + 0.2101) == []
+    assert not two.report("r1").latched
+
+
+def test_what_only_resembles_it_stops_nothing(two):
+    for frame in (b'{"op":"stop-test","x":1}', b'{"op":"sto', b'{"op":"drive"'):
+        send(two, frame)
+    assert not two.report("r1").latched
+    assert {refused.what for refused in two.refusals("b")} == {"command"}
+
+
+def test_a_good_one_is_no_garbage(two):
+    for _ in range(30):
+        send(two, json.dumps({"op": "stop", "robot": "r1"}).encode())
+    assert two.of(messages.CloseConnection) == []
+    assert two.refusals("b") == []
