@@ -19,7 +19,10 @@ def robot(state: str | None = "free", *, holder: str | None = None, **changes):
         report = SimpleNamespace(
             state=state,
             holder=holder and SimpleNamespace(name=holder),
-            **{"link": "up", "goal": None, "measured": None, **changes},
+            **{
+                **{"link": "up", "goal": None, "measured": None, "other_writer": None},
+                **changes,
+            },
         )
     return SimpleNamespace(feed=BRIDGE_OPEN, report=report)
 
@@ -78,6 +81,38 @@ def test_a_robot_with_a_goal_that_nobody_drives_is_on_its_way(state, text):
     goal = SimpleNamespace(state=state, way="navigate_to_pose")
     assert describe(robot(goal=goal)).text == text
     assert describe(robot("held", holder="Ann", goal=goal)).text == "Ann holds it"
+
+
+@pytest.mark.parametrize(
+    ("state", "holder", "text", "mine"),
+    [
+        ("free", None, "Another program drives it", ""),
+        ("stopping", "Ann", "Another program drives it", ""),
+        (
+            "held",
+            "Ann",
+            "Ann holds it, another publishes",
+            "You hold it, another publishes",
+        ),
+        (
+            "driving",
+            "Ann",
+            "Ann drives, another program too",
+            "You drive, another program too",
+        ),
+        ("stopped", None, "Stopped, another publishes", ""),
+    ],
+)
+def test_another_program_that_drives_a_robot_is_said(state, holder, text, mine):
+    said = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)"
+    words = describe(robot(state, holder=holder, other_writer=said))
+    assert (words.text, words.mine) == (text, mine)
+    assert words.tone in ("warn", "bad")
+
+
+def test_a_link_that_is_down_is_said_before_another_program():
+    words = describe(robot("free", link="down", other_writer="another program"))
+    assert words.text == "No way to drive it"
 
 
 def test_a_robot_that_the_gate_does_not_know_is_only_watched():

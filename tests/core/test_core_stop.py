@@ -79,7 +79,7 @@ def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
     drivable(robot)
     robot.stop()
     stop = StopReport("Ann", True, "", "s1")
-    robot.on_gate_report(SimpleNamespace(stop=stop))
+    robot.on_gate_report(SimpleNamespace(stop=stop, other_writer=None))
     robot.reset_stop()
     reset = ("reset", robot.motion.id, "s1")
     assert gate.asked == [("stop", robot.motion.id), reset]
@@ -97,7 +97,12 @@ def test_a_program_resets_no_stop_that_it_was_not_told_of(robot, gate):
 
 def test_a_lease_waits_for_the_word_of_a_gate_that_was_started_anew(robot, gate):
     free = SimpleNamespace(
-        armable=True, latched=False, holder=None, epoch=7, reason=None
+        armable=True,
+        latched=False,
+        holder=None,
+        epoch=7,
+        reason=None,
+        other_writer=None,
     )
 
     async def scenario():

@@ -98,6 +98,22 @@ async def test_what_another_says_on_the_topic_is_told_and_proves_nothing(monkeyp
 
 
 @in_loop
+async def test_others_are_heard_before_anybody_listens_ten_times_a_second_at_most():
+    async with noting_bridge() as bridge, Noting(bridge.url) as noting:
+        lane = await noting.up()
+        await until(lambda: bridge.of("subscribe"), "that it listens")
+        (asked,) = [told.message for told in bridge.of("subscribe")]
+        assert (asked["topic"], asked["throttle_rate"]) == ("/cmd_vel", 100)
+        foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
+        await bridge.publish("/cmd_vel", foreign)
+        told = [Echoed(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
+        await until(lambda: noting.of(Echoed) == told, "what was said")
+        assert lane.lane.ping_period == IDLE_PING
+        lane.detach("/cmd_vel", "geometry_msgs/Twist")
+        await until(lambda: bridge.of("unsubscribe"), "that it listens no longer")
+
+
+@in_loop
 async def test_what_is_no_velocity_of_its_own_machines_is_passed_over():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
@@ -157,7 +173,7 @@ async def test_of_two_robots_on_a_topic_the_type_that_is_known_counts(stated_fir
         said = [
             (t.op, t.message["type"] if t.op == "advertise" else "")
             for t in bridge.told
-            if t.topic == "/base" and t.op != "publish"
+            if t.topic == "/base" and t.op in ("advertise", "unadvertise")
         ]
         alone = ("advertise", "geometry_msgs/Twist")
         known = [("advertise", STAMPED), ("unadvertise", ""), alone]

@@ -259,7 +259,7 @@ def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
         async with linked(sim["ros1"], services={"/dock": trigger()}) as (bridge, node):
             light = {**DOCK, "label": "Light", "during_stop": True}
             module = robot.add_module("Buttons", bridge, [DOCK, light])
-            robot.on_gate_report(SimpleNamespace(latched=True))
+            robot.on_gate_report(SimpleNamespace(latched=True, other_writer=None))
             assert await module["Dock"].press() is False
             assert module["Dock"].words == "Not done: STOP stands: reset it first"
             assert node.calls == []

@@ -75,6 +75,8 @@ class Bench:
         self._timeout = timeout
         self._open = ExitStack()
         self.browser = self.tab = self.display = None
+        self.others_publish = False
+        """Whether the test has another program publish velocities."""
         self.causes = []
         """When zeros may begin, as at each release of the key."""
 
@@ -223,6 +225,9 @@ class Bench:
             self.end_browser()
         if self.tab is None:
             self.open_page()
+        elif not self.others_publish:
+            said = self.tab.evaluate("document.body.innerText")
+            assert "nother program" not in said, said
 
     def drive_off(self, within=30.0):
         """Press W until the robot moves, and keep pressing; like a person, again."""

@@ -149,7 +149,8 @@ class RobotCard:
         self._shape.show(words.shape)
         self._state.text = words.text
         self._mine.text = words.mine or words.text
-        self._reason.text = sentence((report and report.reason) or "")
+        said = (report.other_writer, report.reason) if report is not None else ()
+        self._reason.text = " ".join(sentence(each) for each in said if each)
         self._goal.show(robot)
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
         self.element.set("data-tone", words.tone or None)

@@ -1,7 +1,7 @@
 """What is said of a robot: a word, a shape and a tone that always go together."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -48,6 +48,20 @@ def describe(robot: "Robot") -> Words:
     report = robot.report
     if report is None:
         return Words("Watched only", "state-watched")
+    words = _of_report(robot)
+    if report.other_writer is None or report.link == "down":
+        return words
+    if report.state in ("free", "stopping"):
+        return Words("Another program drives it", "state-driving", "warn")
+    driven = report.state == "driving"
+    also = ", another program too" if driven else ", another publishes"
+    mine = words.mine and words.mine + also
+    return replace(words, text=words.text + also, mine=mine, tone="bad")
+
+
+def _of_report(robot: "Robot") -> Words:
+    report = robot.report
+    assert report is not None
     who = report.holder.name if report.holder is not None else "Somebody"
     if report.state == "stopped":
         return Words("Stopped", "state-stopped", "bad")

@@ -401,6 +401,7 @@ class Driven(Extendable):
     def on_gate_report(self, report: RobotReport) -> None:
         """Keep what the gate says of this robot and fire ``on_report``."""
         self.report, self._report_is_old = report, False
+        self.motion.heed(report)
         self.notify_modules("on_report", report)
 
     def on_written(self, kind: str, message: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """The road of one robot's commands to the gate, and the gate's word of it."""
 
 import logging
+import time
 import zlib
 from collections import Counter
 from concurrent.futures import Future
@@ -8,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.goal_topics import InitialPoseTopic, MoveTopic
+from webmap.core.tasks import spawn
 from webmap.core.twist_topic import TWIST_TYPES, TwistTopic, check_twist_type
 from webmap.core.type_asking import TypeAsking
 from webmap.errors import ConfigError, MotionError
@@ -22,6 +24,12 @@ if TYPE_CHECKING:
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
+
+ASK_WRITERS = 10.0
+"""Seconds between two questions to rosapi who publishes velocities to a robot."""
+
+BRIDGES = ("rosbridge", "webmap")
+"""What is in the names of nodes that publish for their clients, this one too."""
 
 _used: Counter[str] = Counter()
 
@@ -57,6 +65,7 @@ class MotionRoad:
         self._assist: AssistSpec | None = None
         self._own_map = Pose()
         self._asking: TypeAsking | None = None
+        self._ask_writers_at = 0.0
         roads.add(self)
 
     @property
@@ -296,6 +305,21 @@ class MotionRoad:
                 "reset; after stop() wait until report.stop is there"
             )
         gate.reset(self.id, stop.id)
+
+    def heed(self, report: RobotReport) -> None:
+        """Ask who else publishes velocities to the robot, while somebody does."""
+        twist, now = self._twist, time.monotonic()
+        if report.other_writer is None or twist is None:
+            self._ask_writers_at = now
+        elif now >= self._ask_writers_at:
+            self._ask_writers_at = now + ASK_WRITERS
+            spawn(self._ask_writers(twist))
+
+    async def _ask_writers(self, twist: TwistTopic) -> None:
+        nodes = await twist.bridge.publishers(twist.topic)
+        if nodes is not None and self.gate is not None and self._twist is twist:
+            others = [n for n in nodes if not any(part in n for part in BRIDGES)]
+            self.gate.name_writers(self.id, tuple(others))
 
     def _gate(self) -> "GateClient":
         if self.gate is None or not lifecycle.running:

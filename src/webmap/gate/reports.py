@@ -9,7 +9,7 @@
      "latched": false, "stop": null, "armed": false,
      "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
      "sent": [0.0, 0.0, 0.0], "echoed": null, "measured": [0.0, 0.0, 0.0],
-     "alarm": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
+     "alarm": null, "other_writer": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
      "stop_time": 0.25, "stop_source": "stated", "stop_date": null, "test": null,
      "armable": true, "reason": null, "way": "navigate_to_pose", "cancels": true,
      "locates": true, "goal": {"id": "g7", "x": 1.0, "y": 2.0, "yaw": 0.5, "by": "c5",
@@ -34,7 +34,10 @@ stands. ``holder`` and
 taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force, or, while nobody
 has the robot, those that would be if this page took it; ``armable`` and
 ``reason``, whether it can be taken, and what stands against that or against moving it.
-``alarm`` says that the robot moves on a second after zero was sent. ``age`` is the age
+``alarm`` says that the robot moves on a second after zero was sent, ``other_writer``
+that another program publishes velocities to it: ``"another program publishes to
+/cmd_vel (0.10 m/s, -0.20 rad/s): /teleop"``, with its nodes where they are known. It
+comes whether or not somebody drives. ``age`` is the age
 of the driver's loop in milliseconds, ``reaction`` the seconds from a finger to the
 robot at worst, and ``brake`` the deceleration that is assumed, in m/s². ``stop_time``
 is what is known of the base stopping by itself, in seconds: ``"stated"``, or

@@ -279,6 +279,13 @@ class Bridge:
         """
         return await self._graph.topic_type(normalise_topic(topic))
 
+    async def publishers(self, topic: str) -> list[str] | None:
+        """Return the nodes that publish a topic, as rosapi knows them.
+
+        None if the bridge has no rosapi, or it does not answer.
+        """
+        return await self._graph.publishers(normalise_topic(topic))
+
     async def topics(self) -> dict[str, str]:
         """Return the type of every topic.
 

@@ -51,11 +51,17 @@ class Graph:
 
     async def published(self, topic: str) -> bool | None:
         """Return whether anybody publishes ``topic``, or None if nobody answers."""
+        nodes = await self.publishers(topic)
+        return None if nodes is None else bool(nodes)
+
+    async def publishers(self, topic: str) -> list[str] | None:
+        """Return the nodes that publish ``topic``, or None if nobody answers."""
         try:
             answer = await self._call("/rosapi/publishers", {"topic": topic})
-            return bool(convert(answer, _Publishers).publishers)
+            nodes: list[str] = convert(answer, _Publishers).publishers
         except (BridgeError, ProtocolError):
             return None
+        return nodes
 
     async def topics(self) -> dict[str, str]:
         """Return the type of every topic.

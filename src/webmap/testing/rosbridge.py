@@ -40,6 +40,8 @@ class WitnessBridge:
         """Whether a goal runs on its socket's input thread until it ends."""
         self.types: dict[str, str] = {}
         """The topics that rosapi tells of, with their types."""
+        self.publishers: dict[str, list[str]] = {}
+        """The nodes that rosapi names as publishers of a topic."""
         self.port = 0
         self._hear = hear
         self._sockets: dict[int, Socket] = {}
@@ -130,6 +132,10 @@ class WitnessBridge:
                 return {"topics": list(self.types), "types": list(self.types.values())}
             case "/rosapi/topic_type" if isinstance(args, dict):
                 return {"type": self.types.get(str(args.get("topic")), "")}
+            case "/rosapi/publishers" if isinstance(args, dict):
+                nodes = self.publishers.get(str(args.get("topic")))
+                if nodes is not None:
+                    return {"publishers": nodes}
         return {"success": True, "message": ""}
 
 

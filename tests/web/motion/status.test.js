@@ -135,3 +135,23 @@ test("a stop hook that failed is said, whatever else there is to say", () => {
   assert.equal(driving, `0.00 m/s, 0.00 rad/s. ${words}`);
   assert.equal(detail({}, { link: "connecting" }), "");
 });
+
+test("another program that publishes velocities is said in every state", () => {
+  const other_writer = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)";
+  const said = "Another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s).";
+  const mine = { ...STATUS, driven: "r1", settled: true };
+  const stop = { by: "Ann", confirmed: true, why: "", id: "s1" };
+  const cases = [
+    [STATUS, {}, "Free"],
+    [mine, ME, "Ready"],
+    [mine, { ...ME, state: "driving" }, "Driving"],
+    [STATUS, { state: "stopped", latched: true, stop }, "Stopped"],
+  ];
+  for (const [status, more, title] of cases) {
+    const words = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);
+    assert.equal(words.title, title);
+    assert.ok(words.detail.endsWith(said), words.detail);
+    const alone = describe(status, "r1", { ...REPORT, ...more }, true);
+    assert.ok(!alone.detail.includes("nother program"));
+  }
+});

@@ -192,6 +192,10 @@ class GateClient:
         else:
             log.error("the gate does not run: reset is not kept for later")
 
+    def name_writers(self, robot_id: str, nodes: tuple[str, ...]) -> None:
+        """Tell which nodes besides the bridge publish to a robot's velocity topic."""
+        self.tell(messages.WriterNodes(robot_id, nodes))
+
     def tell(self, message: messages.ToGate) -> None:
         """Send a message to the gate, if it runs."""
         self._supervisor.tell(message)

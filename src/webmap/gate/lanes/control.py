@@ -18,6 +18,11 @@ IDLE_PING = 0.5
 """Seconds between pings otherwise; well below the time after which a stall is cut."""
 
 
+IDLE_ECHO = 100
+"""Milliseconds between two echoes at least while nobody listens: others who publish to
+a machine are noticed before it is driven, and a quick one costs little."""
+
+
 class ControlLane:
     """The socket of one bridge that velocity goes through.
 
@@ -72,16 +77,20 @@ class ControlLane:
         if type == said:
             return
         if said is not None:
+            self.lane.let_go(f"webmap-gate others {topic} {said}")
             self.lane.let_go(f"webmap-gate advertise {topic} {said}")
             del self._types[topic]
         if type is not None:
             id = f"webmap-gate advertise {topic} {type}"
             hello = ops.advertise(topic, type, id=id)
             self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
+            id = f"webmap-gate others {topic} {type}"
+            hello = ops.subscribe(topic, id=id, type=type, throttle_rate=IDLE_ECHO)
+            self.lane.hold(id, hello, ops.unsubscribe(topic, id=id))
             self._types[topic] = type
 
     def listen(self, topic: str) -> None:
-        """Hear what is said on ``topic``, ours and others'."""
+        """Hear all that is said on ``topic``, ours and others'."""
         self._listened.add(topic)
         id = f"webmap-gate echo {topic}"
         self.lane.hold(
@@ -133,7 +142,7 @@ class ControlLane:
 
     def _hear(self, data: bytes) -> None:
         heard = words.hear(data)
-        if heard is None or heard.topic not in self._listened or heard.twist is None:
+        if heard is None or heard.topic not in self._types or heard.twist is None:
             return
         self._unproven.echoed(heard.topic, heard.twist)
         self._tell(Echoed(Key(self._url, heard.topic), heard.twist))

@@ -60,6 +60,7 @@ from webmap.gate.messages.to_gate import (
     Speeds,
     Stop,
     ToGate,
+    WriterNodes,
 )
 
 __all__ = [
@@ -106,4 +107,5 @@ __all__ = [
     "ToGate",
     "Velocity",
     "Way",
+    "WriterNodes",
 ]

@@ -132,6 +132,9 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Whether it can be told where it is."""
     goal: GoalReport | None = None
     """The newest goal of this gate, also when it has ended."""
+    other_writer: str | None = None
+    """That another program publishes velocities to it, which and from where, in
+    words."""
     hooks: tuple[str, ...] = ()
     """Which stop hooks failed, or have not been said yet, and why, in words."""
 

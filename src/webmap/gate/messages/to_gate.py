@@ -59,6 +59,13 @@ class Reset(msgspec.Struct, frozen=True, tag="reset"):
     """As :class:`StopReport` tells it."""
 
 
+class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
+    """Which nodes besides the bridge publish to a robot's velocity topic."""
+
+    robot: str
+    nodes: tuple[str, ...]
+
+
 class ProgramTake(msgspec.Struct, frozen=True, tag="program-take"):
     """Python asks for the lease; answered by :class:`TakeReply`."""
 
@@ -115,6 +122,7 @@ ToGate = (
     | Heartbeat
     | Stop
     | Reset
+    | WriterNodes
     | ProgramTake
     | ProgramRelease
     | ProgramTwist

@@ -31,6 +31,7 @@ from webmap.gate.rules.latch import Latch
 from webmap.gate.rules.lease import Epochs
 from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.obedience import Obedience
+from webmap.gate.rules.other_writer import GRACE, OtherWriter
 from webmap.gate.rules.robots import Robots
 from webmap.gate.rules.sight import Sight
 from webmap.gate.rules.speeds import Speeds
@@ -79,6 +80,7 @@ class Base:
         self.motion = Motion(key, control, self.speeds.bounds, self.guard.limit, emit)
         self.sight = Sight(key, emit)
         self.obedience = Obedience()
+        self.other_writer = OtherWriter()
         self.tests = StopTesting(key, self.motion, self.sight, emit)
         self.arming = Arming(key, self.robots, latch, control, pulse, self.sight)
         self.hands = Hands(
@@ -128,6 +130,7 @@ class Base:
             or self.motion.held
             or self.hands.handover.going_on
             or self.sight.on
+            or self.other_writer.seen is not None
         )
 
     # The robots that it is.
@@ -215,6 +218,7 @@ class Base:
         self.speeds.ages.forget_old(now)
         self.hands.step(now)
         self.motion.step(now)
+        self.other_writer.step(now)
         if self.latch.on:
             self.standing.confirm(now)
         self._update_watch(now)
@@ -234,6 +238,7 @@ class Base:
         self.obedience.wrote(write.twist, self.motion.sent, now)
         self.motion.wrote(write, now)
         self.tests.wrote(write.twist)
+        self.other_writer.wrote(write.twist, now)
         twist = write.twist
         for robot in self.robots.specs:
             sent = SentTwist(robot, twist.vx, twist.vy, twist.wz, write.by)
@@ -243,6 +248,10 @@ class Base:
         """Note what came back on the velocity topic, ours or another's."""
         self.sight.saw_echo(twist)
         self.tests.heard(twist, now)
+        if self.arming.lock.elsewhere or self.robots.follow_goals:
+            # Another gate on this computer drives it, or what follows its goal does.
+            self.other_writer.expect(now + GRACE)
+        self.other_writer.heard(twist, now)
 
     def saw(self, measured: Twist | None, said_after: float, now: float) -> None:
         """Note that odometry came, which was said after a moment, maybe long ago."""
@@ -271,6 +280,8 @@ class Base:
         """A zero that may not have arrived goes first."""
         if not self.control.up:
             return
+        # What an earlier gate, or an earlier link, wrote may be heard still.
+        self.other_writer.expect(now + GRACE)
         if self.motion.owes_zero:
             self.obedience.expect(now)  # also of an earlier gate, whose word was motion
         self.motion.pay(now)

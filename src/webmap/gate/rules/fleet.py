@@ -9,7 +9,14 @@ import msgspec
 from webmap.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
-from webmap.gate.messages import Forget, RobotGone, RobotSpec, SentGoal, SentPose
+from webmap.gate.messages import (
+    Forget,
+    RobotGone,
+    RobotSpec,
+    SentGoal,
+    SentPose,
+    WriterNodes,
+)
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.base import Base
 from webmap.gate.rules.goals import Goals
@@ -54,6 +61,7 @@ class Fleet:
         self.handlers: dict[type, Callable[[Any, float], None]] = {
             RobotSpec: self._declare,
             Forget: self._forget,
+            WriterNodes: self._writer_nodes,
             events.LinkUp: self._link_up,
             events.LinkDown: self._link_down,
             events.Alive: self._alive,
@@ -370,6 +378,12 @@ class Fleet:
         base = self._of_key(event.key)
         if base is not None:
             base.saw_stop_file(event.press, now)
+
+    def _writer_nodes(self, message: WriterNodes, now: float) -> None:
+        base = self._by_robot.get(message.robot)
+        if base is not None:
+            self._touched.add(base.key)
+            base.other_writer.named(message.nodes)
 
     def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
         base = self._of_key(event.key)

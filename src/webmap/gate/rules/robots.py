@@ -76,6 +76,14 @@ class Robots:
         return max(known) if len(known) == len(stated) else None
 
     @property
+    def follow_goals(self) -> bool:
+        """Whether a goal is under way whose end would be known."""
+        return any(
+            goals.following and (goals.can_cancel or goals.way != "topic")
+            for goals in self.goals.values()
+        )
+
+    @property
     def hook_failures(self) -> tuple[str, ...]:
         """Which stop hooks it does not follow, under whatever name, and why."""
         said = [words for hooks in self.hooks.values() for words in hooks.failures]

@@ -147,8 +147,9 @@ class Stop {
     for (const { robot, name, alarm } of this._obedience.disobeying(performance.now())) {
       if (alarm === undefined) alarms.set(robot, name);
     }
-    for (const { robot, name, alarm } of this._drive.robots.values()) {
-      if (alarm) alarms.set(robot, `${name}: ${alarm}`);
+    for (const { robot, name, alarm, other_writer } of this._drive.robots.values()) {
+      const words = [alarm, other_writer].filter(Boolean).join("; ");
+      if (alarm) alarms.set(robot, `${name}: ${words}`);
     }
     return alarms;
   }

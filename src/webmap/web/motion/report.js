@@ -26,6 +26,8 @@
  * @property {Asker | null} [asker] Who asks the holder for it.
  * @property {boolean} [changing] Whether a hand-over waits until the robot stands.
  * @property {string | null} [alarm] How the robot does not obey.
+ * @property {string | null} [other_writer] That another program publishes velocities to
+ *     it, and which.
  * @property {number | null} [stop_time] Within how many seconds it stops by itself.
  * @property {'stated' | 'tested' | null} [stop_source] How that is known.
  * @property {string | null} [stop_date] When it was tested, as in 2026-11-21.

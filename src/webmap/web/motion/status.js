@@ -50,9 +50,11 @@ export function describe(status, robot, report, active, more = {}) {
   const link = ofLink(status);
   if (link) return link;
   const said = ofRobot(status, robot, report, active, more);
-  if (!report?.hooks?.length) return said;
-  // Whatever else there is to say: its STOP is not what it was made to be.
-  const words = [said.detail, ...report.hooks].filter(Boolean).map(sentence);
+  const { other_writer: other, hooks = [] } = report ?? {};
+  if (!other && hooks.length === 0) return said;
+  // Whatever else there is to say: who else moves it, and that its STOP is not what it
+  // was made to be.
+  const words = [said.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
   return say(said.state, said.title, words.join(" "));
 }
 

@@ -1,0 +1,95 @@
+"""While another program publishes velocities to a robot, rosapi is asked who it is."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+
+from webmap import Bridge, Robot
+from webmap.core import motion
+from webmap.core.motion import MotionRoad
+
+SAID = SimpleNamespace(other_writer="another program publishes to /cmd_vel")
+NOTHING = SimpleNamespace(other_writer=None)
+NODES = ["/rosbridge_websocket", "/teleop", "/webmap_sim", "/joy"]
+
+
+class Gate:
+    def __init__(self):
+        self.named = []
+
+    def declare(self, spec):
+        pass
+
+    def forget(self, robot_id):
+        pass
+
+    def name_writers(self, robot_id, nodes):
+        self.named.append((robot_id, nodes))
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    gate = Gate()
+    monkeypatch.setattr(MotionRoad, "gate", gate)
+    return gate
+
+
+@pytest.fixture
+def robot():
+    robot = Robot("Bob")
+    yield robot
+    robot.motion.close()
+
+
+def driven(robot, answers):
+    """Give a robot a topic on a bridge whose rosapi answers so."""
+    asked = []
+
+    async def publishers(topic):
+        asked.append(topic)
+        return answers.pop(0)
+
+    bridge = Bridge("ws://robot:9090")
+    bridge.publishers = publishers
+    robot.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
+    return asked
+
+
+def hear(robot, *reports):
+    async def scenario():
+        for report in reports:
+            robot.on_gate_report(report)
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+
+    asyncio.run(scenario())
+
+
+def test_its_nodes_are_named_but_for_those_of_bridges(robot, gate):
+    asked = driven(robot, [NODES, []])
+    hear(robot, NOTHING)
+    assert asked == []
+    hear(robot, SAID, SAID)
+    assert asked == ["/cmd_vel"], "once in a while is enough"
+    assert gate.named == [(robot.id, ("/teleop", "/joy"))]
+    hear(robot, NOTHING, SAID)
+    assert gate.named[1:] == [(robot.id, ())]
+
+
+def test_it_is_asked_again_while_it_goes_on(robot, gate, monkeypatch):
+    monkeypatch.setattr(motion, "ASK_WRITERS", 0.0)
+    asked = driven(robot, [NODES, NODES])
+    hear(robot, SAID, SAID)
+    assert len(asked) == 2
+
+
+def test_a_rosapi_that_does_not_answer_names_nobody(robot, gate):
+    asked = driven(robot, [None])
+    hear(robot, SAID)
+    assert (len(asked), gate.named) == (1, [])
+
+
+def test_a_robot_without_velocity_is_not_asked_about(robot, gate):
+    hear(robot, SAID)
+    assert gate.named == []

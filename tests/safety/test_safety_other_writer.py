@@ -1,0 +1,69 @@
+"""What the page says while another program publishes velocities to the robot.
+
+From a second client of the robot's bridge, through the real gate and display, to the
+words in a real Chromium.
+"""
+
+import json
+import threading
+
+import pytest
+from safety_bench import Bench
+from websockets.sync.client import connect
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+SAID = "nother program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s): /teleop_node"
+WORDS = "(document.querySelector('.webmap-teleop-state')?.innerText ?? '')"
+ALARM = "(document.querySelector('.webmap-alarm')?.innerText ?? '')"
+
+
+class OtherProgram:
+    """Publishes a velocity at 10 Hz for as long as it is used."""
+
+    def __init__(self, port):
+        self._port = port
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._publish)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception):
+        self._over.set()
+        self._thread.join(10)
+
+    def _publish(self):
+        linear, angular = (
+            {"x": 0.1, "y": 0.0, "z": 0.0},
+            {"x": 0.0, "y": 0.0, "z": -0.2},
+        )
+        twist = {"linear": linear, "angular": angular}
+        message = {"op": "publish", "topic": "/cmd_vel", "msg": twist}
+        with connect(f"ws://127.0.0.1:{self._port}", compression=None) as socket:
+            while not self._over.wait(0.1):
+                socket.send(json.dumps(message))
+
+
+@pytest.fixture
+def bench(tmp_path):
+    with Bench(tmp_path, timeout=0.5) as bench:
+        nodes = ["/rosbridge_websocket", "/teleop_node"]
+        bench.robot._bridge.publishers["/cmd_vel"] = nodes
+        bench.open_page()
+        yield bench
+
+
+def test_another_program_is_named_before_driving_while_driving_and_in_the_alarm(bench):
+    bench.drive_off()
+    bench.let_go()
+    bench.tab.wait(f"!{WORDS}.includes('nother program')")
+    bench.others_publish = True
+    with OtherProgram(bench.robot.port):
+        bench.tab.wait(f"{WORDS}.includes({json.dumps(SAID)})")
+        bench.press()
+        bench.tab.wait(f"{WORDS}.includes('Driving') && {WORDS}.includes('{SAID}')")
+        bench.let_go()
+        bench.tab.wait(f"{ALARM}.includes('{SAID}')")
+    bench.tab.wait(f"!{WORDS}.includes('nother program')")
