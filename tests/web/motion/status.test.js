@@ -141,13 +141,13 @@ test("another program that publishes velocities is said in every state", () => {
   const said = "Another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s).";
   const mine = { ...STATUS, driven: "r1", settled: true };
   const stop = { by: "Ann", confirmed: true, why: "", id: "s1" };
-  const cases = [
+  const states = [
     [STATUS, {}, "Free"],
     [mine, ME, "Ready"],
     [mine, { ...ME, state: "driving" }, "Driving"],
     [STATUS, { state: "stopped", latched: true, stop }, "Stopped"],
   ];
-  for (const [status, more, title] of cases) {
+  for (const [status, more, title] of states) {
     const words = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);
     assert.equal(words.title, title);
     assert.ok(words.detail.endsWith(said), words.detail);
