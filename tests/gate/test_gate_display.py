@@ -328,6 +328,10 @@ class TestLife:
         assert gate.told[-1] == messages.Reset("r1", "s1")
         assert list(client._unheard) == [(None, "r1")]
 
+    def test_the_nodes_of_other_programs_are_told(self, client, gate):
+        client.name_writers("r1", ("/teleop",))
+        assert gate.told[-1] == messages.WriterNodes("r1", ("/teleop",))
+
     def test_a_gate_that_says_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)
         eventually(lambda: gate.killed, "its end")

@@ -112,6 +112,21 @@ class TestTheOther:
         onlooker.run(0.2)
         assert onlooker.written == []
 
+    def test_shows_the_newer_stop_that_was_said_there(self, onlooker):
+        onlooker.say("a", op="stop", robot="r1")
+        onlooker.run(1.0)
+        onlooker.disk[KEY] = ANN
+        onlooker.tell(LatchSeen(KEY, ANN))
+        assert onlooker.report().stop.by == "Ann"
+        assert onlooker.stop_of() == ANN.id
+
+    def test_trusts_no_look_for_a_file_that_it_is_writing(self, onlooker):
+        onlooker.slow_disk = True
+        onlooker.say("a", op="stop", robot="r1")
+        onlooker.tell(LatchSeen(KEY, None))
+        onlooker.keep(onlooker.did(actions.KeepLatch)[-1])
+        assert onlooker.report().latched
+
     def test_has_a_stop_of_its_own_stand_when_it_gets_the_machine(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
         onlooker.tell(LockState(KEY, held=True, latched=onlooker.disk[KEY]))
