@@ -177,3 +177,19 @@ def test_a_bag_that_exists_is_left_as_it_is(ros1, tmp_path):
 def test_a_wrong_argument_of_record_is_one_sentence(arguments, words, tmp_path):
     assert_refused(run(*arguments, "--out", tmp_path / "bag"), words)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_pictures_that_came_in_cbor_are_recorded_whole(tmp_path, dialect):
+    topic = "/robot_0/camera/image_raw/compressed"
+    bag = tmp_path / ("camera.bag" if dialect == "ros1" else "camera")
+    with simulator("--robots", "1", "--dialect", dialect) as url:
+        done = run(url, "--topic", topic, "--out", bag, "--duration", "2")
+    assert done.returncode == 0, done.stderr
+    with AnyReader([bag]) as reader:
+        pictures = [
+            reader.deserialize(raw, connection.msgtype)
+            for connection, _, raw in reader.messages()
+        ]
+    assert pictures
+    assert bytes(pictures[0].data).startswith(b"\xff\xd8\xff"), "a JPEG"

@@ -18,9 +18,30 @@ def test_a_subscription_always_has_an_identifier():
         "id": "WebMap-1",
         "topic": "/scan",
         "type": "sensor_msgs/LaserScan",
-        "throttle_rate": 0,
-        "queue_length": 1,
+        "throttle_rate": 1,
+        "queue_length": ops.BURST,
     }
+
+
+@pytest.mark.parametrize("compression", [None, "none", "png", "cbor", "cbor-raw"])
+@pytest.mark.parametrize("queue_length", [0, 1, 100])
+@pytest.mark.parametrize("throttle", [0, 1, 250])
+def test_no_subscription_can_hang_a_bridge_or_drops_a_burst(
+    throttle, queue_length, compression
+):
+    frame = said(
+        ops.subscribe(
+            "/a",
+            id="x",
+            throttle_rate=throttle,
+            queue_length=queue_length,
+            compression=compression,
+        )
+    )
+    assert frame["throttle_rate"] == max(throttle, 1)
+    assert frame["queue_length"] >= max(queue_length, 1)
+    if throttle == 0 and compression in (None, "none"):
+        assert frame["queue_length"] >= 10
 
 
 def test_unsubscribing_names_the_subscription():

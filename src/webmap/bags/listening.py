@@ -12,7 +12,7 @@ from webmap.bags.replay import STATUS
 from webmap.errors import BridgeError, ConfigError
 from webmap.ros.bridge import Bridge
 from webmap.ros.events import Publish
-from webmap.ros.names import normalise_topic
+from webmap.ros.names import is_type, normalise_topic
 
 LOOK = 2.0
 """Seconds between two looks which topics there are."""
@@ -22,6 +22,9 @@ SHOW = 1.0
 
 OPEN_WITHIN = 5.0
 """Seconds after which it is said that the link is not open yet."""
+
+PICTURES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
+"""Types that are asked for in CBOR: encoding them as JSON takes a bridge too long."""
 
 QUEUE = 100
 """Messages of a topic that the bridge may hold back; each one counts."""
@@ -145,7 +148,11 @@ class Listening:
                 return False
             heard = partial(self._heard, name)
             subscription = self._bridge.subscribe(
-                name, heard, type_name, queue_length=QUEUE
+                name,
+                heard,
+                type_name,
+                queue_length=QUEUE,
+                compression="cbor" if is_type(type_name, *PICTURES) else None,
             )
             subscription.undecoded = True
         except ConfigError as error:

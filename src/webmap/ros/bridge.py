@@ -157,11 +157,15 @@ class Bridge:
                 with is cancelled when the subscription ends.
             type: Message type, in either dialect. Without it the bridge can only
                 serve a topic that exists when it is asked.
-            throttle: Least time between two messages, in milliseconds.
+            throttle: Least time between two messages, in milliseconds; 0 gives every
+                message. The bridge is never asked for less than 1 ms between two, and
+                then keeps the messages of a burst.
             decode: A type with the fields that are wanted; None for a plain dict.
             compression: ``none``, ``png``, ``cbor`` or ``cbor-raw``; None lets
-                scans, grids and clouds come in CBOR and the rest in JSON.
-            queue_length: Messages that the bridge may hold back.
+                what may be large (scans, grids, clouds, paths, arrays of poses,
+                markers) come in CBOR and the rest in JSON.
+            queue_length: Messages that the bridge may hold back; it is asked for
+                at least 1.
 
         Returns:
             What ends it. It ends with the current scope, too.

@@ -12,6 +12,15 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+LEAST_THROTTLE = 1
+"""The least ``throttle_rate`` that is ever sent, in milliseconds."""
+
+BURST = 10
+"""Messages of a burst that the bridge keeps for a subscription to every message.
+
+rosbridge for ROS 2 itself subscribes with a depth of 10: deeper bursts end there.
+"""
+
 _dumps = json.JSONEncoder(
     allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=None
 ).encode
@@ -74,25 +83,51 @@ def subscribe(
 ) -> bytes:
     """Ask for the messages of ``topic``.
 
+    The frame never carries a ``throttle_rate`` of 0 or a ``queue_length`` of 0:
+
+    - rosbridge 2.1.0 for ROS 2 keeps a queue and a thread for each subscription with a
+      ``queue_length`` above 0. When the client unsubscribes, closes or is cut off while
+      a message is queued, the thread sends that message again and again until less
+      than ``throttle_rate`` has passed since the last one. With 0 it never ends: the
+      bridge uses all its processor time and answers no handshake (rosbridge_suite,
+      issue 891). With 1 ms it ends after one message.
+    - A ``queue_length`` of 0 has no such thread, but with a ``throttle_rate`` of 1 it
+      drops each message that comes within 1 ms of the one before. A burst loses its
+      last messages: transforms of several publishers, latched ``tf_static``, feedback
+      of goals. For ROS 2 the bridge also encodes in its only thread, so a large message
+      delays velocity and STOP.
+
+    The thread also spins when encoding one message takes longer than ``throttle_rate``.
+    CBOR is encoded once and then kept, so it is safe. JSON is encoded for each sending:
+    ask for JSON of many megabytes with a ``throttle_rate`` above the time it takes.
+
+    A bridge serves several subscriptions of one link to a topic as one, with the lowest
+    ``throttle_rate`` and the lowest ``queue_length`` of them.
+
     Args:
         topic: The resolved name of the topic.
         id: What :func:`unsubscribe` names later. Without one a bridge ends every
             subscription of the link to the topic, so it is not optional here.
         type: The message type; ``None`` leaves it to the bridge, which then needs
             a publisher to be there already.
-        throttle_rate: Least time between two messages, in milliseconds.
-        queue_length: How many messages the bridge may hold back for us.
+        throttle_rate: Least time between two messages, in milliseconds. 0 asks for
+            every message: it is sent as 1, and in JSON with a queue of at least
+            :data:`BURST` messages.
+        queue_length: How many messages the bridge may hold back for us, at least 1.
         compression: ``"none"``, ``"png"``, ``"cbor"`` or ``"cbor-raw"``.
         fragment_size: Largest frame to be sent in one piece, in bytes.
 
     """
+    is_binary = compression in ("cbor", "cbor-raw")
+    # Binary messages may be large: a deeper queue would only make them late.
+    least_queue = BURST if throttle_rate == 0 and not is_binary else 1
     return _frame(
         op="subscribe",
         id=id,
         topic=topic,
         type=type,
-        throttle_rate=throttle_rate,
-        queue_length=queue_length,
+        throttle_rate=max(throttle_rate, LEAST_THROTTLE),
+        queue_length=max(queue_length, least_queue),
         compression=compression,
         fragment_size=fragment_size,
     )

@@ -16,7 +16,21 @@ from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.throttle import Throttle
 from webmap.scope import Scope, current_scope
 
-_BULK = ("sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
+_BULK = (
+    "sensor_msgs/LaserScan",
+    "nav_msgs/OccupancyGrid",
+    "sensor_msgs/PointCloud2",
+    "nav_msgs/GridCells",
+    "nav_msgs/Path",
+    "geometry_msgs/PoseArray",
+    "visualization_msgs/Marker",
+    "visualization_msgs/MarkerArray",
+)
+"""Types that come in CBOR unless a listener asks for something else.
+
+A bridge encodes CBOR faster, and only once. JSON that it encodes for longer than the
+throttle can hang it when a client leaves: see :func:`webmap.ros.ops.subscribe`. No type with an array of fixed length is here, since bridges cannot send that as CBOR.
+"""
 _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
 

@@ -49,12 +49,27 @@ class Publication:
         return self._forms[compression]
 
 
-class Encoder:
-    """Makes frames in one dialect, with one server's quirks."""
+MAX_MESSAGE_SIZE = 10_000_000
+"""What ``max_message_size`` of rosbridge_websocket is unless somebody sets it."""
 
-    def __init__(self, schema: Schema, quirks: Quirks) -> None:
+
+class Encoder:
+    """Makes frames in one dialect, with one server's quirks.
+
+    Args:
+        schema: The types.
+        quirks: Of the server.
+        max_message_size: Bytes above which a server with the quirk ``no_large_cbor``
+            sends JSON in parts and CBOR never.
+
+    """
+
+    def __init__(
+        self, schema: Schema, quirks: Quirks, max_message_size: int = MAX_MESSAGE_SIZE
+    ) -> None:
         self.schema = schema
         self.quirks = quirks
+        self.max_message_size = max_message_size
 
     def json(self, operation: dict[str, Any]) -> str:
         """Return an operation as JSON; NaN and infinity become ``null``."""

@@ -30,6 +30,9 @@ class Client(Protocol):
     def now(self) -> float:
         """Return monotonic seconds."""
 
+    def spin(self) -> None:
+        """Let the whole server hang for good."""
+
     def block(self) -> Callable[[], None]:
         """Hold the client's next operations back until the result is called."""
 

@@ -48,6 +48,8 @@ class Session:
         self._blocked_by: object | None = None
         self._running = False
         self._closed = False
+        self.spinning = False
+        """Whether the server does nothing else any more because of this client."""
         self._topics = Topics(self)
         self._services = Services(self)
         self._handlers: Handlers = {
@@ -119,6 +121,10 @@ class Session:
     def now(self) -> float:
         """Return monotonic seconds."""
         return self._clock()
+
+    def spin(self) -> None:
+        """Let the whole server hang for good."""
+        self.spinning = True
 
     def block(self) -> Callable[[], None]:
         """Hold the client's next operations back until the result is called."""

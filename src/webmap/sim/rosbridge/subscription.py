@@ -27,6 +27,7 @@ class Subscription:
         self._waiting: deque[Publication] = deque()
         self._sent_at = float("-inf")
         self.merged = Request()
+        self._got_any = False
 
     def ask(self, identifier: str | None, request: Request) -> bool:
         """Add a request; return whether its id is new."""
@@ -60,6 +61,7 @@ class Subscription:
 
     def offer(self, publication: Publication, now: float) -> None:
         """Send a message on, keep it until its time comes, or drop it."""
+        self._got_any = True
         depth = self.merged.queue_length
         if now >= self.due and not self._waiting:
             self._pass_on(publication, now)
@@ -67,6 +69,13 @@ class Subscription:
             self._waiting.append(publication)
             while len(self._waiting) > depth:
                 self._waiting.popleft()
+
+    @property
+    def spins(self) -> bool:
+        """Whether a rosbridge 2.1.0 may hang when this subscription ends."""
+        return (
+            self._got_any and self.merged.throttle == 0 and self.merged.queue_length > 0
+        )
 
     @property
     def due(self) -> float:

@@ -1,5 +1,6 @@
 """What a client does with topics: advertise, publish, subscribe."""
 
+import logging
 from functools import partial
 
 from webmap.sim.rosbridge.dialect import resolve
@@ -14,6 +15,8 @@ from webmap.sim.rosbridge.operation import (
 )
 from webmap.sim.rosbridge.outbox import DEFAULT_DEPTH
 from webmap.sim.rosbridge.subscription import Request, Subscription
+
+log = logging.getLogger(__name__)
 
 _COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
@@ -54,20 +57,38 @@ class Topics:
             return []
         request, encoder = subscription.merged, self._client.encoder
         size = request.fragment_size
+        if size is None and encoder.quirks.no_large_cbor:
+            size = encoder.max_message_size
         is_binary = request.compression in ("cbor", "cbor-raw")
-        if is_binary and size and encoder.quirks.no_cbor_fragments:
+        if is_binary and request.fragment_size and encoder.quirks.no_cbor_fragments:
             return []
         frame = publication.form(request.compression, encoder)
         if frame is None:
             return []
-        if size is None or isinstance(frame, bytes):
+        if isinstance(frame, bytes):
+            return self._whole(frame, publication.topic)
+        if size is None:
             return [frame]
         return list(encoder.fragments(frame, size))
 
+    def _whole(self, frame: bytes, topic: str) -> list[str | bytes]:
+        encoder = self._client.encoder
+        if encoder.quirks.no_large_cbor and len(frame) > encoder.max_message_size:
+            log.error(
+                "%s: CBOR of %d bytes is above max_message_size (%d) and is not sent, "
+                "as rosbridge 2.1.0 does (quirk no_large_cbor)",
+                topic,
+                len(frame),
+                encoder.max_message_size,
+            )
+            return []
+        return [frame]
+
     def close(self) -> None:
         """Take the publishers and subscriptions out of the graph."""
-        for topic in self._subscriptions:
+        for topic, subscription in self._subscriptions.items():
             self._graph.unsubscribe(self, topic)
+            self._spin_if_queued(topic, subscription)
         for topic in self._advertised:
             self._graph.unadvertise(self, topic)
         self._subscriptions.clear()
@@ -126,9 +147,19 @@ class Topics:
         if subscription is None:
             raise GraphError(f"{topic} is not subscribed")
         if subscription.drop(operation.get("id")):
+            self._spin_if_queued(topic, subscription)
             del self._subscriptions[topic]
             self._client.outbox.forget(topic)
             self._graph.unsubscribe(self, topic)
+
+    def _spin_if_queued(self, topic: str, subscription: Subscription) -> None:
+        if self._client.encoder.quirks.spinning_queue and subscription.spins:
+            log.error(
+                "%s: a client with throttle_rate 0 and a queue left: this bridge hangs "
+                "from now on, as rosbridge 2.1.0 does (quirk spinning_queue)",
+                topic,
+            )
+            self._client.spin()
 
     def _deliver(self, subscription: Subscription, publication: Publication) -> None:
         subscription.offer(publication, self._client.now())

@@ -1,0 +1,91 @@
+"""Commands leave a bridge that hangs when a client leaves a queue of messages."""
+
+import contextlib
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+from websockets.sync.client import connect
+
+from webmap_process import simulator
+
+COMMANDS = {
+    "record": ("--duration", "1.5"),
+    "doctor": ("--seconds", "1"),
+    "discover": (),
+    "view": ("--port", "0", "--no-browser"),
+}
+
+
+@pytest.fixture(scope="module")
+def bridge():
+    with simulator("--dialect", "ros2", "--robots", "1") as url:
+        yield url
+
+
+@contextlib.contextmanager
+def running(name, url, folder):
+    out = ("--out", folder / "bag") if name == "record" else ()
+    options = [*map(str, COMMANDS[name]), *map(str, out)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "webmap", name, url, *options],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        cwd=folder,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def wait_for_messages(process, url):
+    """Wait until a command has had a socket to the bridge for a moment."""
+    port = int(url.rpartition(":")[2])
+    whole = psutil.Process(process.pid)
+
+    def is_linked():
+        for each in [whole, *whole.children(recursive=True)]:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                for link in each.net_connections("tcp"):
+                    if link.raddr and link.raddr.port == port:
+                        return True
+        return False
+
+    deadline = time.monotonic() + 30
+    while not is_linked():
+        assert time.monotonic() < deadline
+        assert process.poll() is None, process.stderr.read().decode()
+        time.sleep(0.02)
+    time.sleep(0.5)
+
+
+def lets_in(url):
+    with contextlib.suppress(TimeoutError), connect(url, proxy=None, open_timeout=5):
+        return True
+    return False
+
+
+@pytest.mark.parametrize("name", ["record", "doctor", "discover"])
+def test_a_command_is_left_and_the_bridge_still_answers(bridge, name, tmp_path):
+    with running(name, bridge, tmp_path) as process:
+        _, said = process.communicate(timeout=60)
+    assert b"Traceback" not in said
+    assert process.returncode in (0, 1)
+    assert lets_in(bridge)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_command_is_ended_and_the_bridge_still_answers(
+    bridge, name, number, tmp_path
+):
+    with running(name, bridge, tmp_path) as process:
+        wait_for_messages(process, bridge)
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    assert lets_in(bridge)

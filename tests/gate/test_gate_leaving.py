@@ -1,0 +1,99 @@
+"""The gate leaves a bridge that hangs when a client leaves a queue of messages."""
+
+import asyncio
+
+import pytest
+from gate_harness import spec
+from link_bench import in_loop
+
+from hanging_bridge import hanging_bridge, until
+from webmap.gate.actions import SendGoal
+from webmap.gate.events import Echoed, Key, LinkUp
+from webmap.gate.lanes.calls import Calls
+from webmap.gate.lanes.control import ControlLane
+from webmap.gate.lanes.tasks import TasksLane
+from webmap.gate.lanes.witness import WitnessLane
+
+KEY = Key("ws://x", "/cmd_vel")
+MOVE_BASE = spec(
+    action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None
+)
+TYPES = {
+    "/cmd_vel": "geometry_msgs/Twist",
+    "/odom": "nav_msgs/Odometry",
+    "/scan": "sensor_msgs/LaserScan",
+    "/move_base/status": "actionlib_msgs/GoalStatusArray",
+    "/move_base/feedback": "move_base_msgs/MoveBaseActionFeedback",
+    "/move_base/result": "move_base_msgs/MoveBaseActionResult",
+}
+
+
+async def of(events, type):
+    await until(lambda: any(isinstance(event, type) for event in events))
+
+
+async def control(url, events):
+    lane = ControlLane(url, events.append)
+    lane.attach("/cmd_vel", "geometry_msgs/Twist")
+    lane.listen("/cmd_vel")
+    await of(events, Echoed)
+    return lane, lambda: lane.ignore("/cmd_vel")
+
+
+async def witness(url, events):
+    lane = WitnessLane(url, events.append)
+    lane.watch("/odom", "nav_msgs/Odometry", KEY)
+    lane.watch_scan("/scan", KEY)
+    await of(events, LinkUp)
+    await asyncio.sleep(0.2)
+
+    def unwatch():
+        lane.unwatch("/odom", KEY)
+        lane.unwatch_scan("/scan", KEY)
+
+    return lane, unwatch
+
+
+async def tasks(url, events):
+    lane = TasksLane(url, events.append, Calls(url))
+    lane.lane.hold("robots")
+    lane.attach([("/move_base/goal", "move_base_msgs/MoveBaseActionGoal")])
+    await of(events, LinkUp)
+    goal = SendGoal(KEY, MOVE_BASE.id, "g1", 1.0, 2.0, 0.0, "a", "move_base")
+    assert lane.send(MOVE_BASE, goal)
+    await asyncio.sleep(0.2)
+    return lane, lambda: lane.forget(MOVE_BASE.id)
+
+
+async def by_a_reset_of_ours(bridge, lane, unsubscribe):
+    lane.lane.cut("a test")
+
+
+async def by_a_reset_of_the_network(bridge, lane, unsubscribe):
+    bridge.reset_all()
+
+
+async def by_closing(bridge, lane, unsubscribe):
+    lane.lane.close()
+
+
+async def by_unsubscribing(bridge, lane, unsubscribe):
+    unsubscribe()
+
+
+@pytest.mark.parametrize("lane_of", [control, witness, tasks])
+@pytest.mark.parametrize(
+    "leave",
+    [by_a_reset_of_ours, by_a_reset_of_the_network, by_closing, by_unsubscribing],
+)
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+@in_loop
+async def test_each_lane_is_left_and_the_bridge_still_answers(lane_of, leave, dialect):
+    async with hanging_bridge(dialect, TYPES) as bridge:
+        lane, unsubscribe = await lane_of(bridge.url, [])
+        try:
+            await leave(bridge, lane, unsubscribe)
+            await asyncio.sleep(0.1)  # the bridge sees it
+            assert await bridge.lets_in()
+        finally:
+            lane.lane.close()

@@ -1,0 +1,82 @@
+"""A simulated bridge that hangs for good when a client leaves a queue of messages."""
+
+import asyncio
+import contextlib
+
+from websockets.asyncio.client import connect
+
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import parse_quirks
+from webmap.sim.rosbridge.rosapi import Rosapi
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+
+class HangingBridge:
+    """Each topic brings a message every 10 ms, so one is always under way."""
+
+    def __init__(self, dialect, types):
+        quirks = parse_quirks("real,spinning_queue", dialect)
+        schema = Schema(Dialect(dialect))
+        self.graph = Graph(schema)
+        Rosapi(self.graph, quirks).start()
+        self.types = types
+        self.server = RosbridgeServer(self.graph, Encoder(schema, quirks))
+        self.url = ""
+
+    async def publish(self):
+        for topic, type in self.types.items():
+            self.graph.advertise(self, topic, type)
+        while True:
+            for topic, type in self.types.items():
+                self.graph.publish(
+                    self, topic, self.graph.conform(type, {}, finite=True)
+                )
+            await asyncio.sleep(0.01)
+
+    @property
+    def clients(self):
+        return len(self.server.sessions)
+
+    def reset_all(self):
+        """End every socket as a network does: neither end says a word."""
+        for connection in list(self.server._server.connections):
+            connection.transport.abort()
+
+    async def lets_in(self):
+        """Return whether a new client gets in."""
+        try:
+            async with connect(self.url, open_timeout=3, proxy=None):
+                return True
+        except TimeoutError:
+            return False
+
+
+@contextlib.asynccontextmanager
+async def hanging_bridge(dialect, types):
+    """Run such a bridge in this loop.
+
+    Args:
+        dialect: ``ros1`` or ``ros2``.
+        types: The type of each topic.
+
+    """
+    bridge = HangingBridge(dialect, types)
+    bridge.url = await bridge.server.start("127.0.0.1", 0)
+    publishing = asyncio.create_task(bridge.publish())
+    try:
+        yield bridge
+    finally:
+        publishing.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await publishing
+        await bridge.server.stop()
+
+
+async def until(condition):
+    """Wait for a condition; fail after a while."""
+    async with asyncio.timeout(20):
+        while not condition():
+            await asyncio.sleep(0.005)

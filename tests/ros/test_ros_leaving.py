@@ -1,0 +1,100 @@
+"""The display leaves a bridge that hangs when a client leaves a queue of messages."""
+
+import asyncio
+
+import pytest
+from fake_rosbridge import bridged
+
+from hanging_bridge import hanging_bridge, until
+from webmap.ros.bridge import Bridge
+
+TYPES = {
+    "/text": "std_msgs/String",
+    "/tf": "tf2_msgs/TFMessage",
+    "/map": "nav_msgs/OccupancyGrid",
+}
+
+
+async def by_stopping(server, bridge, listeners):
+    await bridge.stop()
+    await until(lambda: not server.clients)
+
+
+async def by_a_reset(server, bridge, listeners):
+    links = bridge.stats.links
+    server.reset_all()
+    await until(lambda: bridge.stats.links > links or server.server.hangs)
+
+
+async def by_unsubscribing(server, bridge, listeners):
+    for listener in listeners:
+        listener.remove()
+    # The bridge answers it after what came before, if it answers at all.
+    await asyncio.sleep(0.1)
+
+
+async def by_asking_for_less(server, bridge, listeners):
+    for topic, type in TYPES.items():
+        bridge.subscribe(topic, print, type, throttle=500)
+    await by_unsubscribing(server, bridge, listeners)
+
+
+@pytest.mark.parametrize(
+    "leave", [by_stopping, by_a_reset, by_unsubscribing, by_asking_for_less]
+)
+def test_the_data_lane_is_left_and_the_bridge_still_answers(leave):
+    async def scenario():
+        async with hanging_bridge("ros2", TYPES) as server:
+            bridge, heard = Bridge(server.url), set()
+            listeners = [
+                bridge.subscribe(topic, lambda _, topic=topic: heard.add(topic), type)
+                for topic, type in TYPES.items()
+            ]
+            bridge.start(asyncio.get_running_loop())
+            try:
+                await until(lambda: heard == TYPES.keys())
+                await leave(server, bridge, listeners)
+                assert await server.lets_in()
+            finally:
+                await bridge.stop()
+
+    asyncio.run(scenario())
+
+
+def test_the_calls_lane_is_left_and_the_bridge_still_answers():
+    async def scenario():
+        async with hanging_bridge("ros2", TYPES) as server:
+            bridge = Bridge(server.url)
+            bridge.start(asyncio.get_running_loop())
+            try:
+                await until(lambda: bridge.state == "open")
+                await bridge.call_service("/rosapi/get_time")
+                server.reset_all()
+                await until(lambda: bridge.stats.links == 2)
+                await bridge.call_service("/rosapi/get_time")
+                assert await server.lets_in()
+            finally:
+                await bridge.stop()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("type", "compression"),
+    [
+        ("nav_msgs/Path", "cbor"),
+        ("geometry_msgs/msg/PoseArray", "cbor"),
+        ("visualization_msgs/MarkerArray", "cbor"),
+        ("sensor_msgs/PointCloud2", "cbor"),
+        ("nav_msgs/Odometry", None),  # has an array that no bridge sends in CBOR
+        ("std_msgs/String", None),
+    ],
+)
+def test_what_takes_long_to_encode_is_asked_for_in_cbor(type, compression):
+    async def scenario():
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/a", print, type)
+            (asked,) = await server.heard("subscribe")
+            assert asked.get("compression") == compression
+
+    asyncio.run(scenario())

@@ -1,0 +1,123 @@
+"""Faults of rosbridge 2.1.0 that the simulator plays: the endless queue, large CBOR."""
+
+import asyncio
+import contextlib
+import json
+
+import cbor2
+import pytest
+from simulated import Bench, room
+from websockets.asyncio.client import connect
+
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import parse_quirks
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+TYPE = "std_msgs/String"
+TOPIC = "/latched"
+
+
+@contextlib.asynccontextmanager
+async def serving(quirks):
+    schema, behaviour = Schema(Dialect("ros2")), parse_quirks(quirks, "ros2")
+    graph = Graph(schema)
+    node = object()
+    graph.advertise(node, TOPIC, TYPE, latch=True)
+    graph.publish(node, TOPIC, {"data": "x"})
+    server = RosbridgeServer(graph, Encoder(schema, behaviour))
+    url = await server.start("127.0.0.1", 0)
+    try:
+        yield url, server
+    finally:
+        await server.stop()
+
+
+async def answers(url):
+    """Whether a new client gets in."""
+    try:
+        async with connect(url, open_timeout=0.5, proxy=None):
+            return True
+    except TimeoutError:
+        return False
+
+
+async def leave_by_reset(client):
+    client.transport.abort()
+
+
+async def leave_by_closing(client):
+    await client.close()
+
+
+async def leave_by_unsubscribing(client):
+    await client.send(json.dumps({"op": "unsubscribe", "id": "a", "topic": TOPIC}))
+
+
+@pytest.mark.parametrize(
+    "leave", [leave_by_reset, leave_by_closing, leave_by_unsubscribing]
+)
+@pytest.mark.parametrize(
+    ("quirks", "throttle", "queue", "hangs"),
+    [
+        ("real", 0, 1, True),
+        ("real", 1, 1, False),
+        ("real", 0, 0, False),
+        ("real,-spinning_queue", 0, 1, False),
+    ],
+)
+def test_a_bridge_hangs_when_a_client_leaves_a_queue_without_throttle(
+    quirks, throttle, queue, hangs, leave
+):
+    async def scenario():
+        async with serving(quirks) as (url, server):
+            other = await connect(url, proxy=None)
+            client = await connect(url, proxy=None)
+            request = {"op": "subscribe", "id": "a", "topic": TOPIC}
+            asked = {"throttle_rate": throttle, "queue_length": queue}
+            await client.send(json.dumps(request | asked))
+            assert json.loads(await client.recv())["msg"] == {"data": "x"}
+            await leave(client)
+            async with asyncio.timeout(5):
+                while leave is not leave_by_unsubscribing and len(server.sessions) > 1:
+                    await asyncio.sleep(0.01)
+            assert await answers(url) is not hangs
+            # Neither does anybody get an answer who was connected before.
+            await other.send(json.dumps(request))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(0.5 if hangs else 5):
+                    await other.recv()
+                    assert not hangs
+                    return
+            assert hangs
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("compression", ["cbor", "cbor-raw"])
+def test_cbor_above_the_limit_is_logged_and_never_sent(compression, caplog):
+    bench = Bench("ros2", "real", plan=room())
+    small = bench.client()
+    small.send(op="subscribe", topic="/map", compression=compression)
+    (frame,) = small.session.next_frames()
+    assert cbor2.loads(frame)["topic"] == "/map"
+    bench.encoder.max_message_size = 1000
+    client = bench.client()
+    client.send(op="subscribe", topic="/map", compression=compression)
+    assert client.session.next_frames() == []
+    assert "above max_message_size (1000)" in caplog.text
+
+
+def test_json_above_the_limit_comes_in_parts_that_nobody_asked_for():
+    bench = Bench("ros2", "real", plan=room())
+    bench.encoder.max_message_size = 10_000
+    client = bench.client()
+    client.send(op="subscribe", topic="/map")
+    parts = [json.loads(frame) for frame in client.session.next_frames()]
+    assert len(parts) > 1
+    assert {part["op"] for part in parts} == {"fragment"}
+    whole = json.loads("".join(part["data"] for part in parts))
+    info = whole["msg"]["info"]
+    assert len(whole["msg"]["data"]) == info["width"] * info["height"] > 10_000
