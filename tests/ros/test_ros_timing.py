@@ -1,3 +1,5 @@
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -69,11 +71,11 @@ class TestLag:
         assert liveness.lag(2.6) == pytest.approx(0.01)
 
 
-def look(liveness, start, end):
+def look(liveness, start, end, heard=lambda _now: -math.inf):
     """Look four times a second; return when the link was found dead."""
     now = start
     while now <= end:
-        if liveness.is_dead(now):
+        if liveness.is_dead(now, heard(now)):
             return now
         now += 0.25
     return None
@@ -83,6 +85,26 @@ def test_a_link_is_dead_three_seconds_after_an_unanswered_ping():
     liveness = Liveness(0.0)
     liveness.pinged(0.0)
     assert look(liveness, 0.0, 10.0) == pytest.approx(3.25)
+
+
+def test_a_link_on_which_a_large_message_comes_is_not_dead():
+    liveness = Liveness(0.0)
+    liveness.pinged(0.0)
+    assert look(liveness, 0.0, 20.0, lambda now: now - 1.0) is None
+    liveness = Liveness(0.0)
+    liveness.pinged(0.0)
+    assert look(liveness, 0.0, 30.0, lambda now: min(now, 10.0)) == pytest.approx(13.25)
+    liveness = Liveness(0.0)
+    liveness.pinged(0.0)
+    assert look(liveness, 0.0, 99.0, lambda now: now) == pytest.approx(60.25)
+
+
+def test_a_bridge_that_is_known_to_be_busy_is_given_time():
+    liveness = Liveness(0.0)
+    liveness.pinged(0.0)
+    looks = [n / 4 for n in range(1, 400)]
+    dead = [now for now in looks if liveness.is_dead(now, busy=True)]
+    assert dead[0] == pytest.approx(60.25)
 
 
 def test_an_answered_ping_keeps_the_link_alive():

@@ -312,6 +312,7 @@ class Bridge:
             received=self._received,
             closed=self._link_lost,
             failed=self._trouble.not_opened,
+            busy=lambda: any(t.awaits_large for t in self._topics.values()),
         )
         self._lane.start(loop)
 
@@ -345,6 +346,7 @@ class Bridge:
             name,
             send=self._send,
             complain=self._doubts.message_failed,
+            too_large=self._doubts.too_large,
             emptied=self._topic_emptied,
         )
 

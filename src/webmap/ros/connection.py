@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from webmap.errors import BridgeClosed
@@ -40,6 +41,7 @@ class Lane:
         closed: Called with the reason when an open link has ended.
         failed: Called with the error when the link could not be opened.
         again: Whether to open it again whenever it ends or fails.
+        busy: Whether the bridge may be busy with something large that was asked for.
 
     """
 
@@ -52,6 +54,7 @@ class Lane:
         closed: Callable[[str], None],
         failed: Callable[[BridgeClosed], None],
         again: bool = True,
+        busy: Callable[[], bool] = lambda: False,
     ) -> None:
         self.url = url
         self.state: State = "new"
@@ -63,6 +66,7 @@ class Lane:
         self._closed = closed
         self._failed = failed
         self._again = again
+        self._busy = busy
         self._task: asyncio.Task[None] | None = None
         self._unsent: deque[bytes] = deque()
         self._unsent_size = 0
@@ -192,7 +196,9 @@ class Lane:
         self._liveness = liveness = Liveness(time.monotonic())
         pinging: set[asyncio.Task[None]] = set()
         try:
-            while not liveness.is_dead(time.monotonic()):
+            while not liveness.is_dead(
+                time.monotonic(), _bytes_came(socket), busy=self._busy()
+            ):
                 if liveness.wants_ping(time.monotonic()):
                     liveness.pinged(time.monotonic())
                     pinging = {asyncio.create_task(self._ping(socket, liveness))}
@@ -215,7 +221,16 @@ class Lane:
 
 
 async def _connect(url: str) -> "ClientConnection":
-    from websockets.asyncio.client import connect
+    from websockets.asyncio.client import ClientConnection, connect
+
+    class Timed(ClientConnection):
+        """A connection that knows when its last bytes came."""
+
+        bytes_came = -inf
+
+        def data_received(self, data: bytes) -> None:
+            self.bytes_came = time.monotonic()
+            super().data_received(data)
 
     class ConnectHere(connect):
         """Connect to the address that was given and to no other."""
@@ -225,6 +240,7 @@ async def _connect(url: str) -> "ClientConnection":
 
     return await ConnectHere(
         url,
+        create_connection=Timed,
         compression=None,
         max_size=MAX_FRAME,
         open_timeout=CONNECT_TIMEOUT,
@@ -233,6 +249,11 @@ async def _connect(url: str) -> "ClientConnection":
         proxy=None,
         user_agent_header=None,
     )
+
+
+def _bytes_came(socket: "ClientConnection") -> float:
+    """Return when the last bytes came over a socket of :func:`_connect`."""
+    return float(getattr(socket, "bytes_came", -inf))
 
 
 async def _say_farewell(socket: "ClientConnection") -> None:

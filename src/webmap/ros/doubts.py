@@ -9,10 +9,12 @@ import logging
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from webmap.errors import ProtocolError
+from webmap.errors import BridgeError, ProtocolError
+from webmap.ros import large
 from webmap.ros.decoding import Unreadable
 from webmap.ros.graph import Graph
 from webmap.ros.names import is_type, same_type
+from webmap.ros.renewal import IN_CBOR
 from webmap.ros.subscriptions import Topic
 from webmap.scope import no_scope
 
@@ -48,6 +50,35 @@ class Doubts:
             self._told(topic, ProtocolError(f"{topic.name}: {words}: {error}"), error)
             return
         self._ask(self._explain(topic, expected, error))
+
+    def too_large(self, topic: Topic, size: int | None) -> None:
+        """Report a topic whose messages are too large for the bridge's CBOR.
+
+        Args:
+            topic: The topic.
+            size: Bytes of a message in JSON; None if links ended before one came.
+
+        """
+        got = (
+            f"{topic.name}: the bridge sent nothing in CBOR for {IN_CBOR:g} s, though "
+            f"the topic is published. "
+        )
+        if size is None:
+            got += "It was asked for JSON, and the link ended before a message came. "
+            enough = "to more bytes than a message has"
+        else:
+            got += (
+                f"In JSON a message came, in parts ({size} bytes in all): it is larger "
+                f"than max_message_size of the bridge, above which no CBOR is sent. It "
+                f"is asked for in JSON, once in {large.THROTTLE // 60_000} minutes. "
+            )
+            enough = f"to {size} or more"
+        fault = BridgeError(
+            f"{got}Set the parameter max_message_size of rosbridge_websocket {enough}"
+        )
+        log.warning("%s: %s", self._name, fault)
+        self._report(fault)
+        topic.over(fault)
 
     def watch(self, topic: Topic) -> None:
         """Report a topic that stays silent because its type was stated wrongly."""

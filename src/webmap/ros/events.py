@@ -18,12 +18,14 @@ from webmap.ros.decoding import check_depth, convert, decode_json
 class Publish:
     """A message on a topic (rosbridge protocol, 3.3.3)."""
 
-    __slots__ = ("_decoded", "_map", "frame", "topic")
+    __slots__ = ("_decoded", "_map", "frame", "in_parts", "topic")
 
     def __init__(self, topic: str, frame: bytes) -> None:
         self.topic = topic
         self.frame = frame
         """The whole operation as it came, JSON or CBOR."""
+        self.in_parts = False
+        """Whether the bridge sent it in fragments."""
         self._decoded: dict[Any, Any] = {}
         self._map: dict[str, Any] | None = None
 

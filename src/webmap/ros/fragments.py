@@ -74,7 +74,7 @@ class Fragments:
     """Most messages that wait for their rest at a time."""
 
     def __init__(
-        self, *, max_count: int = 64, max_bytes: int = 32 << 20, max_age: float = 10.0
+        self, *, max_count: int = 64, max_bytes: int = 64 << 20, max_age: float = 60.0
     ) -> None:
         self.max_count = max_count
         self.max_bytes = max_bytes

@@ -1,5 +1,7 @@
 """Whether a link still lives, told by the answers to its pings."""
 
+from math import inf
+
 
 class Liveness:
     """Decide from the times of pings and pongs; all times in monotonic seconds.
@@ -13,6 +15,9 @@ class Liveness:
 
     PERIOD = 0.5
     """Time from one answer to the next ping, in seconds."""
+
+    LONGEST = 60.0
+    """Longest wait for the answer while something large is on its way, in seconds."""
 
     SLOW = 0.25
     """Round trip, in seconds, from which on the next ping follows at once."""
@@ -53,12 +58,22 @@ class Liveness:
         waiting = 0.0 if self._pinged is None else now - self._pinged
         return max(self._took, waiting)
 
-    def is_dead(self, now: float) -> bool:
+    def is_dead(self, now: float, heard: float = -inf, *, busy: bool = False) -> bool:
         """Return whether the last ping went unanswered for too long.
 
         A look that comes late judges nothing: where this process stood still, the
-        answer may lie unread.
+        answer may lie unread. The answer comes after all that was sent before it, so a
+        large map on a slow link may hold it up for as long as its bytes come.
+
+        Args:
+            now: The time of the look.
+            heard: When the last bytes came.
+            busy: Whether the bridge is known to encode something large.
+
         """
         late = now - self._looked > self.LATE
         self._looked = now
-        return not late and self._pinged is not None and now - self._pinged > self.LIMIT
+        if late or self._pinged is None or now - self._pinged <= self.LIMIT:
+            return False
+        silent = now - heard > self.LIMIT and not busy
+        return silent or now - self._pinged > self.LONGEST

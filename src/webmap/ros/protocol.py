@@ -122,7 +122,10 @@ class Protocol:
         text = self._fragments.add(decode_json(frame, Fragment), now)
         if text is None:
             return None
-        return self._read(_encoded(text), now, nested=True)
+        event = self._read(_encoded(text), now, nested=True)
+        if isinstance(event, Publish):
+            event.in_parts = True
+        return event
 
     def _read_inner(self, frame: bytes, now: float) -> Event | None:
         if topic_in_head(frame) is None and decode_json(frame, _Op).op in (

@@ -3,6 +3,8 @@
 A bridge of ROS 2 chooses how it subscribes by those who publish a topic at that moment.
 A map that is published later and once, or a topic whose type was not stated, would
 never come; nor would either come by itself. So who is silent is looked after.
+A message above ``max_message_size`` does not come in CBOR at all: after some time it is
+asked for in JSON.
 """
 
 import asyncio
@@ -20,6 +22,9 @@ LONGEST = 8.0
 
 AGAIN = 30.0
 """Seconds after which a topic that is published and stays silent is asked for anew."""
+
+IN_CBOR = 10.0
+"""Seconds of silence after which a published topic is asked for in JSON, not CBOR."""
 
 UNANSWERED = 3
 """Questions in a row that go unanswered until no more are asked on a link.
@@ -44,10 +49,17 @@ class Silence:
         self._next = now + FIRST
         self._published: bool | None = None
         self._renewed = now
+        self._began = now
+        self._unsent_at: float | None = None
+        """When it will have been published and silent for :data:`IN_CBOR`."""
 
     def due(self, now: float) -> bool:
         """Return whether it is time to ask who publishes it."""
         return now >= self._next
+
+    def is_unsent(self, now: float) -> bool:
+        """Return whether it has been published and silent for :data:`IN_CBOR`."""
+        return self._unsent_at is not None and now >= self._unsent_at
 
     def heard(self, published: bool | None, now: float) -> bool:
         """Take in whether anybody publishes it; return whether to subscribe again.
@@ -61,6 +73,13 @@ class Silence:
         self._wait = min(2 * self._wait, LONGEST)
         self._next = now + self._wait
         came = published is True and before is not True
+        if published is not True:
+            self._unsent_at = None
+        elif self._unsent_at is None:
+            since = self._began if before is None else now
+            self._unsent_at = since + IN_CBOR
+        if self._unsent_at is not None and now < self._unsent_at < self._next:
+            self._next = self._unsent_at
         renew = published is not False and (came or now - self._renewed >= AGAIN)
         if renew:
             self._renewed = now
@@ -122,6 +141,11 @@ class Renewals:
         if self._unanswered < UNANSWERED:
             published = await self._published(topic.name)
             self._unanswered = self._unanswered + 1 if published is None else 0
-        renew = silence.heard(published, time.monotonic())
-        if renew and not topic.count and topic.listeners:
+        now = time.monotonic()
+        renew = silence.heard(published, now)
+        if topic.count or not topic.listeners:
+            return
+        if silence.is_unsent(now) and topic.ask_in_json():
+            return
+        if renew:
             topic.renew()

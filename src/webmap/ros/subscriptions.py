@@ -9,9 +9,10 @@ import msgspec
 
 from webmap.errors import BridgeError, ConfigError, ProtocolError
 from webmap.identifiers import generate_id
-from webmap.ros import ops
+from webmap.ros import large, ops
 from webmap.ros.callbacks import Callback
 from webmap.ros.events import Publish
+from webmap.ros.large import InJson
 from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.throttle import Throttle
 from webmap.scope import Scope, current_scope
@@ -29,7 +30,8 @@ _BULK = (
 """Types that come in CBOR unless a listener asks for something else.
 
 A bridge encodes CBOR faster, and only once. JSON that it encodes for longer than the
-throttle can hang it when a client leaves: see :func:`webmap.ros.ops.subscribe`. No type with an array of fixed length is here, since bridges cannot send that as CBOR.
+throttle can hang it when a client leaves: see :func:`webmap.ros.ops.subscribe`.
+No type with an array of fixed length is here, since bridges cannot send that as CBOR.
 """
 _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
@@ -151,6 +153,8 @@ class Topic:
         send: Sends a frame if the link is open, else does nothing.
         complain: Is told of a message that does not decode, once for each link and
             each kind of error.
+        too_large: Called when messages turn out to be too large for CBOR, with the
+            bytes of one in JSON; with None if links ended before one came.
         emptied: Called when the last listener has gone.
 
     """
@@ -161,6 +165,7 @@ class Topic:
         *,
         send: Callable[[bytes], None],
         complain: Callable[["Topic", str, ProtocolError], None],
+        too_large: Callable[["Topic", int | None], None],
         emptied: Callable[["Topic"], None],
     ) -> None:
         self.name = name
@@ -169,7 +174,10 @@ class Topic:
         """Messages since the link was opened."""
         self._send = send
         self._complain = complain
+        self._too_large = too_large
         self._emptied = emptied
+        self._in_json = InJson()
+        self._json_asked_at = 0.0
         self.failing: set[object] = set()
         """As what the newest messages could not be decoded."""
         self._fault: BridgeError | None = None
@@ -227,13 +235,35 @@ class Topic:
         each = [listener.wish for listener in self.listeners]
         chosen = next((w.compression for w in each if w.compression), None)
         bulk = type is not None and is_type(type, *_BULK)
-        return Wish(
+        wish = Wish(
             # The name as in ROS 1, which bridges of both kinds understand.
             str(split_type(type)) if type else None,
             min(w.throttle for w in each),
             max(w.queue_length for w in each),
             chosen or ("cbor" if bulk else None),
         )
+        if wish.compression == "cbor" and self._in_json.on:
+            throttle = max(wish.throttle, large.THROTTLE)
+            return wish._replace(throttle=throttle, compression="none")
+        return wish
+
+    def ask_in_json(self) -> bool:
+        """Ask for JSON because CBOR does not come; return whether that was done."""
+        if self._asked is None:
+            return False
+        answer = self._in_json.silent(self._asked.type, self._asked.compression)
+        if answer == "ask":
+            self._json_asked_at = time.monotonic()
+            self.renew()
+        elif answer == "given up":
+            self._too_large(self, None)
+        return answer == "ask"
+
+    @property
+    def awaits_large(self) -> bool:
+        """Whether the bridge may be busy with a large message for this topic."""
+        waited = time.monotonic() - self._json_asked_at
+        return self._in_json.awaited and waited < large.PATIENCE
 
     def update(self) -> None:
         """Ask the bridge anew if what is wanted has changed.
@@ -252,6 +282,7 @@ class Topic:
         """Ask the bridge on a new link, which knows nothing of the old one."""
         self.count = 0
         self._found.clear()
+        self._in_json.begin()
         self._mend()
         self._ask(self.wish())
 
@@ -287,6 +318,11 @@ class Topic:
         """Note a message that came."""
         self.count += 1
         self._latest = message
+        too_large = self._in_json.received(in_parts=message.in_parts)
+        if too_large:
+            self._too_large(self, len(message.frame))
+        elif too_large is False:
+            self.renew()
 
     @property
     def replay(self) -> Publish | None:

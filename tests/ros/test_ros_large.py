@@ -1,0 +1,225 @@
+"""Messages above ``max_message_size``, which a bridge of ROS 2 never sends in CBOR."""
+
+import asyncio
+import contextlib
+import json
+
+import pytest
+from fake_rosbridge import bridged, until
+
+from webmap.ros import renewal
+from webmap.ros.bridge import Bridge
+from webmap.ros.large import MOST_LOST, THROTTLE, InJson
+from webmap.ros.renewal import IN_CBOR, Silence
+from webmap.scope import Scope
+from webmap.sim.rosbridge.dialect import Dialect
+from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.graph import Graph
+from webmap.sim.rosbridge.quirks import parse_quirks
+from webmap.sim.rosbridge.rosapi import Rosapi
+from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.rosbridge.server import RosbridgeServer
+
+MAP = "nav_msgs/OccupancyGrid"
+LIMIT = 5000
+
+
+class TestDecision:
+    @pytest.mark.parametrize(
+        "type",
+        [
+            "nav_msgs/msg/OccupancyGrid",
+            "sensor_msgs/PointCloud2",
+            "sensor_msgs/Image",
+            "sensor_msgs/CompressedImage",
+        ],
+    )
+    def test_what_is_replaced_by_the_next_is_asked_for_once(self, type):
+        in_json = InJson()
+        assert in_json.silent(type, "cbor") == "ask"
+        assert in_json.on
+        assert in_json.silent(type, "cbor") is None
+        assert in_json.received(in_parts=True) is True
+        assert in_json.received(in_parts=True) is None
+        assert in_json.on
+
+    @pytest.mark.parametrize(
+        ("type", "compression"),
+        [
+            (None, "cbor"),
+            (MAP, None),
+            (MAP, "none"),
+            (MAP, "cbor-raw"),
+            ("map_msgs/OccupancyGridUpdate", "cbor"),
+            ("visualization_msgs/MarkerArray", "cbor"),
+            ("sensor_msgs/LaserScan", "cbor"),
+        ],
+    )
+    def test_nothing_else_is_asked_for_in_json(self, type, compression):
+        in_json = InJson()
+        assert in_json.silent(type, compression) is None
+        assert not in_json.on
+
+    def test_what_was_only_late_comes_in_cbor_again(self):
+        in_json = InJson()
+        in_json.silent(MAP, "cbor")
+        assert in_json.received(in_parts=False) is False
+        assert not in_json.on
+        assert in_json.silent(MAP, "cbor") is None
+        in_json.begin()
+        assert in_json.silent(MAP, "cbor") == "ask", "on a new link it may be large"
+
+    def test_a_link_that_ends_by_it_is_not_ended_for_ever(self):
+        in_json = InJson()
+        for _ in range(MOST_LOST):
+            assert in_json.silent(MAP, "cbor") == "ask"
+            in_json.begin()
+            assert not in_json.on
+        assert in_json.silent(MAP, "cbor") == "given up"
+        assert in_json.silent(MAP, "cbor") is None
+
+
+class TestSilence:
+    def looks(self, answers, until=60):
+        """When a silent topic counts as not sent, looking ten times a second."""
+        silence = Silence(0.0)
+        for tenth in range(10 * until):
+            now = tenth / 10
+            if silence.due(now):
+                silence.heard(answers(now), now)
+                if silence.is_unsent(now):
+                    return now
+        return None
+
+    def test_one_that_is_published_is_not_sent_after_ten_seconds(self):
+        assert self.looks(lambda _: True) == IN_CBOR == 10
+
+    def test_the_time_begins_when_it_is_published(self):
+        at = self.looks(lambda now: now >= 20)
+        assert 30 <= at <= 40
+
+    @pytest.mark.parametrize("published", [False, None])
+    def test_one_that_nobody_publishes_is_never_not_sent(self, published):
+        assert self.looks(lambda _: published) is None
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(renewal, "PERIOD", 0.01)
+    monkeypatch.setattr(renewal, "FIRST", 0.02)
+    monkeypatch.setattr(renewal, "LONGEST", 0.05)
+    monkeypatch.setattr(renewal, "IN_CBOR", 0.2)
+
+
+@contextlib.asynccontextmanager
+async def ros2(cells, *, limit=LIMIT, published=True):
+    """A simulated bridge with a map, and a link to it."""
+    quirks = parse_quirks("real", "ros2")
+    schema = Schema(Dialect("ros2"))
+    graph, node = Graph(schema), object()
+    Rosapi(graph, quirks).start()
+
+    def publish():
+        grid = {"info": {"width": cells, "height": 1}, "data": [100] * cells}
+        graph.publish(node, "/map", graph.conform(MAP, grid, finite=True))
+
+    graph.advertise(node, "/map", MAP, latch=True)
+    if published:
+        publish()
+    server = RosbridgeServer(graph, Encoder(schema, quirks, limit))
+    url = await server.start("127.0.0.1", 0)
+    bridge = Bridge(url)
+    bridge.start(asyncio.get_running_loop())
+    try:
+        yield server, bridge, publish
+    finally:
+        await bridge.stop()
+        await server.stop()
+
+
+def test_a_map_too_large_for_cbor_comes_in_json_and_people_are_told(quick, caplog):
+    async def scenario():
+        got, told = [], []
+        scope = Scope("page", lambda text, about: told.append((text, about)))
+        async with ros2(cells=10_000) as (server, bridge, _):
+            with scope.active():
+                listener = bridge.subscribe("/map", got.append, MAP)
+            await until(lambda: got)
+            assert got[0]["info"]["width"] == 10_000
+            ((text, about),) = told
+            assert about is listener
+            assert text.startswith("/map: the bridge sent nothing in CBOR")
+            assert "parameter max_message_size of rosbridge_websocket to " in text
+            assert text in caplog.text
+            (subscription,) = (
+                session._topics._subscriptions["/map"]
+                for session in server.sessions
+                if session._topics._subscriptions
+            )
+            merged = subscription.merged
+            assert (merged.throttle, merged.compression) == (THROTTLE / 1000, "none")
+            assert merged.queue_length == 1
+
+    asyncio.run(scenario())
+
+
+def test_one_that_is_published_late_comes_in_cbor_again_and_nobody_is_told(quick):
+    async def scenario():
+        got, told = [], []
+        scope = Scope("page", lambda text, about: told.append(text))
+        async with bridged(publishers={"publishers": ["/slam"]}) as (server, bridge):
+            with scope.active():
+                bridge.subscribe("/map", got.append, MAP)
+
+            def asked():
+                return [m.get("compression") for m in server.ops("subscribe")]
+
+            await until(lambda: "none" in asked())
+            (json_request,) = server.ops("subscribe", compression="none")
+            assert json_request["throttle_rate"] == THROTTLE
+            await server.publish("/map", {"info": {}})
+            await until(lambda: asked()[-1] == "cbor")
+            await until(lambda: len(got) == 1)
+            count = len(asked())
+            await asyncio.sleep(0.6)
+            assert len(asked()) == count, "it is not asked for again and again"
+            assert told == []
+
+    asyncio.run(scenario())
+
+
+def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick):
+    async def scenario():
+        told = []
+        scope = Scope("page", lambda text, about: told.append(text))
+        async with bridged(publishers={"publishers": ["/map_server"]}) as both:
+            server, bridge = both
+            with scope.active():
+                bridge.subscribe("/map", print, MAP)
+            for number in range(1, MOST_LOST + 1):
+                await server.heard("subscribe", number, compression="none")
+                server.drop()
+                await until(lambda n=number: bridge.stats.links > n)
+            await until(lambda: told)
+            assert "the link ended before a message came" in told[0]
+            assert "max_message_size" in told[0]
+            assert len(server.ops("subscribe", compression="none")) == MOST_LOST
+
+    asyncio.run(scenario())
+
+
+def test_a_message_in_parts_is_known_as_one(quick):
+    async def scenario():
+        got = []
+        async with bridged() as (server, bridge):
+            listener = bridge.subscribe("/a", got.append, "std_msgs/String")
+            listener.undecoded = True
+            text = json.dumps({"op": "publish", "topic": "/a", "msg": {"data": "x"}})
+            await server.send(text)
+            for number, piece in enumerate((text[:20], text[20:])):
+                part = {"op": "fragment", "id": 0, "data": piece}
+                await server.send(json.dumps({**part, "num": number, "total": 2}))
+            await until(lambda: len(got) == 2)
+            assert [message.in_parts for message in got] == [False, True]
+
+    asyncio.run(scenario())
