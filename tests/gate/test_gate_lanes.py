@@ -14,6 +14,7 @@ from link_bench import (
     until,
 )
 
+from webmap.gate.lanes import attempts as waits
 from webmap.gate.lanes import lane as lanes
 from webmap.gate.lanes.sockets import Ears
 
@@ -138,7 +139,7 @@ async def test_a_lane_in_a_hurry_pings_at_once_and_then_more_often():
 async def test_a_lane_that_is_cut_while_there_is_no_link_goes_on_trying(
     monkeypatch, caplog
 ):
-    monkeypatch.setattr(lanes, "FIRST_WAIT", 0.01)
+    monkeypatch.setattr(waits, "FIRST_WAIT", 0.01)
     happened = []
     async with noting_bridge() as bridge:
         await bridge.stop()
@@ -155,8 +156,8 @@ async def test_a_lane_that_is_cut_while_there_is_no_link_goes_on_trying(
 
 @in_loop
 async def test_that_there_is_no_link_is_said_once_for_each_reason(monkeypatch, caplog):
-    monkeypatch.setattr(lanes, "FIRST_WAIT", 0.01)
-    monkeypatch.setattr(lanes, "LONGEST_WAIT", 0.01)
+    monkeypatch.setattr(waits, "FIRST_WAIT", 0.01)
+    monkeypatch.setattr(waits, "LONGEST_WAIT", 0.01)
     attempts = []
 
     async def talk(link):
@@ -185,7 +186,7 @@ async def test_a_bridge_that_takes_links_and_closes_them_at_once_is_not_run_at()
         with noting_lane(url, happened):
             await until(lambda: len(times) == 3, "three attempts")
     assert "up" not in happened
-    assert times[2] - times[0] >= lanes.FIRST_WAIT
+    assert times[2] - times[0] >= waits.FIRST_WAIT
 
 
 @in_loop

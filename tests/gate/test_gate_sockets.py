@@ -24,11 +24,12 @@ from websockets.asyncio.server import serve
 
 from webmap.errors import BridgeClosed
 from webmap.gate.lanes import sockets
+from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Socket, open_socket
 
 
 async def opened(url, heard):
-    return await open_socket(url, heard.ears)
+    return await open_socket(url, heard.ears, Budget())
 
 
 async def forever(link):
@@ -227,7 +228,7 @@ class TestRefused:
     @in_loop
     async def test_a_socket_that_never_connected_is_closed_without_a_word(self):
         heard = Heard()
-        link = Socket("ws://127.0.0.1:1", heard.ears)
+        link = Socket("ws://127.0.0.1:1", heard.ears, Budget())
         assert link.unsent == 0
         link.close()
         assert not link.is_open

@@ -8,6 +8,7 @@ from websockets.exceptions import WebSocketException
 
 from webmap.errors import BridgeClosed
 from webmap.gate.lanes.answers import answer_to
+from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable
 from webmap.gate.lanes.sockets import Ears, open_socket
 
@@ -30,6 +31,7 @@ class Calls:
 
     def __init__(self, url: str) -> None:
         self._url = url
+        self._budget = Budget()
         self._calling: set[asyncio.Task[None]] = set()
 
     def call(
@@ -81,7 +83,7 @@ class Calls:
         ears = Ears(text=hear, pong=lambda _: None, lost=lost)
         try:
             async with asyncio.timeout(CALL_TIMEOUT):
-                link = await open_socket(self._url, ears)
+                link = await open_socket(self._url, ears, self._budget)
                 try:
                     link.send(request)
                     return await outcomes.get()

@@ -9,15 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from webmap.errors import BridgeClosed
+from webmap.gate.lanes.attempts import FIRST_WAIT, Attempts
+from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Ears, Socket, open_socket
 
 log = logging.getLogger("webmap.gate")
-
-FIRST_WAIT = 0.1
-"""Seconds until the first attempt to connect again."""
-
-LONGEST_WAIT = 3.0
-"""Seconds between attempts at most."""
 
 DEAD = 3.0
 """A link whose ping is unanswered for so long is cut, in seconds."""
@@ -67,6 +63,9 @@ class Lane:
         self._pong = pong
         self._holds: dict[str, Hold] = {}
         self._socket: Socket | None = None
+        self._budget = Budget()
+        self._trouble: str | None = None
+        """Why the last socket was lost; None if it was handed over."""
         self._changed = asyncio.Event()
         self._pings = 0
         self._answered = 0
@@ -113,14 +112,19 @@ class Lane:
 
     def cut(self, why: str) -> None:
         """Throw the socket away, with all that it has not sent, and connect anew."""
-        if self._socket is not None:
-            self._socket.abort(why)
+        link = self._socket
+        if link is not None and link.is_behind:
+            # The answers that are missed may wait behind all that it sends.
+            link.drop(f"{why}, and it sends more than can be dealt with")
+        elif link is not None:
+            link.abort(why)
 
     def spend(self, ears: Ears) -> Socket:
         """Hand over the open socket to somebody else and connect anew."""
         link = self._socket
         assert link is not None  # it has just been written to
         link.ears = ears
+        self._trouble = None
         self._drop()
         return link
 
@@ -136,7 +140,7 @@ class Lane:
             self.write(data, only_if_clear=False)
 
     def _lost(self, why: str) -> None:
-        log.warning("lost the link to %s: %s", self.url, why)
+        self._trouble = why
         self._drop()
 
     def _drop(self) -> None:
@@ -153,20 +157,18 @@ class Lane:
             self._pong(number)
 
     async def _run(self) -> None:
-        wait, complained = FIRST_WAIT, ""
+        attempts, loop = Attempts(), asyncio.get_running_loop()
         while True:
             try:
                 ears = Ears(self._text, self._on_pong, self._lost)
-                self._socket = await open_socket(self.url, ears)
+                link = await open_socket(self.url, ears, self._budget)
             except BridgeClosed as error:
-                if str(error) != complained:
-                    complained = str(error)
-                    log.warning("no link: %s", complained)
-                await asyncio.sleep(wait * random.uniform(0.5, 1.0))  # noqa: S311
-                wait = min(2 * wait, LONGEST_WAIT)
+                if attempts.is_news(str(error)):
+                    log.warning("no link: %s", error)
+                await _sleep_about(attempts.failed())
                 continue
-            wait, complained = FIRST_WAIT, ""
-            if self._socket.is_open:  # and not closed again in the same breath
+            begun, self._socket = loop.time(), link
+            if link.is_open:  # and not closed again in the same breath
                 for held in list(self._holds.values()):
                     self._say(held.hello)
                 self._up()
@@ -174,7 +176,18 @@ class Lane:
             # A bridge that closes the link while it reads nothing would keep it, and
             # what waits in it, beside the next one.
             self.cut("the bridge is closing it")
-            await asyncio.sleep(FIRST_WAIT * random.uniform(0.5, 1.0))  # noqa: S311
+            if self._trouble is None:  # it goes on elsewhere
+                await _sleep_about(FIRST_WAIT)
+                continue
+            wait = attempts.ended(loop.time() - begun, flooded=link.flooded)
+            if attempts.is_news(self._trouble):
+                log.warning(
+                    "lost the link to %s: %s; the next attempt comes within %.1f s",
+                    self.url,
+                    self._trouble,
+                    wait,
+                )
+            await _sleep_about(wait)
 
     async def _keep_pinging(self) -> None:
         """Ping until the lane's socket is gone."""
@@ -197,3 +210,8 @@ class Lane:
         if period < self.ping_period:
             self._changed.set()
         self.ping_period = period
+
+
+async def _sleep_about(seconds: float) -> None:
+    """Sleep for up to ``seconds``, so that not all lanes connect at one time."""
+    await asyncio.sleep(seconds * random.uniform(0.5, 1.0))  # noqa: S311

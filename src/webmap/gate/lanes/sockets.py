@@ -12,6 +12,7 @@ import socket
 import ssl
 import struct
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import cast
@@ -25,12 +26,23 @@ from websockets.uri import parse_uri
 
 from webmap.errors import BridgeClosed
 from webmap.gate.clock import now
+from webmap.gate.lanes.budget import Budget
+from webmap.gate.lanes.navigation import readable
+from webmap.ros.pieces import Pieces
+from webmap.ros.turns import turns
 
 CONNECT_TIMEOUT = 3.0
 """Seconds for name lookup, TCP, TLS and handshake together."""
 
 MAX_FRAME = 1 << 20
 """The longest message that is taken from a bridge, in bytes."""
+
+MAX_PARTS = 4096
+"""The most frames of one message. Bridges send one, some proxies a few."""
+
+MAX_WAITING = 1 << 16
+"""Bytes that may wait for their turn until no more are read. asyncio reads up to
+256 KiB at once, so at most that much more waits."""
 
 # The kernel's "linger 0": closing drops unsent bytes and resets the connection.
 _LINGER = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
@@ -52,12 +64,24 @@ class Socket(asyncio.Protocol):
     Args:
         url: The bridge's address.
         ears: Who hears what comes.
+        budget: How much may come.
 
     """
 
-    def __init__(self, url: str, ears: Ears) -> None:
+    def __init__(self, url: str, ears: Ears, budget: Budget) -> None:
         self.url = url
         self.ears = ears
+        self.flooded = False
+        """Whether it was dropped for what the bridge sent."""
+        self._budget = budget
+        self._turns = turns()
+        self._pieces = Pieces()
+        self._waiting = bytearray()
+        """What came and was not dealt with yet."""
+        self._choked = False
+        """Whether the bridge does not take what is written, as answers to pings."""
+        self._ended: str | None = None
+        """Why nothing more comes, as soon as that is known."""
         self.opened: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._protocol = ClientProtocol(parse_uri(url), max_size=MAX_FRAME)
         self._transport: asyncio.Transport | None = None
@@ -67,7 +91,8 @@ class Socket(asyncio.Protocol):
     @property
     def is_open(self) -> bool:
         """Whether something can be written now."""
-        return not self._over and self._protocol.state is State.OPEN
+        open = not self._over and self._ended is None
+        return open and self._protocol.state is State.OPEN
 
     @property
     def unsent(self) -> int:
@@ -94,6 +119,11 @@ class Socket(asyncio.Protocol):
         self._protocol.send_ping(data)
         self._flush()
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether more has come than was dealt with."""
+        return bool(self._waiting)
+
     def close(self) -> None:
         """Say goodbye, send what is unsent, and close."""
         if self.is_open:
@@ -119,29 +149,113 @@ class Socket(asyncio.Protocol):
         self._flush()
 
     def data_received(self, data: bytes) -> None:
-        """Take in bytes."""
-        self._protocol.receive_data(data)
-        self._take_events()
+        """Keep bytes until the link has its turn."""
+        self._waiting += data
+        if len(self._waiting) > MAX_WAITING:
+            self._read_on(False)
+        self._turns.ask(self)
 
     def eof_received(self) -> None:
-        """Take in the end of the bytes."""
-        self._protocol.receive_eof()
-        self._take_events()
+        """Note the end of the bytes; asyncio closes the connection."""
+        self._end("the bridge closed the link")
 
     def connection_lost(self, error: Exception | None) -> None:
-        """Note the end."""
-        self._lose(str(error) if error else "the bridge closed the link")
+        """Note the end; what came before it is dealt with first."""
+        self._end(str(error) if error else "the bridge closed the link")
+
+    def pause_writing(self) -> None:
+        """Take in nothing more: it might have to be answered."""
+        self._choked = True
+
+    def resume_writing(self) -> None:
+        """Take in what comes."""
+        self._choked = False
+        self._turns.ask(self)
+
+    def take(self, until: float) -> float | None:
+        """Deal with what waits, as far as the time and the budget of the link allow.
+
+        Args:
+            until: When to end, by :func:`time.thread_time`.
+
+        Returns:
+            Seconds until it wants another turn; ``None`` if it will ask for one.
+
+        """
+        at, begun = now(), time.thread_time()
+        wait = self._budget.wait(at)
+        if wait > 0:
+            return self._hold_back(wait, at)
+        pieces, size = 1, 0  # one for the turn: a byte at a time costs turns
+        while length := self._next_piece():
+            piece = bytes(self._waiting[:length])
+            del self._waiting[:length]
+            try:
+                self._protocol.receive_data(piece)
+                self._take_events()
+            except Exception as error:
+                self.drop(f"what it sent cannot be dealt with: {error!r}")
+            pieces, size = pieces + 1, size + length
+            if time.thread_time() >= until:
+                break
+        self._budget.spend(pieces, size, time.thread_time() - begun, at)
+        if length:
+            return 0.0
+        if self._ended is not None:
+            self._finish(self._ended)
+        self._read_on(not self._choked)
+        return None
+
+    def drop(self, why: str) -> None:
+        """Throw the socket away because of what the bridge sends."""
+        self.flooded = True
+        self.abort(why)
+
+    def _next_piece(self) -> int:
+        """Return how many of the bytes that wait are to be dealt with next."""
+        if self._over or self._choked:
+            return 0
+        shaken = self._protocol.state is not State.CONNECTING
+        return self._pieces.next(self._waiting, shaken=shaken)
+
+    def _hold_back(self, wait: float, at: float) -> float | None:
+        """Read nothing for a while, or drop the link if that does not help."""
+        self._read_on(False)
+        why = self._budget.flood(at)
+        if why is not None:
+            self.drop(why)
+        return None if self._over else wait
+
+    def _read_on(self, on: bool) -> None:
+        """Have asyncio read from the connection or not."""
+        assert self._transport is not None
+        if on:
+            self._transport.resume_reading()
+        else:
+            self._transport.pause_reading()
+
+    def _end(self, why: str) -> None:
+        if self._ended is None:
+            self._ended = why
+            self._turns.ask(self)
+
+    def _finish(self, why: str) -> None:
+        """Note the end, after everything that came before it."""
+        self._protocol.receive_eof()
+        self._take_events()
+        self._lose(why)
 
     def _take_events(self) -> None:
         self._flush()
         for event in self._protocol.events_received():
             if isinstance(event, Response):
                 self._shake_hands()
-            elif isinstance(event, Frame) and not self._over:
+            elif isinstance(event, Frame):
                 self._hear(event)
         if self._protocol.handshake_exc is not None:
             self.abort(f"no WebSocket there: {self._protocol.handshake_exc}")
         elif self._protocol.close_expected() and self._transport is not None:
+            self._waiting.clear()
             self._transport.close()
 
     def _shake_hands(self) -> None:
@@ -153,42 +267,47 @@ class Socket(asyncio.Protocol):
             self.ears.pong(bytes(frame.data))
         elif frame.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
             self._parts.append(bytes(frame.data))
-            if frame.fin:
+            if len(self._parts) > MAX_PARTS:
+                self.drop(f"it sends a message in more than {MAX_PARTS} frames")
+            elif frame.fin:
                 text, self._parts = b"".join(self._parts), []
                 self.ears.text(text)
 
     def _flush(self, until: float = math.inf) -> bool:
         """Hand over what the protocol has to say, unless that is too old."""
         assert self._transport is not None
-        waiting = self._protocol.data_to_send()
-        if now() > until:
+        data = b"".join(self._protocol.data_to_send())
+        if now() > until or self._ended is not None:
             return False
-        for data in waiting:
-            if data:
-                self._transport.write(data)
-            elif self._transport.can_write_eof():
-                self._transport.write_eof()
+        self._transport.write(data)
         return True
 
     def _lose(self, why: str) -> None:
         if self._over:
             return
         self._over = True
+        self._waiting.clear()
+        why = readable(why)  # it may hold what the bridge sent
         if not self.opened.done():
             self.opened.set_exception(BridgeClosed(f"{self.url}: {why}"))
         elif not self.opened.cancelled():  # given up before it was open
             self.ears.lost(why)
 
 
-async def open_socket(url: str, ears: Ears) -> Socket:
+async def open_socket(url: str, ears: Ears, budget: Budget) -> Socket:
     """Connect to a bridge.
+
+    Args:
+        url: Its address.
+        ears: Who hears what comes.
+        budget: How much may come, and came on earlier sockets.
 
     Raises:
         BridgeClosed: If that does not succeed in time.
 
     """
     uri = parse_uri(url)
-    made = Socket(url, ears)
+    made = Socket(url, ears, budget)
     try:
         async with asyncio.timeout(CONNECT_TIMEOUT):
             # Reading who may vouch for a name takes 0.1 s: other robots cannot wait.

@@ -1,0 +1,131 @@
+"""What a link may send, when it is dropped, and when it is tried again."""
+
+import pytest
+
+from webmap.gate.lanes import attempts as waits
+from webmap.gate.lanes import budget as limits
+from webmap.gate.lanes.attempts import Attempts
+from webmap.gate.lanes.budget import Budget
+
+
+def send(budget, seconds, rate, *, size=100, work=0.00005, begin=1000.0, kept=0):
+    """Send what was kept and frames at a rate; return when it was dropped, or None.
+
+    Each frame is taken as soon as the budget allows it, as the socket does.
+    """
+    now, sent, end = begin, -kept, begin + seconds
+    while now < end:
+        if budget.flood(now):
+            return now - begin
+        waiting = int((now - begin) * rate) - sent
+        while waiting > 0 and budget.wait(now) == 0:
+            budget.spend(1, size, work, now)
+            waiting, sent = waiting - 1, sent + 1
+        now += 0.01
+    return None
+
+
+class TestBudget:
+    def test_an_odometry_of_a_kilohertz_and_dense_scans_are_taken_for_ever(self):
+        budget = Budget()
+        for each in range(60_000):
+            now = 1000 + each / 1000
+            budget.spend(1, 1000, 0.0001, now)
+            if each % 100 == 0:  # 3,600 beams with intensities, ten times a second
+                budget.spend(2, 65_000, 0.002, now)
+            assert budget.wait(now) == 0
+            assert budget.flood(now) is None
+
+    def test_ten_of_the_longest_messages_a_second_are_taken_for_ever(self):
+        budget = Budget()
+        for each in range(300):
+            budget.spend(18, 1 << 20, 0.012, 1000 + each / 10)
+            assert budget.wait(1000 + each / 10) == 0
+
+    def test_what_a_stall_of_3_s_kept_back_is_taken_at_once(self):
+        budget = Budget()
+        for _ in range(3000):
+            assert budget.wait(1000.0) == 0
+            budget.spend(1, 1000, 0.00008, 1000.0)
+
+    @pytest.mark.parametrize(
+        ("frames", "size", "work"),
+        [(1, 4, 0.000004), (1, 1 << 20, 0.001), (1, 100, 0.05)],
+        ids=["many frames", "many bytes", "much work"],
+    )
+    def test_of_what_sends_too_much_no_more_than_the_rate_is_taken(
+        self, frames, size, work
+    ):
+        budget, taken, now = Budget(), 0, 1000.0
+        for _ in range(10_000):
+            now += 0.001
+            while budget.wait(now) == 0:
+                budget.spend(frames, size, work, now)
+                taken += 1
+        most = min(limits.FRAMES, limits.BYTES / size, limits.WORK / work)
+        assert taken <= 1 + most * (10 + limits.BURST)
+
+    def test_it_waits_for_a_while_and_not_frame_by_frame(self):
+        budget = Budget()
+        while budget.wait(1000.0) == 0:
+            budget.spend(100, 400, 0.0004, 1000.0)
+        assert budget.wait(1000.0) == pytest.approx(limits.PAUSE)
+        assert budget.wait(1000.0 + limits.PAUSE + 0.001) == 0
+
+    def test_one_that_keeps_on_is_dropped_after_its_burst_and_a_second(self):
+        budget = Budget()
+        dropped = send(budget, 60, 20_000, size=4, work=0.000004)
+        assert dropped == pytest.approx(limits.PATIENCE + 0.2, abs=0.2)
+        why = budget.flood(1000 + dropped)
+        assert "frames" in why
+        assert "at most 4000 frames, 16777216 bytes and 0.25 s of work a second" in why
+
+    def test_who_is_dropped_and_comes_back_has_not_been_forgiven(self):
+        budget = Budget()
+        first = send(budget, 60, 20_000, begin=1000.0)
+        again = send(budget, 60, 20_000, begin=1000.0 + first + 0.5)
+        assert again <= first
+
+    def test_one_burst_too_many_is_no_flood(self):
+        assert send(Budget(), 60, 1000, kept=5000) is None
+
+
+class TestAttempts:
+    def test_each_that_fails_waits_twice_as_long_up_to_3_s(self):
+        attempts = Attempts()
+        assert [attempts.failed() for _ in range(7)] == [
+            0.1, 0.2, 0.4, 0.8, 1.6, 3.0, 3.0,
+        ]  # fmt: skip
+
+    def test_that_the_handshake_succeeds_makes_no_wait_shorter(self):
+        attempts = Attempts()
+        lasted = waits.STEADY - 0.01
+        waited = [attempts.ended(lasted, flooded=False) for _ in range(3)]
+        assert waited == [0.1, 0.2, 0.4]
+
+    def test_after_a_link_that_lasted_the_next_attempt_comes_soon(self):
+        attempts = Attempts()
+        attempts.failed()
+        attempts.failed()
+        assert attempts.ended(waits.STEADY, flooded=False) == waits.FIRST_WAIT
+
+    def test_after_each_flood_it_waits_twice_as_long_up_to_a_minute(self):
+        attempts = Attempts()
+        waited = [attempts.ended(3.0, flooded=True) for _ in range(8)]
+        assert waited == [1, 2, 4, 8, 16, 32, 60, 60]
+        attempts.ended(waits.TAME, flooded=False)
+        assert attempts.ended(3.0, flooded=True) == 1
+
+    def test_a_trouble_is_news_once_until_a_link_has_lasted(self):
+        attempts = Attempts()
+        assert attempts.is_news("refused")
+        assert not attempts.is_news("refused")
+        attempts.ended(0.1, flooded=False)
+        assert not attempts.is_news("refused")
+        attempts.ended(waits.STEADY, flooded=False)
+        assert attempts.is_news("refused")
+
+    def test_a_bridge_that_always_names_another_trouble_does_not_fill_the_log(self):
+        attempts = Attempts()
+        news = sum(attempts.is_news(f"trouble {n}") for n in range(1000))
+        assert news == waits.MOST_TROUBLES

@@ -1,0 +1,307 @@
+"""A bridge that sends without end: what its socket takes, and when it is dropped."""
+
+import asyncio
+import itertools
+import time
+
+import pytest
+from link_bench import (
+    MORE,
+    PING,
+    PONG,
+    TEXT,
+    Heard,
+    frame,
+    in_loop,
+    noting_bridge,
+    noting_lane,
+    raw_bridge,
+    until,
+)
+
+from webmap.errors import BridgeClosed
+from webmap.gate.lanes import attempts as waits
+from webmap.gate.lanes import sockets
+from webmap.gate.lanes.budget import Budget
+from webmap.gate.lanes.sockets import open_socket
+
+CHUNK = 1 << 18
+
+
+def flood(piece, *, reads=True):
+    """Return a bridge that repeats some bytes for ever."""
+
+    async def talk(link):
+        await link.accept()
+        reading = asyncio.create_task(link.reader.read()) if reads else None
+        try:
+            while True:
+                link.say(piece * (CHUNK // len(piece)))
+                await link.writer.drain()
+                await asyncio.sleep(0)
+        finally:
+            if reading:
+                reading.cancel()
+
+    return talk
+
+
+async def longest_wait(seconds):
+    """Return how late the loop was for a timer of 5 ms in the worst case."""
+    worst, end = 0.0, time.monotonic() + seconds
+    while (begun := time.monotonic()) < end:
+        await asyncio.sleep(0.005)
+        worst = max(worst, time.monotonic() - begun - 0.005)
+    return worst
+
+
+FLOODS = {
+    "tiny texts": frame(TEXT, b"{}"),
+    "empty texts": frame(TEXT),
+    "pings": frame(PING, b"x" * 125),
+    "pongs": frame(PONG),
+}
+
+
+@pytest.mark.parametrize("name", FLOODS)
+@in_loop
+async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
+    heard = Heard()
+    async with raw_bridge(flood(FLOODS[name])) as url:
+        link = await open_socket(url, heard.ears, Budget())
+        begun = time.monotonic()
+        await until(lambda: heard.lost, "the drop")
+        assert link.flooded
+        assert "it sends too much" in heard.lost[0]
+        taken = len(heard.texts) + len(heard.pongs)
+        most = 4000 * (1 + time.monotonic() - begun) + 100
+        assert taken <= most
+        await until(lambda: link._transport.is_closing(), "its end")
+
+
+@in_loop
+async def test_the_loop_goes_on_while_ten_links_are_flooded():
+    from webmap.testing import Sentinel
+
+    heard = Heard()
+    with Sentinel() as sentinel:
+        async with raw_bridge(flood(FLOODS["tiny texts"])) as url:
+            links = [await open_socket(url, heard.ears, Budget()) for _ in range(10)]
+            begun = time.monotonic()
+            worst = await longest_wait(1.0)
+            late = sentinel.worst(begun)
+            for link in links:
+                link.abort("enough")
+    # The bridge floods within the same loop, which costs some time, too.
+    assert worst < 0.05 + late, (worst, late)
+
+
+@pytest.mark.parametrize(
+    "piece", [frame(MORE, b"x", final=False), frame(MORE, final=False)]
+)
+@in_loop
+async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(piece):
+    heard = Heard()
+
+    async def talk(link):
+        await link.accept(frame(TEXT, b"x", final=False))
+        while True:
+            link.say(piece * 1000)
+            await link.writer.drain()
+            await asyncio.sleep(0)
+
+    async with raw_bridge(talk) as url:
+        link = await open_socket(url, heard.ears, Budget())
+        await until(lambda: heard.lost, "the drop")
+    assert heard.lost == ["it sends a message in more than 4096 frames"]
+    assert (heard.texts, link.flooded) == ([], True)
+
+
+@in_loop
+async def test_who_takes_no_answers_is_not_asked_for_more():
+    heard = Heard()
+    async with raw_bridge(flood(FLOODS["pings"], reads=False)) as url:
+        link = await open_socket(url, heard.ears, Budget())
+        sock = link._transport.get_extra_info("socket")
+        sock.setsockopt(sockets.socket.SOL_SOCKET, sockets.socket.SO_SNDBUF, 4096)
+        await until(lambda: link._choked, "a full buffer")
+        await asyncio.sleep(0.3)
+        assert link.unsent < 2 * sockets.MAX_WAITING
+        assert link.is_behind
+        assert heard.lost == []
+        link.abort("enough")
+
+
+@in_loop
+async def test_who_takes_the_answers_again_is_read_again():
+    heard, go_on = Heard(), asyncio.Event()
+
+    async def talk(link):
+        await link.accept()
+        await go_on.wait()
+        link.say(frame(TEXT, b"meanwhile"))
+        await link.reader.read()
+
+    async with raw_bridge(talk) as url:
+        link = await open_socket(url, heard.ears, Budget())
+        link.pause_writing()  # as asyncio says that its buffer is full
+        go_on.set()
+        await until(lambda: link.is_behind, "a message")
+        await asyncio.sleep(0.05)
+        assert heard.texts == []
+        link.resume_writing()
+        await until(lambda: heard.texts == [b"meanwhile"], "the message")
+        link.close()
+
+
+@in_loop
+async def test_bytes_one_by_one_are_a_message_all_the_same():
+    heard = Heard()
+
+    async def talk(link):
+        answer = await link.request()
+        for byte in answer + frame(TEXT, b"slowly" * 20):
+            link.say(bytes([byte]))
+            await link.writer.drain()
+            await asyncio.sleep(0)
+        await link.reader.read()
+
+    async with raw_bridge(talk) as url:
+        link = await open_socket(url, heard.ears, Budget())
+        await until(lambda: heard.texts == [b"slowly" * 20], "the message")
+        link.close()
+
+
+@pytest.mark.parametrize("header", [b"X: y\r\n", b"X"])
+@in_loop
+async def test_headers_without_end_are_refused(header):
+    async def talk(link):
+        await link.request()
+        link.say(b"HTTP/1.1 101 Switching Protocols\r\n")
+        while True:
+            link.say(header * 10_000)
+            await link.writer.drain()
+            await asyncio.sleep(0)
+
+    async with raw_bridge(talk) as url:
+        with pytest.raises(BridgeClosed, match="no WebSocket there"):
+            await open_socket(url, Heard().ears, Budget())
+
+
+@in_loop
+async def test_what_came_before_the_end_is_heard():
+    heard = Heard()
+
+    async def talk(link):
+        await link.accept(frame(TEXT, b"{}") * 2000)
+        link.writer.close()
+
+    async with raw_bridge(talk) as url:
+        await open_socket(url, heard.ears, Budget())
+        await until(lambda: heard.lost, "the end")
+    assert len(heard.texts) == 2000
+
+
+@in_loop
+async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
+    heard = Heard()
+
+    def fail(data):
+        raise RecursionError("maximum recursion depth exceeded")
+
+    ears = heard.ears
+    ears.text = fail
+
+    async def talk(link):
+        await link.accept(frame(TEXT, b"{}"))
+        await link.reader.read()
+
+    async with raw_bridge(talk) as url:
+        link = await open_socket(url, ears, Budget())
+        await until(lambda: heard.lost, "the drop")
+    assert link.flooded
+    assert heard.lost == [
+        "what it sent cannot be dealt with: "
+        "RecursionError('maximum recursion depth exceeded')"
+    ]
+
+
+@in_loop
+async def test_a_lane_that_is_flooded_is_tried_again_later_and_later(
+    monkeypatch, caplog
+):
+    monkeypatch.setattr(waits, "FIRST_FLOOD_WAIT", 0.02)
+    happened, opened = [], []
+    endless = frame(MORE, final=False) * 5000
+
+    async def talk(link):
+        opened.append(time.monotonic())
+        await link.accept(frame(TEXT, final=False) + endless)
+        await link.reader.read()
+
+    async with raw_bridge(talk) as url:
+        with noting_lane(url, happened):
+            await until(lambda: len(opened) == 6, "six attempts")
+    waited = [b - a for a, b in itertools.pairwise(opened)]
+    assert waited[4] >= 0.5 * 16 * 0.02
+    assert caplog.text.count("it sends a message in more than 4096 frames") >= 1
+
+
+@in_loop
+async def test_a_lane_that_is_cut_while_it_is_behind_counts_as_flooded(caplog):
+    happened = []
+    async with raw_bridge(flood(FLOODS["tiny texts"])) as url:
+        with noting_lane(url, happened) as lane:
+            await until(lambda: happened[-1:] == [b"{}"], "the flood")
+            link = await until(lambda: lane._socket, "the link")
+            await until(lambda: link.is_behind, "more than was dealt with")
+            lane.cut("it carries nothing")
+            assert link.flooded
+            await until(lambda: "more than can be dealt with" in caplog.text, "a line")
+
+
+@in_loop
+async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
+    """Reading from it ends; writing does not."""
+    heard, told = Heard(), []
+
+    async def talk(link):
+        await link.accept()
+
+        async def note():
+            while data := await link.reader.read(1 << 16):
+                told.append(data)
+
+        noting = asyncio.create_task(note())
+        try:
+            while True:
+                link.say(FLOODS["tiny texts"] * 10_000)
+                await link.writer.drain()
+                await asyncio.sleep(0)
+        finally:
+            noting.cancel()
+
+    async with raw_bridge(talk) as url:
+        link = await open_socket(url, heard.ears, Budget())
+        await until(lambda: link._budget.wait(sockets.now()) > 0, "an end of reading")
+        told.clear()
+        assert link.send(b"zero")
+        await until(lambda: told, "the zero")
+        link.abort("enough")
+
+
+@in_loop
+async def test_an_honest_link_beside_a_flood_is_heard_at_once():
+    flooded, heard = Heard(), Heard()
+    async with raw_bridge(flood(FLOODS["tiny texts"])) as url, noting_bridge() as good:
+        bad = await open_socket(url, flooded.ears, Budget())
+        link = await open_socket(good.url, heard.ears, Budget())
+        waited = []
+        for number in range(20):
+            begun = time.monotonic()
+            link.ping(number.to_bytes(8, "big"))
+            await until(lambda: len(heard.pongs) == number + 1, "the pong")  # noqa: B023
+            waited.append(time.monotonic() - begun)
+        assert sorted(waited)[10] < 0.1, waited
+        bad.abort("enough")
+        link.close()

@@ -1,0 +1,119 @@
+"""How the bytes of a WebSocket are cut, and how links take turns."""
+
+import asyncio
+import itertools
+import time
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.ros.pieces import PIECE, Pieces
+from webmap.ros.turns import turns
+
+
+def frame(length):
+    if length < 126:
+        return bytes([0x81, length]) + b"x" * length
+    if length < 1 << 16:
+        return b"\x81\x7e" + length.to_bytes(2, "big") + b"x" * length
+    return b"\x81\x7f" + length.to_bytes(8, "big") + b"x" * length
+
+
+def cut(chunks):
+    """Return the pieces of what comes in chunks."""
+    pieces, waiting, cutting = [], bytearray(), Pieces()
+    for chunk in chunks:
+        waiting += chunk
+        while length := cutting.next(waiting, shaken=True):
+            pieces.append(bytes(waiting[:length]))
+            del waiting[:length]
+    assert not waiting
+    return pieces
+
+
+def test_each_frame_is_a_piece():
+    frames = [frame(length) for length in (0, 1, 125, 126, 1000, 60_000)]
+    assert cut([b"".join(frames)]) == frames
+
+
+def test_a_long_frame_is_cut_and_what_follows_it_is_not_part_of_the_last_piece():
+    long = frame(200_000)
+    pieces = cut([long + frame(0) * 3])
+    assert b"".join(pieces[:-3]) == long
+    assert all(len(piece) <= PIECE for piece in pieces)
+    assert pieces[-3:] == [frame(0)] * 3
+
+
+@given(st.lists(st.sampled_from([0, 1, 125, 126, 127, 70_000]), max_size=5), st.data())
+def test_wherever_the_network_cuts_no_piece_holds_the_ends_of_two_frames(lengths, data):
+    stream = b"".join(map(frame, lengths))
+    ends = {0}
+    for length in lengths:
+        ends.add(max(ends) + len(frame(length)))
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    bounds = [0, *cuts, len(stream)]
+    pieces = cut(stream[a:b] for a, b in itertools.pairwise(bounds))
+    assert b"".join(pieces) == stream
+    at = 0
+    for piece in pieces:
+        assert len([end for end in ends if at < end <= at + len(piece)]) <= 1
+        at += len(piece)
+
+
+def test_before_the_handshake_has_ended_each_line_is_a_piece():
+    cutting = Pieces()
+    assert cutting.next(bytearray(b"HTTP/1.1 101 OK\r\nX: y\r\n"), shaken=False) == 17
+    assert cutting.next(bytearray(b"no end"), shaken=False) == 6
+    assert cutting.next(bytearray(), shaken=False) == 0
+
+
+class Greedy:
+    """Wants a turn as often as it is asked."""
+
+    def __init__(self, noted, name, times):
+        self.noted, self.name, self.times = noted, name, times
+
+    def take(self, until):
+        while time.thread_time() < until:
+            pass
+        self.noted.append(self.name)
+        self.times -= 1
+        return 0.0 if self.times else None
+
+
+def test_links_take_turns_and_the_loop_has_half_of_the_time():
+    async def story():
+        noted, others = [], []
+        for name in "abc":
+            taker = Greedy(noted, name, 20)
+            turns().ask(taker)
+            turns().ask(taker)
+        while len(noted) < 60:
+            others.append(len(noted))
+            await asyncio.sleep(0)
+        return noted, others
+
+    noted, others = asyncio.run(story())
+    assert "".join(noted) == "abc" * 20
+    steps = [b - a for a, b in itertools.pairwise(others)]
+    assert max(steps) <= 5, "the loop goes on after a few turns"
+
+
+def test_who_wants_to_wait_has_its_turn_later():
+    async def story():
+        noted, ended = [], asyncio.Event()
+
+        class Waiting:
+            def take(self, until):
+                noted.append(asyncio.get_running_loop().time())
+                if len(noted) == 2:
+                    ended.set()
+                    return None
+                return 0.05
+
+        turns().ask(Waiting())
+        await ended.wait()
+        return noted
+
+    first, second = asyncio.run(story())
+    assert second - first >= 0.05

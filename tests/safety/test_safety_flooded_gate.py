@@ -1,0 +1,166 @@
+"""A gate alone, with a good robot that is driven and three bridges that flood it."""
+
+import itertools
+import json
+import threading
+import time
+from contextlib import ExitStack
+
+import pytest
+from safety_bench import pass_time, wait_for
+from safety_load import helper
+from safety_run import grace
+
+from webmap.gate.display.client import GateClient
+from webmap.gate.messages import RobotSpec
+from webmap.testing import Sentinel, WitnessRobot
+
+pytestmark = [pytest.mark.safety, pytest.mark.serial]
+
+PERIOD = 0.05
+"""Seconds between two commands, as of a page."""
+
+
+class Hand:
+    """A page's side of ``/drive``, which holds the good robot's key as long as told."""
+
+    def __init__(self, client):
+        self.pressed = False
+        self.robot = {}
+        self.ticks = []
+        self._tick = None
+        self._end = threading.Event()
+        self._connection = client.connect("Ann", "operator", self._hear, print)
+        self._thread = threading.Thread(target=self._stream, daemon=True)
+        self._thread.start()
+
+    def _hear(self, text):
+        message = json.loads(text)
+        if message["op"] == "tick":
+            self._tick = message["tick"]
+            self.ticks.append(time.monotonic())
+        elif message["op"] == "robot" and message["robot"] == "good":
+            self.robot = message
+
+    def say(self, **command):
+        self._connection.receive(json.dumps(command))
+
+    def _stream(self):
+        for seq in itertools.count():
+            if self._end.wait(PERIOD):
+                return
+            if self._tick is not None and self.robot.get("mine"):
+                self.say(
+                    op="drive",
+                    robot="good",
+                    epoch=self.robot["epoch"],
+                    seq=seq,
+                    tick=self._tick,
+                    x=1.0 if self.pressed and self.robot["armed"] else 0.0,
+                    y=0.0,
+                    turn=0.0,
+                )
+
+    def end(self):
+        self._end.set()
+        self._thread.join()
+
+
+def spec(id, url):
+    return RobotSpec(
+        id=id,
+        name=id,
+        bridge_url=url,
+        twist_topic="/cmd_vel",
+        stops_within=0.5,
+        v_max=1.0,
+        w_max=1.5,
+        odometry_topic="/odom",
+        odometry_type="nav_msgs/Odometry",
+    )
+
+
+class FloodedGate:
+    """A running gate, a good robot, and one more for each hostile bridge."""
+
+    def __init__(self, folder, monkeypatch, peers):
+        monkeypatch.setenv("WEBMAP_STATE_DIR", str(folder))
+        self._open = ExitStack()
+        self._peers = peers
+
+    def __enter__(self):
+        enter = self._open.enter_context
+        helpers = [
+            enter(helper("safety_hostile_peers.py", f"safety_hostile_peers:{peer}"))
+            for peer in self._peers
+        ]
+        urls = [process.stdout.readline().strip() for process in helpers]
+        self.robot, self.sentinel = enter(WitnessRobot()), enter(Sentinel())
+        self.client = GateClient()
+        self.client.start()
+        self._open.callback(self.client.stop)
+        self.hand = Hand(self.client)
+        self._open.callback(self.hand.end)
+        self.client.declare(spec("good", self.robot.url))
+        for number, url in enumerate(urls):
+            self.client.declare(spec(f"h{number}", url))
+        pass_time(2.0)
+        return self
+
+    def __exit__(self, *exception):
+        self._open.close()
+
+    def drive_off(self):
+        hand = self.hand
+        wait_for(lambda: hand.robot.get("armable") or hand.robot.get("mine"), "a robot")
+        hand.say(op="take", robot="good")
+        wait_for(lambda: hand.robot.get("mine"), "the lease")
+        pass_time(0.3)
+        hand.pressed = True
+        wait_for(lambda: self.robot.velocity.vx == 1.0, "full speed")
+
+    def stop(self):
+        """Say STOP, which resets nothing; return the seconds to the first zero."""
+        begun = time.monotonic()
+        self.client.stop_robot("good")
+        zero = wait_for(lambda: self.robot.log.first_zero(begun), "a zero")
+        late = self.sentinel.stolen(begun, zero)
+        self.hand.pressed = False
+        pass_time(0.6)
+        self.client.reset("good")
+        return zero - begun, late
+
+
+FLOODS = [
+    ("tiny_texts", "tiny_texts", "tiny_texts"),
+    ("endless_message", "pings", "empty_frames"),
+    ("pongs", "topics", "frames_with_handshake"),
+    ("endless_headers", "status_words", "nested"),
+]
+
+
+@pytest.mark.parametrize("peers", FLOODS, ids=" ".join)
+def test_beside_three_that_flood_stop_leaves_the_gate_within_50_ms(
+    peers, tmp_path, monkeypatch
+):
+    with FloodedGate(tmp_path, monkeypatch, peers) as gate:
+        for _ in range(3):
+            gate.drive_off()
+            begun = time.monotonic()
+            pass_time(1.5)
+            ended = time.monotonic()
+            late = gate.sentinel.worst(begun - 0.1, ended)
+            told = [t for t in gate.robot.log.told if begun <= t.at <= ended]
+            ticks = [at for at in gate.hand.ticks if begun <= at <= ended]
+            stopped, stolen = gate.stop()
+            figures = (stopped, stolen, late, longest_gap(ticks), len(told))
+            print(peers, figures)
+            assert stopped < 0.05 + grace(stolen), figures
+            assert longest_gap(ticks) < 0.15 + grace(late), figures
+            if late < 0.1:  # else nobody could have been driven without a break
+                assert not any(t.is_zero for t in told), figures
+                assert longest_gap([t.at for t in told]) < 0.15 + late, figures
+
+
+def longest_gap(times):
+    return max(b - a for a, b in itertools.pairwise(times))
