@@ -60,7 +60,10 @@ def demo() -> Iterator[Demo]:
 
 @pytest.fixture
 def open_console(chromium: Browser, demo: Demo):
-    """Open the console, and fail on anything that the browser complains about."""
+    """Open the console, and fail on what the browser complains about.
+
+    Patterns in ``open_console.allowed`` are no failure.
+    """
     contexts, complaints = [], Complaints()
 
     def open_(size: str = "desk", scheme: str = "light") -> Page:
@@ -76,6 +79,7 @@ def open_console(chromium: Browser, demo: Demo):
         wait_until_ready(page)
         return page
 
+    open_.allowed = complaints.allowed
     yield open_
     for context in contexts:
         context.close()

@@ -56,3 +56,34 @@ def test_who_drives_with_a_finger_is_told_of_no_key(
     bench.until(lambda: bench.shown() == "ready")
     words = bench.page.locator(".webmap-teleop-detail")
     assert words.inner_text() == "Hold the stick to drive, let go to stop."
+
+
+@pytest.mark.parametrize("width", [360, 800])
+def test_stop_of_the_driven_robot_does_not_move(
+    open_bench: Callable[..., Bench], width: int
+) -> None:
+    bench = open_bench()
+    bench.page.evaluate(
+        """(width) => Object.assign(document.querySelector("svg.webmap").style,
+             { width: `${width}px`, height: "600px" })""",
+        width,
+    )
+    stop = bench.page.locator(".webmap-teleop-stop")
+    boxes = {"no robot": stop.bounding_box()}
+    bench.select("r1")
+    bench.until(stop.is_enabled)
+    boxes["selected"] = stop.bounding_box()
+    bench.drive()
+    bench.until(lambda: bench.shown() == "driving")
+    boxes["driving"] = stop.bounding_box()
+    bench.page.keyboard.up("w")
+    bench.until(lambda: bench.shown() == "ready")
+    boxes["ready"] = stop.bounding_box()
+    stopped = {"by": "Ann", "confirmed": False, "why": "no link to ws://bob"}
+    bench.gate.change("r1", latched=True, state="stopped", stop=stopped)
+    bench.until(lambda: bench.shown() == "unconfirmed")
+    boxes["stopped"] = stop.bounding_box()
+    bench.gate.ticking = False
+    bench.until(lambda: bench.shown() == "late")
+    boxes["late"] = stop.bounding_box()
+    assert len({tuple(box.values()) for box in boxes.values()}) == 1, boxes

@@ -91,10 +91,11 @@ def build(
     for robot in robots:
         map.add_robot(robot)
     map.add_module("MouseViewControl")
-    map.add_module("Teleop", SPEED, ROTATION_SPEED, holonomic=None)
+    stops = "#stop-place"
+    map.add_module("StopButton", place=stops)
+    map.add_module("Teleop", SPEED, ROTATION_SPEED, holonomic=None, stop_place=stops)
     goals = map.add_module("GoalTool")
     poses = map.add_module("InitialPoseTool")
-    map.add_module("StopButton")
     map.add_module("LayerSwitches", off=["Costmaps"])
     map.add_module("MeasureTool")
     map.add_module("AlignTool")

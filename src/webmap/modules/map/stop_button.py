@@ -13,11 +13,13 @@ class StopButton:
 
     Args:
         map: The map.
+        place: A CSS selector of the page's element that the button goes into; over the
+            map if not given.
 
     """
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: "Map", *, place: str = "") -> None:
         self.map = map
         self.half = map.add_browser_half(
-            self, "modules/stop.js", {}, "modules/stop.css"
+            self, "modules/stop.js", {"place": place}, "modules/stop.css"
         )

@@ -20,6 +20,8 @@ class Teleop:
         rotation_speed: Radians per second at most.
         holonomic: Whether Q and E move sideways, for bases that can; None if for
             those of which :meth:`Robot.set_twist_topic` says so.
+        stop_place: A CSS selector of the page's element that the STOP button of the
+            selected robot goes into; in the panel over the map if not given.
 
     Raises:
         ValueError: If a speed is not a number above 0.
@@ -33,6 +35,7 @@ class Teleop:
         rotation_speed: float,
         *,
         holonomic: bool | None = False,
+        stop_place: str = "",
     ) -> None:
         for name, value in (("speed", speed), ("rotation_speed", rotation_speed)):
             if not (math.isfinite(value) and value > 0):
@@ -44,7 +47,7 @@ class Teleop:
         self.half = map.add_browser_half(
             self,
             "modules/teleop.js",
-            {"holonomic": holonomic},
+            {"holonomic": holonomic, "stopPlace": stop_place},
             "modules/teleop.css",
         )
 

@@ -16,9 +16,16 @@ const CORNERS = ["top-left", "top-right", "bottom-left", "bottom-right"];
  * @param {MapCanvas} map
  * @param {Element} panel
  * @param {Corner} [corner] Where panels share the room; without one it covers the map.
+ * @param {string} [place] A selector of the page's own element, which gets it instead. A
+ *     page without such an element has it over the map.
  * @returns {() => void} Takes it away.
  */
-export function lay(map, panel, corner) {
+export function lay(map, panel, corner, place = "") {
+  const own = ownPlace(place);
+  if (own) {
+    own.append(panel);
+    return () => panel.remove();
+  }
   const overlay = overlays.get(map) ?? new Overlay(map);
   overlays.set(map, overlay);
   overlay.add(panel, corner);
@@ -28,6 +35,14 @@ export function lay(map, panel, corner) {
     overlay.destroy();
     overlays.delete(map);
   };
+}
+
+/**
+ * @param {string} place A selector, or "" for none.
+ * @returns {Element | null} The page's own element for a part of a module.
+ */
+export function ownPlace(place) {
+  return place === "" ? null : document.querySelector(place);
 }
 
 /**

@@ -1,6 +1,6 @@
 import { deskOf } from "../inputs/desk.js";
 import { html, say, svg } from "./elements.js";
-import { lay } from "./overlay.js";
+import { lay, ownPlace } from "./overlay.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 
@@ -141,13 +141,8 @@ export class SaveMenu {
    * @returns {() => void}
    */
   _lay(place) {
-    const own = place === "" ? null : document.querySelector(place);
-    if (!own) {
-      this._element.classList.add("webmap-panel");
-      return lay(this._map, this._element, "top-left");
-    }
-    own.append(this._element);
-    return () => this._element.remove();
+    if (!ownPlace(place)) this._element.classList.add("webmap-panel");
+    return lay(this._map, this._element, "top-left", place);
   }
 
   /** @returns {boolean} Whether there was something to leave. */

@@ -3,6 +3,7 @@ import { isLatched, stopKey, stopOf } from "../motion/report.js";
 import { Obedience, standingStops } from "../motion/stopping.js";
 import { button, html, say, stopButton } from "./elements.js";
 import { lay } from "./overlay.js";
+import { StopTwins } from "./stop_twins.js";
 import { TwiceButton } from "./twice_button.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
@@ -23,17 +24,24 @@ const RESET_AT_ONCE = 60;
  * Space and Escape stop the robot that is driven or selected, all while there is none,
  * and Shift and Escape all, whether or not the map has a `Teleop`.
  *
+ * Options: `place`, a selector of the page's own element for the button; without a place
+ * it lies over the map.
+ *
  * @param {MapCanvas} map
+ * @param {{place?: string}} options
  * @returns {Half}
  */
-export default function attach(map) {
-  const stop = new Stop(map);
+export default function attach(map, options) {
+  const stop = new Stop(map, options);
   return { destroy: () => stop.destroy() };
 }
 
 class Stop {
-  /** @param {MapCanvas} map */
-  constructor(map) {
+  /**
+   * @param {MapCanvas} map
+   * @param {{place?: string}} options
+   */
+  constructor(map, { place }) {
     /** @type {Drive} */
     this._drive = map.drive;
     this._obedience = new Obedience();
@@ -80,7 +88,7 @@ class Stop {
     this._shown = "";
     const drive = this._drive;
     this._offs = [
-      lay(map, panel, "top-right"),
+      lay(map, panel, "top-right", place),
       deskOf(drive).open(),
       drive.on("stop", () => this._stopped()),
       drive.on("robot", (report) => this._report(report)),
@@ -179,7 +187,7 @@ function byName(one, other) {
 
 /** Covers the page: a robot does not do what it is told. */
 class Alarm {
-  /** @param {() => void} stopAll As the alarm covers the button that does. */
+  /** @param {() => void} stopAll Where no button of the page that does is in sight. */
   constructor(stopAll) {
     // Figures change several times a second, which nobody wants to have read out.
     this._names = html("p", "webmap-alarm-names", { "aria-live": "off" });
@@ -188,14 +196,18 @@ class Alarm {
     /** @type {ReadonlyMap<string, string>} */
     this._current = new Map();
     this._ending = new AbortController();
+    this._stop = stopButton("webmap-alarm-stop", "Stop all", stopAll);
+    // A hand that knows where STOP is on the page finds it there.
+    this._twins = new StopTwins();
     this._element = html(
       "div",
       "webmap-alarm",
       { role: "alert", "aria-atomic": "false", popover: "manual" },
+      this._twins.element,
       html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
       html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
       this._names,
-      stopButton("webmap-alarm-stop", "Stop all", stopAll),
+      this._stop,
       button("webmap-alarm-seen", "I have seen this", () => {
         this._seen = new Set(this._current.keys());
         this.show(this._current);
@@ -215,7 +227,17 @@ class Alarm {
     const news = [...alarms].filter(([robot]) => !this._seen.has(robot));
     say(this._names, news.map(([, words]) => words).join(", "));
     if (news.length === 0) this.destroy();
-    else if (!this._element.isConnected) this._begin();
+    else {
+      if (!this._element.isConnected) this._begin();
+      this._place();
+    }
+  }
+
+  /** Have STOP where it is on the page, and everything else beside it. */
+  _place() {
+    const { all, top, bottom } = this._twins.place();
+    this._stop.hidden = all;
+    this._element.style.paddingBlock = `${Math.max(top, 24)}px ${Math.max(bottom, 24)}px`;
   }
 
   _begin() {

@@ -2,7 +2,7 @@ import { deskOf } from "../inputs/desk.js";
 import { heldByAnother, isLatched, mayReach, stopOf } from "../motion/report.js";
 import { describe, inputsOf } from "../motion/status.js";
 import { Halos } from "./halos.js";
-import { lay, overlayOf } from "./overlay.js";
+import { lay, overlayOf, ownPlace } from "./overlay.js";
 import { Requests } from "./requests.js";
 import { StickPad } from "./stick_pad.js";
 import { Panel } from "./teleop_panel.js";
@@ -11,17 +11,20 @@ import { withoutKeys } from "./touch_words.js";
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
 /** @typedef {import('../halves.js').Half} Half */
+/** @typedef {{holonomic?: boolean | null, stopPlace?: string}} Options */
 
 /**
  * Drive the selected robot with keys, an on-screen stick or a gamepad, and show how that
  * stands.
  *
  * Options: `holonomic`, whether Q and E, and the sticks, move the base sideways; null if
- * each robot's element says so (`data-holonomic`). Speeds are not known here: the gate
- * scales. Sends `{active}` when the page's keys start or stop to belong to this map.
+ * each robot's element says so (`data-holonomic`). `stopPlace`, a selector of the page's
+ * own element for the robot's STOP; without it STOP is a part of the panel. Speeds are not
+ * known here: the gate scales. Sends `{active}` when the page's keys start or stop to
+ * belong to this map.
  *
  * @param {MapCanvas} map
- * @param {{holonomic?: boolean | null}} options
+ * @param {Options} options
  * @param {Send} send
  * @returns {Half}
  */
@@ -36,10 +39,10 @@ const SELECTED_HOLONOMIC = ".robot.selected[data-holonomic]";
 class Teleop {
   /**
    * @param {MapCanvas} map
-   * @param {{holonomic?: boolean | null}} options
+   * @param {Options} options
    * @param {Send} send
    */
-  constructor(map, { holonomic = false }, send) {
+  constructor(map, { holonomic = false, stopPlace = "" }, send) {
     this._map = map;
     /** @type {import('../drive.js').Drive} */
     this._drive = map.drive;
@@ -58,6 +61,7 @@ class Teleop {
       lay(map, this._panel.element, "bottom-left"),
       lay(map, this._stick.element, "bottom-right"),
     ];
+    if (ownPlace(stopPlace)) takes.push(lay(map, this._panel.stop, undefined, stopPlace));
     this._desk = deskOf(this._drive);
     this._seat = {
       map,

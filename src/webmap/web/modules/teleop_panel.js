@@ -27,7 +27,8 @@ export class Panel {
     this._figures = html("dl", "webmap-teleop-figures");
     /** @type {Map<string, HTMLElement>} */
     this._values = new Map();
-    this._stop = stopButton("webmap-teleop-stop", "Stop", acts.stop);
+    /** In this panel, unless the page has a place of its own for it. */
+    this.stop = stopButton("webmap-teleop-stop", "Stop", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take", acts.lease);
     this._reset = new TwiceButton(
       "webmap-reset",
@@ -61,7 +62,7 @@ export class Panel {
       this._mark,
       html("div", "webmap-teleop-words", {}, state, this._test, this._cap, this._own),
       html("div", "webmap-teleop-acts", {}, ...buttons),
-      this._stop,
+      this.stop,
       this._figures,
     );
   }
@@ -138,9 +139,10 @@ export class Panel {
     this._tester.element.classList.toggle("known", known);
     this._stick.hidden = stick === null;
     set(this._stick, "aria-pressed", String(stick === true));
-    set(this._stop, "aria-label", name ? `Stop ${name}` : "Stop the selected robot");
+    set(this.stop, "aria-label", name ? `Stop ${name}` : "Stop the selected robot");
     // Off only when there is nothing to stop, never because of doubt.
-    this._stop.disabled = report === null;
+    set(this.stop, "data-robot", name);
+    this.stop.disabled = report === null;
   }
 }
 
