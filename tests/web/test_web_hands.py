@@ -50,6 +50,22 @@ def test_doubt_is_neutral_within_50_ms_and_nothing_resumes(
     bench.still()
 
 
+def test_a_key_held_since_before_it_was_heard_does_nothing_and_that_is_said(
+    bench: Bench,
+) -> None:
+    bench.page.keyboard.down("w")  # no robot is selected, so no key drives
+    bench.select("r1")
+    bench.until(lambda: bench.shown() == "free")
+    bench.page.wait_for_timeout(250)
+    # The keyboard repeats it, and is heard for the first time.
+    bench.page.keyboard.down("w")
+    bench.until(lambda: bench.shown() == "hands-off")
+    bench.still()
+    bench.page.keyboard.up("w")
+    bench.until(lambda: bench.shown() == "free")
+    bench.hold("w", bench.gate.moves)
+
+
 @pytest.mark.parametrize("key", ["Meta", "Control", "Alt"])
 def test_a_modifier_is_a_doubt(bench: Bench, key: str) -> None:
     bench.drive()

@@ -123,11 +123,12 @@ export class Drive {
    *
    * @param {string} source
    * @param {Partial<Axes> | null} axes Null when the input is gone.
+   * @param {{fresh?: boolean}} [how] See {@link Hands#set}.
    */
-  setInput(source, axes) {
+  setInput(source, axes, how) {
     const { hands } = this._session;
     const was = hands.pressed;
-    hands.set(source, axes, performance.now());
+    hands.set(source, axes, performance.now(), how);
     // A release must not wait for the next step, nor should a press.
     if (was !== hands.pressed) this._step();
   }

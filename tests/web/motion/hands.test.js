@@ -86,3 +86,21 @@ test("axes that are no numbers are neutral, all of them", () => {
 test("axes beyond one are one", () => {
   assert.deepEqual(clean({ x: 7, turn: -7 }), { x: 1, y: 0, turn: -1 });
 });
+
+test("what was pressed before it could be heard does nothing until it is released", () => {
+  const hands = rested();
+  hands.set("keys", FORWARD, 0, { fresh: false });
+  assert.equal(hands.pressed, true);
+  hands.set("keys", LEFT, 10_000);
+  assert.deepEqual(hands.axes, NEUTRAL);
+  hands.set("keys", null, 10_001);
+  hands.set("keys", FORWARD, 10_001 + REST);
+  assert.deepEqual(hands.axes, FORWARD);
+});
+
+test("a key that was not heard ends what its keyboard asked for until then", () => {
+  const hands = rested();
+  hands.set("keys", LEFT, 0);
+  hands.set("keys", { x: 1, y: 0, turn: 1 }, 100, { fresh: false });
+  assert.deepEqual(hands.axes, NEUTRAL);
+});

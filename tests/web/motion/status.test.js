@@ -133,7 +133,7 @@ test("a stop hook that failed is said, whatever else there is to say", () => {
   assert.equal(detail({}, { taking: true }), words);
   const driving = detail({ ...ME, state: "driving" }, { driven: "r1" });
   assert.equal(driving, `0.00 m/s, 0.00 rad/s. ${words}`);
-  assert.equal(detail({}, { link: "connecting" }), "");
+  assert.equal(detail({}, { link: "connecting" }), "Connecting.");
 });
 
 test("another program that publishes velocities is said in every state", () => {

@@ -92,9 +92,10 @@ export class Keys {
     if (!this._drives(event)) return;
     // Arrow keys scroll the page otherwise, also while they repeat.
     event.preventDefault();
-    if (event.repeat || this._held.has(event.code)) return;
+    if (this._held.has(event.code)) return;
     this._held.add(event.code);
-    this._tell();
+    // The first event of a key is a repetition if this page did not hear the press.
+    this._tell({ fresh: !event.repeat });
   }
 
   /** @param {KeyboardEvent} event */
@@ -136,8 +137,9 @@ export class Keys {
     return this._owner.holonomic() && Object.hasOwn(SIDEWAYS, event.code);
   }
 
-  _tell() {
+  /** @param {{fresh?: boolean}} [how] */
+  _tell(how) {
     const holonomic = this._owner.holonomic();
-    this._drive.setInput("keys", axesOf(this._held, { holonomic }));
+    this._drive.setInput("keys", axesOf(this._held, { holonomic }), how);
   }
 }

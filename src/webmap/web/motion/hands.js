@@ -71,12 +71,18 @@ export class Hands {
    * @param {string} source
    * @param {Partial<Axes> | null} asked Its axes; null when it is gone.
    * @param {number} now
+   * @param {{fresh?: boolean}} [how] `fresh`: whether the press was heard. An input that
+   *     was pressed before does nothing until it is released.
    */
-  set(source, asked, now) {
+  set(source, asked, now, { fresh = true } = {}) {
     const axes = clean(asked);
-    if (isNeutral(axes)) this._release(source, now);
-    else if (this._pressed.has(source)) this._pressed.set(source, axes);
-    else this._press(source, axes, now);
+    if (isNeutral(axes)) {
+      this._release(source, now);
+      return;
+    }
+    if (this._pressed.has(source)) this._pressed.set(source, axes);
+    else this._press(source, axes, fresh && this.ready(now));
+    if (!fresh) this._void.add(source);
   }
 
   /**
@@ -103,10 +109,9 @@ export class Hands {
   /**
    * @param {string} source
    * @param {Readonly<Axes>} axes
-   * @param {number} now
+   * @param {boolean} counts
    */
-  _press(source, axes, now) {
-    const counts = this.ready(now);
+  _press(source, axes, counts) {
     this._pressed.set(source, axes);
     if (counts) this._dead = false;
     else this._void.add(source);

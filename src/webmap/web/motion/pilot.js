@@ -75,6 +75,7 @@ export class Pilot {
       driven: this.driven,
       taking: robot !== null,
       settled: this.settled,
+      early: this._stream.early,
       pressed: this.hands.pressed,
       dead: this.hands.dead,
       axes: this.hands.axes,

@@ -110,7 +110,7 @@ export function speedOf({ measured }) {
 
 /** @param {Status} status */
 function ofLink({ link }) {
-  if (link === "connecting") return say("connecting", "Connecting", "");
+  if (link === "connecting") return say("connecting", "Getting ready", "Connecting.");
   if (link === "lost") {
     return say(
       "lost",
@@ -175,7 +175,7 @@ function ofMine(status, report, inputs) {
   if (status.pressed && status.dead) return handsOff();
   if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
   if (rolls(report)) return rolling(report);
-  if (!status.settled) return say("taking", "Getting ready", "");
+  if (!status.settled || status.early) return gettingReady();
   return say("ready", "Ready", `Hold ${inputs}. Space stops.`);
 }
 
@@ -185,7 +185,7 @@ function ofMine(status, report, inputs) {
  * @param {string} inputs
  */
 function ofFree(status, report, inputs) {
-  if (status.taking) return say("taking", "Getting ready", "");
+  if (status.taking) return gettingReady();
   if (!report.armable) {
     return say(
       "fixed",
@@ -197,12 +197,17 @@ function ofFree(status, report, inputs) {
   if (rolls(report)) return rolling(report);
   if (status.refusal) return say("free", "Free", sentence(status.refusal));
   if (status.pressed && status.dead) return handsOff();
+  if (status.early) return gettingReady();
   return say("free", "Free", `Hold ${inputs} to drive.`);
 }
 
 /** @param {RobotReport} report */
 function rolling(report) {
   return say("stopping", "Still moving", speedOf(report));
+}
+
+function gettingReady() {
+  return say("taking", "Getting ready", "");
 }
 
 function handsOff() {

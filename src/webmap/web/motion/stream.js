@@ -29,6 +29,9 @@ export const SETTLE = 250;
 /** Steps come every 50 ms; after a longer gap than this the page was not awake; ms. */
 export const ASLEEP = 250;
 
+/** A page that kept time for so long has loaded what made it late, most likely; ms. */
+export const CALM = 500;
+
 /**
  * The stream of commands under one lease: how the hands are, or neutral.
  *
@@ -50,6 +53,16 @@ export class Stream {
     this.lease = null;
     this._seq = 0;
     this._lookedAt = now;
+    this._sleptAt = now;
+    this._attentive = true;
+  }
+
+  /** Whether a press would come too early: the page gets ready for one by itself. */
+  get early() {
+    if (!this._attentive || this.hands.pressed) return false;
+    const now = this._lookedAt;
+    const calm = now - this._sleptAt >= CALM;
+    return this.loop.tick === null || !calm || !this.hands.ready(now);
   }
 
   /** Whether the gate has seen enough neutral, as far as can be known here. */
@@ -113,7 +126,10 @@ export class Stream {
   look(now, attentive) {
     const gap = now - this._lookedAt;
     this._lookedAt = now;
-    if (!attentive || gap < 0 || gap > ASLEEP) this.doubt(now, { drop: true });
+    this._attentive = attentive;
+    const slept = gap < 0 || gap > ASLEEP;
+    if (slept) this._sleptAt = now;
+    if (!attentive || slept) this.doubt(now, { drop: true });
     if (this.loop.tick === null || this.loop.state(now) !== "open") this.doubt(now);
     if (this.lease && this.pictures.blind(this.lease.robot)) this.doubt(now);
   }

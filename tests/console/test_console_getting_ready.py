@@ -1,0 +1,65 @@
+"""A page that was just opened says that it is getting ready until a press drives."""
+
+import threading
+import time
+
+import pytest
+from playwright.sync_api import Route, expect
+
+pytestmark = pytest.mark.browser
+
+READY = """() => {
+  const shown = document.querySelector(".getting-ready").checkVisibility();
+  const title = document.querySelector(".webmap-teleop-title")?.textContent;
+  return !shown && title === "Free";
+}"""
+"""Whether the page says that a press drives."""
+
+
+def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
+    come = threading.Event()
+    held: list[Route] = []
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.route(
+        "**/modules/teleop.js*",
+        lambda r: r.continue_() if come.is_set() else held.append(r),
+    )
+    page.goto(demo.url, wait_until="commit")
+    words = page.locator(".getting-ready")
+    row = page.locator("#robots .row", has_text="Robot 1").locator("button").first
+    row.click()
+    expect(row).to_have_attribute("aria-pressed", "true")
+    expect(words).to_be_visible()
+    expect(words).to_contain_text("Getting ready")
+    page.keyboard.down("w")
+    come.set()
+    for route in held:
+        route.continue_()
+    expect(words).to_be_hidden()
+    title = page.locator(".webmap-teleop-title")
+    expect(title).to_have_text("Free")
+    page.keyboard.down("w")  # as the keyboard repeats it
+    expect(title).to_have_text("Let go, then press again")
+    page.keyboard.up("w")
+    expect(title).to_have_text("Free")
+    context.close()
+
+
+@pytest.mark.serial  # a page that is kept waiting for a processor lets go
+def test_the_first_press_drives_as_soon_as_the_page_does_not_say_so(chromium, demo):
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.goto(demo.url, wait_until="commit")
+    page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
+    page.wait_for_function(READY, polling=10)
+    page.keyboard.down("a")
+    title = page.locator(".webmap-teleop-title")
+    seen, deadline = set(), time.monotonic() + 10
+    while "Driving" not in seen:
+        assert time.monotonic() < deadline, seen
+        seen.add(title.text_content())
+        page.wait_for_timeout(20)
+    assert "Let go, then press again" not in seen
+    page.keyboard.up("a")
+    context.close()

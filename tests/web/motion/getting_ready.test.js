@@ -1,0 +1,99 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Session } from "../../../src/webmap/web/motion/session.js";
+import { describe } from "../../../src/webmap/web/motion/status.js";
+import { CALM } from "../../../src/webmap/web/motion/stream.js";
+
+const REPORT = {
+  op: "robot",
+  robot: "r1",
+  name: "Bob",
+  state: "free",
+  holder: null,
+  mine: false,
+  epoch: null,
+  armed: false,
+  v: 1,
+  w: 1,
+  why: [],
+  link: "up",
+  sent: [0, 0, 0],
+  echoed: null,
+  measured: null,
+  armable: true,
+  reason: null,
+};
+const MINE = {
+  ...REPORT,
+  holder: { connection: "c1", name: "me" },
+  mine: true,
+  epoch: 3,
+  armed: true,
+  state: "held",
+};
+const FORWARD = { x: 1, y: 0, turn: 0 };
+
+/** A page that loads: when it connects, and when its thread does nothing else; ms. */
+const CONNECTED = 300;
+const BUSY = [
+  [400, 700],
+  [900, 1200],
+];
+const END = 5000;
+
+/**
+ * Open a page, press a key at some moment and hold it.
+ *
+ * @param {number} at When the key goes down, in ms after the page began.
+ * @returns {{title: string, moved: boolean}} What the page said just before, and whether
+ *     the robot moved.
+ */
+function pressAt(at) {
+  const session = new Session(0, {});
+  const { pilot } = session;
+  let title = "Getting ready"; // as the page itself says before there is anything else
+  let [ack, tick, moved, heard] = [-1, 0, false, false];
+  const take = (/** @type {any[]} */ commands, /** @type {number} */ now) => {
+    for (const { op, seq, x } of commands) {
+      if (op === "take") session.receive(MINE, now);
+      if (op === "drive") ack = seq;
+      if (x) moved = true;
+    }
+  };
+  for (let now = 0; now < END; now += 10) {
+    if (BUSY.some(([from, to]) => now >= from && now < to)) continue;
+    if (now === CONNECTED) {
+      session.loop.open(now);
+      session.receive({ op: "hello", connection: "c1" }, now);
+      session.receive(REPORT, now);
+      pilot.choose("r1", now);
+    }
+    if (now > CONNECTED) session.receive({ op: "tick", tick: ++tick, ack }, now);
+    if (now >= at && !heard) {
+      heard = true;
+      session.hands.set("keys", FORWARD, now);
+      take(pilot.step(now, true), now);
+    }
+    if (now % 50 > 0) continue;
+    take(pilot.step(now, true), now);
+    if (heard) continue;
+    const status = { link: session.state, connection: "c1", ...pilot.status };
+    title = describe(status, "r1", pilot.robots.get("r1") ?? null, true).title;
+  }
+  return { title, moved };
+}
+
+test("the first press moves the robot, or the page says that it is getting ready", () => {
+  const refused = [];
+  for (let at = 0; at < 2500; at += 10) {
+    const { title, moved } = pressAt(at);
+    if (!moved && title !== "Getting ready") refused.push([at, title]);
+  }
+  assert.deepEqual(refused, []);
+});
+
+test("a page that has loaded is ready soon", () => {
+  const last = BUSY[BUSY.length - 1][1];
+  assert.deepEqual(pressAt(last + CALM + 60), { title: "Free", moved: true });
+});
