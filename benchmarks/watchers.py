@@ -6,6 +6,7 @@ have got a frame, then JSON with what they received in the seconds after that.
 
 import asyncio
 import json
+import re
 import struct
 import sys
 from urllib.parse import urlsplit
@@ -41,15 +42,16 @@ class Watcher:
 
 
 async def open_link(url: str, name: str) -> ClientConnection:
-    """Open ``/scene`` as a browser of its own would, with a cookie for the token."""
+    """Open ``/scene`` as a browser of its own would, with a key for the token."""
     async with httpx.AsyncClient(follow_redirects=True) as client:
-        (await client.get(url)).raise_for_status()
-        cookies = "; ".join(f"{k}={v}" for k, v in client.cookies.items())
+        page = (await client.get(url)).raise_for_status().text
+    key = re.search(r'name="webmap-key" content="([^"]+)"', page)
+    assert key, "the page that signs in hands out a key"
     place = urlsplit(url)
     return await connect(
         f"ws://{place.netloc}/_webmap/scene?page=/&id={name}",
         origin=f"http://{place.netloc}",  # type: ignore[arg-type]  # a NewType of str
-        additional_headers={"Cookie": cookies},
+        subprotocols=["webmap", key[1]],  # type: ignore[list-item]  # as above
         compression=None,
         max_size=None,
     )

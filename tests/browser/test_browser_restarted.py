@@ -32,6 +32,6 @@ def test_a_page_whose_token_is_of_the_past_is_told_to_open_the_new_address(
         tab.wait_for_selector("svg.webmap")
     expect(status).to_contain_text("No connection to the server")
     with running(*command, urlsplit(first.url).port, pattern=WEB) as second:
-        expect(status).to_contain_text("Open the address that it printed")
+        expect(status).to_contain_text("Open the address that WebMap printed")
         tab.goto(second.url)
         expect(status).to_be_hidden()

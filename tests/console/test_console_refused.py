@@ -5,14 +5,18 @@ from playwright.sync_api import expect
 
 pytestmark = pytest.mark.browser
 
-SEND = """([path, texts]) => new Promise((resolve) => {
-  const socket = new WebSocket(new URL(path, location.href.replace(/^http/, "ws")));
-  socket.onopen = () => {
-    for (const text of texts) socket.send(text);
-    socket.close();
-  };
-  socket.onclose = ({ code }) => resolve(code);
-})"""
+SEND = """async ([path, texts]) => {
+  const { protocols } = await import("/_webmap/key.js");
+  const url = new URL(path, location.href.replace(/^http/, "ws"));
+  const socket = new WebSocket(url, protocols());
+  return await new Promise((resolve) => {
+    socket.onopen = () => {
+      for (const text of texts) socket.send(text ?? new Uint8Array(3));
+      socket.close();
+    };
+    socket.onclose = ({ code }) => resolve(code);
+  });
+}"""
 
 
 def test_refused_messages_are_counted_with_who_sent_them_and_why(open_console):
@@ -26,10 +30,6 @@ def test_refused_messages_are_counted_with_who_sent_them_and_why(open_console):
     expect(line).to_have_count(1)
     expect(line).to_contain_text("9, last at")
     expect(line.locator(".refused-last")).to_contain_text("NaN")
-    binary = (
-        "(path) => { const s = new WebSocket(new URL(path, location.href"
-        ".replace(/^http/, 'ws'))); s.onopen = () => s.send(new Uint8Array(3)); }"
-    )
-    page.evaluate(binary, "_webmap/drive")
+    page.evaluate(SEND, ["_webmap/drive", [None]])
     expect(refused.locator("summary")).to_have_text("10 refused")
     expect(line.locator(".refused-last")).to_contain_text("a binary message")

@@ -43,10 +43,10 @@ def pass_time(seconds):
     time.sleep(seconds)
 
 
-RESET = """new Promise((done) => {
+RESET = """import("/_webmap/key.js").then(({ protocols }) => new Promise((done) => {
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
-    const socket = new WebSocket(url);
+    const socket = new WebSocket(url, protocols());
     socket.onmessage = (event) => {
         const message = JSON.parse(event.data);
         if (message.op !== "robot") return;
@@ -58,7 +58,7 @@ RESET = """new Promise((done) => {
             done(message.state);
         }
     };
-})"""
+}))"""
 
 
 class Bench:

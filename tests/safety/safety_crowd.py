@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import http.client
 import json
+import re
 import sys
 from urllib.parse import urlsplit
 
@@ -15,23 +16,26 @@ from websockets.exceptions import ConnectionClosed
 
 
 def sign_in(url: str) -> str:
-    """Exchange the token in a URL for a cookie, as a browser does."""
+    """Exchange the token in a URL for the key of a page, as a browser does."""
     parts = urlsplit(url)
     link = http.client.HTTPConnection(parts.hostname, parts.port)
     link.request("GET", f"{parts.path}?{parts.query}")
-    cookie = link.getresponse().headers["set-cookie"].split(";")[0]
+    answer = link.getresponse()
+    answer.read()
+    link.request("GET", answer.headers["location"])
+    page = link.getresponse().read().decode()
     link.close()
-    return cookie
+    return re.search(r'name="webmap-key" content="([^"]+)"', page)[1]
 
 
-async def view(url: str, cookie: str, number: int, silent: bool, there) -> None:
+async def view(url: str, key: str, number: int, silent: bool, there) -> None:
     """Be one page: say hello, and acknowledge each frame or none."""
     address = urlsplit(url).netloc
     name = f"viewer{number:04d}"
     socket = await connect(
         f"ws://{address}/_webmap/scene?page=%2F&id={name}",
         origin=f"http://{address}",
-        additional_headers={"cookie": cookie},
+        subprotocols=["webmap", key],
         compression=None,
         max_size=None,
         ping_interval=None,
@@ -58,7 +62,7 @@ async def view(url: str, cookie: str, number: int, silent: bool, there) -> None:
 
 async def main(url: str, viewers: int, silent: int) -> None:
     """Have all come, then wait for the end."""
-    cookie = sign_in(url)
+    key = sign_in(url)
     there = 0
 
     def arrived() -> None:
@@ -68,7 +72,7 @@ async def main(url: str, viewers: int, silent: int) -> None:
             print("ready", flush=True)
 
     tasks = [
-        asyncio.create_task(view(url, cookie, n, n < silent, arrived))
+        asyncio.create_task(view(url, key, n, n < silent, arrived))
         for n in range(viewers)
     ]
     await asyncio.to_thread(sys.stdin.read)

@@ -24,7 +24,8 @@ MAX_AGE = 0.3
 ON_THE_WAY = 0.1
 """Seconds for the ways to and from the gate, and for both clocks to be compared."""
 
-DRIVE = """(() => {
+DRIVE = """(async () => {
+    const { protocols } = await import("/_webmap/key.js");
     const OFF = [0, 0];
     const PHASES = [
         [1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1],
@@ -35,7 +36,7 @@ DRIVE = """(() => {
         const url = new URL("/_webmap/drive", location.href);
         url.protocol = "ws:";
         [tick, robot, epoch] = [null, null, null];
-        socket = new WebSocket(url);
+        socket = new WebSocket(url, protocols());
         socket.onclose = () => setTimeout(connect, 100);
         socket.onmessage = (event) => {
             const message = JSON.parse(event.data);

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 from page_loop import Loop
-from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite
+from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, key_in
 
 with warnings.catch_warnings():
     # Starlette wants another client library under its test client; httpx serves.
@@ -55,7 +55,8 @@ def stranger(app, make_client):
 def client(app, make_client):
     """A client that has signed in."""
     client = make_client(app)
-    assert client.get(f"/?token={TOKEN}").status_code == 303
+    page = client.get(f"/?token={TOKEN}", follow_redirects=True)
+    client.headers["webmap-key"] = key_in(page.text)
     return client
 
 

@@ -1,6 +1,7 @@
 """Stand-ins for the rooms below the server, and a way to run it for real."""
 
 import contextlib
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -108,6 +109,36 @@ class FakeGate:
         return connection
 
 
+@dataclass
+class Browser:
+    """What a browser has that has signed in."""
+
+    cookie: str
+    """Its Cookie header."""
+
+    key: str
+    """What its pages open their sockets with."""
+
+    @property
+    def protocols(self) -> list[str]:
+        """What its pages offer as subprotocols."""
+        return ["webmap", self.key]
+
+
+def sign_in(url: str) -> Browser:
+    """Sign a new browser in by an address with a token or a code."""
+    with httpx.Client(follow_redirects=True) as client:
+        page = client.get(url)
+        assert page.status_code == 200
+        cookie = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+    return Browser(cookie, key_in(page.text))
+
+
+def key_in(html: str) -> str:
+    """Return the key that a page hands out."""
+    return re.search(r'<meta name="webmap-key" content="([^"]+)">', html)[1]
+
+
 class Running:
     """A server that runs in a thread of its own."""
 
@@ -116,11 +147,9 @@ class Running:
         self.port = port
         self._app = app
 
-    def sign_in(self) -> str:
-        """Return the Cookie header of a new viewer."""
-        answer = httpx.get(f"{self.origin}/?token={self._app.settings.token}")
-        assert answer.status_code == 303
-        return answer.headers["set-cookie"].partition(";")[0]
+    def sign_in(self) -> Browser:
+        """Return what a new viewer's browser has."""
+        return sign_in(f"{self.origin}/?token={self._app.settings.token}")
 
     def socket_url(self, name: str) -> str:
         return f"ws://127.0.0.1:{self.port}/_webmap/{name}"

@@ -1,13 +1,14 @@
 import logging
 
 import pytest
-from server_fakes import TOKEN, FakePage
+from server_fakes import TOKEN, FakePage, key_in
 from starlette.applications import Starlette
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from webmap.core.pictures import pictures
 from webmap.server.app import create_app
+from webmap.server.auth import Token
 from webmap.server.headers import CONTENT_SECURITY_POLICY
 from webmap.server.settings import Settings
 from webmap.server.viewer import Viewer
@@ -21,11 +22,11 @@ def socket_url(name, **query):
     return f"ws://127.0.0.1:8000/_webmap/{name}?{text}"
 
 
-def refused(client, url, headers):
+def refused(client, url, headers, protocols=None):
     """Return the status with which a socket is refused before the upgrade."""
     with (
         pytest.raises(WebSocketDisconnect) as caught,
-        client.websocket_connect(url, headers=dict(headers)),
+        client.websocket_connect(url, protocols, headers=dict(headers)),
     ):
         pass
     return getattr(caught.value, "status_code", None)
@@ -112,7 +113,7 @@ def test_a_failing_page_gets_the_headers_too(app, rooms, make_client):
 
     app = create_app(Broken(), rooms.model, rooms.gate, Settings(token=TOKEN))
     client = make_client(app, raise_server_exceptions=False)
-    client.get(f"/?token={TOKEN}")
+    client.cookies["webmap_8000"] = Token(TOKEN).issue()
     answer = client.get("/")
     assert answer.status_code == 500
     assert answer.headers["content-security-policy"] == CONTENT_SECURITY_POLICY
@@ -130,9 +131,12 @@ def test_a_browser_is_asked_to_sign_in_and_other_programs_are_told(stranger):
 def test_signing_in_leads_to_the_page_and_leaves_no_token_behind(stranger, caplog):
     with caplog.at_level(logging.DEBUG):
         answer = stranger.get(f"/lab/?token={TOKEN}")
-        assert answer.headers["location"] == "/lab/"
+        location = answer.headers["location"]
+        assert location.startswith("/lab/?webmap_code=")
         assert answer.headers["cache-control"] == "no-store"
-        page = stranger.get(answer.headers["location"])
+        page = stranger.get(location)
+        assert page.headers["cache-control"] == "no-store"
+        assert stranger.get(location).headers["location"] == "/lab/"
         wrong = stranger.get("/?token=not-the-token", headers={"host": "x"})
     assert page.status_code == 200
     for text in (str(answer.headers), page.text, str(page.headers), wrong.text):
@@ -268,12 +272,70 @@ def test_a_published_file_may_have_any_name(app, client, folder):
     assert client.get(app.published.publish_file(odd)).text == "odd{}"
 
 
-def test_ten_wrong_tokens_make_an_address_wait_and_say_how_long(stranger):
+def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_works_at_once(stranger):
     for _ in range(10):
         assert stranger.get("/?token=wrong").status_code == 401
     answer = stranger.get("/?token=wrong")
     assert answer.status_code == 429
     assert 0 < int(answer.headers["retry-after"]) <= 60
+    page = stranger.get(f"/?token={TOKEN}", follow_redirects=True)
+    assert page.status_code == 200
+    assert key_in(page.text)
+
+
+def test_a_code_signs_one_browser_in_once(app, make_client):
+    first, second = make_client(app), make_client(app)
+    address = f"/lab/?a=1&webmap_code={app.new_code()}"
+    page = first.get(address)
+    assert page.status_code == 200
+    assert key_in(page.text)
+    assert page.headers["set-cookie"].startswith("webmap_8000=")
+    assert first.get("/lab/").status_code == 200
+    late = second.get(address)
+    assert late.status_code == 401
+    assert "works once" in late.text
+    assert "set-cookie" not in late.headers
+    # In the browser that used it, the address that is in its history still leads on.
+    assert first.get(address).headers["location"] == "/lab/?a=1"
+
+
+def test_only_the_page_that_signs_in_is_handed_the_key(client, with_page):
+    assert "webmap-key" not in client.get("/lab/").text
+    assert "webmap-key" not in with_page.get("/own/page").text
+    own = with_page.get(f"/own/page?token={TOKEN}", follow_redirects=True)
+    assert own.text.index(key_in(own.text)) < own.text.index("</head>")
+
+
+def test_a_browser_that_has_lost_its_key_gets_the_same_one_again(client):
+    key = client.headers["webmap-key"]
+    page = client.get(f"/?token={TOKEN}", follow_redirects=True)
+    assert key_in(page.text) == key
+    assert "set-cookie" not in page.headers
+
+
+@pytest.mark.parametrize("name", ["scene", "drive"])
+def test_the_cookie_opens_no_socket(app, client, make_client, name, rooms):
+    """Another server on this host receives the cookie: cookies know no ports."""
+    key = client.headers.pop("webmap-key")
+    url = socket_url(name, id="p")
+    assert refused(client, url, ORIGIN) == 401
+    for wrong in (client.cookies["webmap_8000"], TOKEN, key[:-1], key + "0"):
+        assert refused(client, url, ORIGIN, ["webmap", wrong]) == 401
+    other = make_client(app)
+    with other.websocket_connect(url, ["webmap", key], headers=dict(ORIGIN)) as socket:
+        assert socket.accepted_subprotocol == "webmap"
+        socket.close()
+    assert len(rooms.model.scenes) + len(rooms.gate.connections) == 1
+
+
+def test_a_page_learns_why_its_socket_was_refused(client):
+    ask = "/_webmap/key"
+    assert client.post(ask, headers=ORIGIN).status_code == 204
+    assert client.post(ask).status_code == 403
+    client.headers["webmap-key"] = "wrong"
+    answer = client.post(ask, headers=ORIGIN)
+    assert answer.status_code == 401
+    assert "Open the address that WebMap printed" in answer.text
 
 
 def test_what_a_stranger_sends_writes_no_lines_of_its_own_into_the_log(
@@ -289,8 +351,11 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
     client = make_client(host)
     assert client.get("/robots/").status_code == 401
     answer = client.get(f"/robots/lab/?token={TOKEN}")
-    assert answer.headers["location"] == "/robots/lab/"
+    location = answer.headers["location"]
+    assert location.startswith("/robots/lab/?webmap_code=")
+    answer = client.get(location)
     assert "Path=/robots/;" in answer.headers["set-cookie"]
+    key = key_in(answer.text)
     assert 'src="/robots/_webmap/page.js"' in client.get("/robots/lab/").text
     assert client.get("/robots/lab").headers["location"] == "/robots/lab/"
     assert client.get("/robots/_webmap/icon.svg").status_code == 200
@@ -298,7 +363,7 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
     url = socket_url("scene", page="lab/", id="p").replace(
         "/_webmap", "/robots/_webmap"
     )
-    with client.websocket_connect(url, headers=dict(ORIGIN)) as socket:
+    with client.websocket_connect(url, ["webmap", key], headers=dict(ORIGIN)) as socket:
         socket.send_text("hello")
         socket.close()
     assert rooms.model.scenes[0].path == "/lab/"

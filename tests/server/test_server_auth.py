@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.errors import ConfigError
-from webmap.server.auth import Attempts, Token, new_token
+from webmap.server.auth import Attempts, Codes, Token, new_token
 
 SECRET = "s" * 43
 
@@ -52,6 +52,28 @@ def test_a_cookie_of_another_token_proves_nothing():
 @given(st.text())
 def test_no_text_is_a_cookie(text):
     assert Token(SECRET).session(text) is None
+
+
+def test_the_cookie_does_not_give_the_key_away_and_is_none():
+    token = Token(SECRET)
+    cookie = token.issue()
+    session = token.session(cookie)
+    key = token.key(session)
+    assert token.session_of_key(key) == session
+    assert token.session_of_key(cookie) is None
+    assert token.session(key) is None
+    assert Token(new_token()).session_of_key(key) is None
+    assert Token(SECRET).key(session) == key
+
+
+def test_a_code_is_used_up_and_the_oldest_is_forgotten_first():
+    codes = Codes(life=10.0, limit=2)
+    first, second, third = (codes.issue(0.0) for _ in range(3))
+    assert not codes.use(first, 0.0)
+    assert codes.use(second, 9.9)
+    assert not codes.use(second, 9.9)
+    assert not codes.use(third, 10.0)
+    assert not codes.use("", 0.0)
 
 
 def test_every_changed_character_spoils_a_cookie():

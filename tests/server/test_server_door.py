@@ -2,7 +2,7 @@ import pytest
 from server_fakes import TOKEN
 
 from webmap.errors import ConfigError
-from webmap.server.door import Door, Refusal, SignedIn
+from webmap.server.door import Door, GoOn, Refusal, SignedIn
 from webmap.server.origins import Hosts, checked_origin
 from webmap.server.request import Request, redact
 from webmap.server.settings import Settings
@@ -22,6 +22,7 @@ def scope(
     method="GET",
     scheme="http",
     root="",
+    keys=(),
 ):
     headers = [(b"host", one.encode("latin-1")) for one in host]
     headers += [(b"origin", one.encode("latin-1")) for one in origin]
@@ -35,7 +36,10 @@ def scope(
         "headers": headers,
         "client": ("127.0.0.1", 5000),
     }
-    return {**made, "method": method} if type == "http" else made
+    if type == "http":
+        headers += [(b"webmap-key", one.encode("latin-1")) for one in keys]
+        return {**made, "method": method}
+    return {**made, "subprotocols": list(keys)}
 
 
 def status(door, **kwargs):
@@ -194,18 +198,52 @@ def cookie_of(signed_in):
     return signed_in.cookie.partition(";")[0]
 
 
-def sign_in(door, **kwargs):
-    return door.identify(Request.of(scope(query=f"token={TOKEN}", **kwargs)), 0.0)
+def sign_in(door, *, now=0.0, **kwargs):
+    query = f"webmap_code={door.codes.issue(now)}"
+    return door.identify(Request.of(scope(query=query, **kwargs)), now)
 
 
-def test_the_token_is_exchanged_for_a_cookie_and_a_clean_url(door):
+def offer(door, token, **kwargs):
+    return door.identify(Request.of(scope(query=f"token={token}", **kwargs)), 0.0)
+
+
+def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(door):
     query = f"a=1&token={TOKEN}&b=%2F"
-    got = door.identify(Request.of(scope(path="/lab", query=query)), 0.0)
+    to = door.identify(Request.of(scope(path="/lab", query=query)), 0.0)
+    assert isinstance(to, GoOn)
+    assert to.location.startswith("/lab?a=1&b=%2F&webmap_code=")
+    query = to.location.partition("?")[2]
+    got = door.identify(Request.of(scope(path="/lab", query=query)), 1.0)
     assert isinstance(got, SignedIn)
-    assert got.location == "/lab?a=1&b=%2F"
     assert got.cookie.startswith("webmap_8080=")
     assert got.cookie.endswith("; Path=/; HttpOnly; SameSite=Strict")
-    assert TOKEN not in got.cookie
+    for secret in (to.location, got.cookie, got.key):
+        assert TOKEN not in secret
+    assert got.key not in got.cookie
+
+
+def test_a_code_is_good_once_and_for_two_minutes(door):
+    query = f"webmap_code={door.codes.issue(0.0)}"
+    assert isinstance(door.identify(Request.of(scope(query=query)), 119.9), SignedIn)
+    assert door.identify(Request.of(scope(query=query)), 119.9).status == 401
+    query = f"webmap_code={door.codes.issue(0.0)}"
+    assert door.identify(Request.of(scope(query=query)), 120.0).status == 401
+
+
+@pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
+def test_the_key_opens_sockets_and_the_cookie_does_not(door, opening):
+    got = sign_in(door)
+    cookie = [cookie_of(got)]
+    with_cookie = Request.of(scope(cookie=cookie, **opening))
+    assert door.identify(with_cookie, 0.0).status == 401
+    with_key = Request.of(scope(keys=["webmap", got.key], **opening))
+    assert door.identify(with_key, 0.0) == got.viewer
+    assert door.identify(Request.of(scope(cookie=cookie)), 0.0) == got.viewer
+
+
+def test_the_key_reads_no_page(door):
+    got = sign_in(door)
+    assert door.identify(Request.of(scope(keys=[got.key])), 0.0).status == 401
 
 
 def test_the_cookie_is_bound_to_prefix_and_port_and_to_tls(door):
@@ -251,17 +289,18 @@ def test_the_token_itself_is_no_cookie(door):
 
 @pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
 def test_a_token_opens_no_socket_and_changes_nothing(door, opening):
+    assert offer(door, TOKEN, **opening).status == 401
     assert sign_in(door, **opening).status == 401
 
 
-def test_wrong_tokens_run_into_a_wall_that_the_right_one_meets_too(door):
+def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_always_works(door):
     for _ in range(10):
-        request = Request.of(scope(query="token=wrong"))
-        assert door.identify(request, 0.0).status == 401
-    got = sign_in(door)
+        assert offer(door, "wrong").status == 401
+    got = offer(door, "wrong")
     assert (got.status, got.retry_after) == (429, 60)
-    after = door.identify(Request.of(scope(query=f"token={TOKEN}")), 60.0)
-    assert isinstance(after, SignedIn)
+    assert isinstance(offer(door, TOKEN), GoOn)
+    assert isinstance(sign_in(door), SignedIn)
+    assert offer(door, "wrong").status == 429
 
 
 def test_who_has_signed_in_is_not_kept_out_by_the_wall(door):
@@ -275,8 +314,8 @@ def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(door):
     cookie = cookie_of(sign_in(door))
     for _ in range(20):
         request = Request.of(scope(query="token=wrong", cookie=[cookie], path="/lab"))
-        assert door.identify(request, 0.0) == SignedIn("/lab", None)
-    assert isinstance(sign_in(door), SignedIn)
+        assert door.identify(request, 0.0) == GoOn("/lab")
+    assert offer(door, "wrong").status == 401
 
 
 @pytest.mark.parametrize(
@@ -289,7 +328,8 @@ def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(door):
     ],
 )
 def test_the_redirect_stays_on_this_origin(door, path, expected):
-    assert sign_in(door, path=path).location == expected
+    location = offer(door, TOKEN, path=path).location
+    assert location.partition("?webmap_code=")[0] == expected
 
 
 def test_refusals_never_repeat_what_was_sent(door):
@@ -299,9 +339,9 @@ def test_refusals_never_repeat_what_was_sent(door):
 
 
 def test_the_token_is_taken_out_of_what_servers_log():
-    one = scope(query=f"a=1&token={TOKEN}&token=x")
+    one = scope(query=f"a=1&token={TOKEN}&token=x&webmap_code=y")
     redact(one)
-    assert one["query_string"] == b"a=1&token=...&token=..."
+    assert one["query_string"] == b"a=1&token=...&token=...&webmap_code=..."
 
 
 def test_settings_do_not_show_their_token():

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite
+from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, sign_in
 from websockets.sync.client import connect
 
 from webmap.errors import ConfigError, WebMapError
@@ -59,15 +59,14 @@ def test_a_signal_ends_it_cleanly_and_soon_with_sockets_open(process, number):
     assert line.endswith(f"/?token={TOKEN}\n")
     url = line.split()[-1]
     origin = url.partition("/?")[0]
-    cookie = httpx.get(url).headers["set-cookie"].partition(";")[0]
+    browser = sign_in(url)
     with contextlib.ExitStack() as stack:
         for name in ("scene?id=p", "drive?id=p"):
             address = f"ws{origin[4:]}/_webmap/{name}"
-            headers = {"cookie": cookie}
             stack.enter_context(
-                connect(address, origin=origin, additional_headers=headers)
+                connect(address, origin=origin, subprotocols=browser.protocols)
             )
-        idle = stack.enter_context(httpx.Client(headers={"cookie": cookie}))
+        idle = stack.enter_context(httpx.Client(headers={"cookie": browser.cookie}))
         assert idle.get(origin).status_code == 200
         half = socket.create_connection(("127.0.0.1", int(origin.rpartition(":")[2])))
         stack.enter_context(half)

@@ -55,13 +55,14 @@ def rooms(module_rooms):
 @pytest.fixture
 def open_socket(server):
     """Open sockets as one viewer's browser does."""
-    cookie = server.sign_in()
+    own = server.sign_in()
 
-    def opened(name, cookie=cookie, **options):
+    def opened(name, browser=own, **options):
         return connect(
             server.socket_url(name),
             origin=server.origin,
-            additional_headers={"cookie": cookie},
+            additional_headers={"cookie": browser.cookie},
+            subprotocols=browser.protocols,
             max_size=None,
             **options,
         )
@@ -340,7 +341,7 @@ def test_two_viewers_may_call_their_pages_the_same(rooms, server, open_socket):
     async def scenario():
         async with (
             open_socket("scene?id=p") as first,
-            open_socket("scene?id=p", cookie=other) as second,
+            open_socket("scene?id=p", browser=other) as second,
         ):
             await second.send("second")
             await asyncio.to_thread(wait_for, lambda: len(rooms.model.scenes) == 2)
@@ -445,7 +446,7 @@ def test_a_model_that_fails_costs_one_page_only(
 
 @pytest.mark.parametrize("name", ["scene?id=p", "drive?id=p"])
 @pytest.mark.parametrize(
-    ("origin", "cookie", "status"),
+    ("origin", "key", "status"),
     [
         (None, True, 403),
         ("null", True, 403),
@@ -455,16 +456,15 @@ def test_a_model_that_fails_costs_one_page_only(
         ("http://127.0.0.1:{port}", False, 401),
     ],
 )
-def test_a_refused_socket_is_never_upgraded(
-    rooms, server, name, origin, cookie, status
-):
+def test_a_refused_socket_is_never_upgraded(rooms, server, name, origin, key, status):
     async def scenario():
-        headers = {"cookie": server.sign_in()} if cookie else {}
+        browser = server.sign_in()
         with pytest.raises(InvalidStatus) as caught:
             async with connect(
                 server.socket_url(name),
                 origin=origin.format(port=server.port) if origin else None,
-                additional_headers=headers,
+                additional_headers={"cookie": browser.cookie},
+                subprotocols=browser.protocols if key else None,
             ):
                 pass
         return caught.value.response

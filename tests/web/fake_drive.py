@@ -100,7 +100,12 @@ class FakeDrive:
     async def _run(self) -> None:
         self._loop = asyncio.get_running_loop()
         async with serve(
-            self._serve, "127.0.0.1", 0, process_request=self._file, close_timeout=0.1
+            self._serve,
+            "127.0.0.1",
+            0,
+            subprotocols=["webmap"],
+            process_request=self._file,
+            close_timeout=0.1,
         ) as server:
             self.port = server.sockets[0].getsockname()[1]
             self._started.set()

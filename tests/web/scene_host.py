@@ -159,13 +159,13 @@ class SceneHost:
         return HTMLResponse(HTML, headers=policy)
 
     async def _drive(self, web_socket: WebSocket) -> None:
-        await web_socket.accept()
+        await web_socket.accept("webmap")
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 await web_socket.receive_text()
 
     async def _scene(self, web_socket: WebSocket) -> None:
-        await web_socket.accept()
+        await web_socket.accept("webmap")
         if self.refuse:
             await web_socket.close(*self.refuse)
             return

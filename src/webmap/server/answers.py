@@ -16,6 +16,7 @@ from webmap.server.html import base_of, make_page, prepare_page
 from webmap.server.paths import find_page, name_in_folder, other_spelling
 from webmap.server.plain import plain
 from webmap.server.ports import PageEntry, Site
+from webmap.server.security import PAGE_KEY
 
 log = logging.getLogger("webmap.server")
 
@@ -81,15 +82,16 @@ class PageAnswers:
 
     async def _page(self, request: Request, entry: PageEntry) -> Response:
         base = base_of(request.scope.get("root_path", ""))
-        headers = {"cache-control": "no-cache"}
+        key = request.scope.get(PAGE_KEY)
+        headers = {"cache-control": "no-store" if key else "no-cache"}
         if entry.html is None:
-            return HTMLResponse(make_page(entry.title, base), headers=headers)
+            return HTMLResponse(make_page(entry.title, base, key), headers=headers)
         try:
             text = await asyncio.to_thread(entry.html.read_text, "utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             log.error("page %s: cannot read %s: %s", entry.path, entry.html, error)
             return plain(500, "The HTML file of this page cannot be read as UTF-8.")
-        page = prepare_page(text, base)
+        page = prepare_page(text, base, key)
         self._warn(entry.html, page.blocked)
         return HTMLResponse(page.text, headers=headers)
 

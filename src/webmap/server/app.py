@@ -48,12 +48,13 @@ class WebApp:
         self.routes = [
             WebSocketRoute("/_webmap/scene", scene.serve),
             WebSocketRoute("/_webmap/drive", drive.serve),
+            Route("/_webmap/key", _key_fits, methods=["POST"]),
             Route(FILES + "{name:path}", self._published_file),
             Route(IMAGES + "{tag}", self._published_image),
             Route("/_webmap/{name:path}", self._static),
             Route("/{path:path}", PageAnswers(site)),
         ]
-        self._app = Security(
+        self._security = Security(
             Starlette(
                 routes=self.routes,
                 exception_handlers={HTTPException: _answer_error},
@@ -64,7 +65,11 @@ class WebApp:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request, one socket, or the life of the application."""
-        await self._app(scope, receive, send)
+        await self._security(scope, receive, send)
+
+    def new_code(self) -> str:
+        """Return a one-time code: an address with ``?webmap_code=`` signs in once."""
+        return self._security.new_code()
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -113,6 +118,12 @@ def create_app(
         published or Published(),
         lifespan,
     )
+
+
+async def _key_fits(request: Request) -> Response:
+    """Answer a page that asks why its socket was refused: this request was not."""
+    del request
+    return Response(status_code=204)
 
 
 def _read_static(name: str) -> File:

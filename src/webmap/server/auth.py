@@ -1,9 +1,13 @@
 """Sign-in by one token per start: the decisions, without I/O.
 
-The token is in the URL that WebMap prints. A browser exchanges it once for a cookie,
-and from then on the cookie alone is sent. The cookie holds a random session and its
-signature by a key derived from the token, so that whoever reads it has not the token,
-and a server that starts again with the same token still knows its viewers.
+The token is in the URL that WebMap prints. The server answers it with a one-time code,
+and the browser exchanges the code for two secrets of a new session. The cookie is sent
+by the browser with each request and opens what can only be read. The key is kept by the
+pages themselves and opens their sockets: a browser sends a cookie to every port of a
+host, and only pages of the very origin can read the key. Both are the session with a
+signature, made with a secret that is derived from the token. So neither shows the
+token, neither shows the other, and a server that starts again with the same token still
+knows its viewers.
 """
 
 import hashlib
@@ -18,6 +22,9 @@ from webmap.errors import ConfigError
 _SESSION = re.compile(r"([A-Za-z0-9_-]{22})\.([0-9a-f]{64})")
 # 32 bytes are 43 characters in base64 and 64 in hexadecimal.
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{43,256}")
+
+CODE_LIFE_S = 120.0
+"""For how long a one-time code is good: a browser may take its time to start."""
 
 
 def new_token() -> str:
@@ -36,7 +43,7 @@ class Token:
 
     """
 
-    __slots__ = ("_digest", "_key")
+    __slots__ = ("_cookie_secret", "_digest", "_key_secret")
 
     def __init__(self, secret: str) -> None:
         if not _TOKEN.fullmatch(secret):
@@ -47,7 +54,8 @@ class Token:
                 'python -c "import secrets; print(secrets.token_urlsafe(32))"'
             )
         self._digest = hashlib.sha256(secret.encode()).digest()
-        self._key = hmac.digest(secret.encode(), b"webmap session v1", "sha256")
+        self._cookie_secret = _derive(secret, b"webmap session v1")
+        self._key_secret = _derive(secret, b"webmap page key v1")
 
     def matches(self, offered: str) -> bool:
         """Tell in constant time whether ``offered`` is the token."""
@@ -55,26 +63,72 @@ class Token:
         return hmac.compare_digest(digest, self._digest)
 
     def issue(self) -> str:
-        """Return a new cookie value for a browser that gave the token."""
-        session = secrets.token_urlsafe(16)
-        return f"{session}.{self._sign(session)}"
+        """Return the cookie value of a new session."""
+        return _signed(self._cookie_secret, secrets.token_urlsafe(16))
 
     def session(self, cookie: str) -> str | None:
         """Return the session that a cookie value proves, None if it proves none."""
-        match = _SESSION.fullmatch(cookie)
-        if match is None or not hmac.compare_digest(self._sign(match[1]), match[2]):
-            return None
-        return match[1]
+        return _proved(self._cookie_secret, cookie)
 
-    def _sign(self, session: str) -> str:
-        return hmac.digest(self._key, session.encode(), "sha256").hex()
+    def key(self, session: str) -> str:
+        """Return the key with which the pages of a session open their sockets."""
+        return _signed(self._key_secret, session)
+
+    def session_of_key(self, key: str) -> str | None:
+        """Return the session that a page's key proves, None if it proves none."""
+        return _proved(self._key_secret, key)
+
+
+def _derive(secret: str, label: bytes) -> bytes:
+    return hmac.digest(secret.encode(), label, "sha256")
+
+
+def _signed(secret: bytes, session: str) -> str:
+    return f"{session}.{hmac.digest(secret, session.encode(), 'sha256').hex()}"
+
+
+def _proved(secret: bytes, text: str) -> str | None:
+    match = _SESSION.fullmatch(text)
+    if match is None or not hmac.compare_digest(_signed(secret, match[1]), text):
+        return None
+    return match[1]
+
+
+class Codes:
+    """One-time codes: each signs in one browser, once, soon after it was made.
+
+    Args:
+        life: For how long a code is good, in seconds.
+        limit: How many codes are remembered; the oldest is forgotten first.
+
+    """
+
+    def __init__(self, life: float = CODE_LIFE_S, limit: int = 64) -> None:
+        self._life = life
+        self._limit = limit
+        self._ends: OrderedDict[str, float] = OrderedDict()
+
+    def issue(self, now: float) -> str:
+        """Return a new code."""
+        code = secrets.token_urlsafe(16)
+        self._ends[code] = now + self._life
+        if len(self._ends) > self._limit:
+            self._ends.popitem(last=False)
+        return code
+
+    def use(self, code: str, now: float) -> bool:
+        """Use a code up; False if it was used before, is too old, or never was one."""
+        return now < self._ends.pop(code, now)
 
 
 class Attempts:
     """How often each address gave a wrong token in the last minute.
 
+    The right token is never kept waiting: one address may be everybody's, as that of a
+    reverse proxy or of the machine itself.
+
     Args:
-        limit: How many failures an address has before it must wait.
+        limit: How many failures an address has before its wrong tokens must wait.
         window: How long a failure counts, in seconds.
         addresses: How many addresses are remembered; the oldest is forgotten first.
 

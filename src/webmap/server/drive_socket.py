@@ -12,7 +12,7 @@ from starlette.websockets import WebSocket
 from webmap.gate.malformed_stop import begins_like_stop
 from webmap.server.bounds import DRIVE
 from webmap.server.hop import Hops
-from webmap.server.line import BROKEN_RULE, FAILED, Line
+from webmap.server.line import BROKEN_RULE, FAILED, Line, accept, close
 from webmap.server.paths import page_id_of
 from webmap.server.ports import DriveConnection, Gate, Model
 from webmap.server.queues import DriveQueue
@@ -41,9 +41,10 @@ class DriveSockets:
         # Without an id it drives all the same, as a page of its own.
         named = "id" in socket.query_params
         page_id = page_id_of(socket.query_params) if named else secrets.token_hex(8)
-        await socket.accept()
+        if not await accept(socket):
+            return
         if page_id is None:
-            await socket.close(BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
+            await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return
         name = f"drive for {viewer.name}"
         line = Line(socket, name, self._hops.here(), DRIVE, DriveQueue())

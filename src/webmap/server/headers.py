@@ -23,8 +23,14 @@ SANDBOX = CONTENT_SECURITY_POLICY + "; sandbox"
 _STARTS = {"http.response.start", "websocket.http.response.start"}
 
 
-def with_headers(send: Send) -> Send:
-    """Return ``send`` with the headers added that an answer does not have yet."""
+def with_headers(send: Send, cookie: str | None = None) -> Send:
+    """Return ``send`` with the headers added that an answer does not have yet.
+
+    Args:
+        send: What answers.
+        cookie: A whole Set-Cookie header, which is added too.
+
+    """
 
     async def send_with_headers(message: Message) -> None:
         if message["type"] in _STARTS:
@@ -37,6 +43,8 @@ def with_headers(send: Send) -> Send:
             headers += [header for header in HEADERS if header[0] not in present]
             if b"cache-control" not in present:
                 headers.append((b"cache-control", b"no-store"))
+            if cookie is not None:
+                headers.append((b"set-cookie", cookie.encode("latin-1")))
             message = {**message, "headers": headers}
         await send(message)
 

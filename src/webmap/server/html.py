@@ -15,7 +15,7 @@ _MADE = """<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport"
   content="width=device-width, initial-scale=1, interactive-widget=resizes-content">
-<title>{title}</title>
+<title>{title}</title>{key}
 <link rel="icon" href="{base}icon.svg" type="image/svg+xml">
 <link rel="stylesheet" href="{base}webmap.css">
 <link rel="stylesheet" href="{base}made_page.css">
@@ -38,9 +38,20 @@ def base_of(root_path: str) -> str:
     return quote(root_path.rstrip("/")) + "/_webmap/"
 
 
-def make_page(title: str, base: str) -> str:
-    """Return a page with one container that fills the window."""
-    return _MADE.format(title=escape(title), base=escape(base))
+def make_page(title: str, base: str, key: str | None = None) -> str:
+    """Return a page with one container that fills the window.
+
+    Args:
+        title: The page's title.
+        base: Where WebMap's own files are, as :func:`base_of` gives it.
+        key: The key that is handed to the page, if it has just signed in.
+
+    """
+    return _MADE.format(title=escape(title), base=escape(base), key=_key_element(key))
+
+
+def _key_element(key: str | None) -> str:
+    return "" if key is None else f'<meta name="webmap-key" content="{escape(key)}">'
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +63,19 @@ class OwnPage:
     """What the Content-Security-Policy will block, in sentences, with line numbers."""
 
 
-def prepare_page(text: str, base: str) -> OwnPage:
+def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
     """Put the base style sheet and the page's script into a user's HTML.
 
     Args:
         text: The user's HTML, whole.
         base: Where WebMap's own files are, as :func:`base_of` gives it.
+        key: The key that is handed to the page, if it has just signed in.
 
     """
     seen = _Reader(text)
-    first, last = "", ""
+    first, last = _key_element(key), ""
     if not seen.has("webmap.css"):
-        first = f'<link rel="stylesheet" href="{escape(base)}webmap.css">'
+        first += f'<link rel="stylesheet" href="{escape(base)}webmap.css">'
     if not seen.has("page.js"):
         last = f'<script type="module" src="{escape(base)}page.js"></script>'
     if not seen.icon:

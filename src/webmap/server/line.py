@@ -11,6 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from webmap.server.bounds import Allowance, Bounds
 from webmap.server.hop import Hop
 from webmap.server.queues import Queue
+from webmap.server.request import PROTOCOL
 
 log = logging.getLogger("webmap.server")
 
@@ -28,6 +29,27 @@ _REST_S = 0.05
 
 _REST_PAUSE_S = 0.01
 """How long the next of them is waited for."""
+
+# What sending to a page that has gone raises. The last is for one that the server gave
+# up itself, as its pings were not answered.
+_GONE = (WebSocketDisconnect, OSError, RuntimeError)
+
+
+async def accept(socket: WebSocket) -> bool:
+    """Accept a socket; False if the page has gone meanwhile."""
+    offered = socket.scope.get("subprotocols", ())
+    try:
+        await socket.accept(PROTOCOL if PROTOCOL in offered else None)
+    except _GONE:
+        return False
+    return True
+
+
+async def close(socket: WebSocket, code: int, reason: str) -> None:
+    """Close a socket and say why, unless the page has gone or reads nothing."""
+    with contextlib.suppress(TimeoutError, *_GONE):
+        async with asyncio.timeout(_GOODBYE_S):
+            await socket.close(code, short(reason))
 
 
 class Line:
@@ -172,7 +194,7 @@ class Line:
             except TimeoutError:
                 self._end(COME_BACK, f"this page read nothing for {STALLED_S:.0f} s")
                 return
-            except (WebSocketDisconnect, OSError):
+            except _GONE:
                 self._gone = True
                 return
 
@@ -187,12 +209,7 @@ class Line:
             return
         code, reason = self._ended
         log.info("%s: closed with %d, %s", self._name, code, reason)
-        # A page that reads nothing does not read this either.
-        with contextlib.suppress(
-            TimeoutError, WebSocketDisconnect, OSError, RuntimeError
-        ):
-            async with asyncio.timeout(_GOODBYE_S):
-                await self._socket.close(code, short(reason))
+        await close(self._socket, code, reason)
 
 
 def short(reason: str) -> str:

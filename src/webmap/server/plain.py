@@ -5,7 +5,7 @@ from http import HTTPStatus
 
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 
-from webmap.server.door import Refusal, SignedIn
+from webmap.server.door import GoOn, Refusal
 
 _SIGN_IN = """<!doctype html>
 <html lang="en">
@@ -43,10 +43,8 @@ def refuse(refusal: Refusal, *, wants_html: bool) -> Response:
     return response
 
 
-def go_on(signed_in: SignedIn) -> Response:
-    """Return the redirect that ends a sign-in."""
+def go_on(to: GoOn) -> Response:
+    """Return the redirect to an address without the token."""
     response = Response(status_code=HTTPStatus.SEE_OTHER)
-    response.headers["location"] = signed_in.location
-    if signed_in.cookie is not None:
-        response.headers["set-cookie"] = signed_in.cookie
+    response.headers["location"] = to.location
     return response

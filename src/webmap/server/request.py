@@ -7,6 +7,14 @@ from starlette.types import Scope
 
 _SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 
+TOKEN = "token"  # noqa: S105 - the name of a field
+CODE = "webmap_code"
+"""The fields of a query that sign in: the token, and a one-time code."""
+
+PROTOCOL = "webmap"
+"""The subprotocol of both sockets. A page offers it together with its key, as a browser
+lets a page set no other header of a WebSocket."""
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
@@ -29,6 +37,9 @@ class Request:
     origins: tuple[str, ...]
     cookies: tuple[str, ...]
     query: tuple[tuple[str, str], ...]
+    keys: tuple[str, ...]
+    """What it offers as the key of a page."""
+
     address: str
     """Where it came from, as the server says."""
 
@@ -54,6 +65,10 @@ class Request:
                     keep_blank_values=True,
                 )
             ),
+            keys=(
+                *(name for name in scope.get("subprotocols", ()) if name != PROTOCOL),
+                *_headers(scope, b"webmap-key"),
+            )[:4],
             address=(scope.get("client") or ("",))[0],
             wants_html=any("text/html" in one for one in _headers(scope, b"accept")),
         )
@@ -76,7 +91,11 @@ class Request:
 
     def tokens(self) -> list[str]:
         """Return every ``?token=`` of the query."""
-        return [value for name, value in self.query if name == "token"]
+        return [value for name, value in self.query if name == TOKEN]
+
+    def codes(self) -> list[str]:
+        """Return every one-time code of the query."""
+        return [value for name, value in self.query if name == CODE]
 
     def cookie(self, name: str) -> list[str]:
         """Return every value of a cookie; nested paths may each have one."""
@@ -87,21 +106,31 @@ class Request:
         )
         return [value for key, _, value in pairs if key == name]
 
-    def clean_url(self) -> str:
-        """Return this URL without its token, as a path on the same origin."""
+    def clean_url(self, code: str | None = None) -> str:
+        """Return this URL without what signs in, as a path on the same origin.
+
+        Args:
+            code: A one-time code that the URL carries in place of the token.
+
+        """
         # Two slashes at the start would be another host.
         path = "/" + quote(self.path.lstrip("/\\"), safe="/~!$&'()*+,;=:@-._")
-        kept = [(name, value) for name, value in self.query if name != "token"]
+        kept = [(name, value) for name, value in self.query if name not in _SECRET]
+        if code is not None:
+            kept.append((CODE, code))
         return f"{path}?{urlencode(kept)}" if kept else path
 
 
+_SECRET = {TOKEN, CODE}
+
+
 def redact(scope: Scope) -> None:
-    """Take the token out of a scope, from which servers write their access logs."""
+    """Take what signs in out of a scope, from which servers write access logs."""
     query = scope.get("query_string", b"").decode("latin-1")
-    if "token" in query:
+    if any(name in query for name in _SECRET):
         kept = [pair for pair in parse_qsl(query, keep_blank_values=True)]
         scope["query_string"] = urlencode(
-            [(name, "..." if name == "token" else value) for name, value in kept],
+            [(name, "..." if name in _SECRET else value) for name, value in kept],
             safe=".",
         ).encode("latin-1")
 

@@ -6,7 +6,7 @@ from starlette.websockets import WebSocket
 
 from webmap.server.bounds import SCENE
 from webmap.server.hop import Hops
-from webmap.server.line import BROKEN_RULE, FAILED, Line
+from webmap.server.line import BROKEN_RULE, FAILED, Line, accept, close
 from webmap.server.paths import find_page, page_id_of
 from webmap.server.ports import Model, Site
 from webmap.server.queues import FrameQueue
@@ -48,12 +48,13 @@ class SceneSockets:
         viewer: Viewer = socket.scope[VIEWER]
         page_id = page_id_of(socket.query_params)
         entry = find_page(self._site, socket.query_params.get("page", "/"))
-        await socket.accept()
+        if not await accept(socket):
+            return
         if entry is None:
-            await socket.close(BROKEN_RULE, "there is no page at this address")
+            await close(socket, BROKEN_RULE, "there is no page at this address")
             return
         if page_id is None:
-            await socket.close(BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
+            await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return
         name = f"scene of {entry.path} for {viewer.name}"
         line = Line(socket, name, self._hops.here(), SCENE, FrameQueue())

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from webmap.server.door import Door, Refusal, SignedIn
+from webmap.server.door import Door, GoOn, Refusal, SignedIn
 from webmap.server.headers import with_headers
 from webmap.server.plain import go_on, refuse
 from webmap.server.request import Request, redact
@@ -19,6 +19,9 @@ log = logging.getLogger("webmap.server")
 
 VIEWER = "webmap.viewer"
 """The key of the scope under which the routes find who makes a request."""
+
+PAGE_KEY = "webmap.page_key"
+"""The key of the scope under which a page finds the key to hand out, if it signs in."""
 
 
 class Security:
@@ -43,19 +46,30 @@ class Security:
         request = Request.of(scope)
         if self._authenticate is None:
             redact(scope)
-        send = with_headers(send)
         who = await self._who(request, scope)
+        if isinstance(who, SignedIn):
+            scope[PAGE_KEY] = who.key
+            send = with_headers(send, who.cookie)
+            who = who.viewer
+        else:
+            send = with_headers(send)
         if isinstance(who, Viewer):
             scope[VIEWER] = who
             await self._app(scope, receive, send)
-        elif isinstance(who, SignedIn):
+        elif isinstance(who, GoOn):
             await go_on(who)(scope, receive, send)
         else:
             _log_refusal(who, request, scope)
             answer = refuse(who, wants_html=request.wants_html)
             await _deny(answer, scope, receive, send)
 
-    async def _who(self, request: Request, scope: Scope) -> Viewer | SignedIn | Refusal:
+    def new_code(self) -> str:
+        """Return a one-time code that signs one browser in, soon."""
+        return self._door.codes.issue(self._now())
+
+    async def _who(
+        self, request: Request, scope: Scope
+    ) -> Viewer | GoOn | SignedIn | Refusal:
         refusal = self._door.check_address(request)
         if refusal is not None:
             return refusal

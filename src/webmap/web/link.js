@@ -1,3 +1,5 @@
+import { onSignIn, protocols } from "./key.js";
+
 /** Milliseconds before a lost link is tried again: at first, and at the most. */
 const FIRST_WAIT = 250;
 const LONGEST_WAIT = 5000;
@@ -32,6 +34,7 @@ export class Link {
     this._socket = null;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this._timer = undefined;
+    onSignIn(() => this._hurry());
     addEventListener("online", () => this._hurry());
     this._open();
   }
@@ -84,7 +87,7 @@ export class Link {
   _open() {
     this._timer = undefined;
     this._since = performance.now();
-    const socket = new WebSocket(this._address());
+    const socket = new WebSocket(this._address(), protocols());
     this._socket = socket;
     socket.binaryType = "arraybuffer";
     let opened = false;

@@ -2,6 +2,7 @@ import { BASE, pagePath, socketAddress } from "./addresses.js";
 import { Halves } from "./halves.js";
 import { takeIdentity } from "./identity.js";
 import { importOf } from "./imports.js";
+import { takeKey, whyRefused } from "./key.js";
 import { Link } from "./link.js";
 import { contentSize } from "./map.js";
 import { Notices } from "./notices.js";
@@ -22,6 +23,7 @@ const FAILURES = 3;
 /** One open page: its link to the display, the scene that it shows, its notices. */
 export class Page {
   constructor() {
+    takeKey();
     this.path = pagePath();
     this.id = takeIdentity(this.path);
     this.notices = new Notices();
@@ -140,18 +142,10 @@ export class Page {
     this._disconnected(`${what} ${forGood ? "Reload the page." : "Trying again…"}`);
   }
 
-  /** A browser does not tell a page why its socket was refused; the page's own address does. */
+  /** The server answers, but lets this page open no socket: say what to do. */
   async _askWhy() {
-    try {
-      const { status } = await fetch(location.href, { method: "HEAD", cache: "no-store" });
-      if (status !== 401 || this._link.isOpen) return;
-      this._disconnected(
-        "WebMap was started anew and does not know this browser any more. " +
-          "Open the address that it printed when it started.",
-      );
-    } catch {
-      // There is no server, which is what the notice says already.
-    }
+    const why = await whyRefused();
+    if (why && !this._link.isOpen) this._disconnected(why);
   }
 
   /** @param {string} text */

@@ -1,3 +1,5 @@
+import { protocols } from "../key.js";
+
 /** A connection that does not open within this time is given up, in ms. */
 const OPENING_PATIENCE = 5000;
 
@@ -87,7 +89,7 @@ export class Line {
 
   /** @param {number} now */
   _connect(now) {
-    const socket = new WebSocket(this._url);
+    const socket = new WebSocket(this._url, protocols());
     this._socket = socket;
     this._since = now;
     socket.onopen = () => this._events.open();
