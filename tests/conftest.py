@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, expect
 
 from real_browser import launched
+from webmap.logs import budgets
 
 # Two noisy cores: how long an example takes says nothing about the code.
 settings.register_profile(
@@ -31,6 +32,12 @@ def state_folder() -> Iterator[None]:
             del os.environ["WEBMAP_STATE_DIR"]
         else:
             os.environ["WEBMAP_STATE_DIR"] = before
+
+
+@pytest.fixture(autouse=True)
+def log_budgets() -> None:
+    """Let each test log as if nothing was logged before."""
+    budgets.clear()
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,10 @@ Names are loaded when they are first used, so that importing this costs little.
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from webmap.logs import guard_loggers
+
+guard_loggers()
+
 if TYPE_CHECKING:
     from webmap import geometry, modules
     from webmap.core.alignment import align_bridge

@@ -6,6 +6,7 @@ from typing import Any
 import yaml
 
 from webmap.errors import ConfigError
+from webmap.outside_text import one_line
 from webmap.plain_files import read_file
 
 LARGEST = 1 << 20
@@ -66,8 +67,7 @@ class LinedYaml:
             way = way[:-1]
         line = self._lines.get(way, 1)
         # What a file holds must not steer the terminal that shows it.
-        said = "".join(char if char.isprintable() else "?" for char in words)
-        return ConfigError(f"{self.file}:{line}: {said}")
+        return ConfigError(f"{self.file}:{line}: {one_line(words)}")
 
     def _note(self, way: tuple[str | int, ...], node: yaml.Node) -> None:
         self._lines[way] = node.start_mark.line + 1

@@ -82,6 +82,14 @@ def test_its_last_words_are_kept_and_all_of_them_passed_on(run, capfd):
     assert capfd.readouterr().err == "first\nno such module\n\n"
 
 
+def test_its_last_words_steer_no_terminal(run, capfd):
+    gate = run(*shell(r"printf 'ValueError: \033[2J\r\302\233 \377\n' >&2; exit 3"))
+    eventually(lambda: gate.ends, "its end")
+    gate.child.stop(30.0)
+    assert gate.child.epitaph == r"ValueError: \x1b[2J\r\x9b �"
+    assert capfd.readouterr().err == "ValueError: \\x1b[2J\\r\\x9b �\n"
+
+
 def test_one_that_was_killed_is_said_to_have_been(run):
     gate = run(*shell("kill -9 $$"))
     eventually(lambda: gate.ends, "its end")

@@ -460,6 +460,23 @@ def test_a_status_of_the_bridge_is_reported():
     run(scenario)
 
 
+def test_statuses_of_a_hostile_bridge_do_not_forge_or_flood_the_log(caplog):
+    async def scenario():
+        errors = []
+        async with bridged() as (server, bridge):
+            bridge.on_error(errors.append)
+            words = "bad\\nERROR webmap.gate: forged \\u001b[2J" + "x" * 100_000
+            for _ in range(300):
+                await server.send(f'{{"op":"status","level":"error","msg":"{words}"}}')
+            await until(lambda: len(errors) == 300)
+            assert len(str(errors[0])) < 1100
+
+    run(scenario)
+    said = [r.getMessage() for r in caplog.records if "forged" in r.getMessage()]
+    assert 1 < len(said) < 40
+    assert all(one.isprintable() and len(one) < 1200 for one in said)
+
+
 def test_publishing_advertises_first_and_once():
     async def scenario():
         async with bridged() as (server, bridge):

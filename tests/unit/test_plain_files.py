@@ -115,7 +115,7 @@ def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):
 def test_what_a_file_holds_does_not_steer_a_terminal(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("a: 1\n")
-    assert str(LinedYaml(file).wrong(("a",), "\x1b[2J")) == f"{file}:1: ?[2J"
+    assert str(LinedYaml(file).wrong(("a",), "\x1b[2J")) == f"{file}:1: \\x1b[2J"
 
 
 def test_links_in_a_circle_are_refused_with_a_sentence(tmp_path):

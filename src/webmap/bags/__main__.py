@@ -11,7 +11,9 @@ from webmap.bags.player import Player
 from webmap.bags.recording import Recording
 from webmap.children import end_with_parent
 from webmap.errors import ConfigError, WebMapError
+from webmap.logs import set_up_logging
 from webmap.not_listening import why_not_listening
+from webmap.outside_text import one_line
 from webmap.sim.process import signals_set
 from webmap.sim.rosbridge.encode import Encoder
 from webmap.sim.rosbridge.quirks import POLITE
@@ -30,16 +32,11 @@ WRONG = "error: "
 def main() -> int:
     """Play a recording until SIGINT or SIGTERM and return the exit status."""
     options = vars(_parser().parse_args())
-    logging.basicConfig(
-        level=logging.INFO,
-        stream=sys.stderr,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-    )
-    logging.getLogger("websockets").setLevel(logging.WARNING)
+    set_up_logging()
     try:
         asyncio.run(_run(**options))
     except (WebMapError, OSError) as error:
-        print(f"{WRONG}{error}", flush=True)
+        print(f"{WRONG}{one_line(error)}", flush=True)
         return 2
     return 0
 

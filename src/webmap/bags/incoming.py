@@ -10,7 +10,7 @@ from webmap.bags.recorder import Recorder
 from webmap.errors import ProtocolError
 from webmap.ros.events import Publish
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.bags")
 
 HELD = 256 << 20
 """Bytes of messages that may wait; what comes when there are more is left out."""

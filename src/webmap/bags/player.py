@@ -11,7 +11,7 @@ from webmap.bags.recording import Recorded, Recording
 from webmap.bags.replay import Replay
 from webmap.errors import ConfigError
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.bags")
 
 SAY_EVERY = 0.5
 """Seconds between two words of where in the recording it is."""

@@ -7,7 +7,8 @@ from types import FrameType
 import click
 
 import webmap
-from webmap.errors import WebMapError
+from webmap.cli.echo import echo
+from webmap.errors import ConfigError, WebMapError
 
 COMMANDS = {
     "check": "webmap.cli.check:check",
@@ -94,8 +95,11 @@ def main() -> None:
     except click.UsageError as error:
         path = error.ctx.command_path if error.ctx else "webmap"
         said = error.format_message().rstrip(".").replace("\n", " ")
-        click.echo(f"Error: {said} (see '{path} --help').", err=True)
+        echo(f"Error: {said} (see '{path} --help').", err=True)
+        sys.exit(2)
+    except ConfigError as error:  # of a fleet file it has a line for each mistake
+        echo(f"Error: {error}", err=True, lines=True)
         sys.exit(2)
     except (WebMapError, OSError) as error:
-        click.echo(f"Error: {error}", err=True)
+        echo(f"Error: {error}", err=True)
         sys.exit(2)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from webmap.cli.echo import echo
 from webmap.cli.options import verbose_option
 
 
@@ -20,7 +21,7 @@ def check(file: Path) -> None:
 
     ready = prepare(file)
     robots, bridges = len(ready.robots), len(ready.bridges)
-    click.echo(
+    echo(
         f"{file}: {robots} robot{'s' * (robots != 1)} behind "
         f"{bridges} bridge{'s' * (bridges != 1)}, and nothing wrong"
     )

@@ -5,6 +5,7 @@ import sys
 
 import click
 
+from webmap.cli.echo import echo
 from webmap.cli.options import Finite, verbose_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
@@ -42,15 +43,14 @@ def discover(
     urls = [normalise_url(text) for text in url]
     found = asyncio.run(find(urls, wait=wait, topics=topics))
     if toml:
-        click.echo(
-            fleet_toml([(one.label, one.url, one.findings) for one in found]), nl=False
-        )
+        text = fleet_toml([(one.label, one.url, one.findings) for one in found])
+        click.echo(text, nl=False)  # not cut, and escaped as TOML has it
     for one in found:
         if one.trouble is not None:
-            click.echo(one.why, err=True)
+            echo(one.why, err=True)
         elif not toml:
-            click.echo(report(one.url, one.findings))
+            echo(report(one.url, one.findings), lines=True)
         elif not one.findings.robots:
-            click.echo(report(one.url, one.findings), err=True)
+            echo(report(one.url, one.findings), err=True, lines=True)
     if not any(one.findings.robots for one in found):
         sys.exit(1)

@@ -5,6 +5,7 @@ import sys
 
 import click
 
+from webmap.cli.echo import echo
 from webmap.cli.options import Finite, verbose_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
@@ -101,7 +102,7 @@ def doctor(
     for number, (address, meant) in enumerate(bridges):
 
         def waiting(why: str, address: str = address) -> None:
-            click.echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
+            echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
 
         seen = asyncio.run(
             observe(
@@ -117,5 +118,5 @@ def doctor(
         )
         findings = judge(seen)
         ready &= is_ready(findings)
-        click.echo("\n" * bool(number) + report(address, findings))
+        echo("\n" * bool(number) + report(address, findings), lines=True)
     sys.exit(0 if ready else 1)

@@ -4,8 +4,7 @@ import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import click
-
+from webmap.cli.echo import echo
 from webmap.discovery import Findings, discover
 from webmap.discovery.asking import ask_topics
 from webmap.discovery.hearing import hear_frames
@@ -92,7 +91,7 @@ async def _ask(
     url: str, wait: float
 ) -> tuple[Findings, Mapping[str, str], BridgeError | None]:
     def waiting(why: str) -> None:
-        click.echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
 
     try:
         topics = await ask_topics(url, wait=wait, waiting=waiting)

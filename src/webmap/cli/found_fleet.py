@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-import click
-
 from webmap.cli.described import describe, overrules
 from webmap.cli.draw_layer import meant, shared_map
+from webmap.cli.echo import echo
 from webmap.cli.finding import Found, find
 from webmap.cli.names import set_twice
 from webmap.cli.overruling import TOLD, Overruling
@@ -20,6 +19,7 @@ from webmap.discovery.naming import free_name, same_name
 from webmap.discovery.rules import VELOCITY
 from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
 from webmap.errors import BridgeClosed
+from webmap.outside_text import escaped
 from webmap.ros.names import is_topic, is_type, normalise_topic
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class FoundFleet:
             lines += drawn_table(space, layers, findings.left_out[space])
         if self.robots:
             lines += ["", OVERRULE]
-        return "\n".join(lines).lstrip("\n") or "No robot is known."
+        return "\n".join(map(escaped, lines)).lstrip("\n") or "No robot is known."
 
     def show(self, console: "Console", *, grid: bool) -> None:
         """Show what was found and what comes later.
@@ -142,14 +142,14 @@ def find_fleet(
     missing = any(isinstance(one.trouble, BridgeClosed) for one in found)
     names += [robot.name for robot in told]
     for sentence in overruling.check(names, all_known=not missing):
-        click.echo(sentence, err=True)
+        echo(sentence, err=True)
     fleet = FoundFleet([*overruling.tell(told)], stops_within, overruling=overruling)
     behind = {bridge: one.topics for bridge, one in zip(bridges, found, strict=True)}
     fleet.told = [_typed(robot, behind[robot.bridge]) for robot in fleet.told]
     taken = {same_name(other.name) for other in fleet.told}
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
-            click.echo(one.why, err=True)
+            echo(one.why, err=True)
         for robot in overruling.findings(bridge.url, one.findings).robots:
             about = describe(robot, bridge, stops_within=stops_within)
             about = _typed(about, one.topics)
@@ -159,7 +159,7 @@ def find_fleet(
                 raise set_twice(robot.name)
             robot = replace(robot, name=free_name(robot.name, taken))
             about = replace(about, name=robot.name)
-            click.echo(f"Found {in_one_line(robot)}", err=True)
+            echo(f"Found {in_one_line(robot)}", err=True)
             fleet.robots.append((robot, about))
         fleet.behind[bridge] = one
     return fleet
@@ -181,7 +181,7 @@ def told_fleet(
     found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
     for one in found:
         if one.trouble is not None:
-            click.echo(
+            echo(
                 f"{one.url}: {one.trouble}. No more is known of what can be drawn "
                 f"than was told with --robot.",
                 err=True,

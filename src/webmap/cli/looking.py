@@ -7,10 +7,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import click
-
+from webmap.cli.echo import echo
 from webmap.errors import BridgeError
 from webmap.lifecycle import lifecycle
+from webmap.logs import budgets
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -81,6 +81,12 @@ class Looking(ABC):
 
 
 def say(text: str) -> None:
-    """Say something on standard error; that nobody hears it is no reason to stop."""
+    """Print a line on standard error; that nobody reads it is no reason to stop.
+
+    Robots that appear cause such lines, so there is a limit as for a log.
+    """
+    added = budgets.note(("say",), "")
+    if added is None:
+        return
     with contextlib.suppress(OSError, ValueError):  # a full disk, nobody at the pipe
-        click.echo(text, err=True)
+        echo(f"{text}{added}", err=True)

@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 
 import click
 
+from webmap.logs import set_up_logging
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 PORT = click.IntRange(0, 65535)
@@ -57,12 +59,7 @@ def web_options(command: F) -> F:
 
 
 def _set_up_log(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    logging.basicConfig(
-        level=logging.DEBUG if value else logging.INFO,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-    )
-    for noisy in ("websockets", "uvicorn", "asyncio", "PIL"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
+    set_up_logging(logging.DEBUG if value else logging.INFO)
 
 
 verbose_option = click.option(

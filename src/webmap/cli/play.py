@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from webmap.cli.beside import beside
+from webmap.cli.echo import echo
 from webmap.cli.options import PORT, Finite, web_options
 from webmap.errors import ConfigError
 
@@ -113,7 +114,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
             try:  # past the buffer, which would keep it and fail once more at the end
                 os.write(started.told.fileno(), b"again\n")
             except (OSError, ValueError):
-                click.echo("The replay has ended: nothing is played", err=True)
+                echo("The replay has ended: nothing is played", err=True)
 
         yield line.removeprefix(READY).strip(), begin_anew
 

@@ -12,6 +12,7 @@ from webmap.bags.bag_file import new_bag
 from webmap.bags.listening import Listening
 from webmap.bags.recorder import Recorder
 from webmap.bags.types import Types
+from webmap.cli.echo import echo
 from webmap.discovery.asking import ask_topics
 from webmap.errors import BridgeError, ConfigError, ServiceError
 from webmap.ros.bridge import Bridge
@@ -88,7 +89,7 @@ async def record_to(
         stop = asyncio.Event()
 
         def ready() -> None:
-            click.echo(f"Recording {url} to {bag.path}")
+            echo(f"Recording {url} to {bag.path}")
             if listening.missing:
                 line.say(f"Waiting for: {', '.join(listening.missing)}")
 
@@ -145,11 +146,13 @@ class ProgressLine:
             self._shown = len(text)
         elif seconds >= self._next:
             self._next += EVERY
-            click.echo(text, err=True)
+            echo(text, err=True)
 
     def say(self, text: str) -> None:
         """Say something else, on a line of its own."""
-        click.echo(f"\n{text}" if self._shown else text, err=True)
+        if self._shown:
+            echo("", err=True)
+        echo(text, err=True)
         self._shown = 0
 
 
@@ -165,7 +168,7 @@ async def _topics(
         return dict(told)
 
     def waiting(why: str) -> None:
-        click.echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
 
     try:
         return await ask_topics(url, wait=wait, waiting=waiting)

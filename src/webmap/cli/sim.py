@@ -8,6 +8,7 @@ from typing import Literal
 import click
 
 from webmap.children import end_with_parent
+from webmap.cli.echo import echo
 from webmap.cli.options import PORT, Finite, verbose_option
 from webmap.cli.sim_options import simulator_options
 
@@ -153,7 +154,7 @@ def sim(
             quirks="polite" if polite else quirks or "real",
             refuse_nan=not take_nan,
             http_camera=http_camera,
-            on_http_camera=lambda url: click.echo(f"cameras are at {url}", err=True),
-            on_ready=lambda url: click.echo(f"rosbridge is ready at {url}"),
+            on_http_camera=lambda url: echo(f"cameras are at {url}", err=True),
+            on_ready=lambda url: echo(f"rosbridge is ready at {url}"),
         )
     )

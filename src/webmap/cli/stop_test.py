@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 
 import click
 
+from webmap.cli.echo import echo
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.asking import ask_topics
 from webmap.discovery.robots import host_name
@@ -22,6 +23,7 @@ from webmap.errors import BridgeError, ConfigError
 from webmap.gate.display.client import GateClient
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.stoptest import MOVES_ON
+from webmap.outside_text import escaped
 from webmap.ros.names import normalise_url
 
 PERIOD = 0.05
@@ -183,10 +185,10 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
         found = discover(asyncio.run(_topics(url, wait)), host_name(url))
         spec = _spec(url, name, found.robots)
     except (BridgeError, ConfigError) as error:
-        click.echo(f"Nothing was found out: {error}", err=True)
+        echo(f"Nothing was found out: {error}", err=True)
         return UNKNOWN
     except KeyboardInterrupt:
-        click.echo("Ended before anything was found out; nothing was moved.")
+        echo("Ended before anything was found out; nothing was moved.")
         return UNKNOWN
     client = GateClient()
     client.declare(spec)
@@ -194,7 +196,7 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
         client.start()
         return _lead(client, spec, yes)
     except (KeyboardInterrupt, click.Abort):
-        click.echo("Ended before anything was found out; the robot is stopped.")
+        echo("Ended before anything was found out; the robot is stopped.")
         return UNKNOWN
     finally:
         client.stop()
@@ -202,7 +204,7 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
 
 async def _topics(url: str, wait: float) -> dict[str, str]:
     def waiting(why: str) -> None:
-        click.echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
 
     return await ask_topics(url, wait=wait, waiting=waiting)
 
@@ -232,27 +234,27 @@ def _lead(client: GateClient, spec: RobotSpec, yes: bool) -> int:
     """Lead the hand from stage to stage, at 20 Hz."""
     hand = Hand(time.monotonic())
     heard: queue.SimpleQueue[str] = queue.SimpleQueue()
-    connection = client.connect("webmap doctor", "operator", heard.put, click.echo)
+    connection = client.connect("webmap doctor", "operator", heard.put, echo)
     while hand.stage != "over":
         time.sleep(PERIOD)
         while not heard.empty():
             hand.hear(json.loads(heard.get()), time.monotonic())
         if hand.stage == "ready":
             if not yes and not _agrees(spec):
-                click.echo("Nothing was moved.")
+                echo("Nothing was moved.")
                 return UNKNOWN
             hand.begin(time.monotonic())
         for words in hand.step(time.monotonic()):
             connection.receive(json.dumps(words))
         for text in hand.news:
-            click.echo(f"{spec.name}: {text}")
+            echo(f"{spec.name}: {text}")
         hand.news.clear()
     return hand.code
 
 
 def _agrees(spec: RobotSpec) -> bool:
     return click.confirm(
-        f"{spec.name} ({spec.twist_topic}) will creep forward at 0.1 m/s for up to "
-        "5 s. Is half a metre free in front of it?",
+        f"{escaped(spec.name)} ({escaped(spec.twist_topic or '')}) will creep forward "
+        "at 0.1 m/s for up to 5 s. Is half a metre free in front of it?",
         default=False,
     )

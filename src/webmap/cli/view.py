@@ -2,6 +2,7 @@
 
 import click
 
+from webmap.cli.echo import echo
 from webmap.cli.options import Finite, web_options
 from webmap.cli.topic_list import one_bridge, topics_option
 
@@ -126,7 +127,7 @@ def view(
         if fleet is None:
             looked = FoundFleet(told)
             fleet = looked if as_told else told_fleet(bridges, told, wait=wait)
-        click.echo(fleet.table(grid=plan is None, as_told=as_told))
+        echo(fleet.table(grid=plan is None, as_told=as_told), lines=True)
         return
     opened = console.open_console(bridges, told, floor=plan)
     if fleet is not None:

@@ -8,6 +8,7 @@ import msgspec
 from webmap.discovery.drawing import Drawing, drawing
 from webmap.discovery.found import Findings, FoundRobot
 from webmap.discovery.layers import FoundLayer
+from webmap.outside_text import escaped
 
 HEAD = """\
 # A fleet file: webmap check FILE reads it, webmap run FILE shows it.
@@ -29,13 +30,14 @@ def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
             of all robots differ, as :func:`unique_names` makes them.
 
     """
-    parts = [HEAD, "[bridges]"]
+    parts = ["[bridges]"]
     parts += [f"{_key(name)} = {_text(url)}" for name, url, _ in found]
     parts += _maps(found)
     for bridge, _, findings in found:
         for robot in findings.robots:
             parts += ["", *_robot(robot, bridge, findings)]
-    return "\n".join(parts) + "\n"
+    # Comments hold names of topics, too; a line break in one would begin a table.
+    return "\n".join([HEAD, *map(escaped, parts)]) + "\n"
 
 
 def _robot(robot: FoundRobot, bridge: str, findings: Findings) -> list[str]:
@@ -185,8 +187,9 @@ def _value(value: Any) -> str:
 
 
 def _text(value: str) -> str:
-    # A JSON text without characters outside ASCII is a TOML text too.
-    return msgspec.json.encode(value).decode()
+    # A JSON text is a TOML text too, but for the characters that are not printable.
+    text = msgspec.json.encode(value).decode()
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
 
 
 def _key(name: str) -> str:

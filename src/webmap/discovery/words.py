@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from webmap.discovery.drawing import drawing
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
 from webmap.discovery.layers import FoundLayer
+from webmap.outside_text import escaped
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
 
@@ -50,7 +51,7 @@ def report(url: str, findings: Findings) -> str:
     lines += ["", *findings.notes]
     if findings.robots:
         lines.append(OVERRULE)
-    return "\n".join(lines)
+    return "\n".join(map(escaped, lines))
 
 
 def robot_table(robot: FoundRobot) -> list[str]:

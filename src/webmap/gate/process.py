@@ -22,6 +22,7 @@ from webmap.gate.kept.records import Records
 from webmap.gate.outbox import BackgroundHandler, Outbox
 from webmap.gate.priority import rise
 from webmap.gate.shell import Shell
+from webmap.logs import set_up_logging
 
 
 def main() -> int:
@@ -31,8 +32,7 @@ def main() -> int:
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
     background = BackgroundHandler(handler)
-    logging.basicConfig(level=logging.INFO, handlers=[background])
-    logging.getLogger("websockets").setLevel(logging.WARNING)
+    set_up_logging(handler=background)
     outbox = Outbox(pipe_out)
     code = asyncio.run(_serve(pipe_in, outbox))
     outbox.close(0.2)

@@ -11,6 +11,7 @@ import msgspec
 
 from webmap.errors import BridgeClosed, BridgeError, ProtocolError
 from webmap.lifecycle import lifecycle
+from webmap.outside_text import one_line
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.calls import Calls
 from webmap.ros.connection import Lane, State
@@ -410,9 +411,9 @@ class Bridge:
             if said is not None:
                 self._mention(said)
         elif isinstance(event, Status) and event.level == "error":
-            error = BridgeError(f"{self.name} says: {event.msg}")
-            log.warning("%s", error)
-            self._report(error)
+            words = one_line(event.msg)
+            log.warning("%s says: %s", self.name, words)
+            self._report(BridgeError(f"{self.name} says: {words}"))
         elif isinstance(event, CallService):
             answer = "this client offers no services"
             id = None if event.id is None else str(event.id)

@@ -45,7 +45,7 @@ class LinkTrouble:
         level = logging.DEBUG if self._complained else logging.WARNING
         self._complained = True
         self.why = error.why
-        log.log(level, "%s", error)
+        log.log(level, "%s", error, extra={"source": self._name})
         self._report(error)
 
     def malformed(self, event: Malformed) -> ProtocolError | None:
@@ -62,6 +62,6 @@ class LinkTrouble:
                 f"{self._name} sent {event.size} bytes that are not rosbridge: "
                 f"{event.reason}"
             )
-            log.warning("%s", error)
+            log.warning("%s", error, extra={"source": self._name})
             self._report(error)
         return error

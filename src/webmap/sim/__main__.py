@@ -2,23 +2,23 @@
 
 import argparse
 import asyncio
-import logging
 import sys
 from typing import Any
 
 from webmap.errors import WebMapError
+from webmap.logs import set_up_logging
+from webmap.outside_text import one_line
 from webmap.sim.process import end_with_stdin, run_simulator
 
 
 def main() -> int:
     """Run the simulator and return the exit status."""
     options = vars(_parser().parse_args())
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr)
-    logging.getLogger("websockets").setLevel(logging.WARNING)
+    set_up_logging()
     try:
         asyncio.run(_run(options))
     except (WebMapError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {one_line(error)}", file=sys.stderr)
         return 2
     return 0
 

@@ -17,7 +17,7 @@ from webmap.sim.rosbridge.graph import Deliver, Graph, Respond
 from webmap.sim.rosbridge.quirks import Quirks
 from webmap.sim.world import World
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 NODE = "/robots"
 IMAGE = "camera/image_raw"

@@ -22,10 +22,12 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from webmap.errors import ConfigError
+from webmap.logs import set_up_logging
+from webmap.outside_text import one_line
 from webmap.sim.process import signals_set
 from webmap.sim.recording import Recording, load_recording
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 _LATCHED = ("/map", "/tf_static")
 _ROSAPI = "/rosapi/"
@@ -161,8 +163,7 @@ def main() -> int:
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--rate", type=float, default=10.0, help="frames a second")
     options = vars(parser.parse_args())
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr)
-    logging.getLogger("websockets").setLevel(logging.WARNING)
+    set_up_logging()
 
     def say_ready(url: str) -> None:
         print(f"rosbridge is ready at {url}", flush=True)
@@ -170,7 +171,7 @@ def main() -> int:
     try:
         asyncio.run(play(**options, on_ready=say_ready))
     except (ConfigError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {one_line(error)}", file=sys.stderr)
         return 2
     return 0
 

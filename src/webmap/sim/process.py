@@ -16,7 +16,7 @@ from webmap.not_listening import why_not_listening
 if TYPE_CHECKING:
     from webmap.sim.node import RobotsNode
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 _MOST_ROBOTS = 1000
 

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from webmap.cli.fleet.lines import Path
 from webmap.discovery.naming import LONGEST, is_name
 from webmap.errors import ConfigError
+from webmap.outside_text import one_line
 from webmap.ros.names import normalise_topic, split_type
 
 Check: TypeAlias = Callable[[Any], Any]
@@ -51,10 +52,8 @@ def show(value: object) -> str:
         text = "of very many digits"
     else:
         text = f'"{value}"' if isinstance(value, str) else str(value)
-    if len(text) > _LONGEST:
-        text = text[: _LONGEST - 3] + "..."
     kind = next((words for cls, words in _KINDS if isinstance(value, cls)), "the value")
-    return f"{kind} {''.join(c if c.isprintable() else '?' for c in text)}"
+    return f"{kind} {one_line(text, _LONGEST)}"
 
 
 def text(value: Any) -> str:

@@ -10,6 +10,7 @@ from webmap.cli.fleet.lines import Path as Way
 from webmap.cli.fleet.schema import Fleet
 from webmap.cli.fleet.syntax import not_toml
 from webmap.errors import ConfigError
+from webmap.outside_text import one_line
 from webmap.plain_files import read_file
 
 LARGEST = 1 << 20
@@ -48,8 +49,7 @@ class FleetText:
         """Return a mistake with file, line and key."""
         said = f"{way_in_words(way)}: {words}"
         # What a file holds must not steer the terminal that shows it.
-        said = "".join(char if char.isprintable() else "?" for char in said)
-        return f"{self.name}:{self._lines.of(way)}: {said}"
+        return f"{self.name}:{self._lines.of(way)}: {one_line(said)}"
 
     def refuse(self, mistakes: Mistakes) -> None:
         """Raise all mistakes at once, if there are any.

@@ -2,6 +2,8 @@
 
 import re
 
+from webmap.outside_text import one_line
+
 _WHERE = re.compile(
     r"(?P<words>.*) \(at (?:line (?P<line>\d+), column \d+|end of .*)\)"
 )
@@ -52,11 +54,6 @@ def not_toml(name: str, text: str, error: ValueError) -> str:
         words = f"a table [{keys}] stands there already"
         if keys.rpartition(".")[2] in SEVERAL:
             words += f"; several are [[{keys}]] in two brackets each"
-    here = _plain(lines[min(line, len(lines)) - 1])
+    here = one_line(lines[min(line, len(lines)) - 1].strip(), _LONGEST)
     got = f"got {here}, " if here else ""
     return f"{name}:{line}: this is not TOML: {got}{WORDS.get(words, words)}"
-
-
-def _plain(line: str) -> str:
-    line = "".join(char if char.isprintable() else "?" for char in line.strip())
-    return line if len(line) <= _LONGEST else line[: _LONGEST - 3] + "..."

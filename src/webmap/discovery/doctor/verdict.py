@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from webmap.discovery.doctor.bridge_rules import bridge_findings
 from webmap.discovery.doctor.observed import LEVELS, Finding, Observed
 from webmap.discovery.doctor.robot_rules import robot_findings
+from webmap.outside_text import one_line
 
 MARKS = {"wrong": "WRONG", "warning": "warning", "note": "note", "good": "good"}
 
@@ -27,21 +28,16 @@ def is_ready(findings: Sequence[Finding]) -> bool:
 
 def report(url: str, findings: Sequence[Finding]) -> str:
     """Return the findings for a terminal."""
-    lines = [url]
+    lines = [one_line(url)]
     about = ""
     for finding in findings:
         if finding.about != about:
             about = finding.about
-            lines += ["", about]
-        lines.append(f"  {MARKS[finding.level]:<8} {_printable(finding.words)}")
+            lines += ["", one_line(about)]
+        lines.append(f"  {MARKS[finding.level]:<8} {one_line(finding.words)}")
         if finding.advice:
-            lines.append(f"           -> {finding.advice}")
+            lines.append(f"           -> {one_line(finding.advice)}")
     counts = [
         f"{sum(each.level == level for each in findings)} {level}" for level in LEVELS
     ]
     return "\n".join([*lines, "", ", ".join(counts)])
-
-
-def _printable(text: str) -> str:
-    # Names of nodes and frames come from the robot, and steer no terminal.
-    return "".join(char if char.isprintable() else "?" for char in text)

@@ -15,6 +15,7 @@ from webmap.children import python_command
 from webmap.errors import WireError
 from webmap.gate import framing
 from webmap.gate.messages import FromGate
+from webmap.outside_text import one_line
 
 log = logging.getLogger("webmap.gate")
 
@@ -85,8 +86,8 @@ class Child:
         if code is not None and code < 0:
             return f"it was ended by {signal.Signals(-code).name}"
         self._listener.join(1.0)
-        said = self._last_words.decode("utf-8", "replace").strip()
-        return said[:MAX_WORDS] or f"exit code {code}, without a word"
+        said = one_line(self._last_words.decode("utf-8", "replace").strip(), MAX_WORDS)
+        return said or f"exit code {code}, without a word"
 
     def start(self) -> None:
         """Begin to read."""
@@ -134,8 +135,9 @@ class Child:
             for line in self._err:
                 if line.strip():
                     self._last_words = line
+                said = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
                 with contextlib.suppress(OSError):
-                    os.write(2, line)
+                    os.write(2, f"{said}\n".encode())
 
     def _read(self) -> None:
         assert self._process.stdout is not None

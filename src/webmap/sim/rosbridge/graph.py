@@ -10,7 +10,7 @@ from webmap.sim.rosbridge.dialect import canonical, resolve
 from webmap.sim.rosbridge.encode import Publication
 from webmap.sim.rosbridge.schema import MessageMismatch, Schema, UnknownType
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 BRIDGE_NODE = "/rosbridge_websocket"
 

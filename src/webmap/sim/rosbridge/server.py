@@ -14,7 +14,7 @@ from webmap.sim.rosbridge.encode import Encoder
 from webmap.sim.rosbridge.graph import Graph
 from webmap.sim.rosbridge.session import Session
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 _LARGEST_FRAME = 10_000_000
 

@@ -14,7 +14,7 @@ from webmap.sim.rosbridge.outbox import Outbox
 from webmap.sim.rosbridge.services import Services
 from webmap.sim.rosbridge.topics import Topics
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 _MOST_INPUT = 10_000
 

@@ -6,7 +6,7 @@ import logging
 from webmap.sim.rosbridge.encode import Publication
 from webmap.sim.rosbridge.graph import Graph
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 NODE = "/web_video_server"
 COMPRESSED = "/compressed"

@@ -12,7 +12,7 @@ from webmap.sim.web_video.feed import NewestPicture, image_topics
 from webmap.sim.web_video.form import NoPicture
 from webmap.sim.web_video.request import Refusal, Request, read_request
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 MOST_CONNECTIONS = 64
 MOST_HEAD = 8192
