@@ -115,6 +115,22 @@ def test_assist_that_makes_no_sense_is_named_with_its_line(tmp_path, line, said)
     assert "fleet.toml:8: robots[0].scan_assist." in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("footprint", "said"),
+    [
+        ("[[0.3, 0.2], [-0.3, -0.2], [0.3, -0.2], [-0.3, 0.2]]", "corner 1 meets the"),
+        ("[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, 0.2]]", "corners 1 and 4 are"),
+        ("[[0.3, 0], [0.1, 0], [-0.3, 0]]", "meets the edge"),
+        ("[[1e-3, 0], [0, 1e-3], [-1e-3, 0]]", "has an area of 1e-06 m²; expected"),
+    ],
+)
+def test_a_footprint_that_is_no_outline_is_refused(tmp_path, footprint, said):
+    text = f'{DRIVEN}scan_assist = {{ topic = "/scan", footprint = {footprint} }}\n'
+    with pytest.raises(ConfigError, match=said) as caught:
+        check(tmp_path, text)
+    assert "robots[0].scan_assist: " in str(caught.value)
+
+
 def test_assist_needs_its_topic_its_footprint_and_something_to_assist(tmp_path):
     with pytest.raises(ConfigError) as caught:
         check(tmp_path, HEAD + "scan_assist = {}\n")

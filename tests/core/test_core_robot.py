@@ -454,7 +454,7 @@ def test_scan_assist_is_told_to_the_gate_and_off_without_a_word():
     assert told.topic == "/scan"
     assert told.sensor == pytest.approx((0.1, 0.0, math.pi / 2))
     assert all(math.hypot(x, y) >= 0.3 for x, y in told.footprint)
-    with pytest.raises(ConfigError, match="3 corners"):
+    with pytest.raises(ConfigError, match="3 to 100 corners"):
         robot.set_scan_assist("scan", [(0, 0), (1, 0)])
     robot.clear_scan_assist()
     assert robot.motion.spec().assist is None

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 from concurrent.futures import Future
 from types import SimpleNamespace
 
@@ -183,6 +184,21 @@ def test_a_robot_without_them_says_nothing_of_them(robot):
     drivable(robot)
     assert "scan_assist" not in robot.to_dict()
     assert "stop_hooks" not in robot.to_dict()["twist"]
+
+
+@pytest.mark.parametrize("radius", [0, -0.3, math.nan, math.inf, True, np.float64(-1)])
+def test_a_radius_that_is_not_above_zero_is_refused(robot, radius):
+    with pytest.raises(ConfigError, match="footprint for scan assist"):
+        robot.set_scan_assist("/scan", radius)
+
+
+def test_an_outline_that_crosses_itself_is_refused_and_the_one_before_stays(robot):
+    corners = [(0.3, 0.2), (-0.3, -0.2), (0.3, -0.2), (-0.3, 0.2)]
+    robot.set_scan_assist("/scan", 0.3)
+    before = robot.motion._assist
+    with pytest.raises(ConfigError, match="edge from corner 1 meets the edge from"):
+        robot.set_scan_assist("/scan", corners)
+    assert robot.motion._assist == before
 
 
 def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):

@@ -178,7 +178,9 @@ def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"footprint": ((0.0, 0.0), (1.0, 0.0))}, "3 corners"),
+        ({"footprint": ((0.0, 0.0), (1.0, 0.0))}, "3 to 100 corners"),
+        ({"footprint": (BOX[0], BOX[2], BOX[1], BOX[3])}, "meets the edge"),
+        ({"footprint": ((math.nan, 0.0), *BOX)}, "finite"),
         ({"brake": 0.0}, "above 0"),
         ({"stop_distance": -1.0}, "from 0 on"),
         ({"creep": math.nan}, "finite"),

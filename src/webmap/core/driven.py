@@ -421,7 +421,13 @@ def _corners(
 ) -> tuple[tuple[float, float], ...]:
     """Return the corners of a footprint, which may be given as a radius."""
     if isinstance(footprint, float | Real):  # numpy's numbers are Real
-        return polygon_around(float(footprint))
+        radius = float(footprint)
+        if isinstance(footprint, bool) or not 0 < radius < math.inf:
+            raise ConfigError(
+                f"robot {name!r}: the footprint for scan assist is a radius above 0 in "
+                f"metres, got {footprint!r}"
+            )
+        return polygon_around(radius)
     try:
         return tuple((float(x), float(y)) for x, y in footprint)
     except (TypeError, ValueError):

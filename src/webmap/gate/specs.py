@@ -9,6 +9,7 @@ from webmap.errors import ConfigError
 from webmap.gate.events import Key
 from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import AssistSpec, RobotSpec
+from webmap.gate.outline import why_no_outline
 from webmap.ros.names import (
     is_type,
     normalise_topic,
@@ -143,11 +144,8 @@ def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
     numbers += [*assist.sensor, assist.stop_distance, assist.brake, assist.creep]
     if not all(map(math.isfinite, numbers)):
         raise ConfigError(f"robot {name!r}: scan assist needs finite numbers")
-    if len(assist.footprint) < 3:
-        raise ConfigError(
-            f"robot {name!r}: the footprint for scan assist has 3 corners or more, "
-            f"got {len(assist.footprint)}"
-        )
+    if why := why_no_outline(assist.footprint):
+        raise ConfigError(f"robot {name!r}: the footprint for scan assist: {why}")
     if assist.stop_distance < 0 or assist.brake <= 0 or assist.creep < 0:
         raise ConfigError(
             f"robot {name!r}: scan assist needs a stop distance and a creep speed "
