@@ -107,6 +107,12 @@ def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
     assert scanner is not None
 
 
+def test_a_robot_that_flies_states_limits_for_its_other_axes(ready):
+    limits = "z_max = 0.5\nrx_max = 0.2\nry_max = 1"
+    spec = ready(changed("w_max = 1", f"w_max = 1\n{limits}")).robots[0].motion.spec()
+    assert (spec.z_max, spec.rx_max, spec.ry_max) == (0.5, 0.2, 1.0)
+
+
 def test_the_only_bridge_need_not_be_said_and_a_topic_is_enough(ready):
     fleet = ready(
         '[bridges]\nhall = "ws://hall:9090"\n'

@@ -40,7 +40,9 @@ def robot():
     bridge = Bridge("ws://robot:9090")
     robot = Robot("Bob", svg.g(svg.circle(r=0.2), "a text"))
     robot.set_odometry_topic(bridge, "/odom", 50, type="nav_msgs/Odometry")
-    robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=[{"topic": "/lock"}])
+    hooks = [{"topic": "/lock"}]
+    limits = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
+    robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=hooks, **limits)
     robot.set_move_topic(bridge, "/goal", on_operator_loss="cancel")
     robot.set_initial_pose_topic(bridge, covariance=(1, 2, 3))
     robot.set_scan_assist("/scan", 0.3)
@@ -56,6 +58,7 @@ def test_a_robot_with_modules_goes_through_a_file_and_comes_back(robot, through)
     data = robot.to_dict()
     again = Robot.from_dict(through(data), {"ws://robot:9090": robot.feed.bridge})
     assert through(again.to_dict()) == through(data)
+    assert again.motion.spec().z_max == 0.5
     again.destroy()
 
 

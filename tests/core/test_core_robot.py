@@ -378,16 +378,18 @@ def test_triggers_tell_what_the_gate_wrote():
             pass
 
         def on_send_twist(self, message):
-            heard.append(message["linear"]["x"])
+            heard.append(message)
 
         def on_send_move(self, message):
             heard.append(message["position"]["y"])
 
     robot = Robot("Bob")
     robot.add_module(Listener)
-    robot.on_written("twist", twist_message(SentTwist(robot.id, 0.5, 0, 0, "c1")))
+    sent = SentTwist(robot.id, 1, 2, 6, "c1", vz=3, wx=4, wy=5)
+    robot.on_written("twist", twist_message(sent))
     robot.on_written("move", goal_message(SentGoal(robot.id, 1, 2, 3, "c1")))
-    assert heard == [0.5, 2]
+    linear, angular = {"x": 1, "y": 2, "z": 3}, {"x": 4, "y": 5, "z": 6}
+    assert heard == [{"linear": linear, "angular": angular}, 2]
 
 
 def test_a_robot_made_for_a_page_ends_with_it():

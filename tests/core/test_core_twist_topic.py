@@ -5,7 +5,9 @@ import math
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.errors import ConfigError
+from webmap.errors import ConfigError, MotionError
+from webmap.geometry import Twist
+from webmap.lifecycle import lifecycle
 
 
 @pytest.fixture
@@ -21,6 +23,9 @@ def robot():
         ("v_max", -1, "-1, expected a number from 0 on"),
         ("w_max", math.inf, "inf, expected a number from 0 on"),
         ("a_max", 0, "0, expected a number from 0.001 on"),
+        ("z_max", 0, "0, expected a number from 0.001 on"),
+        ("rx_max", -1, "-1, expected a number from 0.001 on"),
+        ("ry_max", math.nan, "nan, expected a number from 0.001 on"),
         ("stops_within", math.nan, "nan, expected a number from 0 on"),
     ],
 )
@@ -39,3 +44,48 @@ def test_a_base_that_is_told_wrongly_stays_as_it_was(robot):
         robot.set_twist_topic(bridge, "/other", v_max=-1)
     spec = robot.motion.spec()
     assert (spec.twist_topic, spec.v_max) == ("/cmd_vel", 0.5)
+
+
+class NotingGate:
+    """Notes the velocities that the gate would be handed."""
+
+    def __init__(self):
+        self.twists = []
+
+    def declare(self, spec):
+        pass
+
+    def forget(self, robot):
+        pass
+
+    def twist(self, robot, twist):
+        self.twists.append(twist)
+
+
+@pytest.fixture
+def gate(robot, monkeypatch):
+    gate = NotingGate()
+    monkeypatch.setattr(robot.motion, "gate", gate)
+    monkeypatch.setattr(type(lifecycle), "running", True)
+    return gate
+
+
+@pytest.mark.parametrize(
+    ("axis", "unit"), [("z", "m/s"), ("rx", "rad/s"), ("ry", "rad/s")]
+)
+def test_an_axis_without_a_limit_is_refused_and_not_dropped(robot, gate, axis, unit):
+    robot.set_twist_topic(Bridge("ws://robot:9090"), "/cmd_vel", v_max=0.5)
+    with pytest.raises(MotionError) as error:
+        robot.twist(0.1, **{axis: 0.25})
+    assert str(error.value) == (
+        f"robot 'Bob' was not told to move: got {axis} = 0.25 {unit}, but no limit of "
+        f"the robot is known for {axis}: state {axis}_max with its twist topic"
+    )
+    assert gate.twists == []
+
+
+def test_all_six_numbers_go_to_the_gate_for_a_robot_with_limits(robot, gate):
+    limits = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
+    robot.set_twist_topic(Bridge("ws://robot:9090"), "/cmd_vel", **limits)
+    robot.twist(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert gate.twists == [Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)]

@@ -38,11 +38,13 @@ class TestPages:
     def test_a_page_takes_and_drives_and_sees_what_comes_of_it(self, page, fake):
         page.drive_off(fake)
         assert page.of("hello")[0]["connection"] == page.connection.id
-        eventually(lambda: page.robot()["echoed"] == [0.25, 0, 0], "the echo")
-        eventually(lambda: page.robot()["measured"] == [0.125, 0, -0.5], "odometry")
+        eventually(lambda: page.robot()["echoed"] == [0.25, 0, 0, 0, 0, 0], "the echo")
+        eventually(
+            lambda: page.robot()["measured"] == [0.125, 0, -0.5, 0, 0, 0], "odometry"
+        )
         report = page.robot()
         assert report["state"] == "driving"
-        assert report["sent"] == [0.25, 0.0, 0.0]
+        assert report["sent"] == [0.25, 0, 0, 0, 0, 0]
         assert (report["v"], report["w"], report["link"]) == (0.25, 1.5, "up")
         assert report["why"] == ["limit of the robot"]
 

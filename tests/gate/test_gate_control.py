@@ -120,10 +120,12 @@ async def test_what_is_no_velocity_of_its_own_machines_is_passed_over():
         lane.listen("/cmd_vel")
         await until(lambda: bridge.of("subscribe"), "that it listens")
         zero = {"linear": {"x": 0.0, "y": 0.0}, "angular": {"z": 0.0}}
+        unknown = {**zero, "linear": {"x": 0.0, "y": 0.0, "z": None}}
         for words in (
             "rubbish",
             json.dumps({"op": "publish", "topic": "/other", "msg": zero}),
             json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": {"data": 1}}),
+            json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": unknown}),
             json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": zero}),
         ):
             await bridge.send(1, words)

@@ -673,8 +673,8 @@ class TestBlindness:
         bench.tell(events.Echoed(KEY, Twist(0.2, 0, -0.0)))
         bench.run(0.2)
         report = bench.report()
-        assert report.measured == (0.1, 0, 0)
-        assert report.echoed == (0.2, 0, 0)
+        assert report.measured == Twist(0.1).numbers
+        assert report.echoed == Twist(0.2).numbers
         bench.say("a", op="release", robot="r1")
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
         bench.tell(events.Echoed(KEY, Twist(0.2)))

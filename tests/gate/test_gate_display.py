@@ -144,7 +144,7 @@ class TestProgram:
         gate.say(messages.TakeReply(asked.request, "r1", 3, None))
         assert future.result(1) == 3
         client.twist("r1", Twist(0.5))
-        assert gate.told[-1] == messages.ProgramTwist("r1", 3, 7, (0.5, 0.0, 0.0))
+        assert gate.told[-1] == messages.ProgramTwist("r1", 3, 7, Twist(0.5).numbers)
         client.move("r1", 1.0, 2.0, 0.5)
         assert gate.told[-1] == messages.ProgramMove("r1", 3, 7, (1.0, 2.0, 0.5))
         client.locate("r1", 1.0, 2.0, 0.5)

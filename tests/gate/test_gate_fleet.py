@@ -45,6 +45,7 @@ class TestSpecs:
             {"v_max": -1.0},
             {"w_max": math.inf},
             {"a_max": 0.0},
+            {"z_max": 0.0},
             {"stops_within": -0.1},
         ],
     )

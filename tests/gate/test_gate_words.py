@@ -34,6 +34,42 @@ def test_a_velocity_with_a_header_has_stamp_zero_in_the_dialect(type, stamp):
     assert message["twist"]["angular"] == {"x": 0.0, "y": 0.0, "z": -1.0}
 
 
+@pytest.mark.parametrize("type", ["Twist", "TwistStamped", "msg/TwistStamped"])
+def test_a_velocity_has_all_six_numbers(type):
+    twist = Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
+    message = said(words.velocity("/cmd_vel", f"geometry_msgs/{type}", twist))["msg"]
+    message = message.get("twist", message)
+    assert message["linear"] == {"x": 1.0, "y": 2.0, "z": 3.0}
+    assert message["angular"] == {"x": 4.0, "y": 5.0, "z": 6.0}
+
+
+def heard_with(**changes):
+    numbers = {"x": 1.0, "y": 2.0, "z": 3.0, "rx": 4.0, "ry": 5.0, "rz": 6.0, **changes}
+    message = {
+        "linear": {axis: numbers[axis] for axis in "xyz"},
+        "angular": {axis: numbers[f"r{axis}"] for axis in "xyz"},
+    }
+    frame = {"op": "publish", "topic": "/odom", "msg": {"twist": {"twist": message}}}
+    return words.hear(json.dumps(frame).encode()).twist
+
+
+def test_odometry_tells_all_six_numbers():
+    assert heard_with() == Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
+
+
+@pytest.mark.parametrize(("axis", "field"), [("z", "vz"), ("rx", "wx"), ("ry", "wy")])
+@pytest.mark.parametrize("nothing", [None, math.nan])
+def test_a_number_out_of_the_plane_that_is_missing_is_nan(axis, field, nothing):
+    twist = heard_with(**{axis: nothing})
+    assert math.isnan(getattr(twist, field))
+    assert (twist.vx, twist.vy, twist.wz) == (1.0, 2.0, 6.0)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "rz"])
+def test_without_a_number_in_the_plane_there_is_no_velocity(axis):
+    assert heard_with(**{axis: None}) is None
+
+
 def test_a_plain_velocity_has_no_header():
     message = said(words.velocity("/cmd_vel", "geometry_msgs/Twist", Twist(0.5)))["msg"]
     assert message.keys() == {"linear", "angular"}

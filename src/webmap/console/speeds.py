@@ -5,12 +5,10 @@ from typing import TYPE_CHECKING
 
 from webmap import html
 from webmap.console.words import UNKNOWN, number
+from webmap.geometry import Twist
 
 if TYPE_CHECKING:
     from webmap import Element, Robot
-
-Velocity = tuple[float, float, float]
-"""Forward, left, counter-clockwise."""
 
 COLUMNS = ("Sent", "Echoed", "Measured")
 
@@ -42,9 +40,9 @@ class SpeedTable:
         sent = echoed = measured = None
         if report is not None:
             sent, echoed, measured = report.sent, report.echoed, report.measured
-        if measured is None and robot.measured_twist is not None:
-            twist = robot.measured_twist
-            measured = (twist.vx, twist.vy, twist.wz)
+        seen = robot.motion.axes.seen(robot.measured_twist)
+        if measured is None and seen is not None:
+            measured = seen.numbers
         for index, velocity in enumerate((sent, echoed, measured)):
             self._linear[index].text = linear(velocity)
             self._turn[index].text = (
@@ -95,12 +93,12 @@ class SpeedTable:
         )
 
 
-def linear(velocity: Velocity | None) -> str:
-    """Return the speed along the ground; backwards is below zero."""
+def linear(velocity: tuple[float, ...] | None) -> str:
+    """Return the speed, whatever the direction; backwards is below zero."""
     if velocity is None:
         return UNKNOWN
-    x, y, _ = velocity
-    return number(math.copysign(math.hypot(x, y), x))
+    twist = Twist(*velocity)
+    return number(math.copysign(twist.speed, twist.vx))
 
 
 def cap(v: float, w: float) -> str:

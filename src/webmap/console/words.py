@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from webmap.geometry import Twist
+
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
@@ -89,12 +91,12 @@ def _goes(robot: "Robot", moves: bool) -> bool:
     return report.goal.way != "topic" or (report.cancels and moves)
 
 
-def _moves(measured: tuple[float, float, float] | None) -> bool:
+def _moves(measured: tuple[float, ...] | None) -> bool:
     """Return whether odometry that is fresh shows a robot in motion."""
     if measured is None:
         return False
-    x, y, turn = measured
-    return math.hypot(x, y) >= MOVES or abs(turn) >= TURNS
+    twist = Twist(*measured)
+    return twist.speed >= MOVES or twist.turn >= TURNS
 
 
 def is_lost(bridge: "Bridge") -> bool:

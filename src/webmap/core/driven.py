@@ -67,8 +67,15 @@ class Driven(Extendable):
         a_max: float | None = None,
         holonomic: bool = False,
         stop_hooks: Sequence[Mapping[str, str]] = (),
+        z_max: float | None = None,
+        rx_max: float | None = None,
+        ry_max: float | None = None,
     ) -> None:
         """Say where velocity goes, and what the base behind it does and can.
+
+        A robot that moves in the plane has no ``z_max``, ``rx_max`` and ``ry_max``.
+        State them for one that flies or dives: :meth:`twist` then takes ``z``, ``rx``
+        and ``ry``.
 
         Args:
             bridge: The link to the robot's ROS system.
@@ -78,8 +85,8 @@ class Driven(Extendable):
                 when velocity ceases. Without it nobody knows whether the robot stops
                 when WebMap cannot tell it to, and it is driven at no more than
                 0.3 m/s and 0.6 rad/s.
-            v_max: The highest speed, in metres per second.
-            w_max: The highest rate of turn, in radians per second.
+            v_max: The highest speed, in metres per second, whatever the direction.
+            w_max: The highest rate of turn, in radians per second, whatever the axis.
             a_max: The highest acceleration, in metres per second squared. Slowing
                 down is never delayed by it.
             holonomic: Whether the base can move sideways.
@@ -87,6 +94,12 @@ class Driven(Extendable):
                 ``{"topic": "/lock", "type": "std_msgs/Bool"}`` publishes true, and
                 false on reset; ``{"service": "/e_stop", "type": "std_srvs/Trigger"}``
                 calls the service.
+            z_max: The highest speed upward and downward, in metres per second. Without
+                it the robot takes no ``z``.
+            rx_max: The highest rate of turn about the forward axis, in radians per
+                second. Without it the robot takes no ``rx``.
+            ry_max: The highest rate of turn about the left axis, in radians per
+                second. Without it the robot takes no ``ry``.
 
         Raises:
             ConfigError: If ``type`` carries no velocity, or a number or a stop hook
@@ -105,6 +118,9 @@ class Driven(Extendable):
                     a_max,
                     holonomic,
                     stop_hooks,
+                    z_max,
+                    rx_max,
+                    ry_max,
                 )
             )
         self._show_base(holonomic=holonomic)
@@ -327,16 +343,20 @@ class Driven(Extendable):
         Args:
             x: Metres per second forward.
             y: Metres per second to the left.
-            z: Upward; the gate moves robots in the plane and leaves it out.
-            rx: About x; left out likewise.
-            ry: About y; left out likewise.
+            z: Metres per second upward, for a robot that has a ``z_max``.
+            rx: Radians per second about the forward axis, for a robot that has an
+                ``rx_max``.
+            ry: Radians per second about the left axis, for a robot that has an
+                ``ry_max``.
             rz: Radians per second, counter-clockwise.
 
         Raises:
             NoLease: If the program does not hold the lease.
+            MotionError: If ``z``, ``rx`` or ``ry`` is not 0 and the twist topic states
+                no limit for it, or a number is not finite.
 
         """
-        self.motion.twist(Twist(x, y, rz))
+        self.motion.twist(Twist(x, y, rz, z, rx, ry))
 
     def move(self, position: Position, orientation: Orientation) -> None:
         """Send the robot to a pose in the plane, by its own navigation.

@@ -14,6 +14,7 @@ from webmap.core.twist_topic import TWIST_TYPES, TwistTopic, check_twist_type
 from webmap.core.type_asking import TypeAsking
 from webmap.errors import ConfigError, MotionError
 from webmap.gate.hookspecs import checked_hooks
+from webmap.gate.limits import PLANE, Axes
 from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.specs import checked, checked_assist
 from webmap.geometry import Pose, Twist
@@ -72,6 +73,11 @@ class MotionRoad:
     def twist_topic(self) -> TwistTopic | None:
         """Where velocity goes, if that is set."""
         return self._twist
+
+    @property
+    def axes(self) -> Axes:
+        """The axes out of the plane that the robot moves along, and how fast."""
+        return PLANE if self._twist is None else self._twist.axes
 
     @property
     def pose_topic(self) -> InitialPoseTopic | None:
@@ -235,6 +241,9 @@ class MotionRoad:
             stops_within=twist.stops_within if twist else None,
             v_max=twist.v_max if twist else None,
             w_max=twist.w_max if twist else None,
+            z_max=twist.z_max if twist else None,
+            rx_max=twist.rx_max if twist else None,
+            ry_max=twist.ry_max if twist else None,
             a_max=twist.a_max if twist else None,
             holonomic=twist.holonomic if twist else False,
             assist=self._assist if twist else None,
@@ -276,8 +285,16 @@ class MotionRoad:
         self._gate().release(self.id)
 
     def twist(self, twist: Twist) -> None:
-        """Hand one velocity to the gate, as this program."""
-        self._gate().twist(self.id, twist)
+        """Hand one velocity to the gate, as this program.
+
+        Raises:
+            MotionError: If the twist topic states no limit for an axis that it names.
+
+        """
+        gate = self._gate()
+        if why := self.axes.refusal(twist):
+            raise MotionError(f"robot {self._name!r} was not told to move: {why}")
+        gate.twist(self.id, twist)
 
     def move(self, x: float, y: float, yaw: float) -> None:
         """Hand one goal to the gate, as this program."""

@@ -40,6 +40,9 @@ class TwistData(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     stops_within: float | None = None
     v_max: float | None = None
     w_max: float | None = None
+    z_max: float | None = None
+    rx_max: float | None = None
+    ry_max: float | None = None
     a_max: float | None = None
     holonomic: bool = False
     stop_hooks: list[dict[str, str]] = []

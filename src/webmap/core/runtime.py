@@ -23,7 +23,7 @@ from webmap.gate.messages import (
     SentGoal,
     SentTwist,
 )
-from webmap.geometry import Quaternion
+from webmap.geometry import Quaternion, Twist
 from webmap.lifecycle import lifecycle
 from webmap.scope import Removal
 
@@ -202,10 +202,8 @@ def twist_message(sent: SentTwist) -> dict[str, Any]:
     It is in the robot's own frame, in metres and radians per second, and a Twist also
     where the topic takes TwistStamped.
     """
-    return {
-        "linear": {"x": sent.vx, "y": sent.vy, "z": 0.0},
-        "angular": {"x": 0.0, "y": 0.0, "z": sent.wz},
-    }
+    twist = Twist(sent.vx, sent.vy, sent.wz, sent.vz, sent.wx, sent.wy)
+    return twist.to_message()
 
 
 def goal_message(sent: SentGoal) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from webmap.errors import ConfigError
+from webmap.gate.limits import Axes
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import normalise_topic, same_type
 from webmap.ros.publications import STOP
@@ -24,6 +25,14 @@ class TwistTopic:
     a_max: float | None
     holonomic: bool
     stop_hooks: Sequence[Mapping[str, str]] = ()
+    z_max: float | None = None
+    rx_max: float | None = None
+    ry_max: float | None = None
+
+    @property
+    def axes(self) -> Axes:
+        """The axes out of the plane that the base moves along, and how fast at most."""
+        return Axes(self.z_max or 0.0, self.rx_max or 0.0, self.ry_max or 0.0)
 
     def writes(self) -> dict[str, str]:
         """Return what the gate alone writes: topics, and what each carries."""

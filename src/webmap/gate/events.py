@@ -190,7 +190,10 @@ class Echoed:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Odometry came; ``twist`` is ``None`` if it says nothing of velocity."""
+    """Odometry came; ``twist`` is ``None`` if it says nothing of velocity.
+
+    Its numbers are finite for motion in the plane, and may be NaN for the others.
+    """
 
     key: Key
     twist: Twist | None

@@ -12,6 +12,8 @@ from webmap.gate.events import StopRecord
 from webmap.gate.messages import RobotSpec
 from webmap.geometry import Twist
 
+Vector = tuple[float, float, float]
+
 SLOW_V = 0.3
 """Metres per second for a machine of which too little is known (S9)."""
 
@@ -20,6 +22,76 @@ SLOW_W = 0.6
 
 STOPS_WITHIN = 0.5
 """A base that stops by itself within this time, in seconds, may go faster (S12)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """How fast a machine may move out of the plane, axis by axis.
+
+    An axis that nobody states a limit for has 0: the machine does not move along it.
+    """
+
+    z: float = 0.0
+    """Metres per second upward and downward."""
+
+    rx: float = 0.0
+    """Radians per second about the forward axis."""
+
+    ry: float = 0.0
+    """Radians per second about the left axis."""
+
+    def refusal(self, twist: Twist) -> str | None:
+        """Return why the machine cannot be told ``twist``, in words, or ``None``."""
+        for axis, wanted, unit, limit in (
+            ("z", twist.vz, "m/s", self.z),
+            ("rx", twist.wx, "rad/s", self.rx),
+            ("ry", twist.wy, "rad/s", self.ry),
+        ):
+            if wanted != 0 and limit == 0:
+                return (
+                    f"got {axis} = {wanted:g} {unit}, but no limit of the robot is "
+                    f"known for {axis}: state {axis}_max with its twist topic"
+                )
+        return None
+
+    def seen(self, measured: Twist | None) -> Twist | None:
+        """Return what odometry says of the axes that the machine moves along.
+
+        Args:
+            measured: The velocity that it tells, if it tells one.
+
+        Returns:
+            ``None`` if it tells no finite number for one of those axes.
+
+        """
+        if measured is None:
+            return None
+        seen = Twist(
+            measured.vx,
+            measured.vy,
+            measured.wz,
+            measured.vz if self.z else 0.0,
+            measured.wx if self.rx else 0.0,
+            measured.wy if self.ry else 0.0,
+        )
+        return seen if seen.is_finite else None
+
+
+PLANE = Axes()
+"""The axes of a machine that moves in the plane alone."""
+
+
+def axes_of(specs: Iterable[RobotSpec]) -> Axes:
+    """Return the axes of a machine that everybody states a limit for, and the least.
+
+    Args:
+        specs: The robots that are the machine.
+
+    """
+    limits = [
+        (spec.z_max or 0.0, spec.rx_max or 0.0, spec.ry_max or 0.0) for spec in specs
+    ]
+    return Axes(*map(min, zip(*limits, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,30 +183,50 @@ def offered(own: Speed, page: Cap) -> Speed:
     return in_force(Speed(v, w, why))
 
 
-def fit(wanted: Twist, speed: Speed, *, holonomic: bool) -> Twist:
-    """Return ``wanted`` within ``speed``, in the same direction.
+def fit(wanted: Twist, speed: Speed, *, holonomic: bool, axes: Axes = PLANE) -> Twist:
+    """Return ``wanted`` within ``speed`` and ``axes``, in the same direction.
 
     Args:
         wanted: A velocity of finite numbers.
-        speed: The speeds in force.
+        speed: The speeds in force, whatever the direction.
         holonomic: Whether the base can move sideways; if not, ``vy`` is exactly 0.
+        axes: The limits of the axes that lead out of the plane. A velocity along an
+            axis that has none becomes zero as a whole.
 
     """
     vx, vy = wanted.vx, wanted.vy if holonomic else 0.0
-    length = math.hypot(vx, vy)
-    if length > speed.v:
-        # A velocity along one axis is clamped exactly, without rounding.
-        vx = math.copysign(speed.v, vx) if vy == 0 else vx / length * speed.v
-        vy = vy / length * speed.v
-    wz = min(speed.w, max(-speed.w, wanted.wz))
-    return Twist(vx + 0.0, vy + 0.0, wz + 0.0)  # no negative zeros on the wire
+    vx, vy, vz = _within((vx, vy, wanted.vz), speed.v, (math.inf, math.inf, axes.z))
+    wx, wy, wz = _within(
+        (wanted.wx, wanted.wy, wanted.wz), speed.w, (axes.rx, axes.ry, math.inf)
+    )
+    return Twist(vx, vy, wz, vz, wx, wy)
+
+
+def _within(parts: Vector, most: float, each: Vector) -> Vector:
+    """Return ``parts``, shortened until its length and each part are small enough.
+
+    A velocity along one axis is clamped exactly, without rounding. No quotient here is
+    larger than 1: with an infinity a zero would make a NaN.
+    """
+    length = math.hypot(*parts)
+    found = list(parts)
+    if length > most:
+        found = [part / length * most for part in parts]
+    for axis, limit in enumerate(each):
+        if abs(found[axis]) > limit:
+            shorter = limit / abs(found[axis])
+            clamped = math.copysign(limit, found[axis])
+            found = [part * shorter for part in found]
+            found[axis] = clamped
+    x, y, z = (part + 0.0 for part in found)  # no negative zeros on the wire
+    return (x, y, z)
 
 
 def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
     """Return ``wanted`` or, if that speeds up too much, what is allowed of it.
 
     Slowing down is never held back; turning round counts as speeding up from
-    standstill. The turning rate is not ramped.
+    standstill. The turning rates are not ramped.
 
     Args:
         last: What was written last.
@@ -145,10 +237,11 @@ def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
     """
     step = a_max * elapsed
     vx, vy = _towards(last.vx, wanted.vx, step), _towards(last.vy, wanted.vy, step)
-    allowed, length = math.hypot(last.vx, last.vy) + step, math.hypot(vx, vy)
-    if vx != 0 and vy != 0 and length > allowed:  # both axes at once, aslant
-        vx, vy = vx / length * allowed, vy / length * allowed
-    return Twist(vx, vy, wanted.wz)
+    vz = _towards(last.vz, wanted.vz, step)
+    allowed, length = last.speed + step, math.hypot(vx, vy, vz)
+    if (vx, vy, vz).count(0.0) < 2 and length > allowed:  # aslant, on several axes
+        vx, vy, vz = (part / length * allowed for part in (vx, vy, vz))
+    return Twist(vx, vy, wanted.wz, vz, wanted.wx, wanted.wy)
 
 
 def _towards(last: float, wanted: float, step: float) -> float:

@@ -8,8 +8,9 @@
      "holder": {"connection": "c5", "name": "Ann"}, "mine": true, "epoch": 3,
      "latched": false, "stop": null, "armed": false,
      "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
-     "sent": [0.0, 0.0, 0.0], "echoed": null, "measured": [0.0, 0.0, 0.0],
-     "alarm": null, "other_writer": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
+     "sent": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "echoed": null,
+     "measured": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "alarm": null,
+     "other_writer": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
      "stop_time": 0.25, "stop_source": "stated", "stop_date": null, "test": null,
      "armable": true, "reason": null, "way": "navigate_to_pose", "cancels": true,
      "locates": true, "goal": {"id": "g7", "x": 1.0, "y": 2.0, "yaw": 0.5, "by": "c5",
@@ -21,7 +22,8 @@
 ``hello`` comes first, also when the gate was started anew (all leases are then gone),
 and after it every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest accepted
 ``seq`` of this connection, -1 at first. ``robot`` comes when something changed,
-velocities (``[forward, left, counter-clockwise]``) at 10 Hz at most. While STOP stands
+velocities at 10 Hz at most: ``[forward, left, counter-clockwise, upward, about the
+forward axis, about the left axis]``, in m/s and rad/s. While STOP stands
 ``latched`` is true, ``state`` is ``"stopped"``, and ``stop`` tells what is known of it:
 ``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by odometry", "id":
 "5f0c"}``, with the identity that a reset must name and that is new with each press;

@@ -226,9 +226,9 @@ class TwistMsg(msgspec.Struct, frozen=True):
 
     @property
     def twist(self) -> Twist:
-        """What of it moves a base in the plane."""
-        angular = self.angular
-        return Twist(self.linear.x, self.linear.y, angular.z)
+        """The same velocity, as a base has it."""
+        linear, angular = self.linear, self.angular
+        return Twist(linear.x, linear.y, angular.z, linear.z, angular.x, angular.y)
 
 
 class TwistWithCovarianceMsg(msgspec.Struct, frozen=True):

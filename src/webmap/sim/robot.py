@@ -1,4 +1,7 @@
-"""A differential-drive base: how it moves, and when it stops by itself."""
+"""A differential-drive base: how it moves, and when it stops by itself.
+
+One that has a ``z_max`` also moves upward and downward, as an aerial robot does.
+"""
 
 import math
 from collections.abc import Callable
@@ -26,6 +29,9 @@ class BaseOptions:
 
     w_max: float = 2.5
     """Radians per second."""
+
+    z_max: float = 0.0
+    """Metres per second upward and downward; 0 for a base on wheels."""
 
     acceleration: float = 2.0
     """Metres per second squared, speeding up and slowing down."""
@@ -58,6 +64,8 @@ class Robot:
         self.options = options
         self.pose = pose
         """True pose in the map's frame."""
+        self.height = 0.0
+        """Metres above the floor, which odometry tells without an error."""
         self.odometry = pose
         """Where its odometry thinks it is."""
         self.twist = _STILL
@@ -113,6 +121,8 @@ class Robot:
         before = self.twist
         vx = _towards(before.vx, wanted.vx, limits.v_max, limits.acceleration * dt)
         wz = _towards(before.wz, wanted.wz, limits.w_max, limits.turn_acceleration * dt)
+        vz = _towards(before.vz, wanted.vz, limits.z_max, limits.acceleration * dt)
+        self.height += (before.vz + vz) / 2 * dt
         # The mean of a ramp: a command of 1 m/s for 1 s makes 1 m, ramps included.
         ahead = (before.vx + vx) / 2 * dt
         turn = (before.wz + wz) / 2 * dt
@@ -122,7 +132,7 @@ class Robot:
             ahead, vx = 0.0, 0.0
             target = self.pose @ Pose(yaw=turn)
         self.pose = target
-        self.twist = Twist(vx=vx, wz=wz)
+        self.twist = Twist(vx=vx, wz=wz, vz=vz)
         self._measure(ahead, turn)
         self._drain(dt)
 

@@ -28,6 +28,9 @@ class Bounds:
     w_max: float = math.inf
     """Radians per second."""
 
+    z_max: float = math.inf
+    """Metres per second upward and downward."""
+
     a_max: float | None = None
     """Metres per second squared when speeding up; None if that is not limited."""
 
@@ -108,11 +111,12 @@ def _limits(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
             yield told.at, f"{told.twist} is not finite"
         elif told.speed > bounds.v_max * (1 + 1e-9):
             yield told.at, f"{told.speed:g} m/s is above the limit of {bounds.v_max:g}"
-        elif abs(told.twist.wz) > bounds.w_max * (1 + 1e-9):
-            yield (
-                told.at,
-                f"{told.twist.wz:g} rad/s is above the limit of {bounds.w_max:g}",
-            )
+        elif told.twist.turn > bounds.w_max * (1 + 1e-9):
+            turn = told.twist.turn
+            yield told.at, f"{turn:g} rad/s is above the limit of {bounds.w_max:g}"
+        elif abs(told.twist.vz) > bounds.z_max * (1 + 1e-9):
+            z = told.twist.vz
+            yield told.at, f"{z:g} m/s upward is above the limit of {bounds.z_max:g}"
 
 
 def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:

@@ -49,7 +49,7 @@ class Told:
     @property
     def speed(self) -> float:
         """Metres per second, whatever the direction."""
-        return math.hypot(self.twist.vx, self.twist.vy)
+        return self.twist.speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class WitnessLog:
         """
         rest = None
         for moved in _from(self.moved, since):
-            if max(abs(moved.twist.vx), abs(moved.twist.wz)) > slow:
+            if max(moved.twist.speed, moved.twist.turn) > slow:
                 rest = None
             elif rest is None:
                 rest = moved.at

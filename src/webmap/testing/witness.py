@@ -19,7 +19,7 @@ ODOMETRY_EVERY = 5
 
 
 class WitnessRobot:
-    """A differential base behind a rosbridge of its own, in a thread of its own.
+    """A base behind a rosbridge of its own, in a thread of its own.
 
     Used as a context manager. What it is told stands in :attr:`log`, with the time of
     the monotonic clock, which all processes of one machine share. Its brakes are good:
@@ -30,6 +30,7 @@ class WitnessRobot:
         timeout: Seconds without a command until the base stops by itself; None for a
             bad one that never does.
         obeys: Whether it does what it is told.
+        flies: Whether it moves upward and downward; it is a differential base if not.
         goals_block: Whether a goal runs on its socket's input thread.
 
     """
@@ -42,6 +43,7 @@ class WitnessRobot:
         *,
         timeout: float | None = 0.5,
         obeys: bool = True,
+        flies: bool = False,
         goals_block: bool = False,
     ) -> None:
         self.log = WitnessLog()
@@ -51,6 +53,7 @@ class WitnessRobot:
         options = BaseOptions(
             v_max=5.0,
             w_max=10.0,
+            z_max=5.0 if flies else 0.0,
             acceleration=50.0,
             turn_acceleration=100.0,
             timeout=timeout,
@@ -143,7 +146,7 @@ class WitnessRobot:
             "child_frame_id": "base_link",
             "pose": {
                 "pose": {
-                    "position": {"x": pose.x, "y": pose.y, "z": 0.0},
+                    "position": {"x": pose.x, "y": pose.y, "z": self._base.height},
                     "orientation": {
                         "x": 0.0,
                         "y": 0.0,
@@ -154,10 +157,7 @@ class WitnessRobot:
                 "covariance": [0.0] * 36,
             },
             "twist": {
-                "twist": {
-                    "linear": {"x": twist.vx, "y": 0.0, "z": 0.0},
-                    "angular": {"x": 0.0, "y": 0.0, "z": twist.wz},
-                },
+                "twist": twist.to_message(),
                 "covariance": [0.0] * 36,
             },
         }
@@ -167,9 +167,10 @@ def _twist(message: Any) -> Twist:
     """Read a Twist or a TwistStamped; what is no number is NaN, so that it is seen."""
     inner = message.get("twist", message) if isinstance(message, dict) else {}
     linear, angular = inner.get("linear") or {}, inner.get("angular") or {}
-    return Twist(
-        _number(linear.get("x")), _number(linear.get("y")), _number(angular.get("z"))
+    (vx, vy, vz), (wx, wy, wz) = (
+        [_number(vector.get(axis)) for axis in "xyz"] for vector in (linear, angular)
     )
+    return Twist(vx, vy, wz, vz, wx, wy)
 
 
 def _number(value: Any) -> float:

@@ -90,6 +90,8 @@ const cases = [
     },
   ],
   ["stopping", {}, { ...REPORT, measured: [0, 0, -0.2], goal: { state: "cancelled" } }],
+  ["stopping", {}, { ...REPORT, measured: [0, 0, 0, -0.2, 0, 0] }],
+  ["stopping", {}, { ...REPORT, measured: [0, 0, 0, 0, 0.2, 0] }],
   ["hands-off", { driven: "r1", pressed: true, dead: true }, { ...REPORT, ...ME }],
   ["fixed", { driven: "r1" }, { ...REPORT, ...ME, reason: "no odometry for 1 s" }],
   ["stopped", {}, { ...REPORT, state: "stopped" }],

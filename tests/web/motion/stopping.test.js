@@ -64,6 +64,23 @@ describe("a STOP", () => {
     assert.match(verdict(moving, 100, STAND_PATIENCE + 1).text, /moving at 0.40 m\/s/);
   });
 
+  for (const [motion, measured] of [
+    ["climbs", [0, 0, 0, -0.4, 0, 0]],
+    ["rolls", [0, 0, 0, 0, 0.4, 0]],
+    ["pitches", [0, 0, 0, 0, 0, -0.4]],
+  ]) {
+    test(`of a robot that still ${motion} is not confirmed`, () => {
+      const { state } = verdict(report({ measured }), 100, STAND_PATIENCE + 1);
+      assert.equal(state, "unconfirmed");
+    });
+  }
+
+  test("of a robot that still climbs says how fast", () => {
+    const climbing = report({ measured: [0.3, 0, 0, -0.4, 0, 0] });
+    const { text } = verdict(climbing, 100, STAND_PATIENCE + 1);
+    assert.match(text, /still moving at 0.50 m\/s/);
+  });
+
   test("of a robot without odometry is not confirmed", () => {
     const blind = report({ measured: null });
     assert.match(verdict(blind, 100, STAND_PATIENCE + 1).text, /no odometry/);

@@ -39,6 +39,9 @@ TWIST: dict[str, Check] = {
     "stops_within": checks.above_zero("seconds"),
     "v_max": checks.above_zero("metres per second"),
     "w_max": checks.above_zero("radians per second"),
+    "z_max": checks.above_zero("metres per second"),
+    "rx_max": checks.above_zero("radians per second"),
+    "ry_max": checks.above_zero("radians per second"),
     "a_max": checks.above_zero("metres per second squared"),
     "holonomic": checks.yes_or_no,
     "stop_hooks": lambda value: value,  # read with the way to each of them

@@ -89,7 +89,8 @@ class ProgramRoad:
             raise MotionError(f"a velocity is made of finite numbers, got {twist}")
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            velocity = (float(twist.vx), float(twist.vy), float(twist.wz))
+            x, y, turn, z, rx, ry = map(float, twist.numbers)
+            velocity = (x, y, turn, z, rx, ry)
             now = self._clock()
             at, last = self._passed_on.get(robot_id, (-math.inf, velocity))
             if now - at < LEAST_PAUSE and (any(velocity) or not any(last)):

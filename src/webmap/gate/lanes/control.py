@@ -144,5 +144,7 @@ class ControlLane:
         heard = words.hear(data)
         if heard is None or heard.topic not in self._types or heard.twist is None:
             return
+        if not heard.twist.is_finite:
+            return
         self._unproven.echoed(heard.topic, heard.twist)
         self._tell(Echoed(Key(self._url, heard.topic), heard.twist))

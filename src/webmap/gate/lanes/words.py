@@ -20,10 +20,7 @@ from webmap.ros.names import is_type
 
 def velocity(topic: str, type: str, twist: Twist) -> bytes:
     """Return the operation that publishes ``twist``."""
-    message: dict[str, Any] = {
-        "linear": {"x": twist.vx, "y": twist.vy, "z": 0.0},
-        "angular": {"x": 0.0, "y": 0.0, "z": twist.wz},
-    }
+    message: dict[str, Any] = twist.to_message()
     if is_type(type, "geometry_msgs/TwistStamped"):
         message = {"header": _header(type, ""), "twist": message}
     return ops.publish(topic, message)
@@ -110,20 +107,17 @@ def _header(type: str, frame: str) -> dict[str, Any]:
     return {"stamp": stamp, "frame_id": frame}
 
 
-class _Linear(msgspec.Struct):
+class _Vector(msgspec.Struct):
     x: float | None = 0.0
     y: float | None = 0.0
-
-
-class _Angular(msgspec.Struct):
     z: float | None = 0.0
 
 
 class _Twist(msgspec.Struct):
     """A Twist, or something with a twist in it: TwistStamped, Odometry."""
 
-    linear: _Linear | None = None
-    angular: _Angular | None = None
+    linear: _Vector | None = None
+    angular: _Vector | None = None
     twist: "_Twist | None" = None
 
 
@@ -144,7 +138,8 @@ class Heard(msgspec.Struct, frozen=True):
     id: str | None
     topic: str | None
     twist: Twist | None
-    """The velocity in a published message, if there is one of finite numbers."""
+    """The velocity in a published message, if there is one whose motion in the plane is
+    made of finite numbers. The other numbers are NaN where the message has none."""
 
 
 def hear(data: bytes) -> Heard | None:
@@ -173,9 +168,12 @@ def _velocity(message: _Twist | None) -> Twist | None:
         if message is None:
             return None
         if message.linear is not None and message.angular is not None:
-            found = (message.linear.x, message.linear.y, message.angular.z)
-            if any(part is None or not math.isfinite(part) for part in found):
+            linear, angular = message.linear, message.angular
+            plane = (linear.x, linear.y, angular.z)
+            if any(part is None or not math.isfinite(part) for part in plane):
                 return None
-            return Twist(*(float(part or 0.0) for part in found))
+            # Only who knows the robot knows whether the others matter.
+            found = (*plane, linear.z, angular.x, angular.y)
+            return Twist(*(math.nan if part is None else part for part in found))
         message = message.twist
     return None

@@ -1,8 +1,8 @@
 """What the display and the gate say to each other over the pipe.
 
 Speeds are metres and radians per second in the robot's own frame (x forward, y left,
-turn counter-clockwise); times are seconds. A robot is named by a short opaque text
-that the display makes up; a connection (one page's socket) likewise.
+z up, turn counter-clockwise); times are seconds. A robot is named by a short opaque
+text that the display makes up; a connection (one page's socket) likewise.
 
 ``spec`` is what the display declares of a robot, with ``assist`` in it, ``to_gate``
 what it says otherwise, ``robot_report`` what the gate tells of a robot, ``from_gate``

@@ -70,6 +70,9 @@ class SentTwist(msgspec.Struct, frozen=True, tag="sent-twist"):
     wz: float
     by: str | None
     """The connection that gave it; ``None`` for a zero that the gate sent itself."""
+    vz: float = 0.0
+    wx: float = 0.0
+    wy: float = 0.0
 
 
 class SentGoal(msgspec.Struct, frozen=True, tag="sent-goal"):

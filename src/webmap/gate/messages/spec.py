@@ -31,7 +31,16 @@ class RobotSpec(
     stops_within: float | None = None
     """Seconds after the last command until the base stops by itself, if known."""
     v_max: float | None = None
+    """The highest speed in m/s, whatever the direction."""
     w_max: float | None = None
+    """The highest rate of turn in rad/s, whatever the axis."""
+    z_max: float | None = None
+    """The highest speed upward and downward, in m/s. Without it the robot takes no
+    velocity that has a z."""
+    rx_max: float | None = None
+    """The highest rate of turn about the forward axis, in rad/s; likewise."""
+    ry_max: float | None = None
+    """The highest rate of turn about the left axis, in rad/s; likewise."""
     a_max: float | None = None
     """Greatest growth of the speed, in m/s²; slowing down is never held back."""
     odometry_topic: str | None = None

@@ -239,10 +239,9 @@ class Base:
         self.motion.wrote(write, now)
         self.tests.wrote(write.twist)
         self.other_writer.wrote(write.twist, now)
-        twist = write.twist
+        vx, vy, wz, *others = write.twist.numbers
         for robot in self.robots.specs:
-            sent = SentTwist(robot, twist.vx, twist.vy, twist.wz, write.by)
-            self._emit(Say(sent))
+            self._emit(Say(SentTwist(robot, vx, vy, wz, write.by, *others)))
 
     def heard(self, twist: Twist, now: float) -> None:
         """Note what came back on the velocity topic, ours or another's."""
@@ -257,6 +256,7 @@ class Base:
         """Note that odometry came, which was said after a moment, maybe long ago."""
         if not self.sight.on:
             return
+        measured = self.robots.axes.seen(measured)
         self.sight.saw(measured, said_after, now)
         seen, handover = self.standing.confirmation, self.hands.handover
         if self.latch.on and self.sight.tells_since(seen.since):

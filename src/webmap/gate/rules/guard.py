@@ -62,7 +62,7 @@ class Guard:
         if verdict.scale >= 1.0:
             return wanted
         s = verdict.scale
-        return Twist(s * wanted.vx, s * wanted.vy, s * wanted.wz)
+        return Twist(*(s * part for part in wanted.numbers))
 
 
 def _scale(verdict: Verdict) -> float:

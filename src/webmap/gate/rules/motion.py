@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
 from webmap.gate.events import Key, Wrote
-from webmap.gate.limits import Speed, fit, ramp
+from webmap.gate.limits import PLANE, Axes, Speed, fit, ramp
 from webmap.gate.rules.burst import HELD_LENGTH, HELD_PERIOD, NEW_LINK_LENGTH, Burst
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.lease import Lease
@@ -34,6 +34,7 @@ class Bounds:
     speed: Speed
     a_max: float | None
     holonomic: bool
+    axes: Axes = PLANE
 
 
 class Motion:
@@ -199,7 +200,7 @@ class Motion:
 
     def _bounded(self, wanted: Twist, now: float) -> Twist:
         bounds = self._bounds()
-        twist = fit(wanted, bounds.speed, holonomic=bounds.holonomic)
+        twist = fit(wanted, bounds.speed, holonomic=bounds.holonomic, axes=bounds.axes)
         if bounds.a_max is None:
             return twist
         elapsed = min(now - self._sent_at, RAMP_INTERVAL)

@@ -2,7 +2,7 @@
 
 import math
 
-from webmap.gate.rules.standstill import Standstill, speed_of
+from webmap.gate.rules.standstill import Standstill
 from webmap.geometry import Twist
 
 GRACE = 1.0
@@ -95,7 +95,7 @@ class Obedience:
             return None
         silent = now - self._seen_at > GRACE
         until = ", and odometry has ceased since" if silent else ""
-        speed = speed_of(self._moving)
+        speed, turn = self._moving.speed, self._moving.turn
         if speed > MOVES:
             return f"zero sent, still moving at {speed:.2f} m/s{until}"
-        return f"zero sent, still turning at {abs(self._moving.wz):.2f} rad/s{until}"
+        return f"zero sent, still turning at {turn:.2f} rad/s{until}"

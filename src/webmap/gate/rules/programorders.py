@@ -14,6 +14,8 @@ from webmap.gate.rules.orders import Orders
 from webmap.gate.rules.people import People
 from webmap.geometry import Twist
 
+Vector = tuple[float, float, float]
+
 SETTLE = 1.5
 """Seconds for which a program waits at most until a robot that it took would move."""
 
@@ -120,7 +122,11 @@ class ProgramOrders:
                 program, robot, message.epoch, message.tick, now
             )
             base.speeds.ages.add(age, now)
-            twist = Twist(*_finite(message.velocity))
+            twist = Twist(*message.velocity)
+            if not twist.is_finite:
+                raise Refusal(f"expected finite numbers, got {message.velocity}")
+            if reason := base.robots.axes.refusal(twist):
+                raise Refusal(reason)
             if reason := base.driving.drive(twist, twist.is_zero, message.tick, now):
                 raise Refusal(reason)
 
@@ -159,7 +165,7 @@ class ProgramOrders:
         )
 
 
-def _finite(numbers: messages.Velocity) -> messages.Velocity:
+def _finite(numbers: Vector) -> Vector:
     if not all(map(math.isfinite, numbers)):
         raise Refusal(f"expected finite numbers, got {numbers}")
     return numbers

@@ -24,7 +24,6 @@ BRAKE = 0.5
 """The deceleration that is assumed of a base of which none was stated, in m/s²."""
 
 _DIGITS = 3
-_REST = (0.0, 0.0, 0.0)
 
 
 def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
@@ -32,6 +31,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     lease = base.hands.lease
     speed = base.speeds.own if lease is None else base.speeds.speed
     age, test = base.speeds.ages.p95, base.tests.last
+    echoed, measured = base.sight.echoed, base.sight.shown(now)
     unarmable = base.hands.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
     goals = base.robots.goals[spec.id]
@@ -51,9 +51,9 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         w=speed.w,
         why=speed.why + base.guard.why,
         link="up" if link.up else "down",
-        sent=_velocity(base.motion.sent) or _REST,
-        echoed=_velocity(base.sight.echoed),
-        measured=_velocity(base.sight.shown(now)),
+        sent=_velocity(base.motion.sent),
+        echoed=None if echoed is None else _velocity(echoed),
+        measured=None if measured is None else _velocity(measured),
         alarm=base.obedience.alarm(now),
         other_writer=base.other_writer.words(base.key.topic),
         age=None if age is None else round(age * 1000, 0),
@@ -97,14 +97,9 @@ def _stop(base: Base) -> StopReport | None:
     return StopReport(press.by, seen.confirmed, why, press.id)
 
 
-def _velocity(twist: Twist | None) -> Velocity | None:
-    if twist is None:
-        return None
-    return (
-        round(twist.vx, _DIGITS) + 0.0,
-        round(twist.vy, _DIGITS) + 0.0,
-        round(twist.wz, _DIGITS) + 0.0,
-    )
+def _velocity(twist: Twist) -> Velocity:
+    x, y, turn, z, rx, ry = (round(part, _DIGITS) + 0.0 for part in twist.numbers)
+    return (x, y, turn, z, rx, ry)
 
 
 class Reporter:
@@ -141,7 +136,7 @@ def _gist(report: RobotReport) -> RobotReport:
         stop = msgspec.structs.replace(stop, why="")
     return msgspec.structs.replace(
         report,
-        sent=_REST,
+        sent=_velocity(Twist()),
         echoed=None,
         measured=None,
         asker=asker,

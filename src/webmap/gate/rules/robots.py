@@ -4,6 +4,7 @@ from operator import attrgetter
 
 from webmap.gate.actions import Detach, Emit, Say
 from webmap.gate.events import Key
+from webmap.gate.limits import Axes, axes_of
 from webmap.gate.messages import Refused, RobotSpec
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import Health
@@ -15,6 +16,9 @@ _terms = attrgetter(
     "stops_within",
     "v_max",
     "w_max",
+    "z_max",
+    "rx_max",
+    "ry_max",
     "a_max",
     "odometry_url",
     "odometry_topic",
@@ -62,6 +66,11 @@ class Robots:
     def holonomic(self) -> bool:
         """Whether everybody says that it can move sideways."""
         return all(spec.holonomic for spec in self.specs.values())
+
+    @property
+    def axes(self) -> Axes:
+        """The axes out of the plane that it moves along, and how fast at most."""
+        return axes_of(self.specs.values())
 
     @property
     def a_max(self) -> float | None:

@@ -50,4 +50,5 @@ class Speeds:
 
     def bounds(self) -> Bounds:
         """Return what the machine may do at most now."""
-        return Bounds(self.speed, self._robots.a_max, self._robots.holonomic)
+        robots = self._robots
+        return Bounds(self.speed, robots.a_max, robots.holonomic, robots.axes)

@@ -1,7 +1,5 @@
 """Whether a machine stands, as its odometry tells. No I/O."""
 
-import math
-
 from webmap.geometry import Twist
 
 STILL_V = 0.02
@@ -17,11 +15,6 @@ GAP = 0.5
 """Seconds between two messages that are too many to know what was between."""
 
 
-def speed_of(twist: Twist) -> float:
-    """Return how fast ``twist`` goes, in m/s, whatever the direction."""
-    return math.hypot(twist.vx, twist.vy)
-
-
 def moves(twist: Twist, still_v: float = STILL_V, still_w: float = STILL_W) -> bool:
     """Return whether a machine of that velocity does not stand.
 
@@ -31,7 +24,7 @@ def moves(twist: Twist, still_v: float = STILL_V, still_w: float = STILL_W) -> b
         still_w: Radians per second from which on it turns.
 
     """
-    return speed_of(twist) >= still_v or abs(twist.wz) >= still_w
+    return twist.speed >= still_v or twist.turn >= still_w
 
 
 class Standstill:
@@ -48,7 +41,7 @@ class Standstill:
         self.speed: float | None = None
         """The newest speed in m/s; ``None`` before the first."""
         self.turn = 0.0
-        """The newest speed of turning in rad/s, without its sign."""
+        """The newest speed of turning in rad/s, whatever the axis."""
         self.heard_at = float("-inf")
         """When odometry last told a velocity."""
         self.since: float | None = None
@@ -64,7 +57,7 @@ class Standstill:
             return
         if now - self.heard_at > GAP:
             self.since = None
-        self.speed, self.turn, self.heard_at = speed_of(twist), abs(twist.wz), now
+        self.speed, self.turn, self.heard_at = twist.speed, twist.turn, now
         if moves(twist, self._still_v, self._still_w):
             self.since = None
         elif self.since is None:

@@ -19,7 +19,7 @@ its steps. The base stopped when a standstill began that lasted.
 from collections import Counter
 from typing import Literal
 
-from webmap.gate.rules.standstill import Standstill, speed_of
+from webmap.gate.rules.standstill import Standstill
 from webmap.geometry import Twist
 
 CREEP = Twist(0.1)
@@ -89,7 +89,7 @@ class StopTest:
         """
         if twist is None:
             return
-        if self.state == "creeping" and speed_of(twist) > MOVES:
+        if self.state == "creeping" and twist.speed > MOVES:
             self.state, self.text = "waiting", "no more commands: does it stop?"
             self._left_alone_at = last_command_at
         elif self.state == "waiting":

@@ -1,3 +1,5 @@
+import { linearSpeed } from "./report.js";
+
 /** What stands where a figure would. */
 const UNKNOWN = "not known";
 
@@ -19,14 +21,13 @@ const ASSUMED = { reaction: 1, brake: 0.5 };
 
 /**
  * @param {readonly number[] | null | undefined} velocity
- * @returns {number | null} Along the ground in m/s, below zero for backwards; null when it
- *     is not known.
+ * @returns {number | null} In m/s, whatever the direction, below zero for backwards; null
+ *     when it is not known.
  */
 export function speedAlong(velocity) {
   if (!velocity) return null;
-  const [x, y] = velocity;
-  const speed = Math.hypot(x, y);
-  return Number.isFinite(speed) ? Math.sign(x || 1) * speed : null;
+  const speed = linearSpeed(velocity);
+  return Number.isFinite(speed) ? Math.sign(velocity[0] || 1) * speed : null;
 }
 
 /**

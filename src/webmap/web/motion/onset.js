@@ -1,4 +1,5 @@
 import { STANDING, speedAlong } from "./figures.js";
+import { angularSpeed } from "./report.js";
 
 /** @typedef {import('./axes.js').Axes} Axes */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
@@ -54,7 +55,7 @@ export class Onset {
    */
   report({ robot, measured }, now) {
     const speed = Math.abs(speedAlong(measured) ?? 0);
-    const moves = speed > STANDING || Math.abs(measured?.[2] ?? 0) > TURNS;
+    const moves = speed > STANDING || angularSpeed(measured ?? []) > TURNS;
     this._moves.set(robot, moves);
     if (!moves || this._waiting?.robot !== robot) return;
     const delay = now - this._waiting.since;

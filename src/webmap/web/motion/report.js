@@ -13,7 +13,8 @@
  * @property {number} w The turning speed in force, in rad/s.
  * @property {string[]} why What limits the speed.
  * @property {'up' | 'down'} link
- * @property {number[]} sent Velocity that was written: x, y in m/s, turn in rad/s.
+ * @property {number[]} sent Velocity that was written: x, y in m/s, turn in rad/s, then
+ *     z in m/s, and rx, ry in rad/s.
  * @property {number[] | null} echoed
  * @property {number[] | null} measured
  * @property {boolean} armable
@@ -86,6 +87,22 @@ const MOVES = 0.05;
 /** From here on it turns, in rad/s. */
 const TURNS = 0.1;
 
+/**
+ * @param {readonly number[]} velocity As a report has it.
+ * @returns {number} Metres per second, whatever the direction.
+ */
+export function linearSpeed([x, y, , z = 0]) {
+  return Math.hypot(x, y, z);
+}
+
+/**
+ * @param {readonly number[]} velocity As a report has it.
+ * @returns {number} Radians per second, whatever the axis.
+ */
+export function angularSpeed([, , turn = 0, , rx = 0, ry = 0]) {
+  return Math.hypot(turn, rx, ry);
+}
+
 /** @param {RobotReport} report */
 export function heldByAnother(report) {
   return report.holder !== null && !report.mine;
@@ -136,6 +153,5 @@ export function mayReach(report) {
 export function rolls({ measured, goal, cancels }) {
   const told = goal && (goal.way !== "topic" || cancels);
   if (!measured || (told && GOING.has(goal.state))) return false;
-  const [x, y, turn] = measured;
-  return Math.hypot(x, y) >= MOVES || Math.abs(turn) >= TURNS;
+  return linearSpeed(measured) >= MOVES || angularSpeed(measured) >= TURNS;
 }

@@ -1,5 +1,5 @@
 import { isTested } from "./figures.js";
-import { heldByAnother, isLatched, rolls } from "./report.js";
+import { heldByAnother, isLatched, rolls, linearSpeed } from "./report.js";
 import { stopWords } from "./stopping.js";
 
 /** @typedef {import('./asking.js').Request} Request */
@@ -104,8 +104,7 @@ export function capOf(report) {
  */
 export function speedOf({ measured }) {
   if (!measured) return "No speed known";
-  const [x, y, turn] = measured;
-  return `${Math.hypot(x, y).toFixed(2)} m/s, ${turn.toFixed(2)} rad/s`;
+  return `${linearSpeed(measured).toFixed(2)} m/s, ${measured[2].toFixed(2)} rad/s`;
 }
 
 /** @param {Status} status */

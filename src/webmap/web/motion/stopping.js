@@ -1,4 +1,4 @@
-import { isLatched } from "./report.js";
+import { isLatched, linearSpeed, angularSpeed } from "./report.js";
 
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
@@ -184,8 +184,7 @@ export class Obedience {
   _moves(robot) {
     const measured = this._last.get(robot)?.measured;
     if (!measured) return false;
-    const [x, y, turn] = measured;
-    return Math.hypot(x, y) > MOVES.v || Math.abs(turn) > MOVES.w;
+    return linearSpeed(measured) > MOVES.v || angularSpeed(measured) > MOVES.w;
   }
 }
 
@@ -222,8 +221,7 @@ function judge(robot, report, watch, connected, now) {
     return { robot, name, state: "stopping", text: "stopping" };
   }
   if (!report?.measured) return unsure("no odometry");
-  const [x, y] = report.measured;
-  return unsure(`still moving at ${Math.hypot(x, y).toFixed(2)} m/s`);
+  return unsure(`still moving at ${linearSpeed(report.measured).toFixed(2)} m/s`);
 }
 
 /**
@@ -277,8 +275,7 @@ export function standingStops(reports) {
 /** @param {RobotReport} report */
 function stands({ measured }) {
   if (!measured) return false;
-  const [x, y, turn] = measured;
-  return Math.hypot(x, y) < STANDS.v && Math.abs(turn) < STANDS.w;
+  return linearSpeed(measured) < STANDS.v && angularSpeed(measured) < STANDS.w;
 }
 
 /** @param {RobotReport} report */

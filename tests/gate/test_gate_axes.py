@@ -1,0 +1,277 @@
+"""Velocities out of the plane: who takes them, what bounds them, and what stands."""
+
+import math
+
+import pytest
+from gate_harness import KEY, ZERO, Bench, spec
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from webmap.errors import ConfigError
+from webmap.gate import events, messages
+from webmap.gate.events import Sweep
+from webmap.gate.limits import Axes, Speed, fit, ramp
+from webmap.gate.messages import PROGRAM, AssistSpec
+from webmap.gate.specs import checked
+from webmap.geometry import Twist
+
+FLYING = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
+EVERYTHING = Twist(0.1, 0.2, 0.3, vz=0.4, wx=0.05, wy=-0.06)
+BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
+
+number = st.floats(-1e308, 1e308)
+limit = st.floats(0.0, 10.0)
+
+
+def begin(*specs, **changes):
+    bench = Bench().begin(*specs or (spec(**{**FLYING, "holonomic": True, **changes}),))
+    bench.tell(messages.ProgramTake(7, "r1"))
+    return bench
+
+
+def twist(bench, wanted):
+    epoch = bench.report().epoch or 0
+    command = messages.ProgramTwist("r1", epoch, bench.tick, wanted.numbers)
+    bench.tell(command)
+
+
+def measure(bench, seconds, seen, drive=None):
+    def each():
+        bench.tell(events.Measured(KEY, seen))
+        if drive is not None:
+            twist(bench, drive)
+
+    bench.run(seconds, each)
+
+
+class TestWithoutALimit:
+    @pytest.mark.parametrize(
+        ("wanted", "name", "unit"),
+        [
+            (Twist(0.1, vz=0.5), "z", "m/s"),
+            (Twist(0.1, wx=0.5), "rx", "rad/s"),
+            (Twist(0.1, wy=0.5), "ry", "rad/s"),
+        ],
+    )
+    def test_a_velocity_is_refused_as_a_whole(self, wanted, name, unit):
+        bench = begin(spec())
+        twist(bench, wanted)
+        bench.run(0.1)
+        assert bench.attempts == []
+        assert bench.refusals(PROGRAM)[-1].why == (
+            f"got {name} = 0.5 {unit}, but no limit of the robot is known for {name}: "
+            f"state {name}_max with its twist topic"
+        )
+
+    def test_the_one_that_holds_goes_on_for_200_ms_at_most(self):
+        bench = begin(spec())
+        twist(bench, Twist(0.1))
+        at = bench.now
+        bench.run(0.5, lambda: twist(bench, Twist(0.1, vz=0.5)))
+        moving = [w for w in bench.since(at) if not w.twist.is_zero]
+        assert moving == []
+        assert bench.written[-1].twist == ZERO
+
+    def test_one_name_of_a_machine_that_states_none_refuses_for_all(self):
+        bench = begin(spec(**FLYING), spec(id="r2", name="Bob again"))
+        twist(bench, Twist(vz=0.1))
+        bench.run(0.1)
+        assert bench.attempts == []
+        assert "no limit of the robot is known for z" in bench.refusals(PROGRAM)[-1].why
+
+    def test_the_limits_of_another_machine_do_not_count(self):
+        bench = begin(spec(), spec(id="r2", twist_topic="/other", **FLYING))
+        twist(bench, Twist(vz=0.1))
+        assert bench.attempts == []
+
+    def test_the_last_wall_lets_nothing_of_it_through(self):
+        speed = Speed(1.0, 1.0, ())
+        assert fit(Twist(0.5, vz=0.1), speed, holonomic=True) == ZERO
+        assert fit(Twist(0.5, wx=0.1, wz=0.2), speed, holonomic=True) == Twist(0.5)
+        assert fit(Twist(0.5, wy=0.1, wz=0.2), speed, holonomic=True) == Twist(0.5)
+
+    @pytest.mark.parametrize("field", ["z_max", "rx_max", "ry_max"])
+    @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+    def test_a_limit_that_cannot_be_meant_is_refused(self, field, value):
+        with pytest.raises(ConfigError, match=f"{field} is {value}, expected a number"):
+            checked(spec(**{field: value}))
+
+    def test_changing_a_limit_ends_the_lease(self):
+        bench = begin()
+        twist(bench, Twist(vz=0.1))
+        bench.tell(spec(holonomic=True))
+        assert bench.written[-1].twist == ZERO
+        assert bench.report().holder is None
+
+
+class TestWithLimits:
+    def test_all_six_numbers_are_written_and_told(self):
+        bench = begin()
+        twist(bench, EVERYTHING)
+        assert bench.written[-1].twist == EVERYTHING
+        assert bench.of(messages.SentTwist)[-1] == messages.SentTwist(
+            "r1", 0.1, 0.2, 0.3, PROGRAM, 0.4, 0.05, -0.06
+        )
+        bench.run(0.15)
+        assert bench.report().sent == EVERYTHING.numbers
+
+    def test_numbers_that_are_not_finite_are_refused(self):
+        bench = begin()
+        twist(bench, Twist(0.1, vz=math.nan))
+        assert bench.attempts == []
+        assert "finite" in bench.refusals(PROGRAM)[-1].why
+
+    def test_what_is_too_fast_keeps_its_direction(self):
+        bench = begin()
+        twist(bench, Twist(0.5, vz=-1.0, wx=0.1, wy=0.2))
+        assert bench.written[-1].twist == Twist(0.25, vz=-0.5, wx=0.05, wy=0.1)
+
+    def test_the_least_limit_of_all_names_holds(self):
+        bench = begin(spec(**FLYING), spec(id="r2", **{**FLYING, "z_max": 0.2}))
+        twist(bench, Twist(vz=0.5))
+        assert bench.written[-1].twist == Twist(vz=0.2)
+
+    def test_every_reason_to_be_slow_holds_for_a_climb_too(self):
+        bench = begin(stops_within=None, z_max=2.0)
+        twist(bench, Twist(vz=2.0))
+        assert bench.written[-1].twist == Twist(vz=0.3)
+        bench = begin(v_max=None, z_max=2.0)
+        twist(bench, Twist(vz=2.0))
+        assert bench.written[-1].twist == Twist(vz=0.3)
+
+    def test_without_another_it_is_zero_in_all_axes(self):
+        bench = begin()
+        twist(bench, EVERYTHING)
+        at = bench.now
+        bench.run(0.5)
+        assert bench.since(at)
+        assert {w.twist for w in bench.since(at)} == {ZERO}
+
+    def test_stop_is_zero_in_all_axes(self):
+        bench = begin()
+        twist(bench, EVERYTHING)
+        at = bench.now
+        bench.say("b", op="stop", robot="r1")
+        bench.run(1.0)
+        assert {w.twist for w in bench.written if w.at > at} == {ZERO}
+        assert bench.written[-1].twist == ZERO
+
+    @given(st.builds(Twist, *[number] * 6), st.builds(Axes, *[limit] * 3), limit, limit)
+    @example(Twist(vy=2.0, vz=1e-308), Axes(), 1.0, 0.0)
+    def test_nothing_exceeds_a_limit(self, wanted, axes, v, w):
+        found = fit(wanted, Speed(v, w, ()), holonomic=True, axes=axes)
+        assert found.is_finite
+        assert found.speed <= v * (1 + 1e-9) + 1e-300
+        assert found.turn <= w * (1 + 1e-9) + 1e-300
+        assert abs(found.vz) <= axes.z
+        assert abs(found.wx) <= axes.rx
+        assert abs(found.wy) <= axes.ry
+        pairs = zip(found.numbers, wanted.numbers, strict=True)
+        assert all(mine * its >= 0 for mine, its in pairs)
+
+    def test_a_climb_is_ramped_like_any_speed(self):
+        assert ramp(ZERO, Twist(vz=1.0), 2.0, 0.05).vz == pytest.approx(0.1)
+        aslant = ramp(ZERO, Twist(1.0, vz=1.0), 2.0, 0.05)
+        assert aslant.speed == pytest.approx(0.1)
+        assert aslant.vx == pytest.approx(aslant.vz)
+        assert ramp(Twist(vz=1.0), Twist(vz=0.2), 2.0, 0.05) == Twist(vz=0.2)
+        assert ramp(ZERO, EVERYTHING, 100.0, 0.1) == EVERYTHING
+
+    def test_scan_assist_slows_down_all_of_it(self):
+        assist = AssistSpec(topic="/scan", footprint=BOX, blind="creep", creep=0.05)
+        bench = begin(assist=assist)
+        twist(bench, Twist(0.1, vz=0.4, wx=0.02))
+        assert bench.written[-1].twist == Twist(0.05, vz=0.2, wx=0.01)
+
+    def test_scan_assist_looks_at_the_plane_alone(self):
+        assist = AssistSpec(topic="/scan", footprint=BOX)
+        bench = begin(assist=assist)
+        ranges = [0.4] * 72
+        sweep = Sweep(-math.pi, math.tau / 72, 0.05, 8.0, ranges, bench.now)
+        bench.tell(events.Scanned(KEY, "/scan", sweep))
+        twist(bench, Twist(vz=0.4))
+        assert bench.written[-1].twist == Twist(vz=0.4)
+
+
+class TestStanding:
+    CLIMBING = Twist(vz=0.3)
+    ROLLING = Twist(wx=0.3)
+
+    @pytest.fixture
+    def bench(self):
+        return Bench().begin(spec(odometry_topic="/odom", **FLYING))
+
+    @pytest.mark.parametrize(
+        ("seen", "words"),
+        [
+            (Twist(vz=-0.3), "still moving at 0.30 m/s"),
+            (Twist(wx=0.3), "still turning at 0.30 rad/s"),
+            (Twist(wy=-0.3), "still turning at 0.30 rad/s"),
+        ],
+    )
+    def test_a_stop_is_not_confirmed_while_it_moves_along_any_axis(
+        self, bench, seen, words
+    ):
+        bench.say("b", op="stop", robot="r1")
+        measure(bench, 2.2, seen)
+        stop = bench.report().stop
+        assert (stop.confirmed, stop.why) == (False, words)
+        assert bench.report().alarm == f"zero sent, {words}"
+        assert bench.report().measured == seen.numbers
+        measure(bench, 0.6, ZERO)
+        assert bench.report().stop.confirmed is True
+
+    def test_a_robot_without_limits_stands_whatever_its_other_axes_say(self):
+        bench = Bench().begin(spec(odometry_topic="/odom"))
+        bench.say("b", op="stop", robot="r1")
+        measure(bench, 0.6, Twist(vz=0.3, wx=math.nan, wy=0.4))
+        assert bench.report().stop.confirmed is True
+        assert bench.report().measured == ZERO.numbers
+
+    def test_an_axis_that_odometry_tells_no_number_for_confirms_nothing(self, bench):
+        bench.say("b", op="stop", robot="r1")
+        measure(bench, 2.2, Twist(vz=math.nan))
+        stop = bench.report().stop
+        assert (stop.confirmed, stop.why) == (False, "no odometry")
+        assert bench.report().measured is None
+
+    def test_it_is_handed_over_when_it_climbs_no_more(self, bench):
+        bench.take("a")
+        measure(bench, 0.3, ZERO)
+        bench.say("b", op="ask", robot="r1")
+        bench.say("a", op="grant", robot="r1")
+        measure(bench, 2.0, self.CLIMBING)
+        assert bench.report().holder is None
+        measure(bench, 0.6, ZERO)
+        assert bench.report().holder.connection == "b"
+
+    def test_a_stop_test_does_not_begin_while_it_climbs(self, bench):
+        bench.take("a")
+
+        def each():
+            bench.tell(events.Measured(KEY, self.CLIMBING))
+            bench.drive()
+
+        bench.run(0.5, each)
+        bench.say("a", op="stop-test", robot="r1")
+        assert bench.refusals("a")[-1].why == "it moves already"
+
+    def test_a_stop_test_waits_until_it_climbs_no_more(self, bench):
+        bench.take("a")
+        seen = [ZERO]
+
+        def each():
+            bench.tell(events.Measured(KEY, seen[0]))
+            bench.drive()
+
+        bench.run(0.5, each)
+        bench.say("a", op="stop-test", robot="r1")
+        bench.run(0.2, each)
+        seen[0] = Twist(0.1)
+        bench.run(0.2, each)
+        assert bench.report().test.state == "waiting"
+        seen[0] = self.CLIMBING
+        bench.run(1.0, each)
+        assert bench.report().test.state == "waiting"
+        bench.run(2.5, each)
+        assert bench.report().test.text == "it did not stop by itself within 3 s"
