@@ -99,9 +99,9 @@ def test_an_image_that_cannot_be_loaded_is_said_on_the_page_and_in_the_log(
 
 def test_the_first_robot_is_found_by_css_among_what_else_is_in_the_world(page):
     assert page.evaluate(
-        "[':nth-child(1 of .robot)', '.robot:nth-child(1)'].map((css) =>"
-        " [...document.querySelectorAll('.world > ' + css)].map(e => e.dataset.name))"
-    ) == [["Ann"], []]
+        "['.robot:nth-child(1)', '.robot:nth-child(2)'].map((css) =>"
+        " [...document.querySelectorAll(css)].map((robot) => robot.dataset.name))"
+    ) == [["Ann"], ["Bob"]]
 
 
 def test_what_is_put_on_the_root_of_a_map_is_drawn_in_its_pixels(page):

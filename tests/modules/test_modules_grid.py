@@ -108,8 +108,9 @@ def test_a_costmap_lies_over_a_map_and_both_under_robots(map, link, channel, rob
         map.add_module("OccupancyGrid", link, "/costmap", palette="costmap").layer,
         map.add_module("OccupancyGrid", link, "/map").layer,
     ]
-    fragments = [robot.fragment, *(layer.fragment for layer in layers)]
     number = {fragment: mount for mount, fragment in channel.mounted.items()}
+    group = next(each for each in number if "robots" in each.root.classes)
+    fragments = [group, *(layer.fragment for layer in layers)]
     robots, costs, plan = (channel.orders[number[f]] for f in fragments)
     assert plan < costs < robots
 

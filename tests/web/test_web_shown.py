@@ -15,6 +15,8 @@ def test_a_halo_shows_how_far_a_driven_robot_gets(bench: Bench) -> None:
     halo = bench.page.locator(HALO)
     assert float(halo.get_attribute("r")) == pytest.approx(0.4)
     assert (halo.get_attribute("cx"), halo.get_attribute("cy")) == ("1", "1")
+    behind = "halo => halo.nextElementSibling.matches('.robots')"
+    assert halo.evaluate(behind), "the halo lies behind the robots"
     bench.page.evaluate(
         "document.querySelector('[data-robot=r1]')"
         ".setAttribute('transform', 'translate(2 3) rotate(90)')"

@@ -4,8 +4,10 @@ from webmap.core.layer import Layer
 from webmap.core.registry import Namespace, map_modules
 from webmap.core.robot import Robot
 from webmap.core.world_view import WorldView
+from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.events import Event
+from webmap.scene.fragment import Fragment
 from webmap.scope import Removal, keep
 
 LAYER_ORDER = 10.0
@@ -36,6 +38,9 @@ class Map(WorldView):
     ) -> None:
         super().__init__(container, canvas_width, canvas_height, namespace)
         self.robots: list[Robot] = []
+        """The robots shown, in the order in which they were added."""
+        self._robots = Fragment(svg.g(class_="robots"))
+        self.mount(self._robots, order=ROBOT_ORDER)
         self.selected: Robot | None = None
         self.marked: list[Robot] = []
         """What is selected besides, for what concerns several; never to be driven."""
@@ -54,7 +59,8 @@ class Map(WorldView):
         if robot in self.robots:
             return
         self.robots.append(robot)
-        mount = self.mount(robot.fragment, order=ROBOT_ORDER)
+        # A group of their own, so that in CSS :nth-child counts robots.
+        mount = self.mount(robot.fragment, order=0.0, into=self._robots)
         self.page.listen(
             mount, robot.svg, "click", lambda event: self.pick(robot, event), stop=True
         )
@@ -177,6 +183,7 @@ class Map(WorldView):
         self.remove_modules()
         for robot in tuple(reversed(self.robots)):
             self.remove_robot(robot)
+        self.unmount(self._robots)
         self.page.maps.remove(self)
         self.leave_page()
 

@@ -134,10 +134,22 @@ class WorldView(Extendable):
         if published is not None:
             published.remove()
 
-    def mount(self, fragment: Fragment, *, order: float) -> int:
-        """Show a fragment in the world."""
+    def mount(
+        self, fragment: Fragment, *, order: float, into: Fragment | None = None
+    ) -> int:
+        """Show a fragment in the world.
+
+        Args:
+            fragment: What to show.
+            order: Of two fragments in one place the one with the greater order lies
+                over the other; of two with the same order, the newer one.
+            into: The mounted fragment whose root takes it; the world if not given.
+
+        """
+        under = self.world if into is None else into.root
+        within = self._mount if into is None else self._mounts[into.id]
         mount = self.page.channel.mount(
-            fragment, under=self.world.id, order=order, within=self._mount
+            fragment, under=under.id, order=order, within=within
         )
         self._mounts[fragment.id] = mount
         return mount

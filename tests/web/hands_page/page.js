@@ -90,8 +90,11 @@ async function makeMap(number) {
   const world = document.createElementNS(SVG, "g");
   svg.classList.add("webmap");
   svg.id = `map${number}`;
-  world.append(robot("r1", 1, 1), robot("r2", -1, 1));
-  if (each) world.firstElementChild.setAttribute("data-holonomic", "");
+  const robots = document.createElementNS(SVG, "g");
+  robots.classList.add("robots");
+  robots.append(robot("r1", 1, 1), robot("r2", -1, 1));
+  if (each) robots.firstElementChild.setAttribute("data-holonomic", "");
+  world.append(robots);
   svg.append(world);
   document.querySelector(".place").append(svg);
   const size = { width: 800, height: 300 };

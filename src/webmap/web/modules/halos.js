@@ -51,8 +51,8 @@ export class Halos {
     if (known?.isConnected) return known;
     const circle = svg("circle", { class: "stopping-halo", "data-halo-of": robot });
     // Behind the robots, so that it hides none and is in nobody's way.
-    const first = this._map.world.querySelector(":scope > .robot");
-    this._map.world.insertBefore(circle, first);
+    const robots = this._map.world.querySelector(":scope > .robots");
+    this._map.world.insertBefore(circle, robots);
     this._circles.set(robot, circle);
     return circle;
   }
