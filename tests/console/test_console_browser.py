@@ -62,7 +62,7 @@ def test_stop_is_in_sight_and_large(open_console, size):
         row_.click()
         expect(page.locator("#robots")).to_be_in_viewport()
         expect(stop).to_be_in_viewport(ratio=1)
-        assert stop.bounding_box()["width"] > 300
+        assert stop.bounding_box()["width"] > 250
     stop.click()
     expect(page.locator(".webmap-stop-verdict").first).to_be_visible()
     expect(page.locator(".webmap-stop-standing")).to_contain_text("10 robots")
