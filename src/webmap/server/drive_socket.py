@@ -41,8 +41,7 @@ class DriveSockets:
         # Without an id it drives all the same, as a page of its own.
         named = "id" in socket.query_params
         page_id = page_id_of(socket.query_params) if named else secrets.token_hex(8)
-        if not await accept(socket):
-            return
+        await accept(socket)
         if page_id is None:
             await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return

@@ -35,14 +35,10 @@ _REST_PAUSE_S = 0.01
 _GONE = (WebSocketDisconnect, OSError, RuntimeError)
 
 
-async def accept(socket: WebSocket) -> bool:
-    """Accept a socket; False if the page has gone meanwhile."""
+async def accept(socket: WebSocket) -> None:
+    """Accept a socket, with our subprotocol if the page offers it."""
     offered = socket.scope.get("subprotocols", ())
-    try:
-        await socket.accept(PROTOCOL if PROTOCOL in offered else None)
-    except _GONE:
-        return False
-    return True
+    await socket.accept(PROTOCOL if PROTOCOL in offered else None)
 
 
 async def close(socket: WebSocket, code: int, reason: str) -> None:

@@ -11,16 +11,20 @@ from starlette.types import Receive, Scope, Send
 
 from webmap.errors import WebMapError
 from webmap.memory import return_large_pieces
+from webmap.server.connections import protocols
 from webmap.server.listening import check_exposure, listen, url_of
 from webmap.server.settings import Settings
-from webmap.server.websocket_protocol import WebSocketProtocol
 
 log = logging.getLogger("webmap.server")
 
 PING_EVERY_S = 2.0
 PONG_WITHIN_S = 4.0
 _MAX_MESSAGE = 64 * 1024
-_MAX_REQUESTS_AT_ONCE = 512
+# How many connections are accepted between two looks at those that are open, so that a
+# rush of new ones delays no STOP. uvicorn has one number for this and for how many wait
+# in the kernel, so the latter is set afterwards.
+_ACCEPTED_AT_ONCE = 4
+_BACKLOG = 1024
 
 
 class Application(Protocol):
@@ -83,10 +87,12 @@ def serve(
 
 def make_server(app: Application, on_ready: Callable[[], object]) -> "Server":
     """Return what :func:`serve` runs, for those who start and stop it themselves."""
+    http, ws = protocols()
     config = uvicorn.Config(
         app,
         interface="asgi3",
-        ws=WebSocketProtocol,
+        http=http,
+        ws=ws,
         ws_max_size=_MAX_MESSAGE,
         ws_ping_interval=PING_EVERY_S,
         ws_ping_timeout=PONG_WITHIN_S,
@@ -99,7 +105,7 @@ def make_server(app: Application, on_ready: Callable[[], object]) -> "Server":
         access_log=False,
         log_config=None,
         log_level=logging.WARNING,
-        limit_concurrency=_MAX_REQUESTS_AT_ONCE,
+        backlog=_ACCEPTED_AT_ONCE,
         timeout_graceful_shutdown=1,
     )
     return Server(config, on_ready)
@@ -116,6 +122,8 @@ class Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen, then say so."""
         await super().startup(sockets)
+        for listener in sockets or ():
+            listener.listen(_BACKLOG)
         try:
             self._on_ready()
         except Exception as error:

@@ -48,8 +48,7 @@ class SceneSockets:
         viewer: Viewer = socket.scope[VIEWER]
         page_id = page_id_of(socket.query_params)
         entry = find_page(self._site, socket.query_params.get("page", "/"))
-        if not await accept(socket):
-            return
+        await accept(socket)
         if entry is None:
             await close(socket, BROKEN_RULE, "there is no page at this address")
             return

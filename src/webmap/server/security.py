@@ -1,5 +1,6 @@
 """The door as ASGI middleware: nothing behind it sees a request it did not let in."""
 
+import contextlib
 import inspect
 import logging
 import time
@@ -8,6 +9,7 @@ from collections.abc import Callable
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from webmap.server.connections import connection_of
 from webmap.server.door import Door, GoOn, Refusal, SignedIn
 from webmap.server.headers import with_headers
 from webmap.server.plain import go_on, refuse
@@ -55,12 +57,18 @@ class Security:
             send = with_headers(send)
         if isinstance(who, Viewer):
             scope[VIEWER] = who
-            await self._app(scope, receive, send)
+            connection = connection_of(scope)
+            with connection.serving() if connection else contextlib.nullcontext():
+                await self._app(scope, receive, send)
         elif isinstance(who, GoOn):
             await go_on(who)(scope, receive, send)
         else:
             _log_refusal(who, request, scope)
             answer = refuse(who, wants_html=request.wants_html)
+            if connection_of(scope):
+                # One request for each connection, so that strangers cannot have the
+                # server busy with all of theirs at once.
+                answer.headers["connection"] = "close"
             await _deny(answer, scope, receive, send)
 
     def new_code(self) -> str:

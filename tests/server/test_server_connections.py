@@ -1,0 +1,253 @@
+"""Connections that have not signed in are bounded, and keep nobody else out."""
+
+import asyncio
+import contextlib
+import socket
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from server_fakes import (
+    TOKEN,
+    FakeGate,
+    FakeModel,
+    FakePage,
+    FakeSite,
+    running,
+    wait_for,
+)
+from websockets.asyncio.client import connect
+
+from webmap.server import connections
+from webmap.server.app import create_app
+from webmap.server.bounds import DRIVE
+from webmap.server.connections import STRANGERS
+from webmap.server.hop import Hops
+from webmap.server.line import Line
+from webmap.server.queues import DriveQueue
+from webmap.server.settings import Settings
+
+SHORT_S = 0.5
+HEAD = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+
+
+@pytest.fixture
+def gate():
+    return FakeGate()
+
+
+@pytest.fixture
+def large(tmp_path):
+    path = tmp_path / "large.html"
+    path.write_text("<head></head>" + "x" * 20_000_000)
+    return path
+
+
+@pytest.fixture
+def server(gate, large):
+    site = FakeSite(FakePage("/"), FakePage("/large", large, Path(large.parent)))
+    app = create_app(site, FakeModel(), gate, Settings(token=TOKEN))
+    with running(app) as server:
+        yield server
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Let no connection wait for long."""
+    monkeypatch.setattr(connections, "WAITING_S", SHORT_S)
+
+
+@pytest.fixture
+def open_raw(server):
+    """Open connections that say what the test lets them say."""
+    with contextlib.ExitStack() as stack:
+
+        def opened(said="", receive_buffer=None):
+            link = socket.socket()
+            stack.enter_context(link)
+            if receive_buffer is not None:
+                link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+            link.settimeout(20)
+            link.connect(("127.0.0.1", server.port))
+            link.sendall(said.encode())
+            return link
+
+        yield opened
+
+
+def is_open(link):
+    """Tell whether the server has not ended a connection on which it says nothing."""
+    link.setblocking(False)
+    try:
+        return link.recv(1) != b""
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
+
+
+def ends_though_bytes_come(link, said):
+    """Tell whether the server ends a connection on which a byte comes now and then."""
+    deadline = time.monotonic() + 20 * SHORT_S
+    link.settimeout(SHORT_S / 4)
+    try:
+        while time.monotonic() < deadline:
+            link.sendall(said)
+            said = said and b"x"
+            with contextlib.suppress(TimeoutError):
+                if not link.recv(1 << 16):
+                    return True
+    except ConnectionError:
+        return True
+    return False
+
+
+def rest_of(link):
+    """Return what comes until the server ends a connection."""
+    got = bytearray()
+    with contextlib.suppress(ConnectionError):
+        while data := link.recv(1 << 20):
+            got += data
+    return bytes(got)
+
+
+def test_600_idle_strangers_keep_nobody_out_who_has_signed_in(server, gate, open_raw):
+    browser = server.sign_in()
+    said = ["", HEAD, HEAD + "Cookie: webmap_1=x\r\n"]
+    links = [open_raw(said[n % 3]) for n in range(600)]
+    page = httpx.get(server.origin, headers={"cookie": browser.cookie})
+    assert page.status_code == 200
+
+    async def drive():
+        async with connect(
+            server.socket_url("drive"),
+            origin=server.origin,
+            subprotocols=browser.protocols,
+        ) as link:
+            await link.send('{"op":"stop","robot":"*"}')
+            await asyncio.to_thread(wait_for, lambda: gate.connections[0].received)
+
+    asyncio.run(drive())
+    assert gate.connections[0].received == ['{"op":"stop","robot":"*"}']
+    wait_for(lambda: sum(map(is_open, links)) <= STRANGERS)
+    # The newest stay: one of them is perhaps somebody who is about to sign in.
+    assert is_open(links[-1])
+
+
+def test_the_sockets_of_pages_and_their_requests_are_not_pushed_out(
+    server, gate, open_raw
+):
+    browser = server.sign_in()
+
+    async def scenario():
+        async with connect(
+            server.socket_url("drive"),
+            origin=server.origin,
+            subprotocols=browser.protocols,
+        ) as link:
+            with httpx.Client(headers={"cookie": browser.cookie}) as kept:
+                assert kept.get(server.origin).status_code == 200
+                links = [open_raw() for _ in range(STRANGERS + 50)]
+                await asyncio.to_thread(
+                    wait_for, lambda: sum(map(is_open, links)) == STRANGERS
+                )
+                assert kept.get(server.origin).status_code == 200
+            await link.send("still here")
+            await asyncio.to_thread(wait_for, lambda: gate.connections[0].received)
+
+    asyncio.run(scenario())
+
+
+def test_an_operator_reads_that_there_are_too_many_strangers_once(
+    server, open_raw, caplog
+):
+    links = [open_raw() for _ in range(STRANGERS + 50)]
+    wait_for(lambda: sum(map(is_open, links)) == STRANGERS)
+    assert caplog.text.count("too many connections wait") == 1
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "",
+        "GET / HT",
+        HEAD,
+        "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n",
+        "GET /_webmap/drive HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: upgrade\r\n"
+        "Upgrade: websocket\r\n",
+    ],
+)
+def test_who_does_not_get_to_the_point_is_turned_away(short, open_raw, said):
+    link = open_raw(said)
+    assert ends_though_bytes_come(link, b"x" if said else b"")
+
+
+def test_a_request_that_is_never_ended_after_a_good_one_is_turned_away(
+    short, server, open_raw
+):
+    cookie = server.sign_in().cookie
+    host = f"Host: 127.0.0.1:{server.port}\r\n"
+    link = open_raw(f"HEAD / HTTP/1.1\r\n{host}Cookie: {cookie}\r\n\r\n")
+    assert link.recv(1 << 16).startswith(b"HTTP/1.1 200")
+    assert ends_though_bytes_come(link, b"GET / HTTP/1.1\r\nX: ")
+
+
+def test_a_large_answer_over_a_slow_link_may_take_its_time(short, server, open_raw):
+    cookie = server.sign_in().cookie
+    host = f"Host: 127.0.0.1:{server.port}\r\n"
+    link = open_raw(
+        f"GET /large HTTP/1.1\r\n{host}Cookie: {cookie}\r\n\r\n", receive_buffer=4096
+    )
+    time.sleep(4 * SHORT_S)  # the test's own slowness is what is tested
+    assert len(rest_of(link)) > 20_000_000
+
+
+def test_a_stranger_has_one_request_for_each_connection(open_raw):
+    link = open_raw("GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 3)
+    answer = rest_of(link)
+    assert answer.count(b"HTTP/1.1 401") == 1
+    assert b"connection: close" in answer.lower()
+
+
+UPGRADE = (
+    "GET /_webmap/drive HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\n"
+    "Connection: upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+)
+
+
+@pytest.mark.parametrize(("host", "status"), [("127.0.0.1", 401), ("evil.com", 421)])
+def test_a_refused_socket_is_no_error_of_ours(server, open_raw, caplog, host, status):
+    link = open_raw(UPGRADE.replace("Host: 127.0.0.1", f"Host: {host}"))
+    assert rest_of(link).startswith(f"HTTP/1.1 {status}".encode())
+    open_raw("").close()
+    assert httpx.get(server.origin).status_code == 401  # by now it would be logged
+    assert "handshake" not in caplog.text
+    assert not [one for one in caplog.records if one.levelname == "ERROR"]
+
+
+class GivenUp:
+    """A socket that the server has closed, as its pings were not answered."""
+
+    async def receive(self):
+        await asyncio.Event().wait()
+
+    async def send_text(self, text):
+        raise RuntimeError("Unexpected ASGI message 'websocket.send', after sending")
+
+    async def close(self, code, reason):
+        raise RuntimeError("Unexpected ASGI message 'websocket.close', after sending")
+
+
+def test_what_is_sent_to_a_page_that_has_gone_leaves_no_traceback(caplog):
+    async def scenario():
+        line = Line(GivenUp(), "drive", Hops().here(), DRIVE, DriveQueue())
+        line.offer("tick")
+        async with asyncio.timeout(10):
+            await line.run(print, print)
+        line.end(1011, "too late")
+        await line.refuse(1011, "too late")
+
+    asyncio.run(scenario())
+    assert caplog.records == []
