@@ -1,10 +1,8 @@
 """``webmap.page``, ``run``, ``start``, ``stop`` and ``asgi_app``."""
 
 import logging
-import threading
-import webbrowser
 from collections.abc import AsyncIterator, Callable, Iterable
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.page import site
@@ -110,7 +108,8 @@ def run(
         host: The address to listen on.
         port: The port; 0 lets the system choose.
         open_browser: Whether to open the page in a browser.
-        token: The secret in the URL; made for each start if not given.
+        token: The secret in the printed URL; made for each start if not given. The
+            browser that is opened gets a one-time code instead.
         insecure_lan: Whether other machines may be served without TLS, where
             everybody on the way can read the token.
 
@@ -130,6 +129,7 @@ def _serve(
     *, host: str, port: int, open_browser: bool, insecure_lan: bool, token: str | None
 ) -> None:
     from webmap.server.listening import check_exposure, listen
+    from webmap.server.opening import opened
     from webmap.server.origins import Hosts
     from webmap.server.runner import announce, serve
     from webmap.server.settings import Settings
@@ -141,12 +141,12 @@ def _serve(
         settings["token"] = token
     app = _make_app(Settings(**settings), with_lifespan=False)
     listener = listen(host, port)
+    browser = ExitStack()
 
     def ready(url: str) -> None:
         announce(url)
         if open_browser:
-            # Some browsers return only when they are closed.
-            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+            browser.enter_context(opened(url.partition("?")[0], app.new_code()))
 
     try:
         runtime.start()
@@ -159,6 +159,7 @@ def _serve(
             on_ready=ready,
         )
     finally:
+        browser.close()
         runtime.stop()
         listener.close()
 

@@ -1,0 +1,113 @@
+"""What opens a browser shows other users of the machine nothing that signs in."""
+
+import contextlib
+import re
+import stat
+import tempfile
+import threading
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
+
+from webmap.server import application, opening
+from webmap.server.app import create_app
+
+URL = "http://127.0.0.1:8000/"
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    (tmp_path / "home").mkdir()
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def browser(monkeypatch):
+    """What stands on a browser's command line, once it was opened."""
+    there, arguments = threading.Event(), []
+
+    def opens(*args, **options):
+        arguments.extend([*args, *options.values()])
+        there.set()
+        return True
+
+    def wait():
+        assert there.wait(10)
+        return arguments
+
+    monkeypatch.setattr("webbrowser.open", opens)
+    return wait
+
+
+def file_of(arguments):
+    (address,) = arguments
+    parts = urlsplit(address)
+    assert parts.scheme == "file"
+    return Path(unquote(parts.path))
+
+
+def test_a_browser_is_given_a_file_that_only_its_owner_reads(browser, home):
+    with opening.opened(URL, "the-code"):
+        file = file_of(browser())
+        assert file.parent == home
+        assert stat.S_IMODE(file.stat().st_mode) == 0o600
+        assert f'url={URL}?webmap_code=the-code"' in file.read_text()
+        assert "the-code" not in str(browser())
+    assert list(home.iterdir()) == []
+
+
+def test_the_file_is_removed_when_its_code_is_too_old(browser, home, monkeypatch):
+    monkeypatch.setattr(opening, "CODE_LIFE_S", 0.0)
+    gone = threading.Event()
+    monkeypatch.setattr(Path, "unlink", lambda *_, **__: gone.set())
+    with opening.opened(URL, "the-code"):
+        assert gone.wait(10)
+
+
+def test_without_a_home_that_can_be_written_the_file_lies_elsewhere(browser, home):
+    home.rmdir()
+    (home.parent / "tmp").mkdir()
+    with opening.opened(URL, "the-code"):
+        assert file_of(browser()).parent == home.parent / "tmp"
+
+
+def test_where_no_file_can_be_written_the_printed_address_remains(home, caplog):
+    home.rmdir()
+    with opening.opened(URL, "the-code"):
+        assert "open the printed address yourself" in caplog.text
+    assert "the-code" not in caplog.text
+
+
+def test_run_prints_the_token_and_opens_an_address_that_works_once(
+    browser, capsys, monkeypatch, make_client
+):
+    app = create_app(FakeSite(FakePage("/")), FakeModel(), FakeGate())
+    monkeypatch.setattr(application, "_make_app", lambda *_, **__: app)
+    monkeypatch.setattr(application, "runtime", FakeRuntime())
+    monkeypatch.setattr(application, "has_run", False)
+
+    def serve(app, *, on_ready, **_):
+        on_ready(f"{URL}?token={app.settings.token}")
+        text = file_of(browser()).read_text()
+        location = re.search(r'url=http://127\.0\.0\.1:8000(/[^"]*)"', text)[1]
+        assert app.settings.token not in text
+        assert make_client(app).get(location).status_code == 200
+        assert make_client(app).get(location).status_code == 401
+
+    monkeypatch.setattr("webmap.server.runner.serve", serve)
+    with contextlib.suppress(KeyboardInterrupt):
+        application.run(port=0, open_browser=True)
+    assert f"?token={app.settings.token}\n" in capsys.readouterr().out
+    assert app.settings.token not in str(browser())
+
+
+class FakeRuntime:
+    def start(self):
+        pass
+
+    def stop(self):
+        pass
