@@ -9,8 +9,17 @@ from webmap.errors import ConfigError
 from webmap.outside_text import one_line
 from webmap.plain_files import read_file
 
-LARGEST = 1 << 20
-"""Bytes that a file may have."""
+LARGEST = 1 << 18
+"""Bytes that a file may have; a megabyte takes half a minute to read."""
+
+DEEPEST = 50
+"""Values in one another."""
+
+MOST_VALUES = 40_000
+"""Keys and values of a file."""
+
+MOST_DIGITS = 100
+"""Characters of a number; one of very many, such as 1:1:1, takes minutes to read."""
 
 
 class LinedYaml:
@@ -87,22 +96,42 @@ class LinedYaml:
                 self._lines[(*way, key.value)] = key.start_mark.line + 1
 
 
-class _Loader(yaml.SafeLoader):
+class _Bounded(yaml.composer.Composer):
+    """Refuses what takes long to read, as soon as it is met."""
+
+    _depth = 0
+    _values = 0
+
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        _refuse_alias(self)
-        return super().compose_node(parent, index)
+        event = self.peek_event()  # type: ignore[attr-defined]
+        self._depth += 1
+        self._values += 1
+        problem = None
+        if isinstance(event, yaml.AliasEvent):
+            problem = "aliases (*name) have no place in it"
+        elif self._depth > DEEPEST:
+            problem = f"values are nested more than {DEEPEST} deep"
+        elif self._values > MOST_VALUES:
+            problem = f"it has more than {MOST_VALUES} keys and values"
+        if problem is not None:
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        number = isinstance(node, yaml.ScalarNode) and node.tag in _NUMBERS
+        if node is not None and number and len(node.value) > MOST_DIGITS:
+            raise yaml.MarkedYAMLError(
+                problem=f"a number has more than {MOST_DIGITS} characters",
+                problem_mark=node.start_mark,
+            )
+        return node
 
 
-class _Texts(yaml.BaseLoader):
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        _refuse_alias(self)
-        return super().compose_node(parent, index)
+_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
-def _refuse_alias(loader: yaml.SafeLoader | yaml.BaseLoader) -> None:
-    if loader.check_event(yaml.AliasEvent):
-        event = loader.peek_event()  # type: ignore[no-untyped-call]
-        raise yaml.MarkedYAMLError(
-            problem="aliases (*name) have no place in it",
-            problem_mark=event.start_mark,
-        )
+class _Loader(_Bounded, yaml.SafeLoader):
+    pass
+
+
+class _Texts(_Bounded, yaml.BaseLoader):
+    pass

@@ -39,7 +39,8 @@ def read_file(file: Path, largest: int) -> bytes:
     with open(number, "rb") as stream:
         data = stream.read(largest + 1)
     if len(data) > largest:
-        raise ConfigError(f"{file}: the file is larger than {largest >> 20} MiB")
+        size = f"{largest >> 10} KiB" if largest < 1 << 20 else f"{largest >> 20} MiB"
+        raise ConfigError(f"{file}: the file is larger than {size}")
     return data
 
 

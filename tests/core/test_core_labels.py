@@ -81,7 +81,7 @@ def test_a_file_is_yaml_or_json(tmp_path, name, text):
         (b"- name: [", r"a\.yaml:1: this is no YAML"),
         (b"\xff\xfe\x00", "this is no YAML"),
         (b"!!python/object/apply:os.system ['true']", "no YAML"),
-        (b"[" * 50_000, "nested too deep"),
+        (b"[" * 50_000, "nested more than 50 deep"),
         (b"a: &a [1]\nb: *a", r"a\.yaml:2: this is no YAML: aliases"),
         (b"- {name: A, x: 1, y: 2}\n- {}\n", r"a\.yaml:2: labels\[1\]\.name: expected"),
         (b"labels:\n- name: A\n  x: 1\n  y: '2'\n", r":4: labels\[0\]\.y: expected a"),
@@ -90,7 +90,7 @@ def test_a_file_is_yaml_or_json(tmp_path, name, text):
             r":4: labels\[0\]\.'iocn': no",
         ),
         (b"- name: A\n  x: 1\n  y: 2\n  it's: 3\n", r":4: labels\[0\]\.\"it's\": no"),
-        (b"x" * (1 << 20) + b"xx", "larger than 1 MiB"),
+        (b"x" * (1 << 20) + b"xx", "larger than 256 KiB"),
     ],
 )
 def test_a_file_that_is_none_is_refused(tmp_path, data, words):

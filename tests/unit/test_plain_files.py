@@ -101,7 +101,7 @@ def test_yaml_knows_on_which_line_something_stands(tmp_path):
         ("a: !!python/object:os.system {}\n", ":1: this is no YAML: could not"),
         ("a: 2001-99-99\n", ": this is no YAML: month must be in 1..12"),
         ("\x00", ": this is no YAML: "),
-        ("[" * 5000, ": values are nested too deep"),
+        ("[" * 5000, ":1: this is no YAML: values are nested more than 50 deep"),
     ],
 )
 def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):
@@ -138,3 +138,29 @@ def test_what_has_no_end_is_refused_and_files_and_folders_are_not(tmp_path):
         with pytest.raises(ConfigError, match=f"a file or a folder, got {kind}"):
             refuse_special(tmp_path / name)
     refuse_special(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[" * 5000, "nested more than 50 deep"),
+        ("[" * 51 + "]" * 51, "nested more than 50 deep"),
+        ('{"a":' * 60 + "1" + "}" * 60, "nested more than 50 deep"),
+        ("- 1\n" * 50_000, "more than 40000 keys and values"),
+        ("a: " + "1:" * 5000 + "1", "a number has more than 100 characters"),
+        ("a: " + "1" * 200 + ".5", "a number has more than 100 characters"),
+        ("a: &a [1]\nb: *a", "aliases"),
+        ("#" * (1 << 18) + "#", "larger than 256 KiB"),
+    ],
+)
+def test_yaml_that_would_take_long_is_refused(tmp_path, text, words):
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=words):
+        LinedYaml(file)
+
+
+def test_a_text_of_many_digits_is_no_number_where_texts_are_read(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("a: " + "1" * 200)
+    assert LinedYaml(file, texts=True).data == {"a": "1" * 200}

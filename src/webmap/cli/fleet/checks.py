@@ -29,6 +29,9 @@ _LONGEST = 60
 HEAD = ("title", "floor")
 """Keys that are texts, of the file itself and of no table in it."""
 
+MOST_MISTAKES = 100
+"""Mistakes of a file that are named."""
+
 LARGEST = 1e6
 """No speed, time or length in a file is larger."""
 
@@ -38,10 +41,20 @@ class Mistakes:
     """What is wrong in a file, with the way to it."""
 
     found: list[tuple[Path, str]] = field(default_factory=list)
+    more: int = 0
+    """How many there are besides; nobody reads thousands, and they take long."""
 
     def add(self, path: Path, words: str) -> None:
         """Note one mistake."""
-        self.found.append((path, words))
+        if self.full:
+            self.more += 1
+        else:
+            self.found.append((path, words))
+
+    @property
+    def full(self) -> bool:
+        """Whether no more mistakes are worded."""
+        return len(self.found) >= MOST_MISTAKES
 
 
 def show(value: object) -> str:
@@ -169,7 +182,7 @@ def one(check: Check, value: Any, path: Path, mistakes: Mistakes) -> Any:
     try:
         return check(value)
     except ConfigError as error:
-        hint = _otherwise(check, value)
+        hint = "" if mistakes.full else _otherwise(check, value)
         mistakes.add(path, f"got {show(value)}, expected {error}{hint}")
         return None
 
@@ -223,6 +236,9 @@ def table(
 
 def unknown(key: str, known: Iterable[str], path: Path, mistakes: Mistakes) -> None:
     """Note a key that means nothing."""
+    if mistakes.full:
+        mistakes.add(path, key)  # counted alone: a hint takes long
+        return
     listed = ", ".join(known)
     hint = near(key, known)
     if key in HEAD and len(path) > 1:

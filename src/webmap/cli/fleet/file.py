@@ -4,6 +4,7 @@ import tomllib
 from pathlib import Path
 
 from webmap.cli.fleet.checks import Mistakes
+from webmap.cli.fleet.depth import DEEPEST, too_deep
 from webmap.cli.fleet.fleet_table import read_table
 from webmap.cli.fleet.lines import Lines, way_in_words
 from webmap.cli.fleet.lines import Path as Way
@@ -13,7 +14,7 @@ from webmap.errors import ConfigError
 from webmap.outside_text import one_line
 from webmap.plain_files import read_file
 
-LARGEST = 1 << 20
+LARGEST = 1 << 19
 """Bytes that a file may have."""
 
 EXPECTED = "expected TOML with a table [bridges] and a table [[robots]] for each robot"
@@ -35,6 +36,12 @@ class FleetText:
         self.name = name
         if not text.strip():
             raise ConfigError(f"{name}: the file is empty; {EXPECTED}")
+        line = too_deep(text)
+        if line is not None:
+            raise ConfigError(
+                f"{name}:{line}: keys and values are nested {DEEPEST} deep at the "
+                f"most; {EXPECTED}"
+            )
         try:
             self.data = tomllib.loads(text)
         except ValueError as error:  # also whole numbers of thousands of digits
@@ -60,6 +67,8 @@ class FleetText:
         """
         if mistakes.found:
             lines = [self.complaint(way, words) for way, words in mistakes.found]
+            if mistakes.more:
+                lines.append(f"{self.name}: and {mistakes.more} mistakes more")
             raise ConfigError("\n".join(lines))
 
 

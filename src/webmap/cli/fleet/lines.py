@@ -112,7 +112,7 @@ class Lines:
             string = _STRING.match(self._text, self._at)
             bare = _BARE.match(self._text, self._at)
             if string is not None:
-                keys.append(str(tomllib.loads(f"key = {string[0]}")["key"]))
+                keys.append(_unquoted(string[0]))
                 self._at = string.end()
             elif bare is not None:
                 keys.append(bare[0])
@@ -143,6 +143,12 @@ class Lines:
         line += self._text.count("\n", at, self._at)
         self._seen_to = (self._at, line)
         return line
+
+
+def _unquoted(key: str) -> str:
+    if "\\" in key:
+        return str(tomllib.loads(f"key = {key}")["key"])
+    return key[1:-1]  # keys are of one line, with one quote on each side
 
 
 def way_in_words(way: Path) -> str:

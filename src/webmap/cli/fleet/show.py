@@ -1,5 +1,6 @@
 """Showing the robots of a fleet file."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,14 @@ from webmap.cli.fleet.scenery import (
     show_scenery,
 )
 from webmap.cli.fleet.schema import Fleet
+from webmap.cli.fleet.secrets import readable_secret
 from webmap.errors import ConfigError
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
+
+log = logging.getLogger("webmap.cli")
 
 PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
 """Names that end so are the picture of a floor plan, given in place of its YAML."""
@@ -46,12 +50,17 @@ class ReadyFleet:
 def prepare(file: Path) -> ReadyFleet:
     """Make everything that a file says; no link is opened yet.
 
+    Logs a warning if other users can read a password in it.
+
     Raises:
         ConfigError: If anything in it is wrong; every mistake is named with its line.
         OSError: If it cannot be read.
 
     """
     fleet, text = read_fleet(file)
+    warning = readable_secret(file, text.data)
+    if warning is not None:
+        log.warning("%s", warning)
     mistakes = Mistakes()
     bridges = make_bridges(fleet)
     robots = make_robots(fleet, bridges, file.parent, mistakes)
