@@ -98,11 +98,14 @@ def test_each_robot_is_its_own_model_in_classes_of_its_own(tab, advanced, witnes
     assert place == pytest.approx(witness.place(ODOM), abs=0.01)
 
 
-def test_the_style_sheet_of_the_page_reaches_robots_and_map(tab, advanced):
+def test_the_style_sheet_of_the_page_reaches_robots(tab, advanced):
     opened(tab, advanced, robots=2)
     assert shape(tab, "Robot 0") == (RED, "rgb(0, 0, 0)")
     assert style(tab, robot("Robot 0"), "stroke-width") == "0.01px"
-    assert style(tab, "svg.webmap", "image-rendering") == "pixelated"
+
+
+def test_the_image_of_the_map_is_there(tab, advanced):
+    opened(tab, advanced, robots=2)
     assert tab.locator(".world image").evaluate(
         "async e => { const i = new Image(); i.src = e.href.baseVal;"
         " await i.decode(); return i.naturalWidth; }"

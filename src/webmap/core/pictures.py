@@ -7,6 +7,7 @@ import hashlib
 import threading
 import time
 from collections import deque
+from pathlib import Path
 from typing import NamedTuple
 
 from webmap.geometry import Affine
@@ -21,6 +22,17 @@ MOST_KEPT = 64
 
 PREFIX = "/_webmap/images/"
 """How the URL of every image begins that has no name of its own."""
+
+
+def pixels_across(file: Path) -> int | None:
+    """Return how many pixels wide an image is; None if its file does not tell."""
+    from PIL import Image
+
+    try:
+        with Image.open(file) as image:
+            return image.width
+    except (OSError, ValueError, Image.DecompressionBombError):
+        return None
 
 
 class Published(NamedTuple):
@@ -85,7 +97,9 @@ class Picture:
         self._urls: deque[tuple[str, float]] = deque()
         keep(Removal(self._end))
 
-    def show(self, data: bytes, matrix: Affine, width: float, height: float) -> None:
+    def show(
+        self, data: bytes, matrix: Affine, width: float, height: float, cell: float
+    ) -> None:
         """Show a PNG in place of the one before.
 
         Args:
@@ -94,11 +108,13 @@ class Picture:
                 left corner, to what the element is in.
             width: In metres.
             height: In metres.
+            cell: How wide one of its pixels is, in metres.
 
         """
         now = time.monotonic()
         self._urls.append((pictures.publish(data), now))
         self.element.set(href=self._urls[-1][0], width=width, height=height)
+        self.element.set("data-cell", cell)
         self.element.set_matrix(matrix)
         # A page that is a little behind still asks for those before.
         while len(self._urls) > 2 and (

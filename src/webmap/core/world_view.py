@@ -7,6 +7,7 @@ from typing import Any
 from webmap.core.extendable import Extendable
 from webmap.core.half import BrowserHalf
 from webmap.core.page import Page, page_of
+from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
 from webmap.core.view import Rect, apply_operation, initial_view
 from webmap.errors import ConfigError
@@ -101,6 +102,9 @@ class WorldView(Extendable):
     ) -> Element:
         """Place an image in the world, under everything else.
 
+        It is drawn with sharp pixels, and smoothly where it is seen from far away; a
+        rule of CSS for ``.images > image`` may say otherwise.
+
         A file that does not exist is said on the page, and the rest goes on.
 
         Args:
@@ -123,6 +127,8 @@ class WorldView(Extendable):
             self.report_error(f"image {Path(str(iri)).name!r} is not shown: {error}")
         else:
             image.set("href", url)
+            pixels = pixels_across(self.page.image_file(str(iri)))
+            image.set("data-cell", width / pixels if pixels else None)
         image.set_matrix(Affine(1, 0, 0, -1, 0, 2 * y + height))
         self.images.append(image)
         return image

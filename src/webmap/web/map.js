@@ -1,4 +1,5 @@
 import { DragEnd } from "./drag_end.js";
+import { FarPictures } from "./far_pictures.js";
 import { Following } from "./following.js";
 import { LayoutParts } from "./layout_parts.js";
 import { Operations, operated } from "./operations.js";
@@ -71,6 +72,7 @@ export class MapCanvas {
     /** Whether the view is that of this page before its link broke, or a reload. */
     this.restored = false;
     this._matrix = svg.createSVGMatrix();
+    this._pictures = new FarPictures(world);
 
     this._setSize(size);
     const { width, height } = contentSize(svg);
@@ -295,6 +297,7 @@ export class MapCanvas {
   destroy() {
     this._ends?.abort();
     this._observer?.disconnect();
+    this._pictures.end();
     this._reports.end();
     this._overlay?.remove();
     this._onView.clear();
@@ -320,6 +323,7 @@ export class MapCanvas {
     matrix.e = view.e;
     matrix.f = view.f;
     this._transform.setMatrix(matrix);
+    this._pictures.show(view);
   }
 
   _resized() {

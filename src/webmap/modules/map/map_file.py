@@ -63,7 +63,6 @@ class FileLayer(Layer):
     def start(self) -> None:
         """Begin to read."""
         self.picture = Picture()
-        self.picture.element.set(image_rendering="pixelated")
         self.svg.append(self.picture.element)
         spawn(self._read())
 
@@ -77,7 +76,9 @@ class FileLayer(Layer):
             return
         self.image = image
         height, width = (cells * image.resolution for cells in image.cells.shape)
-        self.picture.show(png, place_grid(image.origin, height), width, height)
+        self.picture.show(
+            png, place_grid(image.origin, height), width, height, image.resolution
+        )
 
     def _draw(self) -> tuple[MapImage, bytes]:
         image = read_map(self.file)

@@ -124,7 +124,6 @@ class Grid(Layer):
     def start(self) -> None:
         """Subscribe to the grid and to its updates."""
         self.picture = Picture()
-        self.picture.element.set(image_rendering="pixelated")
         self.svg.append(self.picture.element)
         self.bridge.subscribe(
             self.topic,
@@ -216,7 +215,9 @@ class Grid(Layer):
         if info is None or self.scope.closed:
             return
         size = (info.width * info.resolution, info.height * info.resolution)
-        self.picture.show(png, place_grid(info.origin.planar, size[1]), *size)
+        self.picture.show(
+            png, place_grid(info.origin.planar, size[1]), *size, info.resolution
+        )
 
 
 def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
