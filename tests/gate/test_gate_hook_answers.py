@@ -53,7 +53,6 @@ class TestAnswer:
         "data",
         [
             b"rubbish",
-            b"[" * 100_000,
             b"[1]",
             response(id="b"),
             response(id=None),

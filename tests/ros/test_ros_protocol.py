@@ -466,3 +466,18 @@ def attempt(event, view):
         return event.decode(view)
     except ProtocolError as error:
         return error
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b'{"op":"service_response","values":',
+        b'{"op":"call_service","service":"/s","args":',
+        b'{"op":"status","msg":',
+    ],
+)
+@pytest.mark.parametrize("depth", [40, 900])
+def test_what_is_nested_too_deeply_is_malformed(head, depth):
+    event = Protocol().receive(head + b"[" * depth + b"]" * depth + b"}", 0.0)
+    assert isinstance(event, Malformed)
+    assert "nested" in event.reason or "recursion" in event.reason

@@ -110,3 +110,11 @@ def test_a_view_report_has_the_matrix_and_the_place():
     report = read_message(text({"op": "view", "map_element": 3, **numbers, **place}))
     assert isinstance(report, ViewReport)
     assert (report.a, report.f, report.left, report.follow) == (0, 5, 10, 0)
+
+
+@pytest.mark.parametrize("depth", [40, 900, 5000])
+def test_a_message_of_a_module_is_not_nested_without_end(depth):
+    data = '{"a":' + "[" * depth + "]" * depth + "}"
+    text = '{"op":"module","instance":1,"data":' + data + "}"
+    with pytest.raises(WireError, match=r"nested deeper than 32|recursion"):
+        read_message(text)

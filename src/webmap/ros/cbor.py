@@ -4,10 +4,8 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from webmap.errors import ProtocolError
+from webmap.nesting import MAX_DEPTH
 from webmap.ros.arrays import TYPED_ARRAY_TAGS, typed_array
-
-MAX_DEPTH = 32
-"""How deeply a message may be nested; ROS messages are far flatter."""
 
 # Dates, big numbers, shared references, regular expressions ... : tags that a
 # general decoder follows and that a robot has no reason to send.

@@ -14,10 +14,8 @@ from typing import Any
 import msgspec
 
 from webmap.errors import ProtocolError
+from webmap.nesting import MAX_DEPTH, is_too_deep
 from webmap.ros.arrays import dec_hook
-
-MAX_DEPTH = 32
-"""How deeply a plain message may be nested; ROS messages are far flatter."""
 
 _FAILURES = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
@@ -75,22 +73,15 @@ def convert(value: Any, type: Any) -> Any:
         raise ProtocolError(str(reason)) from None
 
 
-def check_depth(value: Any, allowed: int = MAX_DEPTH) -> None:
-    """Let a plain value pass if it is nested no deeper than ``allowed``.
+def check_depth(value: Any) -> None:
+    """Let a plain value pass if it is not nested too deeply.
 
     Raises:
         ProtocolError: If it is.
 
     """
-    if isinstance(value, dict):
-        value = value.values()
-    elif not isinstance(value, list):
-        return
-    if allowed == 0:
+    if is_too_deep(value):
         raise ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
-    for item in value:
-        if isinstance(item, (dict, list)):
-            check_depth(item, allowed - 1)
 
 
 def _plain(value: Any, allowed: int) -> Any:

@@ -12,7 +12,7 @@ import msgspec
 
 from webmap.errors import ProtocolError
 from webmap.ros import cbor, png
-from webmap.ros.decoding import convert, decode_json
+from webmap.ros.decoding import check_depth, convert, decode_json
 from webmap.ros.events import (
     CallService,
     Event,
@@ -105,8 +105,7 @@ class Protocol:
         if op == "publish":
             return Publish(decode_json(frame, _Topic).topic, frame)
         if op in _PLAIN_EVENTS:
-            event: Event = decode_json(frame, _PLAIN_EVENTS[op])
-            return event
+            return _flat(decode_json(frame, _PLAIN_EVENTS[op]))
         if op in ("fragment", "png"):
             return self._unwrap(op, frame, now, nested=nested)
         return Unknown(op[:64])
@@ -158,6 +157,13 @@ def _text(name: bytes) -> str | None:
         return name.decode()
     except UnicodeDecodeError:
         return None
+
+
+def _flat(event: ServiceResponse | CallService | Status) -> Event:
+    """Return an event whose free part is not nested too deeply."""
+    for name in ("values", "args", "msg"):
+        check_depth(getattr(event, name, None))
+    return event
 
 
 def _encoded(text: str) -> bytes:

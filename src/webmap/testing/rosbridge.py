@@ -142,7 +142,7 @@ class WitnessBridge:
 def _read(frame: str | bytes) -> Iterator[dict[str, Any]]:
     try:
         message = json.loads(frame)
-    except ValueError:
+    except (ValueError, RecursionError):
         message = None
     if isinstance(message, dict):
         yield message

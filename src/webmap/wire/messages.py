@@ -6,6 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from webmap.errors import WireError
+from webmap.nesting import MAX_DEPTH, is_too_deep
 from webmap.scene.allowed import EVENTS
 
 LONGEST = 16 * 1024
@@ -147,6 +148,8 @@ def read_message(text: str | bytes) -> PageEvent | Seen | Resync:
         message = _decoder.decode(text)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise WireError(f"a page sent no message that is known: {error}") from error
+    if isinstance(message, ModuleMessage) and is_too_deep(message.data):
+        raise WireError(f"a page sent a message nested deeper than {MAX_DEPTH} levels")
     if isinstance(message, ElementEvent) and message.event not in EVENTS:
         raise WireError(f"a page sent an unknown event {message.event!r}")
     return message

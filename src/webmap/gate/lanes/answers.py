@@ -1,11 +1,11 @@
 """What a bridge answers to the call of a service, as far as the gate cares. No I/O."""
 
-import json
 from typing import Any, NamedTuple
 
 import msgspec
 
 from webmap.gate.lanes.navigation import readable
+from webmap.gate.lanes.reading import plain
 
 
 class Answer(NamedTuple):
@@ -29,10 +29,14 @@ def answer_to(data: bytes, id: str) -> Answer | None:
 
     Only what says that the call failed is taken for that: old bridges leave out
     ``result``, and a service of another type than Trigger has no ``success``.
+
+    Raises:
+        ProtocolError: If it holds too many values or is nested too deeply.
+
     """
     try:
-        frame = msgspec.convert(json.loads(data), _Frame)
-    except (ValueError, RecursionError, msgspec.ValidationError):
+        frame = msgspec.convert(plain(data), _Frame)
+    except ValueError:  # msgspec's own errors are of that kind too
         return None
     if str(frame.id) != id:
         return None

@@ -6,7 +6,6 @@ actionlib, each with the id that the goal was given. Nothing else is believed: a
 that is not about this goal, or makes no sense, is passed over.
 """
 
-import json
 import math
 from typing import Any, TypeVar
 
@@ -14,6 +13,7 @@ import msgspec
 
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import GoalEnded, GoalProgress, Outcome
+from webmap.gate.lanes.reading import plain
 from webmap.gate.messages import RobotSpec
 
 Word = GoalProgress | GoalEnded
@@ -108,7 +108,12 @@ class _Frame(msgspec.Struct):
 
 
 def of_action(data: bytes, goal: SendGoal) -> Word | None:
-    """Return what came for a goal on the socket that sent it as an action."""
+    """Return what came for a goal on the socket that sent it as an action.
+
+    Raises:
+        ProtocolError: If it holds too many values or is nested too deeply.
+
+    """
     frame = _read(data)
     if frame is None:
         return None
@@ -132,7 +137,12 @@ def of_action(data: bytes, goal: SendGoal) -> Word | None:
 
 
 def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> Word | None:
-    """Return what came for a goal on one of move_base's topics."""
+    """Return what came for a goal on one of move_base's topics.
+
+    Raises:
+        ProtocolError: If it holds too many values or is nested too deeply.
+
+    """
     frame = _read(data)
     if frame is None or frame.op != "publish":
         return None
@@ -218,8 +228,8 @@ def readable(said: str) -> str:
 def _read(data: bytes) -> _Frame | None:
     try:
         # Bridges write a bare NaN, which msgspec does not take.
-        value = json.loads(data)
-    except (ValueError, RecursionError):
+        value = plain(data)
+    except ValueError:
         return None
     return _as(value, _Frame)
 

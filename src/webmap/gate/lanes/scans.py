@@ -6,6 +6,7 @@ One of many beams is folded to at most 720 here, once; one of far too many is re
 before its numbers are read, and the socket takes no frame of more than a mebibyte.
 """
 
+import re
 from typing import Any
 
 from webmap.errors import ProtocolError
@@ -20,6 +21,25 @@ TYPE = "sensor_msgs/LaserScan"
 
 NAME = 80
 """The longest name of a frame that is kept, in characters."""
+
+MOST_PARTS = 1000
+"""Maps, lists, texts and typed arrays in the message of a scan; a scan has about 40."""
+
+MOST_NUMBERS = 250_000
+"""Numbers in its lists and maps: enough for two lists of the longest scan."""
+
+# A run of integers, floats and the like in CBOR (RFC 8949, 3.1), each with its head.
+_NUMBERS = re.compile(
+    rb"(?:[\x00-\x17\x20-\x37\xf4-\xf7]*+(?:\xfb.{8})*+(?:\xfa.{4})*+"
+    rb"(?:[\x19\x39\xf9]..)*+(?:[\x18\x38].)*+(?:[\x1a\x3a].{4})*+"
+    rb"(?:[\x1b\x3b].{8})*+)*+",
+    re.DOTALL,
+)
+_FURTHER = {24: 1, 25: 2, 26: 4, 27: 8}
+"""By the low bits of a head, in how many further bytes its number stands."""
+_STRINGS, _LISTS_AND_MAPS = (2, 3), (4, 5)
+_ENDLESS = 31
+"""The low bits of a head whose length is not told."""
 
 _FIELDS = ("angle_min", "angle_increment", "range_min", "range_max")
 
@@ -36,19 +56,49 @@ def subscribe(topic: str, id: str) -> bytes:
     )
 
 
+def check_parts(frame: bytes) -> None:
+    """Let CBOR pass that holds few things besides numbers.
+
+    A mebibyte of empty lists takes 0.6 s to decode, one of numbers 10 ms. So what is
+    no number is counted first, which costs at most a millisecond.
+
+    Raises:
+        ProtocolError: If there is too much of it.
+
+    """
+    at = parts = numbers = 0
+    while (at := _NUMBERS.match(frame, at).end()) < len(frame):  # type: ignore[union-attr]
+        kind, low = frame[at] >> 5, frame[at] & 31
+        further = _FURTHER.get(low, 0)
+        at += 1 + further
+        size = int.from_bytes(frame[at - further : at], "big") if further else low
+        parts += 1
+        if kind in _STRINGS:
+            at += size
+        elif kind in _LISTS_AND_MAPS:
+            numbers += size
+        if parts > MOST_PARTS or numbers > MOST_NUMBERS or low == _ENDLESS:
+            raise ProtocolError(
+                f"a scan in CBOR with lists of unknown length, more than {MOST_PARTS} "
+                f"lists, maps and texts, or more than {MOST_NUMBERS} numbers"
+            )
+
+
 def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
     """Return the topic and the scan of a frame; None if it is anything else.
 
     A scan of more than 720 beams comes folded; what is ``refused`` has no ranges.
+
+    Raises:
+        ProtocolError: If it is no CBOR, nested too deeply, or of too many parts.
+
     """
     from webmap.ros import cbor
 
     if not cbor.looks_like_cbor(frame):
         return None
-    try:
-        operation = cbor.decode(frame)
-    except ProtocolError:
-        return None
+    check_parts(frame)
+    operation = cbor.decode(frame)
     topic, message = operation.get("topic"), operation.get("msg")
     if operation.get("op") != "publish" or not isinstance(topic, str):
         return None

@@ -7,6 +7,7 @@ has the kernel throw away what it still holds.
 
 import asyncio
 import contextlib
+import logging
 import math
 import socket
 import ssl
@@ -24,12 +25,14 @@ from websockets.http11 import Response
 from websockets.protocol import State
 from websockets.uri import parse_uri
 
-from webmap.errors import BridgeClosed
+from webmap.errors import BridgeClosed, ProtocolError
 from webmap.gate.clock import now
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable
 from webmap.ros.pieces import Pieces
 from webmap.ros.turns import turns
+
+log = logging.getLogger("webmap.gate")
 
 CONNECT_TIMEOUT = 3.0
 """Seconds for name lookup, TCP, TLS and handshake together."""
@@ -53,6 +56,7 @@ class Ears:
     """Who hears what comes on a socket; may be changed while it is open."""
 
     text: Callable[[bytes], None]
+    """May raise ``ProtocolError``: the message is left out and the log says why."""
     pong: Callable[[bytes], None]
     lost: Callable[[str], None]
     """Called once, with the reason, when a socket that was open is no longer."""
@@ -80,6 +84,7 @@ class Socket(asyncio.Protocol):
         """What came and was not dealt with yet."""
         self._choked = False
         """Whether the bridge does not take what is written, as answers to pings."""
+        self._complained = False
         self._ended: str | None = None
         """Why nothing more comes, as soon as that is known."""
         self.opened: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -271,7 +276,15 @@ class Socket(asyncio.Protocol):
                 self.drop(f"it sends a message in more than {MAX_PARTS} frames")
             elif frame.fin:
                 text, self._parts = b"".join(self._parts), []
-                self.ears.text(text)
+                self._pass_on(text)
+
+    def _pass_on(self, text: bytes) -> None:
+        try:
+            self.ears.text(text)
+        except ProtocolError as error:
+            if not self._complained:
+                self._complained = True
+                log.warning("%s: %s; what is like it is left out", self.url, error)
 
     def _flush(self, until: float = math.inf) -> bool:
         """Hand over what the protocol has to say, unless that is too old."""

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.lanes.reading import check_parts, plain, too_deep
 from webmap.gate.messages import RobotSpec
 from webmap.geometry import Quaternion, Twist
 from webmap.ros import ops
@@ -143,10 +144,18 @@ class Heard(msgspec.Struct, frozen=True):
 
 
 def hear(data: bytes) -> Heard | None:
-    """Return what a message from a bridge says; ``None`` if it makes no sense."""
+    """Return what a message from a bridge says; ``None`` if it makes no sense.
+
+    Raises:
+        ProtocolError: If it holds too many values or is nested too deeply.
+
+    """
+    check_parts(data)
     frame: _Frame | None
     try:
         frame = _decode_frame(data)
+    except RecursionError:
+        raise too_deep() from None
     except msgspec.DecodeError:
         frame = _lenient(data)
     if frame is None:
@@ -158,8 +167,8 @@ def hear(data: bytes) -> Heard | None:
 def _lenient(data: bytes) -> _Frame | None:
     """Read what is JSON but for a bare NaN, as some bridges write it."""
     try:
-        return msgspec.convert(json.loads(data), _Frame)
-    except (ValueError, RecursionError, msgspec.ValidationError):
+        return msgspec.convert(plain(data), _Frame)
+    except ValueError:  # msgspec's own errors are of that kind too
         return None
 
 

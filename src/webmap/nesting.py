@@ -1,0 +1,21 @@
+"""How deeply a value from outside may be nested."""
+
+from typing import Any
+
+MAX_DEPTH = 32
+"""Levels of lists and maps in each other; ROS messages are far flatter."""
+
+
+def is_too_deep(value: Any, allowed: int = MAX_DEPTH) -> bool:
+    """Return whether a plain value is nested deeper than ``allowed``."""
+    if isinstance(value, dict):
+        value = value.values()
+    elif not isinstance(value, list):
+        return False
+    if allowed == 0:
+        return True
+    return any(
+        is_too_deep(item, allowed - 1)
+        for item in value
+        if isinstance(item, (dict, list))
+    )
