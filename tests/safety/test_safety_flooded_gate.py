@@ -149,18 +149,30 @@ def test_beside_three_that_flood_stop_leaves_the_gate_within_50_ms(
             begun = time.monotonic()
             pass_time(1.5)
             ended = time.monotonic()
-            late = gate.sentinel.worst(begun - 0.1, ended)
             told = [t for t in gate.robot.log.told if begun <= t.at <= ended]
             ticks = [at for at in gate.hand.ticks if begun <= at <= ended]
+            tick_gap = longest_gap(ticks, gate.sentinel)
+            velocity_gap = longest_gap([t.at for t in told], gate.sentinel)
             stopped, stolen = gate.stop()
-            figures = (stopped, stolen, late, longest_gap(ticks), len(told))
+            zeros = sum(each.is_zero for each in told)
+            figures = {
+                "stop": stopped,
+                "stolen": stolen,
+                "tick_gap": tick_gap,
+                "velocity_gap": velocity_gap,
+                "zeros": zeros,
+            }
             print(peers, figures)
             assert stopped < 0.05 + grace(stolen), figures
-            assert longest_gap(ticks) < 0.15 + grace(late), figures
-            if late < 0.1:  # else nobody could have been driven without a break
-                assert not any(t.is_zero for t in told), figures
-                assert longest_gap([t.at for t in told]) < 0.15 + late, figures
+            assert tick_gap < 0.15, figures
+            assert velocity_gap < 0.15, figures
+            if gate.sentinel.worst(begun - 0.3, ended) < 0.05:
+                # Else the hand itself may have been held up for too long.
+                assert zeros == 0, figures
 
 
-def longest_gap(times):
-    return max(b - a for a, b in itertools.pairwise(times))
+def longest_gap(times, sentinel):
+    """Return the longest time between two of several times, less the machine's own."""
+    return max(
+        b - a - grace(sentinel.stolen(a, b)) for a, b in itertools.pairwise(times)
+    )

@@ -232,6 +232,8 @@ async def _connect(url: str) -> "ClientConnection":
             self.bytes_came = time.monotonic()
             super().data_received(data)
 
+    from webmap.ros.paced import PacedConnection
+
     class ConnectHere(connect):
         """Connect to the address that was given and to no other."""
 
@@ -248,6 +250,7 @@ async def _connect(url: str) -> "ClientConnection":
         close_timeout=0.5,
         proxy=None,
         user_agent_header=None,
+        create_connection=PacedConnection,
     )
 
 

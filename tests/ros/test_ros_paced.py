@@ -1,0 +1,136 @@
+"""A bridge that floods the display's link holds up nothing else of its thread."""
+
+import asyncio
+import base64
+import contextlib
+import hashlib
+import time
+
+import pytest
+
+from webmap.ros.connection import Lane
+from webmap.testing import Sentinel
+
+MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+
+
+@contextlib.asynccontextmanager
+async def bridge(talk):
+    """Serve WebSockets with ``talk(reader, writer)``; gives the address."""
+
+    async def serve(reader, writer):
+        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
+            request = await reader.readuntil(b"\r\n\r\n")
+            name, lines = b"sec-websocket-key:", request.split(b"\r\n")
+            (line,) = (line for line in lines if line.lower().startswith(name))
+            key = line.split(b":")[1].strip()
+            accept = base64.b64encode(hashlib.sha1(key + MAGIC).digest())
+            writer.write(
+                b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n"
+                b"Connection: Upgrade\r\nSec-WebSocket-Accept: " + accept + b"\r\n\r\n"
+            )
+            await talk(reader, writer)
+        writer.transport.abort()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    try:
+        yield f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+    finally:
+        server.close()
+
+
+def lane(url, heard):
+    return Lane(
+        url,
+        opened=lambda: heard.append("open"),
+        received=heard.append,
+        closed=lambda why: None,
+        failed=lambda error: None,
+    )
+
+
+async def until(check):
+    async with asyncio.timeout(30):
+        while not check():
+            await asyncio.sleep(0.005)
+
+
+@pytest.mark.parametrize(
+    "piece",
+    [
+        b"\x81\x02{}",
+        b"\x89\x7d" + b"x" * 125,
+        b"\x8a\x00",
+        b"\x01\x01x" + b"\0\1x" * 50,
+    ],
+    ids=["tiny texts", "pings", "pongs", "frames of one byte"],
+)
+def test_a_flood_leaves_time_for_everything_else(piece):
+    async def story():
+        async def talk(reader, writer):
+            reading = asyncio.create_task(reader.read())
+            with contextlib.suppress(ConnectionError):
+                while True:
+                    writer.write(piece * ((1 << 18) // len(piece)))
+                    await writer.drain()
+                    await asyncio.sleep(0)
+            reading.cancel()
+
+        heard, worst = [], 0.0
+        async with bridge(talk) as url:
+            link = lane(url, heard)
+            link.start(asyncio.get_running_loop())
+            await until(lambda: heard)
+            begun = time.monotonic()
+            while time.monotonic() < begun + 1.0:
+                before = time.monotonic()
+                await asyncio.sleep(0.005)
+                worst = max(worst, time.monotonic() - before)
+            late = sentinel.worst(begun)
+            await link.stop()
+        return worst, late
+
+    with Sentinel() as sentinel:
+        worst, late = asyncio.run(story())
+    assert worst < 0.1 + late, (worst, late)
+
+
+def test_what_came_before_the_end_is_received_and_in_order():
+    async def story():
+        async def talk(reader, writer):
+            frames = (b"\x82\x04%04d" % n for n in range(3000))
+            writer.write(b"".join(frames))
+            await writer.drain()
+            writer.write_eof()
+            await reader.read()
+
+        heard = []
+        async with bridge(talk) as url:
+            link = lane(url, heard)
+            link.start(asyncio.get_running_loop())
+            await until(lambda: len(heard) >= 3001)
+            await link.stop()
+        return heard
+
+    heard = asyncio.run(story())
+    assert heard[:3001] == ["open", *(b"%04d" % n for n in range(3000))]
+
+
+def test_a_frame_of_many_mebibytes_is_received_whole():
+    body = bytes(range(256)) * (1 << 16)
+
+    async def story():
+        async def talk(reader, writer):
+            writer.write(b"\x82\x7f" + len(body).to_bytes(8, "big") + body)
+            writer.write(b"\x82\x05after")
+            await reader.read()
+
+        heard = []
+        async with bridge(talk) as url:
+            link = lane(url, heard)
+            link.start(asyncio.get_running_loop())
+            await until(lambda: len(heard) == 3)
+            await link.stop()
+        return heard
+
+    assert asyncio.run(story()) == ["open", body, b"after"]
