@@ -89,6 +89,20 @@ class TestBudget:
     def test_one_burst_too_many_is_no_flood(self):
         assert send(Budget(), 60, 1000, kept=5000) is None
 
+    def test_one_that_is_behind_all_the_time_is_dropped_however_little_is_taken(self):
+        budget = Budget()
+        for each in range(20):
+            budget.spend(1, 100, 0.0001, 1000 + each / 10)
+            budget.note(1000 + each / 10, behind=True)
+        assert budget.flood(1001.9) is None
+        assert "it sends too much: for 2 s" in budget.flood(1002.1)
+
+    def test_one_that_catches_up_now_and_then_is_not(self):
+        budget = Budget()
+        for each in range(100):
+            budget.note(1000 + each / 10, behind=each % 15 != 0)
+            assert budget.flood(1000 + each / 10) is None
+
 
 class TestAttempts:
     def test_each_that_fails_waits_twice_as_long_up_to_3_s(self):

@@ -93,7 +93,7 @@ async def test_the_loop_goes_on_while_ten_links_are_flooded():
             for link in links:
                 link.abort("enough")
     # The bridge floods within the same loop, which costs some time, too.
-    assert worst < 0.05 + late, (worst, late)
+    assert worst < 0.3 + late, (worst, late)
 
 
 @pytest.mark.parametrize(
@@ -283,7 +283,7 @@ async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
 
     async with raw_bridge(talk) as url:
         link = await open_socket(url, heard.ears, Budget())
-        await until(lambda: link._budget.wait(sockets.now()) > 0, "an end of reading")
+        await until(lambda: link.is_behind, "more than is taken")
         told.clear()
         assert link.send(b"zero")
         await until(lambda: told, "the zero")

@@ -31,6 +31,10 @@ After a burst a link that sends at less than 3/4 of these rates gets further awa
 the limit than :data:`CLOSE` in this time.
 """
 
+BEHIND = 2.0
+"""A link of which something has waited all the time for so long is dropped, in seconds:
+on a busy computer the gate may take less of it than these rates."""
+
 CLOSE = 0.25
 """How close to :data:`BURST` is close, in seconds."""
 
@@ -42,6 +46,7 @@ class Budget:
         self._used = 0.0
         self._at = 0.0
         self._close_since: float | None = None
+        self._behind_since: float | None = None
         self._frames = self._bytes = 0
         self._work = 0.0
 
@@ -67,6 +72,13 @@ class Budget:
         self._bytes += size
         self._work += work
 
+    def note(self, now: float, *, behind: bool) -> None:
+        """Note whether more of the link waits than was taken."""
+        if not behind:
+            self._behind_since = None
+        elif self._behind_since is None:
+            self._behind_since = now
+
     def wait(self, now: float) -> float:
         """Return for how many seconds nothing may be taken; 0.0 if it may be now."""
         self._pass_time(now)
@@ -75,6 +87,8 @@ class Budget:
     def flood(self, now: float) -> str | None:
         """Return in words why the link is to be dropped; None if it is not."""
         self._pass_time(now)
+        if self._behind_since is not None and now - self._behind_since > BEHIND:
+            return f"it sends too much: for {BEHIND:g} s more waits than can be taken"
         if self._close_since is None or now - self._close_since < PATIENCE:
             return None
         seconds = now - self._close_since

@@ -150,6 +150,7 @@ class Socket(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Ask for a WebSocket."""
         self._transport = cast("asyncio.Transport", transport)
+        self._budget.note(now(), behind=False)  # as the socket before may have been
         self._protocol.send_request(self._protocol.connect())
         self._flush()
 
@@ -188,9 +189,13 @@ class Socket(asyncio.Protocol):
 
         """
         at, begun = now(), time.thread_time()
-        wait = self._budget.wait(at)
+        why, wait = self._budget.flood(at), self._budget.wait(at)
+        if why is not None:
+            self.drop(why)
+            return None
         if wait > 0:
-            return self._hold_back(wait, at)
+            self._read_on(False)
+            return wait
         pieces, size = 1, 0  # one for the turn: a byte at a time costs turns
         while length := self._next_piece():
             piece = bytes(self._waiting[:length])
@@ -204,11 +209,13 @@ class Socket(asyncio.Protocol):
             if time.thread_time() >= until:
                 break
         self._budget.spend(pieces, size, time.thread_time() - begun, at)
+        self._budget.note(at, behind=length > 0)
+        # Not only when nothing waits: a flood would seem to pause each time.
+        self._read_on(not self._choked and len(self._waiting) <= MAX_WAITING)
         if length:
             return 0.0
         if self._ended is not None:
             self._finish(self._ended)
-        self._read_on(not self._choked)
         return None
 
     def drop(self, why: str) -> None:
@@ -222,14 +229,6 @@ class Socket(asyncio.Protocol):
             return 0
         shaken = self._protocol.state is not State.CONNECTING
         return self._pieces.next(self._waiting, shaken=shaken)
-
-    def _hold_back(self, wait: float, at: float) -> float | None:
-        """Read nothing for a while, or drop the link if that does not help."""
-        self._read_on(False)
-        why = self._budget.flood(at)
-        if why is not None:
-            self.drop(why)
-        return None if self._over else wait
 
     def _read_on(self, on: bool) -> None:
         """Have asyncio read from the connection or not."""
@@ -255,7 +254,8 @@ class Socket(asyncio.Protocol):
         for event in self._protocol.events_received():
             if isinstance(event, Response):
                 self._shake_hands()
-            elif isinstance(event, Frame):
+            else:
+                assert isinstance(event, Frame)
                 self._hear(event)
         if self._protocol.handshake_exc is not None:
             self.abort(f"no WebSocket there: {self._protocol.handshake_exc}")
