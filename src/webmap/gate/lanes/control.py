@@ -18,9 +18,9 @@ IDLE_PING = 0.5
 """Seconds between pings otherwise; well below the time after which a stall is cut."""
 
 
-IDLE_ECHO = 100
-"""Milliseconds between two echoes at least while nobody listens: others who publish to
-a machine are noticed before it is driven, and a quick one costs little."""
+ECHO = 20
+"""Milliseconds between two echoes at least: as quick as the gate writes, and a bound
+for others who write without a pause."""
 
 
 class ControlLane:
@@ -69,7 +69,12 @@ class ControlLane:
         self._announce(topic)
 
     def _announce(self, topic: str) -> None:
-        """Announce the type of a topic, if it is another than before."""
+        """Announce the type of a topic, if it is another than before.
+
+        The topic is listened to as long as it is announced, so that others who publish
+        to it are noticed before anybody drives. It is listened to first: a bridge of
+        ROS 2 that publishes already would subscribe so that most others do not match.
+        """
         said, attached = self._types.get(topic), self._attached[topic]
         known = [type for type, assumed in attached if not assumed]
         types = known or [type for type, _ in attached]
@@ -77,33 +82,26 @@ class ControlLane:
         if type == said:
             return
         if said is not None:
-            self.lane.let_go(f"webmap-gate others {topic} {said}")
             self.lane.let_go(f"webmap-gate advertise {topic} {said}")
+            self.lane.let_go(f"webmap-gate echo {topic} {said}")
             del self._types[topic]
         if type is not None:
+            echo = f"webmap-gate echo {topic} {type}"
+            listen = ops.subscribe(topic, id=echo, type=type, throttle_rate=ECHO)
+            self.lane.hold(echo, listen, ops.unsubscribe(topic, id=echo))
             id = f"webmap-gate advertise {topic} {type}"
             hello = ops.advertise(topic, type, id=id)
             self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
-            id = f"webmap-gate others {topic} {type}"
-            hello = ops.subscribe(topic, id=id, type=type, throttle_rate=IDLE_ECHO)
-            self.lane.hold(id, hello, ops.unsubscribe(topic, id=id))
             self._types[topic] = type
 
     def listen(self, topic: str) -> None:
-        """Hear all that is said on ``topic``, ours and others'."""
+        """Ask often whether the bridge answers: ``topic`` may be written to."""
         self._listened.add(topic)
-        id = f"webmap-gate echo {topic}"
-        self.lane.hold(
-            id,
-            ops.subscribe(topic, id=id, type=self._types[topic]),
-            ops.unsubscribe(topic, id=id),
-        )
         self.lane.hurry(BUSY_PING)
 
     def ignore(self, topic: str) -> None:
         """Undo :meth:`listen`."""
         self._listened.remove(topic)
-        self.lane.let_go(f"webmap-gate echo {topic}")
         if not self._listened:
             self.lane.hurry(IDLE_PING)
 
