@@ -53,8 +53,8 @@ class TestPages:
         page.x = 0.0
         eventually(lambda: page.robot()["state"] == "held", "standstill")
         told = [t for t in fake.told if t.topic == "/cmd_vel"]
-        assert [t.op for t in told[:2]] == ["advertise", "subscribe"]
-        advertised = told[0].message
+        assert [t.op for t in told[:2]] == ["subscribe", "advertise"]
+        advertised = told[1].message
         assert (advertised["queue_size"], advertised["latch"]) == (1, False)
         assert len({t.link for t in told}) == 1
         velocity_link = told[0].link
