@@ -14,11 +14,21 @@ from webmap.plain_files import resolved
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from PIL import Image
 
 MAX_YAML = 1 << 14
 """Bytes of the YAML; a map's own has 200, and reading much of it takes long."""
 
 MAX_PIXELS = 1 << 26
+
+MAX_DECODED = 128 << 20
+"""Bytes of the decoded image; it is decoded as a whole."""
+
+PIECE = 1024
+"""Side of the squares that are made cells at a time, some twenty bytes a pixel."""
+
+_PIXEL = {"1": 1, "L": 1, "P": 1, "I;16": 2, "I;16B": 2, "I;16L": 2}
+"""Bytes of a decoded pixel, by the mode of the image; 4 in other modes."""
 
 FINEST = 1e-4
 """The least side of a cell, in metres: less is a number in another unit."""
@@ -73,9 +83,8 @@ def read_map(file: Path) -> MapImage:
 
     """
     settings = _settings(file)
-    light = _read_image(file, settings)
     # An image has its first row at the top, a grid at the bottom.
-    cells = _cells(light, settings)[::-1]
+    cells = _read_image(file, settings)[::-1]
     side = max(cells.shape) * settings.resolution
     if side > FARTHEST:
         raise ConfigError(
@@ -173,14 +182,8 @@ def _image_path(said: LinedYaml, name: object) -> Path:
     return image
 
 
-def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
-    """Return how light each pixel is, 0 to 1, the upper row first.
-
-    As map_server has it, colours count by their mean. What an alpha channel means
-    hangs on the mode: in ``trinary`` it is one more colour, in ``scale`` whatever is
-    not opaque is unknown, here NaN, and in ``raw`` it is nothing.
-    """
-    import numpy as np
+def _read_image(file: Path, settings: _Settings) -> "NDArray[np.int8]":
+    """Return the cells of an image, the upper row first."""
     from PIL import Image, UnidentifiedImageError
 
     too_many = (Image.DecompressionBombError, Image.DecompressionBombWarning)
@@ -194,10 +197,14 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
                     f"{file}: the image has {opened.width} x {opened.height} pixels; "
                     f"{MAX_PIXELS} in all are the limit"
                 )
-            deep = opened.mode.startswith("I")
-            has_alpha = not deep and opened.has_transparency_data
-            colours = "RGBA" if has_alpha else "RGB"
-            pixels = np.asarray(opened if deep else opened.convert(colours))
+            size = opened.width * opened.height * _PIXEL.get(opened.mode, 4)
+            if size > MAX_DECODED:
+                raise ConfigError(
+                    f"{file}: the image has {opened.width} x {opened.height} pixels, "
+                    f"which take {size >> 20} MiB decoded; {MAX_DECODED >> 20} MiB are "
+                    "the limit: save it in grey, with a byte a pixel"
+                )
+            return _cells_of(opened, settings)
     except too_many as error:
         raise ConfigError(f"{file}: the image is too large: {error}") from error
     except UnidentifiedImageError as error:
@@ -208,11 +215,40 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.float32]":
         if isinstance(error, ConfigError):
             raise
         raise ConfigError(f"{file}: the image cannot be read: {error}") from error
-    if deep:
-        return np.asarray(pixels / 65535, np.float32)
-    counted = pixels if settings.mode == "trinary" else pixels[..., :3]
+
+
+def _cells_of(image: "Image.Image", settings: _Settings) -> "NDArray[np.int8]":
+    """Return the cells of an image, looking at a piece at a time."""
+    import numpy as np
+
+    width, height = image.size
+    cells = np.empty((height, width), np.int8)
+    for top in range(0, height, PIECE):
+        for left in range(0, width, PIECE):
+            right, below = min(width, left + PIECE), min(height, top + PIECE)
+            light = _light(image.crop((left, top, right, below)), settings.mode)
+            cells[top:below, left:right] = _cells(light, settings)
+    return cells
+
+
+def _light(image: "Image.Image", mode: str) -> "NDArray[np.float32]":
+    """Return how light each pixel is, 0 to 1, the upper row first.
+
+    As map_server has it, colours count by their mean. What an alpha channel means
+    hangs on the mode: in ``trinary`` it is one more colour, in ``scale`` whatever is
+    not opaque is unknown, here NaN, and in ``raw`` it is nothing.
+    """
+    import numpy as np
+
+    has_alpha = image.has_transparency_data
+    if image.mode.startswith("I"):
+        return np.asarray(np.asarray(image) / 65535, np.float32)
+    if image.mode == "L" and not has_alpha:
+        return np.asarray(image, np.float32) / np.float32(255)
+    pixels = np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
+    counted = pixels if mode == "trinary" else pixels[..., :3]
     light: NDArray[np.float32] = counted.mean(axis=2, dtype=np.float32) / 255
-    if has_alpha and settings.mode == "scale":
+    if has_alpha and mode == "scale":
         light[pixels[..., 3] < 255] = np.nan
     return light
 

@@ -12,7 +12,8 @@ from PIL import Image
 
 from webmap.core.pictures import pictures
 from webmap.errors import ConfigError, ProtocolError
-from webmap.modules.robot.camera import Camera
+from webmap.modules.robot.camera import Camera, ShownAnyImageMsg, ShownImageMsg
+from webmap.ros.image_size import size_of
 from webmap.ros.messages_image import CompressedImageMsg, ImageMsg
 
 TOPIC = "/camera/image_raw/compressed"
@@ -237,3 +238,67 @@ def test_a_raw_picture_is_made_a_jpeg_and_the_newest_wins(link, robot, topic):
             await asyncio.sleep(0.01)
 
     asyncio.run(scenario())
+
+
+def packed(form, size, **options):
+    file = io.BytesIO()
+    Image.new("RGB", size).save(file, form, **options)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("form", "options"),
+    [
+        ("JPEG", {}),
+        ("JPEG", {"progressive": True, "exif": b"Exif\0\0" + bytes(9000)}),
+        ("PNG", {}),
+        ("WEBP", {}),
+        ("WEBP", {"lossless": True}),
+        ("WEBP", {"exif": b"Exif\0\0" + bytes(90)}),
+    ],
+)
+def test_the_size_of_a_picture_is_read_from_its_head(form, options):
+    data = packed(form, (321, 123), **options)
+    assert size_of(data) == (321, 123)
+    assert CompressedImageMsg(data).media_type == f"image/{form.lower()}"
+
+
+@pytest.mark.parametrize("form", ["JPEG", "PNG", "WEBP"])
+def test_a_small_file_of_very_many_pixels_is_refused_before_it_is_decoded(form):
+    data = packed(form, (4001, 4000))
+    assert len(data) < 1 << 20
+    with pytest.raises(ProtocolError, match="4001 x 4000, 16000000 pixels at most"):
+        _ = CompressedImageMsg(data).media_type
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\xff\xd8\xff",
+        b"\xff\xd8\xff\xd9" + bytes(20),
+        b"\xff\xd8\xff\xe0\x00\x04\0\0" + b"junk" + packed("JPEG", (9, 9))[2:],
+        b"\xff\xd8" + b"\xff\xe0\x00\x02" * 2000 + packed("JPEG", (9, 9))[2:],
+        b"\x89PNG\r\n\x1a\n" + bytes(30),
+        packed("PNG", (9, 9))[:20],
+        b"RIFF\0\0\0\0WEBPVP8 " + bytes(20),
+        packed("WEBP", (9, 9))[:24],
+    ],
+)
+def test_a_picture_whose_size_is_not_plain_is_refused(data):
+    with pytest.raises(ProtocolError, match="how many pixels"):
+        _ = CompressedImageMsg(data).media_type
+
+
+@pytest.mark.parametrize("view", [ShownImageMsg, ShownAnyImageMsg])
+def test_a_large_raw_picture_comes_as_jpeg_from_where_it_is_decoded(link, robot, view):
+    raw = view(
+        height=8, width=8, encoding="rgb8", step=24, data=bytes([9, 200, 9]) * 64
+    )
+    made = raw.digest()
+    camera = robot.add_module(Camera, link, "/camera/image_raw")
+    camera.watch(lambda: None)
+    camera.on_picture(made)
+    red, green, blue = shown(camera).getpixel((4, 4))
+    assert max(red, blue) < 40 < 160 < green
+    packed_one = ShownAnyImageMsg(data=a_jpeg())
+    assert packed_one.digest() is packed_one

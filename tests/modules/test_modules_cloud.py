@@ -1,11 +1,15 @@
 """Clouds of points, from above."""
 
 import base64
+import json
 import math
 
 import numpy as np
 import pytest
 from module_fakes import dots, header, pose, to_root
+
+from webmap.modules.robot.point_cloud import ShownCloudMsg
+from webmap.ros.events import Publish
 
 FLOAT32, FLOAT64, UINT8 = 7, 8, 2
 
@@ -207,3 +211,24 @@ def test_a_field_that_the_points_have_not_is_named(link, robot):
 def test_a_cloud_with_options_that_make_no_sense_is_refused(link, robot, options):
     with pytest.raises(ValueError, match="got"):
         robot.add_module("PointCloud", link, "/points", **options)
+
+
+@pytest.mark.parametrize("rows", [1, 4])
+def test_a_large_cloud_is_thinned_evenly_where_it_is_decoded(
+    link, robot, monkeypatch, rows
+):
+    monkeypatch.setattr("webmap.modules.robot.point_cloud.MOST", 25)
+    points = [[x, y, 0.0] for x in range(10) for y in range(12)]
+    text = json.dumps(
+        {
+            "op": "publish",
+            "topic": "/points",
+            "msg": {**cloud(points, rows=rows, row_pad=3), "height": rows},
+        }
+    )
+    whole = Publish("/points", text.encode()).decode(ShownCloudMsg)
+    less = whole.digest()
+    assert (less.height, less.width) == (1, 24)
+    found = zip(*less.columns("x", "y"), strict=True)
+    assert list(found) == [(x, y) for x, y, _ in points[::5]]
+    assert whole.thinned(120) is whole

@@ -5,6 +5,7 @@ import math
 import os
 import re
 import time
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -292,4 +293,45 @@ def test_a_file_that_is_no_description_is_refused(tmp_path, data, why):
     file = tmp_path / "map.yaml"
     file.write_bytes(data)
     with pytest.raises(ConfigError, match=why):
+        read_map(file)
+
+
+def write_map(folder, image, **options):
+    image.save(folder / "map.png", **options)
+    yaml = "image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\n"
+    (folder / "map.yaml").write_text(yaml)
+    return folder / "map.yaml"
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB", "RGBA", "P", "1", "I;16", "LA"])
+def test_a_map_is_the_same_read_in_one_piece_or_in_many(tmp_path, monkeypatch, mode):
+    grey = Image.fromarray(np.arange(64 * 50, dtype=np.uint32).astype(np.uint8))
+    grey = grey.resize((40, 31))
+    image = (
+        grey if mode != "I;16" else Image.fromarray(np.asarray(grey) * np.uint16(257))
+    )
+    file = write_map(tmp_path, image if mode == "I;16" else grey.convert(mode))
+    whole = read_map(file).cells
+    monkeypatch.setattr("webmap.map_file.PIECE", 7)
+    assert np.array_equal(read_map(file).cells, whole)
+    assert whole.shape == (31, 40)
+
+
+def test_a_large_map_takes_little_more_memory_than_its_cells(tmp_path):
+    file = write_map(tmp_path, Image.new("L", (3000, 3000), 254))
+    tracemalloc.start()
+    try:
+        cells = read_map(file).cells
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert cells.shape == (3000, 3000)
+    assert most < cells.nbytes + 40_000_000
+
+
+def test_an_image_that_is_too_large_when_decoded_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("webmap.map_file.MAX_DECODED", 100 << 10)
+    assert read_map(write_map(tmp_path, Image.new("L", (300, 300)))).cells.size == 90000
+    file = write_map(tmp_path, Image.new("RGB", (300, 300)))
+    with pytest.raises(ConfigError, match=r"300 x 300 pixels, which take .* in grey"):
         read_map(file)

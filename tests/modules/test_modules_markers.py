@@ -282,11 +282,33 @@ def test_a_marker_whose_quaternion_nobody_set_is_drawn_unturned_which_is_logged_
     assert "marker 1 of 'test' has a quaternion of zeros and is drawn unturned" in said
 
 
-def test_there_is_an_end_to_the_number_of_markers(link, layer, channel, monkeypatch):
+def test_markers_beyond_the_most_are_left_out_and_their_number_is_said(
+    map, link, channel, monkeypatch
+):
     monkeypatch.setattr("webmap.modules.map.markers.MAX_MARKERS", 10)
-    say(link, *(marker(CUBE, id=i) for i in range(12)))
-    assert len(layer.svg.children) == 10
-    assert "10 markers are the limit (2 of 12 are left out)" in channel.errors[0]
+    monkeypatch.setattr("webmap.modules.map.markers.SETTLED", 0.01)
+
+    async def until(check):
+        async with asyncio.timeout(10):
+            while not check():
+                await asyncio.sleep(0.005)
+
+    async def scenario():
+        layer = map.add_module("Markers", link, "/markers").layer
+        say(link, *(marker(CUBE, id=i) for i in range(11)))
+        say(link, *(marker(CUBE, id=i) for i in range(12)))  # the same, and one more
+        assert len(layer.svg.children) == 10
+        await until(lambda: channel.problems)
+        (said,) = channel.problems.values()
+        assert said == "/markers: 2 markers are left out: 10 are drawn at the most"
+        say(link, marker(CUBE, id=0, action=3))  # delete all
+        assert not channel.problems
+        say(link, *(marker(CUBE, id=i) for i in range(11)))
+        await until(lambda: channel.problems)
+        say(link, marker(CUBE, id=1, action=2), marker(CUBE, id=10))
+        await until(lambda: not channel.problems)
+
+    asyncio.run(scenario())
 
 
 @pytest.mark.parametrize("ros2", [False, True])

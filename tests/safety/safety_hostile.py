@@ -73,12 +73,13 @@ class Driven(NamedTuple):
 
 
 @contextlib.contextmanager
-def beside(bench, *peers):
+def beside(bench, *peers, shown=False):
     """Show one more robot for each peer, on a bridge that the peer plays.
 
     Args:
         bench: The bench of the good robot.
         peers: Each ``module:function``, a module of this folder.
+        shown: Whether the page shows all that the peers send.
 
     """
     with contextlib.ExitStack() as open:
@@ -88,6 +89,7 @@ def beside(bench, *peers):
         ]
         urls = [process.stdout.readline().strip() for process in helpers]
         os.environ["SAFETY_HOSTILE"] = " ".join(urls)
+        os.environ["SAFETY_SHOWN"] = "1" * shown
         try:
             bench.close_page()
             bench.end_display()
@@ -96,7 +98,7 @@ def beside(bench, *peers):
             pass_time(SETTLE)
             yield urls
         finally:
-            del os.environ["SAFETY_HOSTILE"]
+            del os.environ["SAFETY_HOSTILE"], os.environ["SAFETY_SHOWN"]
             bench.close_page()
             bench.end_display()
 

@@ -2,7 +2,8 @@
 
 The addresses come from the environment: SAFETY_BRIDGE, where the robot is, and
 SAFETY_FLOOD, if there is more to show: where robots that scan are, and where maps are;
-SAFETY_HOSTILE, where robots are whose bridges do what they like.
+SAFETY_HOSTILE, where robots are whose bridges do what they like. With SAFETY_SHOWN all
+that those send is shown, too.
 """
 
 import asyncio
@@ -59,12 +60,21 @@ if flood := os.environ.get("SAFETY_FLOOD"):
         one.add_module("LaserScanner", robots, topic, max_dots=None, throttle=0)
         scanners.append(one)
 
-hostile = []
+hostile, shown = [], []
 for url in os.environ.get("SAFETY_HOSTILE", "").split():
     one = webmap.Robot(f"h{len(hostile)}", webmap.svg.circle(cx=0, cy=0, r=0.2))
     one.set_odometry_topic(webmap.Bridge(url), "/odom")
     one.set_twist_topic(webmap.Bridge(url), "/cmd_vel", stops_within=0.5)
     hostile.append(one)
+    if os.environ.get("SAFETY_SHOWN"):
+        theirs = webmap.Bridge(url)
+        one.set_tf(theirs)
+        for module in ("Path", "Rosout", "Diagnostics"):
+            one.add_module(module, theirs)
+        one.add_module("PointCloud", theirs, "/points")
+        for topic in ("/camera/image_raw", "/camera/image_raw/compressed"):
+            one.add_module("Camera", theirs, topic, topic).watch(lambda: None)
+        shown.append(theirs)
 
 
 @webmap.page("/")
@@ -76,6 +86,9 @@ def main(page):
     map.scale(40, map.canvas_width * 0.5, map.canvas_height * 0.5)
     if maps is not None:
         map.add_module("OccupancyGrid", maps, "/huge")
+    for theirs in shown:
+        map.add_module("OccupancyGrid", theirs, "/map")
+        map.add_module("Markers", theirs, "/markers")
     for one in [*scanners, *hostile]:
         map.add_robot(one)
     map.add_robot(bob)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from webmap.errors import ConfigError
 from webmap.geometry import Affine, Pose
+from webmap.ros.offload import aside
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,6 +39,30 @@ def place_grid(origin: Pose, height: float) -> Affine:
     cos, sin = math.cos(origin.yaw), math.sin(origin.yaw)
     placed = Affine(cos, sin, -sin, cos, origin.x, origin.y)
     return placed @ Affine(1, 0, 0, -1, 0, height)
+
+
+async def draw_aside(cells: "NDArray[np.int8]", palette: str) -> bytes:
+    """Return a large grid as a PNG that the worker process draws.
+
+    Args:
+        cells: Of shape (height, width), the lowest row first.
+        palette: The name of one of :data:`PALETTES`.
+
+    Raises:
+        ProtocolError: If the worker fails.
+
+    """
+    import numpy as np
+
+    data = np.ascontiguousarray(cells).data.cast("B")
+    return bytes(await aside(png_of_bytes, data, cells.shape[1], palette))
+
+
+def png_of_bytes(data: bytes, width: int, palette: str) -> bytes:
+    """Return a grid, given as the bytes of its rows, as :func:`grid_png` does."""
+    import numpy as np
+
+    return grid_png(np.frombuffer(data, np.int8).reshape(-1, width), palette)
 
 
 def grid_png(cells: "NDArray[np.int8]", palette: str) -> bytes:

@@ -9,9 +9,10 @@ from webmap.discovery.tf_robots import Trees
 from webmap.errors import ProtocolError
 from webmap.ros import ops
 from webmap.ros.events import Publish
+from webmap.ros.limits import MAX_FRAME
 from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic
-from webmap.ros.protocol import MAX_FRAME, Protocol
+from webmap.ros.protocol import Protocol
 
 SECONDS = 0.8
 """How long is listened: who moves tells of its frames ten times a second."""

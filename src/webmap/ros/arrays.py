@@ -7,7 +7,7 @@ needs no numpy to be made, moved between processes or thrown away.
 
 import sys
 from array import array
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound="Numbers")
 
 _NAN = float("nan")
+
+NOT_COPIED = 1 << 20
+"""Bytes from which numbers stay in the bytes that they came in."""
 
 
 class Numbers:
@@ -49,6 +52,10 @@ class Numbers:
             same = value.typecode == cls.typecode
             return value if same else array(cls.typecode, value)
         if isinstance(value, bytes):
+            if len(value) > NOT_COPIED:
+                return cast(
+                    "array[Any]", memoryview(value).cast(cast(Any, cls.typecode))
+                )
             numbers: array[Any] = array(cls.typecode)
             numbers.frombytes(value)
             return numbers

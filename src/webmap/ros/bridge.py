@@ -398,8 +398,7 @@ class Bridge:
         self.stats.bytes += len(frame)
         if isinstance(event, Publish):
             topic = self._topics.get(event.topic)
-            if topic is not None:
-                topic.received(event)
+            if topic is not None and topic.received(event):
                 self._fan_out.offer(event, topic.listeners)
         elif event is not None:
             self._other(event)

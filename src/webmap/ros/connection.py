@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from webmap.errors import BridgeClosed
 from webmap.ros.backoff import Backoff
+from webmap.ros.limits import LARGE, MAX_FRAME
 from webmap.ros.liveness import Liveness
 
 if TYPE_CHECKING:
@@ -22,8 +23,17 @@ log = logging.getLogger("webmap.ros")
 State: TypeAlias = Literal["new", "connecting", "open", "closed"]
 
 CONNECT_TIMEOUT = 5.0
-MAX_FRAME = 64 << 20
 MAX_UNSENT = 4 << 20
+
+MAX_WAITING = 4
+"""Whole frames that a link may hold before they are read; then its socket waits."""
+
+RATE = 128 << 20
+"""Bytes per second of large frames that are read from a link in the long run."""
+
+TURN = 64
+"""Frames that are read from a link before others get their turn."""
+
 LOOK_PERIOD = 0.25
 CLOSED_HERE = "the link was closed here"
 
@@ -151,10 +161,16 @@ class Lane:
         writing = asyncio.create_task(self._write(socket))
         try:
             self._opened()
+            count = 0
             while True:
                 frame = await socket.recv(decode=False)
                 self.last_heard = time.monotonic()
                 self._hand_over(frame)
+                if len(frame) > LARGE:
+                    await asyncio.sleep(len(frame) / RATE)
+                count += 1
+                if count % TURN == 0:  # recv() waits for nothing if frames are there
+                    await asyncio.sleep(0)
         except ConnectionClosed as error:
             if keeping.done() and not keeping.cancelled() and not keeping.exception():
                 return f"no answer to a ping for {Liveness.LIMIT:g} s"
@@ -221,16 +237,7 @@ class Lane:
 
 
 async def _connect(url: str) -> "ClientConnection":
-    from websockets.asyncio.client import ClientConnection, connect
-
-    class Timed(ClientConnection):
-        """A connection that knows when its last bytes came."""
-
-        bytes_came = -inf
-
-        def data_received(self, data: bytes) -> None:
-            self.bytes_came = time.monotonic()
-            super().data_received(data)
+    from websockets.asyncio.client import connect
 
     from webmap.ros.paced import PacedConnection
 
@@ -242,9 +249,9 @@ async def _connect(url: str) -> "ClientConnection":
 
     return await ConnectHere(
         url,
-        create_connection=Timed,
         compression=None,
         max_size=MAX_FRAME,
+        max_queue=MAX_WAITING,
         open_timeout=CONNECT_TIMEOUT,
         ping_interval=None,
         close_timeout=0.5,

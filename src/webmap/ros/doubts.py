@@ -13,6 +13,7 @@ from webmap.errors import BridgeError, ProtocolError
 from webmap.ros import large
 from webmap.ros.decoding import Unreadable
 from webmap.ros.graph import Graph
+from webmap.ros.limits import TooLarge
 from webmap.ros.names import is_type, same_type
 from webmap.ros.renewal import IN_CBOR
 from webmap.ros.subscriptions import Topic
@@ -44,6 +45,9 @@ class Doubts:
 
     def message_failed(self, topic: Topic, expected: str, error: ProtocolError) -> None:
         """Report a message that does not decode, with the type that it really has."""
+        if isinstance(error, TooLarge):
+            self._told(topic, TooLarge(f"{topic.name}: {error}"), error)
+            return
         if isinstance(error, Unreadable):
             # No type would make sense of it, so none is asked for or named.
             words = "got a frame that was cut off, or is not one message"

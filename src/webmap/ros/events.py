@@ -58,6 +58,10 @@ class Publish:
         """Take over what another process decoded, or the error that it met."""
         self._decoded[type] = value
 
+    def forget(self, type: type[msgspec.Struct] | None) -> None:
+        """Forget what :meth:`prime` took over: whoever asks next decodes anew."""
+        self._decoded.pop(type, None)
+
     def _decode(self, type: type[msgspec.Struct] | None) -> Any:
         if cbor.looks_like_cbor(self.frame):
             if self._map is None:

@@ -64,7 +64,13 @@ class FanOut:
             return
         if self._offload.wants(message):
             types = frozenset(listener.decode for listener in listeners)
-            self._offload.decode(message, types, lambda: _deliver(message, listeners))
+            self._offload.decode(
+                message,
+                types,
+                lambda type: _deliver(
+                    message, [each for each in listeners if each.decode is type]
+                ),
+            )
         else:
             _deliver(message, listeners)
 

@@ -33,20 +33,24 @@ class _Assembly:
     def __init__(self, count: int, began: float) -> None:
         self.count = count
         self.began = began
-        self.pieces: dict[int, str] = {}
+        self.pieces: dict[int, bytes] = {}
         self.size = 0
         self.received = 0
         self.messages = 1
 
     def add(self, fragment: Fragment) -> None:
+        try:
+            data = fragment.data.encode()
+        except UnicodeEncodeError as error:
+            raise ProtocolError(f"fragments that are no text: {error}") from None
         self.received += 1
-        self.size += len(fragment.data)
+        self.size += len(data)
         if fragment.num in self.pieces:
             # Another message of just this length: its pieces cannot be told apart.
             if fragment.num == 0:
                 self.messages += 1
             self.messages = max(self.messages, 2)
-        self.pieces[fragment.num] = fragment.data
+        self.pieces[fragment.num] = data
 
     @property
     def is_complete(self) -> bool:
@@ -56,8 +60,8 @@ class _Assembly:
     def is_ambiguous(self) -> bool:
         return self.messages > 1
 
-    def text(self) -> str:
-        return "".join(self.pieces[num] for num in range(self.count))
+    def text(self) -> bytes:
+        return b"".join(self.pieces[num] for num in range(self.count))
 
 
 class Fragments:
@@ -65,7 +69,7 @@ class Fragments:
 
     Args:
         max_count: Most fragments of a message.
-        max_bytes: Most characters that wait for their rest, in all.
+        max_bytes: Most bytes that wait for their rest, in all.
         max_age: Longest time from the first fragment to the last, in seconds.
 
     """
@@ -84,7 +88,7 @@ class Fragments:
     def __len__(self) -> int:
         return len(self._open)
 
-    def add(self, fragment: Fragment, now: float) -> str | None:
+    def add(self, fragment: Fragment, now: float) -> bytes | None:
         """Take one fragment; return the whole text if this was its last.
 
         Raises:

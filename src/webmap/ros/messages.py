@@ -3,10 +3,13 @@
 A view names a few fields of a message; a decoder skips the rest. Fields that tell one
 type from another have no defaults, so a message of another type is an error and never
 a robot at the origin. A number that was ``null`` is NaN.
+
+Messages are trees, so the garbage collector need not look at those of which a message
+has many (``gc=False``): it would stop every thread for longer than the decoding takes.
 """
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import msgspec
 
@@ -57,7 +60,7 @@ class Time(msgspec.Struct, frozen=True, gc=False):
             ) from None
 
 
-class Header(msgspec.Struct, frozen=True):
+class Header(msgspec.Struct, frozen=True, gc=False):
     """When a message was measured, and in which frame its numbers are."""
 
     stamp: Time = Time()
@@ -91,7 +94,7 @@ class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
         return Quaternion(self.x, self.y, self.z, self.w)
 
 
-class Unstamped(msgspec.Struct, frozen=True):
+class Unstamped(msgspec.Struct, frozen=True, gc=False):
     """A type without a header, which is asked the same as one that has it."""
 
     @property
@@ -156,7 +159,7 @@ class PoseMsg(Unstamped, frozen=True):
         return self
 
 
-class Stamped(msgspec.Struct, frozen=True, kw_only=True):
+class Stamped(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     """Every type that begins with a header."""
 
     header: Header = Header()
@@ -350,7 +353,7 @@ class PathMsg(Stamped, frozen=True, kw_only=True):
     poses: list[PoseStampedMsg]
 
 
-class TransformMsg(msgspec.Struct, frozen=True):
+class TransformMsg(msgspec.Struct, frozen=True, gc=False):
     """``geometry_msgs/Transform``."""
 
     translation: PointMsg
@@ -372,5 +375,8 @@ class TransformStampedMsg(Stamped, frozen=True, kw_only=True):
 
 class TFMessage(msgspec.Struct, frozen=True):
     """``tf2_msgs/TFMessage``."""
+
+    separable: ClassVar = True
+    """Whether the parts of a long one may be handed over one after the other."""
 
     transforms: list[TransformStampedMsg]

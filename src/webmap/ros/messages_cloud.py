@@ -111,6 +111,30 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
         points = np.ascontiguousarray(rows).reshape(-1).view(layout)
         return [points[name].astype(np.float64) for name in names]
 
+    def thinned(self, most: int) -> "PointCloud2Msg":
+        """Return the cloud with ``most`` points at the most, evenly chosen, in one row.
+
+        Raises:
+            ProtocolError: If the sizes do not fit.
+
+        """
+        row_step = self._row_step
+        self._check_sizes(row_step)
+        if self.width * self.height <= most:
+            return self
+        used = self.width * self.point_step
+        rows = self.data.array()[: self.height * row_step]
+        rows = rows.reshape(self.height, row_step)[:, :used]
+        step = 1 + (self.width * self.height - 1) // most
+        kept = rows.reshape(-1, self.point_step)[::step]
+        return msgspec.structs.replace(
+            self,
+            height=1,
+            width=len(kept),
+            row_step=len(kept) * self.point_step,
+            data=Octets(array("B", kept.tobytes())),
+        )
+
     def has(self, name: str) -> bool:
         """Return whether points have a field of this name."""
         return any(field.name == name for field in self.fields)

@@ -1,6 +1,7 @@
 """Typed views of what the parts of a robot say of their health."""
 
 import binascii
+from typing import ClassVar
 
 import msgspec
 
@@ -12,14 +13,14 @@ LEVELS = ("ok", "warn", "error", "stale")
 """The names of the levels, by their numbers."""
 
 
-class KeyValueMsg(msgspec.Struct, frozen=True):
+class KeyValueMsg(msgspec.Struct, frozen=True, gc=False):
     """``diagnostic_msgs/KeyValue``."""
 
     key: str
     value: str
 
 
-class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True):
+class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     """``diagnostic_msgs/DiagnosticStatus``."""
 
     name: str
@@ -51,6 +52,7 @@ class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True):
 class DiagnosticArrayMsg(Stamped, frozen=True, kw_only=True):
     """``diagnostic_msgs/DiagnosticArray``."""
 
+    separable: ClassVar = True
     status: list[DiagnosticStatusMsg]
 
 

@@ -6,6 +6,7 @@ import msgspec
 
 from webmap.errors import ProtocolError
 from webmap.ros.image_encodings import BAYER, YUV, from_bayer, from_yuv
+from webmap.ros.image_size import size_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,7 +16,7 @@ MAX_BYTES = 4 << 20
 """The largest compressed picture that is shown."""
 
 MAX_PIXELS = 16_000_000
-"""The largest raw picture that is looked at."""
+"""The most pixels of a picture that is decoded, here or in a browser."""
 
 _CHANNELS = {
     "rgb8": (0, 1, 2),
@@ -41,21 +42,26 @@ class CompressedImageMsg(msgspec.Struct):
         """What the picture is, by its first bytes, whatever ``format`` says.
 
         Raises:
-            ProtocolError: If it is nothing that a browser shows.
+            ProtocolError: If it is nothing that a browser shows, or has more pixels
+                than a browser should have to decode.
 
         """
         data = self.data
         if len(data) > MAX_BYTES:
             raise ProtocolError(f"a picture of {len(data)} bytes, {MAX_BYTES} at most")
-        if data.startswith(b"\xff\xd8\xff"):
-            return "image/jpeg"
-        if data.startswith(b"\x89PNG\r\n\x1a\n"):
-            return "image/png"
-        if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-            return "image/webp"
-        raise ProtocolError(
-            f"a picture with the format {self.format!r} that is no JPEG, PNG or WebP"
-        )
+        media_type = _media_type(data)
+        if media_type is None:
+            raise ProtocolError(
+                f"a picture with the format {self.format!r} that is no JPEG, PNG or "
+                "WebP"
+            )
+        width, height = size_of(data)
+        if width * height > MAX_PIXELS:
+            raise ProtocolError(
+                f"a picture of {width} x {height}, {MAX_PIXELS} pixels at most: let "
+                "the camera send a smaller one"
+            )
+        return media_type
 
 
 class ImageMsg(msgspec.Struct):
@@ -144,6 +150,16 @@ class AnyImageMsg(msgspec.Struct):
             self.data,
             self.is_bigendian,
         )
+
+
+def _media_type(data: bytes) -> str | None:
+    if data.startswith(b"\xff\xd8\xff"):
+        return "image/jpeg"
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return "image/png"
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "image/webp"
+    return None
 
 
 def _stretched(values: "NDArray[np.uint8]") -> "NDArray[np.uint8]":

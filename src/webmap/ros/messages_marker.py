@@ -1,5 +1,7 @@
 """Typed views of markers, with which ROS programs draw what they think."""
 
+from typing import ClassVar
+
 import msgspec
 
 from webmap.ros.messages import PointMsg, PoseMsg, Stamped, Time
@@ -12,7 +14,7 @@ CUBE_LIST, SPHERE_LIST, POINTS, TEXT_VIEW_FACING, MESH_RESOURCE, TRIANGLE_LIST =
 ADD, DELETE, DELETE_ALL = 0, 2, 3
 
 
-class ColorMsg(msgspec.Struct, frozen=True):
+class ColorMsg(msgspec.Struct, frozen=True, gc=False):
     """``std_msgs/ColorRGBA``; each from 0 to 1."""
 
     r: float
@@ -48,4 +50,5 @@ class MarkerMsg(Stamped, frozen=True, kw_only=True):
 class MarkerArrayMsg(msgspec.Struct, frozen=True):
     """``visualization_msgs/MarkerArray``."""
 
+    separable: ClassVar = True
     markers: list[MarkerMsg]

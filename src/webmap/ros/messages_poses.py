@@ -19,7 +19,7 @@ class PoseArrayMsg(Stamped, frozen=True, kw_only=True):
     poses: list[PoseMsg]
 
 
-class ParticleMsg(msgspec.Struct, frozen=True):
+class ParticleMsg(msgspec.Struct, frozen=True, gc=False):
     """``nav2_msgs/Particle``."""
 
     pose: PoseMsg

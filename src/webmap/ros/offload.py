@@ -3,8 +3,10 @@
 import asyncio
 import contextlib
 import logging
+import time
 from array import array
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import msgspec
@@ -12,46 +14,68 @@ import msgspec
 from webmap.children import python_command
 from webmap.errors import ProtocolError
 from webmap.ros.arrays import dec_hook
-from webmap.ros.decoding import convert
+from webmap.ros.decoding import Unreadable, convert
 from webmap.ros.events import Publish
-from webmap.ros.worker import LENGTH, MAX_MESSAGE, Answer, Request, view_name
+from webmap.ros.limits import LARGE, TooLarge
+from webmap.ros.worker import (
+    LENGTH,
+    MAX_MESSAGE,
+    Answer,
+    Request,
+    item_type,
+    view_name,
+)
 
 log = logging.getLogger("webmap.ros")
-
-LARGE = 256 << 10
-"""Bytes above which a frame is decoded elsewhere."""
 
 PATIENCE = 20.0
 """Longest time for one frame, in seconds."""
 
+CHUNK = 1 << 20
+"""Bytes that are copied at a time: nothing else runs meanwhile."""
+
+MOST_STATIC = 16
+"""Messages of ``/tf_static`` that wait while one is decoded; each is sent but once."""
+
+
+class Reply(NamedTuple):
+    """An answer, what belongs to it, and how long the worker was busy with it."""
+
+    answer: Answer
+    parts: list[bytearray]
+    seconds: float
+
 
 class _Worker:
-    """The one worker process of this process; started by the first large frame."""
+    """The one worker process of this process; started by the first large frame.
+
+    It does one thing at a time, in the order in which it is asked. Each bridge asks for
+    one thing at a time, so every bridge gets its turn.
+    """
 
     def __init__(self) -> None:
         self.users: set[int] = set()
         self._process: asyncio.subprocess.Process | None = None
         self._turn = asyncio.Lock()
 
-    async def decode(self, message: Publish, type: Any) -> None:
-        """Let ``message`` know itself as ``type``, or what is wrong with it."""
-        view = view_name(type)
-        request = Request(message.topic, message.frame, view)
+    async def ask(self, request: Request, data: bytes | memoryview) -> Reply:
+        """Have a request answered; what goes wrong with that is an answer, too."""
         async with self._turn:
+            began = time.monotonic()
             try:
                 async with asyncio.timeout(PATIENCE):
-                    answer = await self._ask(request)
-            except (OSError, EOFError, TimeoutError) as error:
+                    answer, parts = await self._ask(request, data)
+            except (OSError, EOFError, TimeoutError, msgspec.MsgspecError) as error:
                 await self.stop()
-                why = ProtocolError(f"its decoder ended: {error!r}")
-                message.prime(type, why)
-                return
+                answer, parts = Answer(error=f"its decoder ended: {error!r}"), []
             except asyncio.CancelledError:
                 await self.stop()  # an answer that nobody reads would meet the next
                 raise
-        message.prime(type, _outcome(answer, type, view))
+            return Reply(answer, parts, time.monotonic() - began)
 
-    async def _ask(self, request: Request) -> Answer:
+    async def _ask(
+        self, request: Request, data: bytes | memoryview
+    ) -> tuple[Answer, list[bytearray]]:
         process = self._process
         if process is None or process.returncode is not None:
             process = self._process = await _start()
@@ -59,13 +83,19 @@ class _Worker:
             raise EOFError("the worker has no pipes")
         body = msgspec.msgpack.encode(request)
         process.stdin.write(LENGTH.pack(len(body)) + body)
+        view = memoryview(data)
+        for at in range(0, len(data), CHUNK):
+            process.stdin.write(view[at : at + CHUNK])
+            await process.stdin.drain()
         await process.stdin.drain()
         (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
-        if length > MAX_MESSAGE:
+        if length > CHUNK:
             raise EOFError(f"an answer of {length} bytes")
-        return msgspec.msgpack.decode(
-            await process.stdout.readexactly(length), type=Answer
-        )
+        head = await process.stdout.readexactly(length)
+        answer = msgspec.msgpack.decode(head, type=Answer)
+        if sum(answer.sizes) > MAX_MESSAGE:
+            raise EOFError(f"an answer of {sum(answer.sizes)} bytes")
+        return answer, [await _read(process.stdout, size) for size in answer.sizes]
 
     async def stop(self) -> None:
         """End the process; the next large frame starts another."""
@@ -87,18 +117,57 @@ async def _start() -> asyncio.subprocess.Process:
     )
 
 
-def _outcome(answer: Answer, type: Any, view: str | None) -> Any:
-    """Return the value of an answer, or the error that it is."""
+async def _read(stream: asyncio.StreamReader, size: int) -> bytearray:
+    """Return so many bytes; no copy on the way is long enough to be noticed."""
+    found, at = bytearray(size), 0
+    while at < size:
+        piece = await stream.read(min(CHUNK, size - at))
+        if not piece:
+            raise EOFError("the worker has ended")
+        found[at : at + len(piece)] = piece
+        at += len(piece)
+    return found
+
+
+def values(answer: Answer, parts: list[bytearray], type: Any) -> Iterator[Any]:
+    """Take the value of an answer apart, a step for each part that came.
+
+    Yields:
+        For a type that is ``separable``, each part as a message of its own. For others,
+        None for each step and in the end the message.
+
+    Raises:
+        ProtocolError: If the answer is an error, or not of the type.
+
+    """
     if answer.error is not None:
-        return ProtocolError(answer.error)
+        raise _ERRORS.get(answer.kind, ProtocolError)(answer.error)
     try:
-        if view is not None:
-            decoder = msgspec.msgpack.Decoder(type, dec_hook=dec_hook)
-            return decoder.decode(answer.message)
-        plain = msgspec.msgpack.decode(answer.message, ext_hook=_array)
-        return plain if type is None else convert(plain, type)
+        if view_name(type) is None:
+            plain = msgspec.msgpack.decode(parts[0], ext_hook=_array)
+            yield plain if type is None else convert(plain, type)
+            return
+        message = msgspec.msgpack.decode(parts[0], type=type, dec_hook=dec_hook)
+        if answer.field is not None:
+            item: Any = item_type(message, answer.field)
+            items = msgspec.msgpack.Decoder(list[item])
+            whole = getattr(message, answer.field)
+            separable = getattr(type, "separable", False)
+            for part in parts[1:]:
+                yield message if separable else None
+                more = items.decode(part)
+                if separable:
+                    message = msgspec.structs.replace(message, **{answer.field: more})
+                else:
+                    whole += more
+        yield message
     except (msgspec.DecodeError, ProtocolError) as error:
-        return ProtocolError(str(error))
+        raise ProtocolError(str(error)) from None
+
+
+_ERRORS: dict[str, type[ProtocolError]] = {
+    error.__name__: error for error in (TooLarge, Unreadable)
+}
 
 
 def _array(code: int, data: memoryview) -> "array[Any]":
@@ -129,67 +198,118 @@ async def _release(user: object) -> None:
         await worker.stop()
 
 
+async def aside(
+    function: Callable[..., bytes], data: bytes | memoryview, *arguments: object
+) -> bytearray:
+    """Return what a function of WebMap's own makes of bytes, in the worker process.
+
+    Raises:
+        ProtocolError: If it raises one, or does not end.
+
+    """
+    user, name = object(), view_name(function)
+    request = Request(len(data), call=name, arguments=list(arguments))
+    worker = _acquire(user)
+    try:
+        reply = await worker.ask(request, data)
+    finally:
+        await _release(user)
+    if reply.answer.error is not None:
+        raise ProtocolError(reply.answer.error)
+    return reply.parts[0]
+
+
 class _Job(NamedTuple):
     message: Publish
     types: frozenset[Any]
-    then: tuple[Callable[[], None], ...]
-
-
-def _merged(before: _Job | None, job: _Job) -> _Job:
-    """Return what waits now: both, where two listeners want the same message."""
-    if before is None or before.message is not job.message:
-        return job
-    return _Job(job.message, before.types | job.types, before.then + job.then)
+    then: tuple[Callable[[Any], None], ...]
 
 
 class Offload:
-    """The large frames of one bridge: in order within a topic, the newest wins."""
+    """The large frames of one bridge: in order within a topic, the newest wins.
+
+    Of one bridge, one frame at a time is with the worker process. After that no other
+    is for as long as it took, so that the process is free half of the time at least.
+    """
 
     def __init__(self) -> None:
-        self._waiting: dict[str, _Job | None] = {}
+        self._waiting: dict[str, deque[_Job]] = {}
         """For each topic that is being decoded, what comes after."""
         self._tasks: set[asyncio.Task[None]] = set()
+        self._turn = asyncio.Lock()
+        self._rests_until = 0.0
 
     def wants(self, message: Publish) -> bool:
         """Return whether ``message`` must not be decoded here and now."""
         return len(message.frame) > LARGE or message.topic in self._waiting
 
     def decode(
-        self, message: Publish, types: frozenset[Any], then: Callable[[], None]
+        self, message: Publish, types: frozenset[Any], then: Callable[[Any], None]
     ) -> None:
-        """Decode ``message`` as each of ``types`` elsewhere, and call ``then``.
+        """Decode ``message`` as each of ``types`` elsewhere, and call ``then`` of each.
 
-        What waits for its turn is dropped when a newer message of its topic comes.
+        It is called once, or for each part of what is ``separable``. What waits for its
+        turn is dropped when a newer message of its topic comes, and so is the rest of
+        what is handed over in parts.
         """
         job = _Job(message, types, (then,))
-        if message.topic in self._waiting:
-            self._waiting[message.topic] = _merged(self._waiting[message.topic], job)
+        waiting = self._waiting.get(message.topic)
+        if waiting is not None:
+            _join(waiting, job)
             return
-        self._waiting[message.topic] = None
+        self._waiting[message.topic] = deque()
         task = asyncio.ensure_future(self._work(message.topic, job))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _work(self, topic: str, first: _Job) -> None:
-        job: _Job | None = first
+    async def _work(self, topic: str, job: _Job) -> None:
+        waiting = self._waiting[topic]
         try:
-            while job is not None:
-                await self._one(job)
-                job, self._waiting[topic] = self._waiting[topic], None
+            while True:
+                await self._one(job, waiting)
+                if not waiting:
+                    break
+                job = waiting.popleft()
         finally:
             del self._waiting[topic]
 
-    async def _one(self, job: _Job) -> None:
-        if len(job.message.frame) > LARGE:
-            worker = _acquire(self)
-            for type in job.types:
-                if not job.message.is_decoded(type):
-                    await worker.decode(job.message, type)
-        for then in job.then:
-            try:
-                then()
-            except Exception:
-                log.exception("a message on %s was lost", job.message.topic)
+    async def _one(self, job: _Job, waiting: deque[_Job]) -> None:
+        for type in job.types:
+            message = job.message
+            if len(message.frame) <= LARGE or message.is_decoded(type):
+                _call(job, type)
+                continue
+            async with self._turn:
+                wait = self._rests_until - time.monotonic()
+                if wait > 0:
+                    await asyncio.sleep(wait)
+                    if _is_late(job, waiting):
+                        return
+                size, view = len(message.frame), view_name(type)
+                request = Request(size, message.topic, view)
+                reply = await _acquire(self).ask(request, message.frame)
+                self._rests_until = time.monotonic() + reply.seconds
+            await self._hand_over(job, type, reply, waiting)
+
+    async def _hand_over(
+        self, job: _Job, type: Any, reply: Reply, waiting: deque[_Job]
+    ) -> None:
+        """Give the others their turn after each step."""
+        steps = 0
+        try:
+            for value in values(reply.answer, reply.parts, type):
+                if value is not None:
+                    job.message.prime(type, value)
+                    _call(job, type)
+                    steps += 1
+                await asyncio.sleep(0)
+                if _is_late(job, waiting):
+                    break
+        except ProtocolError as error:
+            job.message.prime(type, error)
+            _call(job, type)
+        if steps > 1:  # of which the last part is not the message
+            job.message.forget(type)
 
     async def stop(self) -> None:
         """Forget what is under way, and end the process if nobody else uses it."""
@@ -198,3 +318,31 @@ class Offload:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await _release(self)
+
+
+def _join(waiting: deque[_Job], job: _Job) -> None:
+    """Let a message wait instead of an older one; of static frames, each counts."""
+    if waiting and waiting[-1].message is job.message:
+        last = waiting.pop()
+        job = _Job(job.message, last.types | job.types, last.then + job.then)
+    elif not _counts(job) or len(waiting) >= MOST_STATIC:
+        waiting.clear()
+    waiting.append(job)
+
+
+def _is_late(job: _Job, waiting: deque[_Job]) -> bool:
+    """Return whether a newer message came, for which this one is dropped."""
+    return bool(waiting) and not _counts(job)
+
+
+def _counts(job: _Job) -> bool:
+    """Return whether a message is sent but once, and says what no other does."""
+    return job.message.topic.endswith("/tf_static")
+
+
+def _call(job: _Job, type: Any) -> None:
+    for then in job.then:
+        try:
+            then(type)
+        except Exception:
+            log.exception("a message on %s was lost", job.message.topic)

@@ -5,6 +5,7 @@ The ``websockets`` package deals at once with all that asyncio has read, which m
 """
 
 import asyncio
+import math
 import time
 
 from websockets.asyncio.client import ClientConnection
@@ -20,6 +21,9 @@ MAX_WAITING = 1 << 20
 class PacedConnection(ClientConnection):
     """A connection that takes turns with the others of its loop."""
 
+    bytes_came = -math.inf
+    """When the last bytes came, by :func:`time.monotonic`."""
+
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin."""
         super().connection_made(transport)
@@ -33,6 +37,7 @@ class PacedConnection(ClientConnection):
 
     def data_received(self, data: bytes) -> None:
         """Keep bytes until the connection has its turn."""
+        self.bytes_came = time.monotonic()
         self._waiting += data
         if len(self._waiting) > MAX_WAITING and self._reading:
             self._reading = False

@@ -5,9 +5,10 @@ import binascii
 import io
 
 from webmap.errors import ProtocolError
+from webmap.ros.limits import MAX_OTHER
 
 
-def decode(data: str, *, max_bytes: int = 32 << 20) -> bytes:
+def decode(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
     """Return the text in the pixels of a PNG given in base64.
 
     Raises:
@@ -29,7 +30,11 @@ def _pixels(packed: bytes, max_bytes: int) -> bytes:
     width = int.from_bytes(packed[16:20], "big")
     height = int.from_bytes(packed[20:24], "big")
     if width * height * 3 > max_bytes:
-        raise ProtocolError(f"a PNG of {width} x {height}, which is too large")
+        raise ProtocolError(
+            f"a PNG of {width} x {height}, which is too large: it holds "
+            f"{width * height * 3} bytes, and {max_bytes} are the limit; subscribe "
+            "with compression='cbor'"
+        )
     try:
         with Image.open(io.BytesIO(packed), formats=["PNG"]) as image:
             if image.mode != "RGB" or image.size != (width, height):

@@ -23,9 +23,14 @@ from webmap.ros.events import (
     Unknown,
 )
 from webmap.ros.fragments import Fragment, Fragments
-
-MAX_FRAME = 64 << 20
-"""Most bytes of a frame that are looked at."""
+from webmap.ros.limits import (
+    LARGE,
+    MAX_FRAME,
+    MAX_NUMBERS,
+    MAX_OTHER,
+    MIB,
+    check_count,
+)
 
 # How every bridge measured begins a message on a topic.
 _JSON_HEAD = re.compile(
@@ -99,6 +104,8 @@ class Protocol:
         topic = topic_in_head(frame)
         if topic is not None:
             return Publish(topic, frame)
+        if len(frame) > LARGE:
+            _check_other(frame)
         if cbor.looks_like_cbor(frame):
             return _read_map(frame)
         op = decode_json(frame, _Op).op
@@ -121,7 +128,7 @@ class Protocol:
         text = self._fragments.add(decode_json(frame, Fragment), now)
         if text is None:
             return None
-        event = self._read(_encoded(text), now, nested=True)
+        event = self._read(text, now, nested=True)
         if isinstance(event, Publish):
             event.in_parts = True
         return event
@@ -133,6 +140,22 @@ class Protocol:
         ):
             raise ProtocolError("a PNG that holds another wrapping")
         return self._read(frame, now, nested=True)
+
+
+def _check_other(frame: bytes) -> None:
+    """Let a large frame pass that is decoded here and now, and not by the worker."""
+    if len(frame) > MAX_OTHER:
+        raise ProtocolError(
+            f"a frame of {len(frame) / MIB:.1f} MiB that does not begin as a message "
+            f'on a topic ({{"op":"publish","topic":...); others have '
+            f"{MAX_OTHER // MIB} MiB at most"
+        )
+    check_count(frame)
+    if b"NaN" in frame and frame.count(b",") > MAX_NUMBERS:
+        raise ProtocolError(
+            f"a frame with NaN and more than {MAX_NUMBERS} values; without NaN, which "
+            "is no JSON, it may have more"
+        )
 
 
 def topic_in_head(frame: bytes) -> str | None:
@@ -164,13 +187,6 @@ def _flat(event: ServiceResponse | CallService | Status) -> Event:
     for name in ("values", "args", "msg"):
         check_depth(getattr(event, name, None))
     return event
-
-
-def _encoded(text: str) -> bytes:
-    try:
-        return text.encode()
-    except UnicodeEncodeError as error:
-        raise ProtocolError(f"fragments that are no text: {error}") from None
 
 
 def _read_map(frame: bytes) -> Event:

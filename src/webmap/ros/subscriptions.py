@@ -13,6 +13,7 @@ from webmap.ros import large, ops
 from webmap.ros.callbacks import Callback
 from webmap.ros.events import Publish
 from webmap.ros.large import InJson
+from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
 from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.throttle import Throttle
 from webmap.scope import Scope, current_scope
@@ -314,15 +315,31 @@ class Topic:
             )
         )
 
-    def received(self, message: Publish) -> None:
-        """Note a message that came."""
+    def received(self, message: Publish) -> bool:
+        """Note a message that came; False if it is too large for its type.
+
+        One that is too large is reported and belongs to nobody.
+        """
         self.count += 1
+        size = len(message.frame)
+        if size > GENERAL.size:
+            views = [listener.decode for listener in self.listeners]
+            type = self.message_type
+            try:
+                check_size(size, limit_of(type, views), type)
+            except TooLarge as error:
+                self.failing.add(TooLarge)
+                self._find_out(error, None)
+                return False
         self._latest = message
         too_large = self._in_json.received(in_parts=message.in_parts)
         if too_large:
             self._too_large(self, len(message.frame))
         elif too_large is False:
             self.renew()
+        if size > LARGE and self.replay is None:  # nobody will ask for it
+            self._latest = None
+        return True
 
     @property
     def replay(self) -> Publish | None:
@@ -382,7 +399,7 @@ class Topic:
 
     def understood(self, decode: type[msgspec.Struct] | None) -> None:
         """Note that messages decode so, and take back what is true no more."""
-        self.failing.discard(_Silence)
+        self.failing -= {_Silence, TooLarge}
         self._succeeds(decode)
 
     def _succeeds(self, decode: type[msgspec.Struct] | None) -> None:

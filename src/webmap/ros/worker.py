@@ -2,7 +2,7 @@
 
 It reads requests from its standard input and writes answers to its standard output,
 one after the other, and ends when its input does. Each is a length of 4 bytes,
-little-endian, and that much MessagePack.
+little-endian, that much MessagePack, and the bytes that it announces.
 """
 
 import importlib
@@ -11,7 +11,9 @@ import signal
 import struct
 import sys
 from array import array
-from typing import Any, BinaryIO
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Any, BinaryIO, get_args, get_type_hints
 
 import msgspec
 
@@ -19,6 +21,7 @@ from webmap.errors import ProtocolError
 from webmap.memory import return_large_pieces
 from webmap.ros.arrays import Numbers
 from webmap.ros.events import Publish
+from webmap.ros.limits import check_count, check_items
 
 LENGTH = struct.Struct("<I")
 MAX_MESSAGE = 512 << 20
@@ -26,55 +29,121 @@ MAX_MESSAGE = 512 << 20
 BACKGROUND = 10
 """How nice the process is: a map may come later, what drives a robot may not."""
 
+MEMORY = 1536 << 20
+"""Bytes of memory that the process may use; a message that needs more is an error."""
+
+PIECE = 32
+"""Items of a long list that are handed over at a time: a few milliseconds of work."""
+
 
 class Request(msgspec.Struct, array_like=True):
-    """One frame, and what to make of it."""
+    """One frame and what to make of it, or a function to be called with bytes."""
 
-    topic: str
-    frame: bytes
-    view: str | None
+    size: int
+    """Bytes that follow: the frame, or the function's first argument."""
+
+    topic: str = ""
+    view: str | None = None
     """``module:name`` of a view of WebMap's own, or None for a plain mapping."""
+
+    call: str | None = None
+    """``module:name`` of a function of WebMap's own that returns bytes."""
+
+    arguments: list[Any] = []
+    """The further arguments of the function."""
 
 
 class Answer(msgspec.Struct, array_like=True):
-    """What became of it."""
+    """What became of it; the bytes of each part follow, one after the other."""
 
-    message: msgspec.Raw = msgspec.Raw(b"\xc0")
+    sizes: list[int] = []
+    """Bytes of each part: the message, then further items of one of its lists."""
+
+    field: str | None = None
+    """Which list that is."""
+
     error: str | None = None
+    kind: str = ""
+    """The class of the error."""
 
 
-def view_name(view: Any) -> str | None:
-    """Return how a view is named to the worker, or None if it cannot be.
+def view_name(thing: Any) -> str | None:
+    """Return how a view or a function is named to the worker, or None if it cannot be.
 
     Only WebMap's own are: a script's types would need the script to be run again.
     """
-    own = view is not None and view.__module__.startswith("webmap.")
-    if not own or "<" in view.__qualname__:
+    own = thing is not None and thing.__module__.startswith("webmap.")
+    if not own or "<" in thing.__qualname__:
         return None
-    return f"{view.__module__}:{view.__qualname__}"
+    return f"{thing.__module__}:{thing.__qualname__}"
 
 
-def answer(request: Request) -> Answer:
-    """Return the decoded message, or what is wrong with it."""
+def answer(request: Request, data: bytes) -> tuple[Answer, list[bytes]]:
+    """Return what became of a request, and the parts."""
     try:
-        message = Publish(request.topic, request.frame).decode(_view(request.view))
-        return Answer(msgspec.Raw(_encode(message)))
+        if request.call is not None:
+            made = _named(request.call)(data, *request.arguments)
+            return Answer([len(made)]), [made]
+        check_count(data)
+        view = _named(request.view)
+        message = Publish(request.topic, data).decode(view)
+        if hasattr(view, "digest"):
+            message = message.digest()
+        field, parts = _parts(message)
+        return Answer([len(part) for part in parts], field), parts
+    except MemoryError:
+        return Answer(error="it takes too much memory to be decoded"), []
     except ProtocolError as error:
-        return Answer(error=str(error))
+        return Answer(error=str(error), kind=type(error).__name__), []
     except Exception as error:  # whatever a robot sent, the next frame is due
-        return Answer(error=f"it cannot be decoded: {error!r}")
+        return Answer(error=f"it cannot be decoded: {error!r}"), []
 
 
-def _view(name: str | None) -> Any:
+def _named(name: str | None) -> Any:
     if name is None:
         return None
     module, _, attribute = name.partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
+def _parts(message: Any) -> tuple[str | None, list[bytes]]:
+    """Return a message in MessagePack, its longest list of structs in pieces."""
+    field = long_list(message)
+    if field is None:
+        return None, [_encode(message)]
+    items = getattr(message, field)
+    check_items(field, len(items))
+    first = msgspec.structs.replace(message, **{field: items[:PIECE]})
+    return field, [_encode(first), *map(_encode, _slices(items))]
+
+
+def _slices(items: Sequence[Any]) -> Iterator[Sequence[Any]]:
+    for at in range(PIECE, len(items), PIECE):
+        yield items[at : at + PIECE]
+
+
+def long_list(message: Any) -> str | None:
+    """Return the name of the longest list of structs, None if it is no long one."""
+    found, most = None, PIECE
+    if isinstance(message, msgspec.Struct):
+        for name in message.__struct_fields__:
+            value = getattr(message, name)
+            if type(value) is list and len(value) > most and item_type(message, name):
+                found, most = name, len(value)
+    return found
+
+
+def item_type(message: Any, field: str) -> Any:
+    """Return the type of the structs in a list of a message; None if there are none."""
+    items = get_args(get_type_hints(type(message)).get(field))
+    if items and isinstance(items[0], type) and issubclass(items[0], msgspec.Struct):
+        return items[0]
+    return None
+
+
 def _enc_hook(value: Any) -> Any:
     if isinstance(value, Numbers):
-        return bytes(value)
+        return memoryview(value.values).cast("B")
     if isinstance(value, array):
         return msgspec.msgpack.Ext(ord(value.typecode), value.tobytes())
     raise ProtocolError(f"a message cannot hold a {type(value).__name__}")
@@ -83,14 +152,18 @@ def _enc_hook(value: Any) -> Any:
 _encode = msgspec.msgpack.Encoder(enc_hook=_enc_hook).encode
 
 
-def read(stream: BinaryIO) -> bytes | None:
-    """Return the next message of the stream, or None at its end."""
+def read(stream: BinaryIO) -> tuple[Request, bytes] | None:
+    """Return the next request of the stream and its bytes, or None at its end."""
     head = stream.read(LENGTH.size)
     if len(head) < LENGTH.size:
         return None
     (length,) = LENGTH.unpack(head)
     body = stream.read(length)
-    return body if len(body) == length else None
+    if len(body) < length:
+        return None
+    request = msgspec.msgpack.decode(body, type=Request)
+    data = stream.read(request.size)
+    return (request, data) if len(data) == request.size else None
 
 
 def main() -> None:
@@ -99,13 +172,24 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if os.name == "posix":
         os.nice(BACKGROUND)
+        _bound_memory()
     return_large_pieces()
-    decoder = msgspec.msgpack.Decoder(Request)
-    encoder = msgspec.msgpack.Encoder()
-    while (body := read(sys.stdin.buffer)) is not None:
-        reply = encoder.encode(answer(decoder.decode(body)))
-        sys.stdout.buffer.write(LENGTH.pack(len(reply)) + reply)
+    encode = msgspec.msgpack.Encoder().encode
+    while (asked := read(sys.stdin.buffer)) is not None:
+        reply, parts = answer(*asked)
+        del asked
+        body = encode(reply)
+        sys.stdout.buffer.write(LENGTH.pack(len(body)) + body)
+        for part in parts:
+            sys.stdout.buffer.write(part)
         sys.stdout.buffer.flush()
+
+
+def _bound_memory() -> None:
+    import resource
+
+    with suppress(OSError, ValueError):  # a lower bound is in force already
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 
 if __name__ == "__main__":

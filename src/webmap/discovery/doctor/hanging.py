@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from webmap.ros import ops
 from webmap.ros.events import CallService, ServiceResponse
-from webmap.ros.protocol import MAX_FRAME, Protocol
+from webmap.ros.limits import MAX_FRAME
+from webmap.ros.protocol import Protocol
 
 if TYPE_CHECKING:
     from websockets.asyncio.client import ClientConnection

@@ -10,7 +10,8 @@ from webmap.discovery.doctor.observed import Heard
 from webmap.discovery.doctor.sampling import Sampling
 from webmap.ros import ops
 from webmap.ros.events import Publish
-from webmap.ros.protocol import MAX_FRAME, Protocol
+from webmap.ros.limits import MAX_FRAME
+from webmap.ros.protocol import Protocol
 
 FRAMES_AT_ONCE = 100
 """Messages with frames that the bridge may hold back; each one counts."""

@@ -4,11 +4,11 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from webmap.core.grid_picture import Palette, check_palette, grid_png, place_grid
+from webmap.core.grid_picture import Palette, check_palette, draw_aside, place_grid
 from webmap.core.layer import Layer
 from webmap.core.pictures import Picture
 from webmap.core.tasks import spawn
-from webmap.errors import ConfigError
+from webmap.errors import ConfigError, ProtocolError
 from webmap.map_file import MapImage, read_map
 
 if TYPE_CHECKING:
@@ -68,8 +68,9 @@ class FileLayer(Layer):
 
     async def _read(self) -> None:
         try:
-            image, png = await asyncio.to_thread(self._draw)
-        except (ConfigError, MemoryError) as error:
+            image = await asyncio.to_thread(read_map, self.file)
+            png = await draw_aside(image.cells, self.palette)
+        except (ConfigError, ProtocolError, MemoryError) as error:
             self.set_problem(self, f"map {error}")
             return
         if self.scope.closed:
@@ -79,7 +80,3 @@ class FileLayer(Layer):
         self.picture.show(
             png, place_grid(image.origin, height), width, height, image.resolution
         )
-
-    def _draw(self) -> tuple[MapImage, bytes]:
-        image = read_map(self.file)
-        return image, grid_png(image.cells, self.palette)

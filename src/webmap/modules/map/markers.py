@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 import msgspec
 
@@ -47,6 +47,7 @@ class FramedMarkerMsg(MarkerMsg, frozen=True, kw_only=True):
 class FramedMarkerArrayMsg(msgspec.Struct, frozen=True):
     """``visualization_msgs/MarkerArray``."""
 
+    separable: ClassVar = True
     markers: list[FramedMarkerMsg]
 
 
@@ -64,6 +65,15 @@ VIEWS: dict[str, type[FramedMarkerMsg] | type[FramedMarkerArrayMsg]] = {
 }
 
 Key = tuple[str, int]
+
+MOST_COUNTED = 100_000
+"""Markers that are counted of those that are left out."""
+
+SETTLED = 0.5
+"""Seconds after the first that is left out until their number is said."""
+
+_LEFT_OUT = "left out"
+"""The problem of markers that are too many."""
 
 _MOVED = "moved"
 """The problem of markers that cannot be drawn where their frames have got to."""
@@ -153,6 +163,9 @@ class MarkerLayer(Layer):
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._said_unturned = False
+        self._left_out: set[Key] = set()
+        """Markers that would be beyond :data:`MAX_MARKERS`."""
+        self._count_timer: asyncio.TimerHandle | None = None
         self.svg.classes.add("markers")
         self.svg.set("data-layer", short(topic, "" if robot is None else robot.name))
         self.svg.set(pointer_events="none")
@@ -160,7 +173,9 @@ class MarkerLayer(Layer):
     def start(self) -> None:
         """Subscribe to the markers."""
         keep(Removal(self._forget_timer))
+        keep(Removal(self._forget_count))
         keep(Removal(lambda: self.clear_problem(_MOVED)))
+        keep(Removal(lambda: self.clear_problem(_LEFT_OUT)))
         # Every message counts: one may take away what another has put there.
         self.bridge.subscribe(
             self.topic,
@@ -198,8 +213,10 @@ class MarkerLayer(Layer):
         if marker.action == ADD:
             self._put(key, marker)
         elif marker.action == DELETE:
+            self._forget_left_out({key})
             self._drop(key)
         elif marker.action == DELETE_ALL:
+            self._forget_left_out(set(self._left_out))
             for each in tuple(self.shapes):
                 self._drop(each)
         else:
@@ -210,7 +227,9 @@ class MarkerLayer(Layer):
 
     def _put(self, key: Key, marker: FramedMarkerMsg) -> None:
         if key not in self.shapes and len(self.shapes) >= MAX_MARKERS:
-            raise ProtocolError(f"{MAX_MARKERS} markers are the limit")
+            self._leave_out(key)
+            return
+        self._forget_left_out({key})
         lifetime = marker.lifetime.seconds
         frame = self.frames.place(
             key,
@@ -228,6 +247,33 @@ class MarkerLayer(Layer):
         self._ends.pop(key, None)
         if lifetime > 0:
             self._ends[key] = time.monotonic() + lifetime
+
+    def _forget_left_out(self, keys: set[Key]) -> None:
+        if self._left_out:
+            self._left_out -= keys
+            if not self._left_out:
+                self.clear_problem(_LEFT_OUT)
+
+    def _leave_out(self, key: Key) -> None:
+        """Count a marker that has no room; that is said when no more come."""
+        if len(self._left_out) < MOST_COUNTED:
+            self._left_out.add(key)
+        if self._count_timer is None:
+            loop = asyncio.get_running_loop()
+            self._count_timer = loop.call_later(SETTLED, self._say_left_out)
+
+    def _say_left_out(self) -> None:
+        self._count_timer = None
+        count = len(self._left_out)
+        if count:
+            more = " or more" * (count == MOST_COUNTED)
+            self.set_problem(
+                _LEFT_OUT,
+                f"{self.topic}: {count}{more} markers are left out: {MAX_MARKERS} are "
+                "drawn at the most",
+            )
+        else:
+            self.clear_problem(_LEFT_OUT)
 
     def _move(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
         """Put a marker where its frame is by now.
@@ -305,6 +351,11 @@ class MarkerLayer(Layer):
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+    def _forget_count(self) -> None:
+        if self._count_timer is not None:
+            self._count_timer.cancel()
+            self._count_timer = None
 
 
 def _wrong(marker: MarkerMsg, error: WebMapError) -> str:

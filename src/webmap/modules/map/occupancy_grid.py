@@ -5,7 +5,13 @@ import math
 from typing import TYPE_CHECKING
 
 from webmap.core.anchored import Anchored
-from webmap.core.grid_picture import Palette, check_palette, grid_png, place_grid
+from webmap.core.grid_picture import (
+    Palette,
+    check_palette,
+    draw_aside,
+    grid_png,
+    place_grid,
+)
 from webmap.core.layer import Layer
 from webmap.core.pictures import Picture
 from webmap.core.refusals import refusing
@@ -24,7 +30,7 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 SMALL = 1 << 18
-"""Cells up to which a grid is drawn at once; a larger one in a thread of its own."""
+"""Cells up to which a grid is drawn at once; a larger one in the worker process."""
 
 NEVER = 1e9
 """Seconds after which a grid without an age limit is drawn as old."""
@@ -206,7 +212,12 @@ class Grid(Layer):
                 self._undrawn = False
                 cells, info = self.cells, self.info
                 # An update meanwhile may be half drawn; it has it drawn again.
-                png = await asyncio.to_thread(grid_png, cells, self.palette)
+                try:
+                    png = await draw_aside(cells, self.palette)
+                except ProtocolError as error:
+                    self.set_problem(self, f"{self.topic}: {error}")
+                    continue
+                self.clear_problem(self)
                 self._show(png, info)
         finally:
             self._drawing = None

@@ -30,10 +30,42 @@ CameraType: TypeAlias = Literal[
 
 PACKED, RAW = "sensor_msgs/CompressedImage", "sensor_msgs/Image"
 
+DRAWN = "jpeg"
+"""The encoding of a large raw picture that the worker process has drawn."""
+
+
+class ShownImageMsg(ImageMsg):
+    """A raw picture that comes as JPEG if it is large."""
+
+    def digest(self) -> ImageMsg:
+        """Return the picture as JPEG; called in the worker process.
+
+        Raises:
+            ProtocolError: If its encoding or its size cannot be used.
+
+        """
+        return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self))
+
+
+class ShownAnyImageMsg(AnyImageMsg):
+    """A picture of either type, that comes as JPEG if it is raw and large."""
+
+    def digest(self) -> AnyImageMsg:
+        """Return the picture as JPEG if it is raw; called in the worker process.
+
+        Raises:
+            ProtocolError: If its encoding or its size cannot be used.
+
+        """
+        if self.raw is None:
+            return self
+        return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self.raw))
+
+
 VIEWS: dict[str | None, type[msgspec.Struct]] = {
     PACKED: CompressedImageMsg,
-    RAW: ImageMsg,
-    None: AnyImageMsg,
+    RAW: ShownImageMsg,
+    None: ShownAnyImageMsg,
 }
 
 PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
@@ -142,6 +174,9 @@ class Camera(CameraFeed):
             ProtocolError: If its encoding or its size cannot be used.
 
         """
+        if image.encoding == DRAWN:
+            self.show(image.data, "image/jpeg", self._bridge.lag)
+            return
         self._undrawn = image
         if self._drawing is None:
             self._drawing = spawn(self._draw())

@@ -70,8 +70,8 @@ class HttpCamera(CameraFeed):
     def _show(self, data: bytes) -> None:
         try:
             media_type = CompressedImageMsg(data).media_type
-        except ProtocolError:
-            self._complain("what it sends is no JPEG, PNG or WebP")
+        except ProtocolError as error:
+            self._complain(f"it sends {error}")
             return
         self.robot.clear_problem(self)
         self.show(data, media_type)

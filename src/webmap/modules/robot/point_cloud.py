@@ -26,11 +26,22 @@ if TYPE_CHECKING:
 MANY = 100_000
 """Points of which no more are looked at one by one."""
 
+MOST = 2 * MANY
+"""Points of a large cloud that the worker process hands over, evenly chosen."""
+
 COLOURS = (
     "#30318f", "#2f6fde", "#1aa5c8", "#1fbf7a", "#8fcf2f", "#e8c51c", "#f08a1d",
     "#d02f2f",
 )  # fmt: skip
 """From low to high."""
+
+
+class ShownCloudMsg(PointCloud2Msg, frozen=True, kw_only=True):
+    """A cloud of which no more is handed over than can be drawn."""
+
+    def digest(self) -> PointCloud2Msg:
+        """Return what is to be drawn; called in the worker process."""
+        return self.thinned(MOST)
 
 
 class PointCloud:
@@ -135,7 +146,7 @@ class PointCloud:
             refusing(robot, topic, self.on_cloud),
             "sensor_msgs/PointCloud2",
             throttle=throttle,
-            decode=PointCloud2Msg,
+            decode=ShownCloudMsg,
         )
 
     def on_cloud(self, cloud: PointCloud2Msg) -> None:

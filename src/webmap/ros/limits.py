@@ -1,0 +1,208 @@
+"""How large a message may be: the one table of limits by type, and how it is checked.
+
+A message of one robot must not delay what other robots and their drivers see. So the
+bytes of a message are checked when it comes, and the number of values in it is counted
+before any of them is built.
+"""
+
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from webmap.errors import ProtocolError
+from webmap.ros.names import split_type
+
+MIB = 1 << 20
+
+MAX_FRAME = 64 * MIB
+"""Most bytes of a WebSocket message; a longer one ends the link."""
+
+MAX_OTHER = 4 * MIB
+"""Most bytes of a frame that is not plainly a message on a topic."""
+
+MAX_NUMBERS = 200_000
+"""Most values in such a frame if only the slow decoder takes it, since it has NaN."""
+
+LARGE = 256 << 10
+"""Bytes above which a frame is decoded by the worker process."""
+
+MAX_VALUES = 100_000
+"""Most objects and lists in one message, as JSON and CBOR have them."""
+
+MAX_ITEMS = 1_000_000
+"""Most data items in one message in CBOR, where an array of numbers is one item."""
+
+
+class TooLarge(ProtocolError):
+    """A message is larger than its type may be."""
+
+
+class Limit(NamedTuple):
+    """How large messages of a type may be, and why."""
+
+    size: int
+    """Bytes of the whole frame, as it comes."""
+
+    why: str
+    """Why the limit is where it is."""
+
+    advice: str
+    """What a person can do about a message that is larger."""
+
+
+GENERAL = Limit(
+    4 * MIB,
+    "room for 10,000 poses, transforms or markers, which is more than a page can show",
+    "publish less at a time, or on several topics",
+)
+
+_GRID = Limit(
+    64 * MIB,
+    "a map of 64 million cells has this size in CBOR",
+    "publish a coarser map, or a part of it",
+)
+
+LIMITS: dict[str, Limit] = {
+    "nav_msgs/OccupancyGrid": _GRID,
+    "map_msgs/OccupancyGridUpdate": _GRID,
+    "sensor_msgs/PointCloud2": Limit(
+        64 * MIB,
+        "a cloud of 4 million points of 16 bytes has this size in CBOR",
+        "thin the cloud on the robot, for instance with a voxel filter",
+    ),
+    "sensor_msgs/Image": Limit(
+        64 * MIB,
+        "a picture of 16 million pixels in three colours has 48 MiB",
+        "publish a smaller picture, or a compressed one",
+    ),
+    "sensor_msgs/CompressedImage": Limit(
+        8 * MIB,
+        "a picture of 4 MiB has 6 MiB in JSON, which writes it in base64",
+        "publish a smaller picture, or compress it more",
+    ),
+}
+"""The types, by the name in ROS 1, that may be larger than :data:`GENERAL`."""
+
+ITEMS = {
+    "transforms": (10_000, "4,096 frames are kept"),
+    "poses": (20_000, "500 of them are drawn"),
+    "particles": (20_000, "500 of them are drawn"),
+    "markers": (10_000, "5,000 of them are drawn"),
+    "status": (2_000, "1,000 parts of a robot are shown"),
+}
+"""Most items of one list of a message, and why, by the name of the field."""
+
+_VIEWS = {"ShownAnyImageMsg": "sensor_msgs/Image"}
+"""Views that belong to a type which nobody stated."""
+
+
+def limit_of(type: str | None, views: Iterable[object] = ()) -> Limit:
+    """Return the limit of a topic.
+
+    Args:
+        type: The message type, in either dialect; None if nobody stated it.
+        views: What the message is decoded as, which tells the type if nobody did.
+
+    """
+    if type is None:
+        names = (_VIEWS.get(getattr(view, "__name__", "")) for view in views)
+        type = next((name for name in names if name), None)
+    return GENERAL if type is None else LIMITS.get(str(split_type(type)), GENERAL)
+
+
+def check_size(size: int, limit: Limit, type: str | None) -> None:
+    """Refuse a message that is larger than its type may be.
+
+    Args:
+        size: Bytes of the frame.
+        limit: The limit of its topic.
+        type: The message type; None if nobody stated it.
+
+    Raises:
+        TooLarge: If it is larger; the words say what to do.
+
+    """
+    if size > limit.size:
+        raise TooLarge(
+            f"got a message of {size / MIB:.1f} MiB; {type or 'this topic'} may have "
+            f"{limit.size // MIB} MiB: {limit.advice}"
+        )
+
+
+def check_count(frame: bytes) -> None:
+    """Refuse a frame that holds more values than anything would be built for.
+
+    Args:
+        frame: A whole frame, JSON or CBOR. One that is neither passes: whoever decodes
+            it says so.
+
+    Raises:
+        TooLarge: If there are more than :data:`MAX_VALUES` objects and lists, or more
+            than :data:`MAX_ITEMS` items of CBOR.
+
+    """
+    if frame[:1] and 0xA0 <= frame[0] <= 0xBF:
+        _count_cbor(frame)
+    elif (
+        _brackets(frame) > MAX_VALUES
+        # Texts may have brackets, too.
+        and (count := _brackets(_TEXT.sub(b"", frame))) > MAX_VALUES
+    ):
+        raise _too_many(count, MAX_VALUES)
+
+
+def check_items(field: str, count: int) -> None:
+    """Refuse a list that is longer than anybody can use.
+
+    Args:
+        field: The field's name.
+        count: How many items are in the list.
+
+    Raises:
+        TooLarge: If there are more than :data:`ITEMS` allows.
+
+    """
+    most, _ = ITEMS.get(field, (MAX_VALUES, ""))
+    if count > most:
+        raise TooLarge(
+            f"got a message with {count} {field}; {most} are the limit: "
+            f"{GENERAL.advice}"
+        )
+
+
+# Possessive: nothing is kept in order to try again.
+_TEXT = re.compile(rb'"(?:[^"\\]++|\\.)*+"', re.DOTALL)
+
+
+def _brackets(text: bytes) -> int:
+    return text.count(b"{") + text.count(b"[")
+
+
+def _too_many(count: int, most: int) -> TooLarge:
+    what = "objects and lists" if most == MAX_VALUES else "items of CBOR"
+    return TooLarge(
+        f"got a message with {count} or more {what}; {most} are the limit: "
+        f"{GENERAL.advice}"
+    )
+
+
+def _count_cbor(frame: bytes) -> None:
+    """Walk from the head of one item to the next, as RFC 8949, 3 has them."""
+    at = items = values = 0
+    end = len(frame)
+    while at < end:
+        kind, info = frame[at] >> 5, frame[at] & 31
+        at += 1
+        length = info
+        if 24 <= info <= 27:
+            size = 1 << (info - 24)
+            length = int.from_bytes(frame[at : at + size], "big")
+            at += size
+        if kind in (2, 3) and info != 31:
+            at += length
+        items += 1
+        values += kind in (4, 5)
+        if values > MAX_VALUES:
+            raise _too_many(values, MAX_VALUES)
+        if items > MAX_ITEMS:
+            raise _too_many(items, MAX_ITEMS)

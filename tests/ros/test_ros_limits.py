@@ -1,0 +1,195 @@
+"""How large a message may be, and that nothing is built before that is looked at."""
+
+import asyncio
+import json
+import struct
+import tracemalloc
+from pathlib import Path
+
+import cbor2
+import pytest
+from fake_rosbridge import bridged, until
+
+from webmap.ros import limits, worker
+from webmap.ros.events import Malformed, Publish
+from webmap.ros.limits import (
+    GENERAL,
+    LIMITS,
+    MAX_ITEMS,
+    MAX_OTHER,
+    MAX_VALUES,
+    TooLarge,
+    check_count,
+    limit_of,
+)
+from webmap.ros.messages import TFMessage
+from webmap.ros.protocol import Protocol
+from webmap.scope import Scope
+
+MIB = 1 << 20
+
+
+@pytest.mark.parametrize(
+    ("type", "mib"),
+    [
+        (None, 4),
+        ("nav_msgs/Path", 4),
+        ("some_robot/msg/Anything", 4),
+        ("nav_msgs/OccupancyGrid", 64),
+        ("nav_msgs/msg/OccupancyGrid", 64),
+        ("sensor_msgs/msg/PointCloud2", 64),
+        ("sensor_msgs/Image", 64),
+        ("sensor_msgs/msg/CompressedImage", 8),
+    ],
+)
+def test_the_limit_hangs_on_the_type_in_either_dialect(type, mib):
+    assert limit_of(type).size == mib * MIB
+
+
+def test_no_type_may_have_more_than_a_link_takes():
+    assert all(limit.size <= limits.MAX_FRAME for limit in LIMITS.values())
+    assert all(limit.size > GENERAL.size for limit in LIMITS.values())
+
+
+def publish(text, topic="/t"):
+    return f'{{"op":"publish","topic":"{topic}","msg":{text}}}'.encode()
+
+
+def test_a_message_that_is_too_large_is_said_to_who_subscribed_and_logged_once(caplog):
+    text = json.dumps({"data": "x" * (5 * MIB)})
+
+    async def scenario():
+        got, said, mended = [], [], []
+        scope = Scope("page", lambda text, about: said.append(text), mended.append)
+        async with bridged() as (server, bridge):
+            with scope.active():
+                bridge.subscribe("/t", got.append, "std_msgs/String")
+            for _ in range(3):
+                await server.send(publish(text).decode())
+            await until(lambda: bridge.stats.frames >= 3)
+            await until(lambda: said)
+            assert got == []
+            assert said == [
+                "/t: got a message of 5.0 MiB; std_msgs/String may have 4 MiB: publish "
+                "less at a time, or on several topics"
+            ]
+            await server.send(publish('{"data":"small"}').decode())
+            await until(lambda: got)
+            assert len(mended) == 1
+            scope.close()
+
+    asyncio.run(scenario())
+    lines = [r for r in caplog.records if "got a message of" in r.getMessage()]
+    assert len(lines) == 1
+
+
+def test_objects_and_lists_are_counted_and_texts_are_not():
+    check_count(publish('{"a":[' + "[]," * (MAX_VALUES - 10) + "1]}"))
+    check_count(publish('{"a":"' + r"{[\"{\\" * MAX_VALUES + '"}'))
+    check_count(publish('{"a":[' + "1," * MAX_VALUES * 3 + "1]}"))
+    for many in ('{"a":[' + "{}," * MAX_VALUES + "1]}", "[" * (MAX_VALUES + 9)):
+        with pytest.raises(TooLarge, match=f"{MAX_VALUES} are the limit"):
+            check_count(publish(many))
+
+
+def test_items_of_cbor_are_counted_whatever_they_are():
+    op = {"op": "publish", "topic": "/t"}
+    check_count(cbor2.dumps({**op, "msg": {"data": b"\x80" * 5 * MIB, "n": [1.5, -7]}}))
+    check_count(cbor2.dumps({**op, "msg": cbor2.CBORTag(72, b"\x80" * 5 * MIB)}))
+    check_count(b"\xa1\x5f\x41a\xff\x01")  # a text in pieces
+    check_count(b"\xbf\xff\xa1")  # and what is cut off is somebody else's to refuse
+    head = cbor2.dumps({**op, "msg": 0})[:-1]
+    with pytest.raises(TooLarge, match="objects and lists"):
+        check_count(head + b"\x9b" + struct.pack(">Q", 1 << 60) + b"\x80" * MAX_VALUES)
+    with pytest.raises(TooLarge, match="items of CBOR"):
+        check_count(head + b"\x9a" + struct.pack(">I", MAX_ITEMS) + b"\x00" * MAX_ITEMS)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        publish('{"transforms":[' + "[]," * 10 * MAX_VALUES + "1]}"),
+        cbor2.dumps({"op": "publish", "topic": "/t", "msg": [[]] * 10 * MAX_VALUES}),
+    ],
+    ids=["json", "cbor"],
+)
+def test_the_worker_builds_nothing_of_what_it_refuses(frame):
+    tracemalloc.start()
+    try:
+        reply, _ = worker.answer(worker.Request(len(frame), "/t"), frame)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert reply.kind == "TooLarge"
+    assert "are the limit" in reply.error
+    assert most < 3 * len(frame)  # what it counts is a copy without texts
+
+
+def transforms(count):
+    each = (
+        '{"child_frame_id":"f%d","transform":{"translation":{"x":1,"y":2,"z":0},'
+        '"rotation":{"x":0,"y":0,"z":0,"w":1}}}'
+    )
+    text = ",".join(each % number for number in range(count))
+    return publish('{"transforms":[' + text + "]}")
+
+
+def test_a_list_that_nobody_can_use_as_a_whole_is_refused():
+    frame = transforms(10_001)
+    view = worker.view_name(TFMessage)
+    reply, _ = worker.answer(worker.Request(len(frame), "/t", view), frame)
+    assert reply.error.startswith("got a message with 10001 transforms; 10000 are")
+
+
+@pytest.mark.parametrize("start", ['{"a":[', '{"msg":{"data":['])
+def test_a_large_frame_that_is_no_plain_message_is_refused_unread(start):
+    frame = start + "[]," * (MAX_OTHER // 3) + "[]]"
+    event = Protocol().receive(frame + ',"topic":"/t","op":"publish"}', 0.0)
+    assert isinstance(event, Malformed)
+    assert "4.0 MiB that does not begin as a message on a topic" in event.reason
+
+
+def test_an_answer_of_very_many_values_is_refused():
+    frame = '{"op":"service_response","values":[' + "[]," * MAX_VALUES + "1]}"
+    event = Protocol().receive(frame, 0.0)
+    assert isinstance(event, Malformed)
+    assert "objects and lists" in event.reason
+    slow = '{"op":"service_response","values":[NaN' + ",1" * limits.MAX_NUMBERS + "]}"
+    assert "NaN" in Protocol().receive(slow, 0.0).reason
+    quick = slow.replace("NaN", "1")
+    assert len(Protocol().receive(quick, 0.0).values) == limits.MAX_NUMBERS + 1
+
+
+def test_a_message_in_fragments_may_be_as_large_as_one_in_one_piece():
+    text = publish(json.dumps({"data": "é" * 3 * MIB})).decode()
+    pieces = [text[at : at + MIB] for at in range(0, len(text), MIB)]
+    protocol = Protocol()
+    for number, data in enumerate(pieces):
+        part = {"op": "fragment", "id": "1", "num": number, "total": len(pieces)}
+        event = protocol.receive(json.dumps({**part, "data": data}), 0.0)
+    assert isinstance(event, Publish)
+    assert event.decode()["data"] == "é" * 3 * MIB
+
+
+def test_fragments_are_counted_in_bytes_and_not_in_characters():
+    part = {"op": "fragment", "id": "1", "total": 50, "data": "\U0001f600" * (MIB // 2)}
+    protocol, events = Protocol(), []
+    for number in range(20):
+        text = json.dumps({**part, "num": number}, ensure_ascii=False)
+        events.append(protocol.receive(text, 0.0))
+    assert any(isinstance(event, Malformed) for event in events)
+
+
+def test_the_documented_limits_are_those_that_hold():
+    page = Path(__file__).parents[2] / "docs/reference/limits.md"
+    rows = [line.split("|")[1:-1] for line in page.read_text().splitlines()]
+    told = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row}
+    for name, limit in LIMITS.items():
+        (row,) = (cells for what, cells in told.items() if f"`{name}`" in what)
+        assert row == [str(limit.size // MIB), limit.why]
+    other = told["every other type, and a topic without a type"]
+    assert other == [str(GENERAL.size // MIB), GENERAL.why]
+    for field, (most, why) in limits.ITEMS.items():
+        (row,) = (cells for what, cells in told.items() if f"`{field}`" in what)
+        assert row == [f"{most:,}", why]
+    assert told["objects and lists in one message"][0] == f"{MAX_VALUES:,}"

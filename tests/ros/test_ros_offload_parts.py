@@ -1,0 +1,260 @@
+"""What becomes of large messages: in steps, in turns, and without stopping the rest."""
+
+import asyncio
+import json
+import resource
+import time
+
+import cbor2
+import pytest
+from fake_rosbridge import until
+from test_ros_limits import publish, transforms
+
+from webmap.modules.map.markers import FramedMarkerArrayMsg
+from webmap.ros import offload, worker
+from webmap.ros.events import Publish
+from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
+from webmap.ros.messages_diagnostics import DiagnosticArrayMsg
+from webmap.ros.offload import Offload
+
+STEP = 0.1
+"""Seconds of processor that no step may take: five times what any takes here."""
+
+
+def run(scenario):
+    try:
+        asyncio.run(asyncio.wait_for(scenario(), 60))
+        assert offload._shared is None
+    finally:
+        offload._shared = None  # for the next test
+
+
+def take(aside, message, view, got):
+    aside.decode(message, frozenset([view]), lambda type: got.append(read(message)))
+
+    def read(message):
+        return message.decode(view)
+
+
+def poses(count):
+    pose = (
+        '{"header":{"frame_id":"map"},"pose":{"position":{"x":%d,"y":2,"z":0},'
+        '"orientation":{"x":0,"y":0,"z":0,"w":1}}}'
+    )
+    text = ",".join(pose % number for number in range(count))
+    return publish('{"header":{},"poses":[' + text + "]}", "/plan")
+
+
+def statuses(count):
+    each = '{"name":"p%d","level":0,"values":[]}'
+    text = ",".join(each % number for number in range(count))
+    pad = ',{"name":"' + "x" * offload.LARGE + '","level":0}'
+    return publish('{"status":[' + text + pad + "]}", "/diagnostics")
+
+
+def markers(count):
+    marker = {
+        "header": {"frame_id": "map"},
+        "ns": "a",
+        "type": 1,
+        "action": 0,
+        "pose": {
+            "position": {"x": 1.0, "y": 2.0, "z": 0.0},
+            "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+        },
+        "scale": {"x": 1.0, "y": 1.0, "z": 1.0},
+        "color": {"r": 1.0, "g": 0.0, "b": 0.0, "a": 1.0},
+        "points": [],
+        "colors": [],
+    }
+    each = [json.dumps({**marker, "id": number}) for number in range(count)]
+    return publish('{"markers":[' + ",".join(each) + "]}", "/markers")
+
+
+LONG = {
+    TFMessage: ("transforms", "/t", transforms(9000)),
+    FramedMarkerArrayMsg: ("markers", "/markers", markers(8000)),
+    DiagnosticArrayMsg: ("status", "/diagnostics", statuses(1900)),
+    PathMsg: ("poses", "/plan", poses(16000)),
+}
+
+
+@pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
+def test_all_of_a_long_message_comes_in_order(view):
+    field, topic, frame = LONG[view]
+    assert len(frame) > offload.LARGE
+
+    async def scenario():
+        aside, got = Offload(), []
+        message = Publish(topic, frame)
+        take(aside, message, view, got)
+        whole = Publish(topic, frame).decode(view)
+        await until(lambda: topic not in aside._waiting)
+        items = [item for part in got for item in getattr(part, field)]
+        assert items == getattr(whole, field)
+        most = max(len(getattr(part, field)) for part in got)
+        if getattr(view, "separable", False):
+            assert most <= worker.PIECE
+            # Whoever comes later is given the whole of it, and not the last part.
+            assert not message.is_decoded(view)
+        else:
+            assert len(got) == 1
+        await aside.stop()
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
+def test_no_step_of_a_long_message_holds_the_processor(view):
+    """The steps of all tasks of this thread, by its own processor time."""
+    _, topic, frame = LONG[view]
+
+    async def scenario():
+        aside, got, steps = Offload(), [], []
+        take(aside, Publish("/warm", frame.replace(topic.encode(), b"/warm")), view, [])
+        await until(lambda: not aside._waiting)
+
+        async def tick():
+            while True:
+                before = time.thread_time()
+                await asyncio.sleep(0.001)
+                steps.append(time.thread_time() - before)
+
+        ticking = asyncio.create_task(tick())
+        take(aside, Publish(topic, frame), view, got)
+        await until(lambda: got and topic not in aside._waiting)
+        ticking.cancel()
+        assert max(steps) < STEP / 5
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_a_newer_message_ends_the_parts_of_an_older_one():
+    async def scenario():
+        aside, got = Offload(), []
+
+        def newer(_):
+            got.append("old")
+            if got == ["old"] * 3:
+                take(aside, Publish("/t", transforms(3)), TFMessage, got)
+
+        old = Publish("/t", transforms(9000))
+        aside.decode(old, frozenset([TFMessage]), newer)
+        await until(lambda: not aside._waiting)
+        assert got[:3] == ["old"] * 3
+        (new,) = got[3:]
+        assert len(new.transforms) == 3
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_of_static_frames_which_are_told_once_nothing_is_dropped():
+    async def scenario():
+        aside, got = Offload(), []
+        for count in (5000, 3, 4000):
+            frame = transforms(count).replace(b'"/t"', b'"/r1/tf_static"')
+            take(aside, Publish("/r1/tf_static", frame), TFMessage, got)
+        await until(lambda: not aside._waiting)
+        assert sum(len(part.transforms) for part in got) == 9003
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_a_robot_with_many_large_messages_leaves_another_its_turn():
+    """Many topics of one bridge wait, and then one message of another bridge comes."""
+
+    async def scenario():
+        greedy, other, order = Offload(), Offload(), []
+
+        def note(name):
+            return lambda _: order.append(name)
+
+        for number in range(12):
+            name = f"/plan{number}"
+            frame = poses(3000).replace(b'"/plan"', f'"{name}"'.encode())
+            greedy.decode(Publish(name, frame), frozenset([PathMsg]), note("greedy"))
+        await until(lambda: order)
+        plan = Publish("/plan", poses(3000))
+        other.decode(plan, frozenset([PathMsg]), note("other"))
+        await until(lambda: "other" in order)
+        assert order.index("other") <= 2
+        await greedy.stop()
+        await other.stop()
+
+    run(scenario)
+
+
+def test_after_a_long_message_its_bridge_rests_for_as_long(monkeypatch):
+    async def scenario():
+        aside, got = Offload(), []
+        take(aside, Publish("/plan", poses(3000)), PathMsg, got)
+        await until(lambda: got)
+        aside._rests_until = time.monotonic() + 0.4
+        began = time.monotonic()
+        take(aside, Publish("/plan", poses(3001)), PathMsg, got)
+        await asyncio.sleep(0.05)
+        take(aside, Publish("/plan", poses(3002)), PathMsg, got)  # the newest counts
+        await until(lambda: len(got) == 2)
+        assert time.monotonic() - began > 0.35
+        assert len(got[1].poses) == 3002
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_a_large_map_comes_in_pieces_that_nobody_notices():
+    side = 4000
+    op = {"op": "publish", "topic": "/map"}
+    origin = {
+        "position": {"x": 0.0, "y": 0.0},
+        "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+    }
+    info = {"resolution": 0.05, "width": side, "height": side, "origin": origin}
+    data = cbor2.CBORTag(72, bytes(side * side))
+    frame = cbor2.dumps({**op, "msg": {"header": {}, "info": info, "data": data}})
+
+    async def scenario():
+        aside, got, steps = Offload(), [], []
+
+        async def tick():
+            while True:
+                before = time.thread_time()
+                await asyncio.sleep(0.001)
+                steps.append(time.thread_time() - before)
+
+        ticking = asyncio.create_task(tick())
+        take(aside, Publish("/map", frame), OccupancyGridMsg, got)
+        await until(lambda: got)
+        ticking.cancel()
+        assert got[0].cells.shape == (side, side)
+        assert max(steps) < STEP
+        await aside.stop()
+
+    run(scenario)
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="Linux alone tells")
+def test_the_worker_may_use_so_much_memory_and_no_more():
+    async def scenario():
+        aside, got = Offload(), []
+        take(aside, Publish("/t", transforms(3000)), TFMessage, got)
+        await until(lambda: got)
+        pid = offload._shared._process.pid
+        bounds = resource.prlimit(pid, resource.RLIMIT_DATA)
+        assert bounds == (worker.MEMORY, worker.MEMORY)
+        await aside.stop()
+
+    run(scenario)
+
+
+def test_a_message_that_takes_too_much_memory_is_an_error(monkeypatch):
+    def decode(self, view):
+        raise MemoryError
+
+    monkeypatch.setattr(Publish, "decode", decode)
+    reply, parts = worker.answer(worker.Request(2, "/t"), b"{}")
+    assert reply.error == "it takes too much memory to be decoded"
+    assert not parts

@@ -1,0 +1,32 @@
+"""A person drives a good robot while others send messages that are far too large."""
+
+import pytest
+from safety_hostile import beside, drive
+from test_safety_hostile import check
+
+pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+
+PEERS = {
+    "beyond the limits": (
+        "huge_diagnostics",
+        "huge_path",
+        "huge_transforms",
+        "huge_markers",
+    ),
+    "just within them": (
+        "long_diagnostics",
+        "long_path",
+        "long_transforms",
+        "long_markers",
+    ),
+    "maps, clouds and pictures": ("large_map", "large_cloud", "large_picture"),
+    "of other kinds": ("long_line", "many_lists", "fragments", "bombs"),
+}
+"""Several robots at a time, each of which sends one of these once a second."""
+
+
+@pytest.mark.parametrize("peers", PEERS.values(), ids=PEERS)
+def test_large_messages_of_others_delay_no_tick_and_no_stop(bench, peers):
+    names = [f"safety_large_peers:{name}" for name in peers]
+    with beside(bench, *names, shown=True):
+        check(drive(bench))
