@@ -206,3 +206,11 @@ def test_a_page_that_is_closed_is_told_nothing(problems, channel, page):
     problems.leave(problems.maps[0])
     assert len(told(channel)) == 1
     page.closed = False
+
+
+def test_of_an_endless_sentence_the_beginning_is_shown(problems, lines):
+    problems.set("it", "x" * 100_000)
+    (standing,) = problems.standing.values()
+    assert standing == "x" * 1000 + "..."
+    problems.set("it", "x" * 100_000)
+    problems.report("y" * 100_000)

@@ -237,3 +237,18 @@ def test_others_are_told_and_the_badge_goes_with_the_module(link, robot, module)
 def test_a_time_of_nothing_is_refused(link, robot):
     with pytest.raises(ValueError, match="hold must be seconds above 0, got 0"):
         robot.add_module("Diagnostics", link, hold=0)
+
+
+def test_of_endless_texts_the_beginning_is_kept(link, module):
+    long = "x" * 100_000
+    part = {**status(long, 2, long), "hardware_id": long}
+    part["values"] = [{"key": f"{i}{long}", "value": long} for i in range(200)]
+    link.say("/diagnostics", array(part))
+    (kept,) = module.parts
+    assert (len(kept.name), len(kept.message), len(kept.hardware_id)) == (
+        256,
+        1000,
+        256,
+    )
+    assert len(kept.values) == 100
+    assert all(len(k) == 256 and len(v) == 1000 for k, v in kept.values.items())

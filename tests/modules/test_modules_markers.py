@@ -311,6 +311,16 @@ def test_markers_beyond_the_most_are_left_out_and_their_number_is_said(
     asyncio.run(scenario())
 
 
+def test_a_marker_with_an_endless_namespace_is_left_out_in_few_words(
+    link, layer, channel
+):
+    say(link, marker(CUBE, ns="n" * 100_000), marker(CUBE, id=2))
+    assert len(layer.svg.children) == 1
+    (said,) = channel.problems.values()
+    assert "a namespace of 100000 characters; 256 are the limit" in said
+    assert len(said) < 1100
+
+
 @pytest.mark.parametrize("ros2", [False, True])
 def test_a_marker_is_seen_for_its_lifetime_unless_it_comes_again(map, link, ros2):
     brief = {"sec": 0, "nanosec": 50_000_000} if ros2 else {"secs": 0, "nsecs": 5e7}

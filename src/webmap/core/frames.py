@@ -14,6 +14,7 @@ from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
 from webmap.scope import Removal, no_scope
 from webmap.tf import Buffer, Transform, TransformError
+from webmap.tf.buffer import LONGEST_NAME
 
 log = logging.getLogger("webmap.tf")
 
@@ -178,6 +179,7 @@ class Frames:
                 )
             except TransformError as error:
                 note = f"a transform was left out: {error}"
+                parent, child = parent[:LONGEST_NAME], child[:LONGEST_NAME]
             except ProtocolError as error:  # Of its stamp, which names no frames.
                 note = f"a transform was left out: {parent!r} -> {child!r}: {error}"
             if note and self.faults.note(parent, child, note, now):

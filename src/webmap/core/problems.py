@@ -24,6 +24,14 @@ class Told(Protocol):
 
 T = TypeVar("T", bound=Told)
 
+LONGEST = 1000
+"""Characters of a sentence that is shown."""
+
+
+def cut(text: str) -> str:
+    """Return a text that people may read; robots may put anything into one."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
 
 class Problems(Generic[T]):
     """The sentences of one thing that maps share, and the maps that show them.
@@ -51,7 +59,7 @@ class Problems(Generic[T]):
 
     def report(self, text: str) -> None:
         """Log a failure and show it on every map there is now."""
-        sentence = self._worded(text)
+        sentence = self._worded(cut(text))
         self._log.warning("%s", sentence)
         for map in self.maps:
             map.show_error(sentence)
@@ -62,6 +70,7 @@ class Problems(Generic[T]):
         A text that differs in its numbers alone is kept and not told. The same words
         go to the log once a minute at most, whether it was good in between or not.
         """
+        text = cut(text)
         before = self.standing.get(about)
         if before == text:
             return

@@ -46,6 +46,15 @@ class Reply(NamedTuple):
     seconds: float
 
 
+_WORKER_FAILURES = (
+    OSError,
+    EOFError,
+    TimeoutError,
+    msgspec.MsgspecError,
+    RuntimeError,  # of uvloop, for a pipe that has just closed
+)
+
+
 class _Worker:
     """The one worker process of this process; started by the first large frame.
 
@@ -65,7 +74,7 @@ class _Worker:
             try:
                 async with asyncio.timeout(PATIENCE):
                     answer, parts = await self._ask(request, data)
-            except (OSError, EOFError, TimeoutError, msgspec.MsgspecError) as error:
+            except _WORKER_FAILURES as error:
                 await self.stop()
                 answer, parts = Answer(error=f"its decoder ended: {error!r}"), []
             except asyncio.CancelledError:

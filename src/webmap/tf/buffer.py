@@ -30,6 +30,9 @@ SHARED = ("map", "world", "earth")
 MOST_FRAMES = 4096
 """Frames that are known at a time; of more, those heard of longest ago go."""
 
+LONGEST_NAME = 256
+"""Characters of a frame's name."""
+
 MOST_COMPARED = 200
 """Frames up to which it is looked for one whose name is like a missing one."""
 
@@ -113,6 +116,12 @@ class Buffer:
 
         """
         parent, child = self.name(parent, namespace), self.name(child, namespace)
+        longest = max(len(parent), len(child))
+        if longest > LONGEST_NAME:
+            raise TransformError(
+                f"a frame has a name of {longest} characters; {LONGEST_NAME} are the "
+                f"limit: {max(parent, child, key=len)[:40]!r}..."
+            )
         said = f"{parent!r} -> {child!r}"
         if not parent or not child:
             raise TransformError(f"{said}: a frame has no name")
@@ -248,6 +257,11 @@ class Buffer:
         name = self.name(frame)
         if name in self._tracks or name in self._roots:
             return name
+        if len(name) > LONGEST_NAME:
+            raise FrameMissing(
+                f"there is no frame with a name of {len(name)} characters; "
+                f"{LONGEST_NAME} are the limit: {name[:40]!r}..."
+            )
         said = self._missing.get(name)
         if said is None:  # Robots and modules ask for it at each message.
             if len(self._missing) >= _SENTENCES:

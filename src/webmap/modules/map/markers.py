@@ -66,6 +66,9 @@ VIEWS: dict[str, type[FramedMarkerMsg] | type[FramedMarkerArrayMsg]] = {
 
 Key = tuple[str, int]
 
+LONGEST_NAME = 256
+"""Characters of a marker's namespace."""
+
 MOST_COUNTED = 100_000
 """Markers that are counted of those that are left out."""
 
@@ -210,6 +213,11 @@ class MarkerLayer(Layer):
 
     def _take(self, marker: FramedMarkerMsg) -> None:
         key = (marker.ns, marker.id)
+        if len(marker.ns) > LONGEST_NAME:
+            raise ProtocolError(
+                f"a namespace of {len(marker.ns)} characters; {LONGEST_NAME} are the "
+                "limit"
+            )
         if marker.action == ADD:
             self._put(key, marker)
         elif marker.action == DELETE:
@@ -359,4 +367,4 @@ class MarkerLayer(Layer):
 
 
 def _wrong(marker: MarkerMsg, error: WebMapError) -> str:
-    return f"marker {marker.id} of {marker.ns!r}: {error}"
+    return f"marker {marker.id} of {marker.ns[:LONGEST_NAME]!r}: {error}"

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 MAX_PARTS = 1000
 """The most parts that one robot may have."""
 
+MAX_VALUES = 100
+"""The most values that are kept of one part."""
+
+LONGEST_NAME, LONGEST = 256, 1000
+"""The most characters that are kept of a name, and of a message or a value."""
+
 UNHEARD = "unheard"
 """The class of a badge while nothing was heard that tells how the robot is."""
 
@@ -193,19 +199,23 @@ class Diagnostics:
             raise wrong
 
     def _take(self, status: DiagnosticStatusMsg) -> None:
-        if status.name not in self._parts and len(self._parts) >= MAX_PARTS:
+        name = status.name[:LONGEST_NAME]
+        if name not in self._parts and len(self._parts) >= MAX_PARTS:
             raise ProtocolError(f"{MAX_PARTS} parts are the limit")
         said = Health(
-            status.name,
+            name,
             LEVELS[status.level],
-            status.message,
-            status.hardware_id,
-            {pair.key: pair.value for pair in status.values},
+            status.message[:LONGEST],
+            status.hardware_id[:LONGEST_NAME],
+            {
+                pair.key[:LONGEST_NAME]: pair.value[:LONGEST]
+                for pair in status.values[:MAX_VALUES]
+            },
             time.monotonic(),
             self._whose(status.name) == "nobody",
         )
         if not self._hides_worse(said):
-            self._parts[status.name] = said
+            self._parts[name] = said
 
     def _hides_worse(self, said: Health) -> bool:
         """Tell whether another part of this name said worse just now.

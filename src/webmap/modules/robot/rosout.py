@@ -104,7 +104,7 @@ class Rosout:
         if not name.lstrip("/").startswith(self.prefix):
             return
         text = message.msg[:MAX_TEXT]
-        line = Line(level, name, text, message.stamp, time.monotonic())
+        line = Line(level, name[:MAX_TEXT], text, message.stamp, time.monotonic())
         self.lines.append(line)
         for element in self._lists:
             element.append(_row(line))
