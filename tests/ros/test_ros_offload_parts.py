@@ -150,6 +150,24 @@ def test_a_newer_message_ends_the_parts_of_an_older_one():
     run(scenario)
 
 
+def test_a_path_that_comes_quicker_than_it_is_decoded_is_still_shown():
+    async def scenario():
+        aside, got = Offload(), []
+
+        async def publish():
+            while True:
+                take(aside, Publish("/plan", poses(4000)), PathMsg, got)
+                await asyncio.sleep(0.01)
+
+        publishing = asyncio.create_task(publish())
+        await until(lambda: got)
+        publishing.cancel()
+        assert len(got[0].poses) == 4000
+        await aside.stop()
+
+    run(scenario)
+
+
 def test_of_static_frames_which_are_told_once_nothing_is_dropped():
     async def scenario():
         aside, got = Offload(), []

@@ -6,6 +6,7 @@ needs a lock. The web thread hands over what came from pages and takes finished 
 
 import asyncio
 import logging
+import sys
 import threading
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap")
+
+SWITCH = 0.001
+"""Seconds after which a thread lets another run that wants to."""
 
 TICK = 0.05
 """Seconds between two frames for viewers: 20 Hz."""
@@ -70,6 +74,9 @@ class Runtime:
         """
         if self._thread is not None:
             return
+        # A busy model's thread holds the interpreter for this long at a time, while
+        # the web thread has the ticks of drivers to hand on.
+        sys.setswitchinterval(min(SWITCH, sys.getswitchinterval()))
         self._looked_at, self._ending = asyncio.Event(), asyncio.Event()
         ready = threading.Event()
         failure: list[BaseException] = []

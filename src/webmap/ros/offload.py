@@ -66,6 +66,8 @@ class _Worker:
         self.users: set[int] = set()
         self._process: asyncio.subprocess.Process | None = None
         self._turn = asyncio.Lock()
+        self.taking_over = asyncio.Lock()
+        """Held by whoever takes over a part of an answer; others wait in order."""
 
     async def ask(self, request: Request, data: bytes | memoryview) -> Reply:
         """Have a request answered; what goes wrong with that is an answer, too."""
@@ -228,6 +230,9 @@ async def aside(
     return reply.parts[0]
 
 
+_END = object()
+
+
 class _Job(NamedTuple):
     message: Publish
     types: frozenset[Any]
@@ -296,24 +301,37 @@ class Offload:
                         return
                 size, view = len(message.frame), view_name(type)
                 request = Request(size, message.topic, view)
-                reply = await _acquire(self).ask(request, message.frame)
+                worker = _acquire(self)
+                reply = await worker.ask(request, message.frame)
                 self._rests_until = time.monotonic() + reply.seconds
-            await self._hand_over(job, type, reply, waiting)
+            await self._hand_over(job, type, reply, waiting, worker.taking_over)
 
     async def _hand_over(
-        self, job: _Job, type: Any, reply: Reply, waiting: deque[_Job]
+        self,
+        job: _Job,
+        type: Any,
+        reply: Reply,
+        waiting: deque[_Job],
+        turn: asyncio.Lock,
     ) -> None:
-        """Give the others their turn after each step."""
-        steps = 0
+        """Take a step at a time, and then leave as much time to all others.
+
+        The lock is that of all bridges, so that many of them take no more time.
+        """
+        steps, parts = 0, values(reply.answer, reply.parts, type)
         try:
-            for value in values(reply.answer, reply.parts, type):
-                if value is not None:
-                    job.message.prime(type, value)
-                    _call(job, type)
-                    steps += 1
-                await asyncio.sleep(0)
-                if _is_late(job, waiting):
-                    break
+            # One that came as a whole is given, or a quick topic would show nothing.
+            while not (steps and _is_late(job, waiting)):
+                async with turn:
+                    began = time.monotonic()
+                    value = next(parts, _END)
+                    if value is _END:
+                        break
+                    if value is not None:
+                        job.message.prime(type, value)
+                        _call(job, type)
+                        steps += 1
+                    await asyncio.sleep(time.monotonic() - began)
         except ProtocolError as error:
             job.message.prime(type, error)
             _call(job, type)
