@@ -9,7 +9,7 @@ import numpy as np
 from webmap.sim.maps import FREE, FloorPlan
 from webmap.sim.node import STEP, RobotsNode
 from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
+from webmap.sim.rosbridge.encode import MAX_MESSAGE_SIZE, Encoder
 from webmap.sim.rosbridge.graph import Graph
 from webmap.sim.rosbridge.quirks import parse_quirks
 from webmap.sim.rosbridge.rosapi import Rosapi
@@ -61,6 +61,7 @@ async def site(
     change=lambda name, message: message,
     rosapi=True,
     twist="Twist",
+    limit=MAX_MESSAGE_SIZE,
 ):
     """Run a system with one robot, ``robot_0``.
 
@@ -71,6 +72,7 @@ async def site(
         change: Takes a topic and a message; returns the message, or None to lose it.
         rosapi: Whether there is one.
         twist: The type of velocity.
+        limit: The server's ``max_message_size``.
 
     """
     behaviour = parse_quirks(quirks, dialect)
@@ -84,7 +86,7 @@ async def site(
     )
     node.start()
     graph.advertised.clear()
-    server = RosbridgeServer(graph, Encoder(schema, behaviour))
+    server = RosbridgeServer(graph, Encoder(schema, behaviour, limit))
 
     async def turn():
         while True:

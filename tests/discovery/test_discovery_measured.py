@@ -8,7 +8,7 @@ import pytest
 from faulty_site import site
 from websockets.asyncio.server import serve
 
-from webmap.discovery.doctor import Observed, judge
+from webmap.discovery.doctor import Observed, judge, measure
 from webmap.discovery.doctor.heard_from import listen
 from webmap.discovery.doctor.measure import observe, tried
 from webmap.discovery.doctor.sampling import ENOUGH
@@ -68,6 +68,29 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     assert plan.level == "note"
     assert seen.heard[camera].count <= ENOUGH
     assert seen.heard[camera].every > 0
+
+
+def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
+    _, findings, seen = looked_at(site("ros2", limit=8000))
+    assert seen.heard["/map"].not_in_cbor
+    (found,) = [each for each in findings if each.words.startswith("/map comes")]
+    assert found.level == "warning"
+    assert "larger than max_message_size of the bridge" in found.words
+    assert "parameter max_message_size of rosbridge_websocket to" in found.advice
+
+
+def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named(
+    monkeypatch,
+):
+    monkeypatch.setattr(measure, "IN_JSON", 0.3)
+
+    def mute(name, message):
+        return None if name == "/map" else message
+
+    _, findings, seen = looked_at(site("ros2", change=mute))
+    assert not seen.heard["/map"].not_in_cbor
+    (found,) = [each for each in findings if "Nothing came on /map" in each.words]
+    assert "max_message_size" in found.advice
 
 
 def test_a_camera_that_is_silent_is_told_with_what_it_costs():

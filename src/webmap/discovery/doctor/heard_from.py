@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import Listening
 from webmap.discovery.doctor.observed import Heard
-from webmap.discovery.doctor.sampling import Sampling
-from webmap.ros import ops
+from webmap.discovery.doctor.sampling import ENOUGH, Sampling
+from webmap.ros import large, ops
 from webmap.ros.events import Publish
 from webmap.ros.limits import MAX_FRAME
 from webmap.ros.protocol import Protocol
@@ -80,7 +80,7 @@ async def listen(
 
 
 async def sample(
-    url: str, topics: Mapping[str, str], seconds: float
+    url: str, topics: Mapping[str, str], seconds: float, *, in_json: bool = False
 ) -> dict[str, Heard]:
     """Listen to a few messages of each topic, which may be large.
 
@@ -88,6 +88,8 @@ async def sample(
         url: The bridge's address.
         topics: The type of each.
         seconds: How long at the most.
+        in_json: Whether to ask for one message of each in JSON, not for CBOR. A bridge
+            may take longer than ``seconds`` to encode it.
 
     Returns:
         What came on each topic.
@@ -104,9 +106,16 @@ async def sample(
             url, max_size=MAX_FRAME, open_timeout=5.0, close_timeout=0.5, proxy=None
         ) as socket:
             for topic, type in topics.items():
-                request = ops.subscribe(topic, id=topic, type=type, compression="cbor")
+                request = ops.subscribe(
+                    topic,
+                    id=topic,
+                    type=type,
+                    throttle_rate=large.THROTTLE if in_json else 0,
+                    compression="none" if in_json else "cbor",
+                )
                 await socket.send(request.decode())
-            sampling = Sampling(topics, time.monotonic())
+            enough = 1 if in_json else ENOUGH
+            sampling = Sampling(topics, time.monotonic(), enough=enough)
             protocol = Protocol()
             try:
                 async with asyncio.timeout(seconds):

@@ -51,7 +51,9 @@ class Listening:
         self._last[topic] = now
         self._newest[topic] = (message, wall)
         self._heard[topic] = Heard(
-            heard.count + 1, bytes=heard.bytes + len(message.frame)
+            heard.count + 1,
+            bytes=heard.bytes + len(message.frame),
+            in_parts=heard.in_parts or message.in_parts,
         )
 
     def end(self, now: float) -> dict[str, Heard]:
@@ -85,5 +87,6 @@ class Listening:
             stamp=stamp,
             arrived=wall,
             binary=cbor.looks_like_cbor(message.frame),
+            in_parts=heard.in_parts,
             trouble=trouble,
         )

@@ -23,12 +23,19 @@ from webmap.discovery.robots import discover, host_name
 from webmap.discovery.tf_robots import MAP
 from webmap.errors import BridgeClosed, BridgeError
 from webmap.ros.calls import Calls
+from webmap.ros.names import is_type
 
 SLOW_TOPICS = 1.0
 """Seconds that maps and pictures have at the least, which come a few times a second."""
 
 MOST_SCANS = 6
 """How many scans of a robot are listened to."""
+
+LATCHED = ("nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
+"""Types of maps, which are published once: one that is silent may be too large."""
+
+IN_JSON = 10.0
+"""Seconds for which a map that did not come in CBOR is awaited in JSON."""
 
 NEEDLESS = ("/rosout", "/parameter_events")
 """Topics of every ROS that no client needs; whoever hides topics hides these."""
@@ -105,6 +112,7 @@ async def observe(
             progress("Listening for a few pictures, maps and plans.")
             heard = await sample(url, rest, max(seconds, SLOW_TOPICS))
             seen = replace(seen, heard={**seen.heard, **heard})
+            seen = await _in_json(seen, rest, progress)
         return seen
     except (OSError, TimeoutError) as error:
         return Observed(url, trouble=str(error) or type(error).__name__)
@@ -185,6 +193,31 @@ async def _listen(seen: Observed, seconds: float) -> Observed:
     return replace(
         seen, peer=peer, listens=listens, deflate=deflate, heard=heard, ways=ways
     )
+
+
+async def _in_json(
+    seen: Observed, topics: Mapping[str, str], progress: Callable[[str], object]
+) -> Observed:
+    """Return what was seen, with published maps that came only in JSON."""
+    silent = {
+        topic: type
+        for topic, type in topics.items()
+        if is_type(type, *LATCHED)
+        and seen.publishers.get(topic)
+        and topic in seen.heard
+        and not seen.heard[topic].count
+    }
+    if not silent:
+        return seen
+    names = ", ".join(silent)
+    progress(f"Nothing came of {names} in CBOR: listening for {IN_JSON:g} s in JSON.")
+    came = await sample(seen.url, silent, IN_JSON, in_json=True)
+    found = {
+        topic: replace(heard, not_in_cbor=heard.in_parts)
+        for topic, heard in came.items()
+        if heard.count
+    }
+    return replace(seen, heard={**seen.heard, **found})
 
 
 def _scans(robot: FoundRobot) -> list[str]:

@@ -57,6 +57,12 @@ class Heard:
     binary: bool = False
     """Whether messages came as CBOR."""
 
+    in_parts: bool = False
+    """Whether a message came in fragments."""
+
+    not_in_cbor: bool = False
+    """Whether nothing came in CBOR, and messages came in JSON, in fragments."""
+
     trouble: str = ""
     """Why a message could not be read."""
 

@@ -23,10 +23,14 @@ class Sampling:
     Args:
         topics: Which.
         now: When listening begins, on the monotonic clock.
+        enough: Messages after which a topic is left.
 
     """
 
-    def __init__(self, topics: Iterable[str], now: float) -> None:
+    def __init__(
+        self, topics: Iterable[str], now: float, *, enough: int = ENOUGH
+    ) -> None:
+        self._enough = enough
         self._topics = tuple(topics)
         self._listening = Listening(self._topics, now)
         self._bytes = dict.fromkeys(self._topics, 0)
@@ -54,7 +58,7 @@ class Sampling:
         self._listening.received(message, now, wall)
         self._bytes[topic] += len(message.frame)
         self._came[topic].append(now)
-        if len(self._came[topic]) < ENOUGH and self._bytes[topic] < MOST_BYTES:
+        if len(self._came[topic]) < self._enough and self._bytes[topic] < MOST_BYTES:
             return False
         self._left[topic] = self._heard(topic, now)
         return True

@@ -1,6 +1,7 @@
 """What the readiness check says of topics that are shown besides pose and scan."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from webmap.discovery.doctor.heard_rules import age_of, silence
 from webmap.discovery.doctor.observed import Finding, Heard, Level, Observed
@@ -36,6 +37,16 @@ def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             continue
         if not heard.count:
             yield from _silent(kind, robot.name, topic, seen)
+        elif heard.not_in_cbor:
+            yield Finding(
+                "warning",
+                robot.name,
+                f"{topic} comes in JSON only ({heard.bytes} bytes, in parts): it is "
+                f"larger than max_message_size of the bridge, above which it sends no "
+                f"CBOR. JSON keeps the bridge busy for seconds.",
+                f"Set the parameter max_message_size of rosbridge_websocket to "
+                f"{heard.bytes} or more.",
+            )
         elif heard.trouble:
             yield Finding(
                 "warning",
@@ -94,7 +105,14 @@ def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Findin
         "cloud": ", so no points are drawn",
     }
     level: Level = "warning"
-    yield silence(name, topic, seen, level, why[kind])
+    found = silence(name, topic, seen, level, why[kind])
+    if kind in ("map", "costmap", "cloud") and seen.publishers.get(topic):
+        advice = (
+            f"{found.advice} If it is larger than max_message_size of "
+            f"rosbridge_websocket (10 MB unless set), set that higher."
+        )
+        found = replace(found, advice=advice)
+    yield found
 
 
 def _in_words(seconds: float) -> str:
