@@ -14,7 +14,7 @@ from webmap.errors import BridgeClosed, ServiceError
 from webmap.identifiers import generate_id
 from webmap.ros import ops
 from webmap.ros.connection import Lane
-from webmap.ros.events import ServiceResponse, Status
+from webmap.ros.events import Malformed, ServiceResponse, Status
 from webmap.ros.protocol import Protocol
 
 
@@ -52,9 +52,7 @@ class Calls:
                 answer = await lane.ask(id, frame)
         except TimeoutError:
             self._retire(lane)
-            raise ServiceError(
-                f"{service} did not answer within {patience:g} s"
-            ) from None
+            raise ServiceError(lane.why_unanswered(service, patience)) from None
         if not answer.result:
             raise ServiceError(f"{service} failed: {answer.values}")
         return answer.values
@@ -81,6 +79,8 @@ class _CallsLane:
         self._ready: asyncio.Future[None] = asyncio.Future()
         self._retired = False
         self._ending: asyncio.Task[None] | None = None
+        self._unreadable: str | None = None
+        """What was wrong with the newest frame that could not be read."""
         self._lane = Lane(
             url,
             opened=self._opened,
@@ -94,6 +94,15 @@ class _CallsLane:
     @property
     def is_over(self) -> bool:
         return self._lane.state == "closed"
+
+    def why_unanswered(self, service: str, patience: float) -> str:
+        """Return a sentence on why a call got no answer."""
+        if self._unreadable is None:
+            return f"{service} did not answer within {patience:g} s"
+        return (
+            f"{service}: no answer that can be read within {patience:g} s; the bridge "
+            f"sent what is not rosbridge: {self._unreadable}"
+        )
 
     async def ask(self, id: str, frame: bytes) -> ServiceResponse:
         await asyncio.shield(self._ready)
@@ -131,6 +140,8 @@ class _CallsLane:
 
     def _received(self, frame: bytes) -> None:
         event = self._protocol.receive(frame, time.monotonic())
+        if isinstance(event, Malformed):
+            self._unreadable = event.reason[:200]
         if not isinstance(event, ServiceResponse | Status):
             return
         answer = self._waiting.get(str(event.id))

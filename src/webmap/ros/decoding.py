@@ -2,11 +2,13 @@
 
 Nearly every frame takes the first road, one strict pass by msgspec. What real bridges
 write beside the standard takes the second: the bare tokens ``NaN`` and ``Infinity``,
-and ``null`` in the place of a number.
+``null`` in the place of a number, and half a pair of surrogates in a text, which Python
+writes for a byte that is no UTF-8. Such a half becomes U+FFFD.
 """
 
 import json
 import math
+import re
 from array import array
 from functools import lru_cache
 from typing import Any
@@ -16,6 +18,10 @@ import msgspec
 from webmap.errors import ProtocolError
 from webmap.nesting import MAX_DEPTH, is_too_deep
 from webmap.ros.arrays import dec_hook
+
+_HALF_PAIRS = re.compile("[\ud800-\udfff]")
+_HALF_PAIR_ESCAPE = re.compile(rb"\\u[dD][89a-fA-F]")
+_REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 _FAILURES = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
@@ -41,15 +47,34 @@ def decode_json(text: bytes, type: Any) -> Any:
     except msgspec.ValidationError as error:
         reason: Exception = error
     except _FAILURES as error:
-        # Only these tokens can make good text of what is bad JSON.
-        if b"NaN" not in text and b"Infinity" not in text:
+        # Only these can make good text of what is bad JSON.
+        numbers = b"NaN" in text or b"Infinity" in text
+        if not numbers and not _HALF_PAIR_ESCAPE.search(text):
             raise Unreadable(f"not JSON: {error}") from None
         reason = error
     try:
         value = json.loads(text.decode())
+        if _HALF_PAIR_ESCAPE.search(text):
+            value = _whole_text(value, MAX_DEPTH)
     except (ValueError, RecursionError):
         raise Unreadable(f"not JSON: {reason}") from None
     return convert(value, type)
+
+
+def _whole_text(value: Any, allowed: int) -> Any:
+    """Return ``value`` with U+FFFD for each half of a pair of surrogates in a text."""
+    if allowed == 0:
+        raise ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
+    if isinstance(value, str):
+        return _HALF_PAIRS.sub(_REPLACEMENT, value)
+    if isinstance(value, dict):
+        return {
+            _HALF_PAIRS.sub(_REPLACEMENT, key): _whole_text(item, allowed - 1)
+            for key, item in value.items()
+        }
+    if isinstance(value, list):
+        return [_whole_text(item, allowed - 1) for item in value]
+    return value
 
 
 def convert(value: Any, type: Any) -> Any:

@@ -1,0 +1,73 @@
+"""Text with half a pair of surrogates, which a bridge writes for bytes of no UTF-8."""
+
+import asyncio
+import json
+from typing import Any
+
+import pytest
+from fake_rosbridge import bridged, until
+
+from webmap.discovery import discover
+from webmap.errors import ProtocolError, ServiceError
+from webmap.ros.decoding import decode_json
+from webmap.ros.protocol import Protocol
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        (rb'"/bad\ud800"', "/bad�"),
+        (rb'"\udcff\udc80"', "��"),
+        (rb'["a\uDBFF", NaN]', None),
+        (rb'{"\ud800": [{"x": "\udfff"}]}', {"�": [{"x": "�"}]}),
+        (rb'"\ud83d\ude00"', "\N{GRINNING FACE}"),
+        (rb'"\\ud800"', "\\ud800"),
+        (rb'["\\ud800", "\ud800"]', ["\\ud800", "�"]),
+    ],
+)
+def test_half_a_pair_is_replaced_and_nothing_else(text, value):
+    decoded = decode_json(text, Any)
+    if value is None:
+        assert decoded[0] == "a�"
+    else:
+        assert decoded == value
+    json.dumps(decoded).encode()
+
+
+@pytest.mark.parametrize("text", [rb'"\ud800', rb'{"a": \ud800}', rb"[" * 9999])
+def test_what_is_no_json_stays_unreadable(text):
+    with pytest.raises(ProtocolError):
+        decode_json(text, Any)
+
+
+def test_a_topic_with_half_a_pair_does_not_hide_the_others():
+    async def scenario():
+        names = {"topics": ["/odom", "/bad\udc80"], "types": ["nav_msgs/Odometry", "x"]}
+        async with bridged(topics=names) as (_, bridge):
+            found = await bridge.topics()
+            assert found == {"/odom": "nav_msgs/Odometry", "/bad�": "x"}
+            assert [robot.name for robot in discover(found, "bob").robots] == ["bob"]
+
+    asyncio.run(scenario())
+
+
+def test_a_message_with_half_a_pair_is_read():
+    event = Protocol().receive(
+        rb'{"op": "publish", "topic": "/a", "msg": {"data": "x\ud800"}}', 0.0
+    )
+    assert event.decode() == {"data": "x�"}
+
+
+def test_an_answer_that_cannot_be_read_is_not_called_none():
+    async def scenario():
+        async with bridged(topics=None) as (server, bridge):
+            call = asyncio.create_task(
+                bridge.call_service("/rosapi/topics", timeout=0.5)
+            )
+            await until(lambda: server.ops("call_service"))
+            await server.send('{"op": "service_response", "values": ')
+            with pytest.raises(ServiceError, match="no answer that can be read") as why:
+                await call
+            assert "did not answer" not in str(why.value)
+
+    asyncio.run(scenario())
