@@ -9,7 +9,7 @@ from fake_rosbridge import bridged, until
 
 from webmap.ros import renewal
 from webmap.ros.bridge import Bridge
-from webmap.ros.large import MOST_LOST, THROTTLE, InJson
+from webmap.ros.large import MOST_LOST, PATIENCE, THROTTLE, InJson
 from webmap.ros.renewal import IN_CBOR, Silence
 from webmap.scope import Scope
 from webmap.sim.rosbridge.dialect import Dialect
@@ -221,5 +221,24 @@ def test_a_message_in_parts_is_known_as_one(quick):
                 await server.send(json.dumps({**part, "num": number, "total": 2}))
             await until(lambda: len(got) == 2)
             assert [message.in_parts for message in got] == [False, True]
+
+    asyncio.run(scenario())
+
+
+def test_a_bridge_may_be_busy_with_a_map_for_a_while_and_with_nothing_else(monkeypatch):
+    async def scenario():
+        async with bridged() as (server, bridge):
+            busy = bridge._lane._busy
+            bridge.subscribe("/text", print, "std_msgs/String")
+            bridge.subscribe("/scan", print, "sensor_msgs/LaserScan")
+            assert not busy()
+            bridge.subscribe("/map", print, MAP)
+            assert busy()
+            await server.publish("/map", {"info": {}})
+            await until(lambda: not busy())
+            bridge.subscribe("/other", print, MAP)
+            assert busy()
+            monkeypatch.setitem(PATIENCE, "cbor", 0.0)
+            assert not busy()
 
     asyncio.run(scenario())

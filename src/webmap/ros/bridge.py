@@ -25,7 +25,8 @@ from webmap.ros.ops import service_response
 from webmap.ros.protocol import Protocol
 from webmap.ros.publications import Publications, written_behind
 from webmap.ros.renewal import Renewals
-from webmap.ros.subscriptions import Subscription, Topic, Wish, checked
+from webmap.ros.subscriptions import Subscription, Topic
+from webmap.ros.wish import Wish, checked
 from webmap.scope import Removal, keep
 
 log = logging.getLogger("webmap.ros")

@@ -1,4 +1,4 @@
-"""Messages that are too large for a bridge's CBOR, and are asked for in JSON. No I/O.
+"""Large messages: in CBOR, or in JSON if they are too large for CBOR. No I/O.
 
 rosbridge for ROS 2 splits what is larger than its parameter ``max_message_size`` (10 MB
 unless somebody sets it) into fragments. It does so for JSON; for CBOR it fails, logs an
@@ -8,6 +8,23 @@ error and sends nothing. So a large map, which is published once, would never co
 from typing import Literal
 
 from webmap.ros.names import is_type
+
+BULK = (
+    "sensor_msgs/LaserScan",
+    "nav_msgs/OccupancyGrid",
+    "sensor_msgs/PointCloud2",
+    "nav_msgs/GridCells",
+    "nav_msgs/Path",
+    "geometry_msgs/PoseArray",
+    "visualization_msgs/Marker",
+    "visualization_msgs/MarkerArray",
+)
+"""Types that come in CBOR unless a listener asks for something else.
+
+A bridge encodes CBOR faster, and only once. JSON that it encodes for longer than the
+throttle can hang it when a client leaves: see :func:`webmap.ros.ops.subscribe`.
+No type with an array of fixed length is here, since bridges cannot send that as CBOR.
+"""
 
 REPLACED = (
     "nav_msgs/OccupancyGrid",
@@ -29,8 +46,8 @@ else late meanwhile. The throttle has to be longer than that takes, or the bridg
 hang when a client leaves: see :func:`webmap.ros.ops.subscribe`.
 """
 
-PATIENCE = 120.0
-"""Seconds for which the bridge is given time to encode a message that was asked for."""
+PATIENCE = {"cbor": 20.0, "none": 120.0}
+"""Seconds for which a bridge may be busy with the first message, by its encoding."""
 
 MOST_LOST = 2
 """Links that may end while a message in JSON is awaited, until none is asked for."""
@@ -44,11 +61,6 @@ class InJson:
     def __init__(self) -> None:
         self._state: Literal["cbor", "asked", "json", "not again"] = "cbor"
         self._lost = 0
-
-    @property
-    def awaited(self) -> bool:
-        """Whether a message in JSON was asked for and has not come."""
-        return self._state == "asked"
 
     @property
     def on(self) -> bool:

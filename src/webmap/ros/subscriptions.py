@@ -3,7 +3,6 @@
 import time
 from asyncio import AbstractEventLoop, TimerHandle
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import msgspec
 
@@ -16,39 +15,15 @@ from webmap.ros.large import InJson
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
 from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.throttle import Throttle
+from webmap.ros.wish import Wish
 from webmap.scope import Scope, current_scope
 
-_BULK = (
-    "sensor_msgs/LaserScan",
-    "nav_msgs/OccupancyGrid",
-    "sensor_msgs/PointCloud2",
-    "nav_msgs/GridCells",
-    "nav_msgs/Path",
-    "geometry_msgs/PoseArray",
-    "visualization_msgs/Marker",
-    "visualization_msgs/MarkerArray",
-)
-"""Types that come in CBOR unless a listener asks for something else.
-
-A bridge encodes CBOR faster, and only once. JSON that it encodes for longer than the
-throttle can hang it when a client leaves: see :func:`webmap.ros.ops.subscribe`.
-No type with an array of fixed length is here, since bridges cannot send that as CBOR.
-"""
 _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
 
 
 class _Silence(ProtocolError):
     """Nothing comes at all."""
-
-
-class Wish(NamedTuple):
-    """What is asked of the bridge for one topic."""
-
-    type: str | None
-    throttle: int
-    queue_length: int
-    compression: str | None
 
 
 class Subscription:
@@ -178,7 +153,8 @@ class Topic:
         self._too_large = too_large
         self._emptied = emptied
         self._in_json = InJson()
-        self._json_asked_at = 0.0
+        self._asked_at = 0.0
+        """When the wire was asked for the first message of this encoding."""
         self.failing: set[object] = set()
         """As what the newest messages could not be decoded."""
         self._fault: BridgeError | None = None
@@ -235,7 +211,7 @@ class Topic:
         type = self.message_type
         each = [listener.wish for listener in self.listeners]
         chosen = next((w.compression for w in each if w.compression), None)
-        bulk = type is not None and is_type(type, *_BULK)
+        bulk = type is not None and is_type(type, *large.BULK)
         wish = Wish(
             # The name as in ROS 1, which bridges of both kinds understand.
             str(split_type(type)) if type else None,
@@ -254,7 +230,6 @@ class Topic:
             return False
         answer = self._in_json.silent(self._asked.type, self._asked.compression)
         if answer == "ask":
-            self._json_asked_at = time.monotonic()
             self.renew()
         elif answer == "given up":
             self._too_large(self, None)
@@ -263,8 +238,13 @@ class Topic:
     @property
     def awaits_large(self) -> bool:
         """Whether the bridge may be busy with a large message for this topic."""
-        waited = time.monotonic() - self._json_asked_at
-        return self._in_json.awaited and waited < large.PATIENCE
+        asked = self._asked
+        if self.count or asked is None or asked.type is None:
+            return False
+        if not is_type(asked.type, *large.REPLACED):
+            return False
+        waited = time.monotonic() - self._asked_at
+        return waited < large.PATIENCE.get(asked.compression or "", 0.0)
 
     def update(self) -> None:
         """Ask the bridge anew if what is wanted has changed.
@@ -303,6 +283,8 @@ class Topic:
             listener.hush()
 
     def _ask(self, wish: Wish) -> None:
+        if self._asked is None or self._asked.compression != wish.compression:
+            self._asked_at = time.monotonic()
         self._asked, self._id = wish, generate_id()
         self._send(
             ops.subscribe(
@@ -417,25 +399,3 @@ class Topic:
         self.failing.clear()
         for listener in tuple(self.listeners):
             listener.take_back()
-
-
-def checked(
-    callback: object, throttle: object, queue_length: object, decode: object
-) -> None:
-    """Let the arguments of a subscription pass if they make sense.
-
-    Raises:
-        ConfigError: If they do not.
-
-    """
-    if not callable(callback):
-        raise ConfigError(f"a subscription needs a function, got {callback!r}")
-    for name, value in (("throttle", throttle), ("queue_length", queue_length)):
-        if not isinstance(value, int) or value < 0:
-            raise ConfigError(f"{name} is a whole number from 0 up, got {value!r}")
-    if decode is not None and not _is_struct(decode):
-        raise ConfigError(f"decode is a msgspec.Struct type, got {decode!r}")
-
-
-def _is_struct(decode: Any) -> bool:
-    return isinstance(decode, type) and issubclass(decode, msgspec.Struct)
