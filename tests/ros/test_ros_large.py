@@ -148,8 +148,8 @@ def test_a_map_too_large_for_cbor_comes_in_json_and_people_are_told(quick, caplo
             assert got[0]["info"]["width"] == 10_000
             ((text, about),) = told
             assert about is listener
-            assert text.startswith("/map: the bridge sent nothing in CBOR")
-            assert "parameter max_message_size of rosbridge_websocket to " in text
+            assert text.startswith("/map is larger than the bridge sends in CBOR: set")
+            assert "set max_message_size of rosbridge_websocket to " in text
             assert text in caplog.text
             (subscription,) = (
                 session._topics._subscriptions["/map"]
@@ -201,7 +201,7 @@ def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick)
                 server.drop()
                 await until(lambda n=number: bridge.stats.links > n)
             await until(lambda: told)
-            assert "the link ended before a message came" in told[0]
+            assert "the link ended before it came in JSON" in told[0]
             assert "max_message_size" in told[0]
             assert len(server.ops("subscribe", compression="none")) == MOST_LOST
 

@@ -63,23 +63,20 @@ class Doubts:
             size: Bytes of a message in JSON; None if links ended before one came.
 
         """
-        got = (
-            f"{topic.name}: the bridge sent nothing in CBOR for {IN_CBOR:g} s, though "
-            f"the topic is published. "
-        )
+        # A page shows three lines: what to do comes before the details.
         if size is None:
-            got += "It was asked for JSON, and the link ended before a message came. "
-            enough = "to more bytes than a message has"
-        else:
-            got += (
-                f"In JSON a message came, in parts ({size} bytes in all): it is larger "
-                f"than max_message_size of the bridge, above which no CBOR is sent. It "
-                f"is asked for in JSON, once in {large.THROTTLE // 60_000} minutes. "
+            words = (
+                f"{topic.name}: nothing came in CBOR for {IN_CBOR:g} s, though it is "
+                f"published, and the link ended before it came in JSON. If it is "
+                f"larger than max_message_size of rosbridge_websocket, set that higher"
             )
-            enough = f"to {size} or more"
-        fault = BridgeError(
-            f"{got}Set the parameter max_message_size of rosbridge_websocket {enough}"
-        )
+        else:
+            words = (
+                f"{topic.name} is larger than the bridge sends in CBOR: set "
+                f"max_message_size of rosbridge_websocket to {size} or more. Until "
+                f"then it comes in JSON, once in {large.THROTTLE // 60_000} minutes"
+            )
+        fault = BridgeError(words)
         log.warning("%s: %s", self._name, fault)
         self._report(fault)
         topic.over(fault)
