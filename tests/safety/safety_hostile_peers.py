@@ -165,7 +165,10 @@ async def serve(talk, stop):
 
     async def take(reader, writer):
         links.add(asyncio.current_task())
-        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
+        # asyncio would log that a link was cancelled, as they are at the end.
+        with contextlib.suppress(
+            ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError
+        ):
             await talk(Link(reader, writer))
         writer.transport.abort()
         links.discard(asyncio.current_task())

@@ -1,4 +1,4 @@
-"""A person drives a good robot while the bridges of others do what they like."""
+"""A person drives a good robot on the bench that has room for hostile peers."""
 
 import pytest
 from safety_hostile import beside, drive
@@ -20,16 +20,4 @@ def check(driven):
 
 def test_with_nobody_beside_the_good_robot_is_driven_and_stopped(bench):
     with beside(bench):
-        check(drive(bench))
-
-
-FLOODS = [
-    ("tiny_texts", "tiny_texts", "tiny_texts"),
-    ("endless_message", "pings", "empty_frames"),
-]
-
-
-@pytest.mark.parametrize("peers", FLOODS, ids=" ".join)
-def test_beside_three_that_flood_the_good_robot_is_driven_and_stopped(bench, peers):
-    with beside(bench, *(f"safety_hostile_peers:{peer}" for peer in peers)):
         check(drive(bench))
