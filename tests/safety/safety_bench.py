@@ -47,13 +47,15 @@ RESET = """import("/_webmap/key.js").then(({ protocols }) => new Promise((done) 
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
     const socket = new WebSocket(url, protocols());
+    const stopped = new Set();
     socket.onmessage = (event) => {
         const message = JSON.parse(event.data);
         if (message.op !== "robot") return;
         if (message.latched) {
             const { robot, stop } = message;
+            stopped.add(robot);
             socket.send(JSON.stringify({ op: "reset", robot, stop: stop.id }));
-        } else {
+        } else if (stopped.has(message.robot)) {
             socket.close();
             done(message.state);
         }

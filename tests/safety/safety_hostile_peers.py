@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import importlib
 import json
+import os
 import sys
 
 from webmap.sim.process import end_with_stdin
@@ -184,6 +185,8 @@ async def serve(talk, stop):
 
 async def main(name):
     """Serve the peer that a name tells, until standard input ends."""
+    # A hostile bridge runs on another computer: it takes no processor from WebMap.
+    os.nice(19)
     module, function = name.split(":")
     stop = asyncio.Event()
     end_with_stdin(stop)

@@ -1,7 +1,7 @@
 """A person drives a good robot while others send messages that are far too large."""
 
 import pytest
-from safety_hostile import beside, drive
+from safety_hostile import beside
 from test_safety_hostile import check
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
@@ -13,6 +13,13 @@ PEERS = {
         "huge_transforms",
         "huge_markers",
     ),
+    "just within them": (
+        "long_diagnostics",
+        "long_path",
+        "long_transforms",
+        "long_markers",
+    ),
+    "of other kinds": ("long_line", "many_lists", "fragments", "bombs"),
 }
 """Several robots at a time, each of which sends one of these once a second."""
 
@@ -21,4 +28,4 @@ PEERS = {
 def test_large_messages_of_others_delay_no_tick_and_no_stop(bench, peers):
     names = [f"safety_large_peers:{name}" for name in peers]
     with beside(bench, *names, shown=True):
-        check(drive(bench))
+        check(bench)
