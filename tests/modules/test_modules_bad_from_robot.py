@@ -141,6 +141,7 @@ NOWHERE = pose(math.inf, 0)
 NANOSECONDS = {"stamp": {"secs": 1, "nsecs": 2_000_000_005}}
 WHOLE = publish("/map", grid(50))
 TEN_MILLION = scan(1.0, ranges=typed(85, np.full(10_000_000, 2, "<f4")))
+ONE_MILLION = scan(1.0, ranges=typed(85, np.full(1_000_000, 2, "<f4")))
 
 SAID = {
     "a frame that was cut": (
@@ -175,7 +176,8 @@ SAID = {
     "an increment of zero": ("/scan", scan(1, angle_increment=0), "increment"),
     "an increment of NaN": ("/scan", scan(1, angle_increment=None), "increment"),
     "an angle of NaN": ("/scan", scan(1, angle_min=None), "angle_min"),
-    "ten million beams": ("/scan", TEN_MILLION, "10000000 rays"),
+    "a million beams": ("/scan", ONE_MILLION, "1000000 rays"),
+    "ten million beams": ("/scan", TEN_MILLION, "may have 4 MiB"),
     "ranges of text": ("/scan", scan(1, ranges=["far"]), "no whole sensor_msgs/Laser"),
     "another type": ("/scan", {"data": "hello"}, "angle_min"),
     "odometry of another type": (
@@ -485,13 +487,13 @@ def test_a_map_of_fifty_megabytes_is_drawn_while_the_rest_goes_on(map, channel):
 
 
 BEAMS = publish("/scan", scan(1, ranges=[-7])).replace(
-    "[-7]", "[" + "2," * 9_999_999 + "2]"
+    "[-7]", "[" + "2," * 1_899_999 + "2]"
 )
 
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_ten_million_beams_as_text_are_said_while_the_rest_goes_on(map, channel):
+def test_two_million_beams_as_text_are_said_while_the_rest_goes_on(map, channel):
     async def scenario(scene: Scene) -> None:
         mine = await scene.say_good(0, 1.0)
         seen: list[float] = []
@@ -506,7 +508,7 @@ def test_ten_million_beams_as_text_are_said_while_the_rest_goes_on(map, channel)
         await sending
         assert max(np.diff(seen)) < 1.0, "the other robot went on meanwhile"
         (line,) = scene.errors
-        assert "/scan: a scan of 10000000 rays" in line
+        assert "/scan: a scan of 1900000 rays" in line
         assert scene.state(0) == mine, "what was drawn stays"
         await scene.say_good(0, 2.0)
 

@@ -286,7 +286,7 @@ def test_a_device_is_neither_a_description_nor_an_image(tmp_path):
         (b"image: !!python/object/apply:os.system [ls]", "map.yaml:1: resolution"),
         (b" " * ((1 << 14) + 1), "no map's YAML"),
         (b"\xff\xfe\xfa", "map.yaml"),
-        (b"[" * 10_000, "nested too deep"),
+        (b"[" * 10_000, "nested more than 50 deep"),
     ],
 )
 def test_a_file_that_is_no_description_is_refused(tmp_path, data, why):

@@ -174,7 +174,7 @@ def test_a_message_in_fragments_may_be_as_large_as_one_in_one_piece():
 def test_fragments_are_counted_in_bytes_and_not_in_characters():
     part = {"op": "fragment", "id": "1", "total": 50, "data": "\U0001f600" * (MIB // 2)}
     protocol, events = Protocol(), []
-    for number in range(20):
+    for number in range(40):
         text = json.dumps({**part, "num": number}, ensure_ascii=False)
         events.append(protocol.receive(text, 0.0))
     assert any(isinstance(event, Malformed) for event in events)

@@ -61,7 +61,7 @@ def decode_large():
 
     async def decode():
         offload, done = Offload(), asyncio.Event()
-        offload.decode(message, frozenset({None}), done.set)
+        offload.decode(message, frozenset({None}), lambda _: done.set())
         await asyncio.wait_for(done.wait(), 60)
         await offload.stop()
 
@@ -154,7 +154,7 @@ from webmap.ros.offload import Offload
 async def main():
     frame = b'{"op":"publish","topic":"/a","msg":{"data":"%s"}}' % (b"x" * (1 << 20))
     decoded = asyncio.Event()
-    Offload().decode(Publish("/a", frame), frozenset({None}), decoded.set)
+    Offload().decode(Publish("/a", frame), frozenset({None}), lambda _: decoded.set())
     await decoded.wait()
     print("ready", flush=True)
     await asyncio.sleep(600)

@@ -16,7 +16,7 @@ from webmap.sim.rosbridge.operation import (
 from webmap.sim.rosbridge.outbox import DEFAULT_DEPTH
 from webmap.sim.rosbridge.subscription import Request, Subscription
 
-log = logging.getLogger(__name__)
+log = logging.getLogger("webmap.sim")
 
 _COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
