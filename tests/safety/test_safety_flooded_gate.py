@@ -127,7 +127,7 @@ class FloodedGate:
         late = self.sentinel.stolen(begun, zero)
         self.hand.pressed = False
         pass_time(0.6)
-        self.client.reset("good")
+        self.client.reset("good", self.hand.robot["stop"]["id"])
         return zero - begun, late
 
 
