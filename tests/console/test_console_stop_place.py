@@ -51,12 +51,15 @@ DRIVE = """async (change) => {
 }"""
 """Have the gate's reports say something else to this page."""
 
-CUT = """async () => {
+LOSE_SIGN_IN = """async () => {
   const { page } = await import(document.querySelector("script[type=module]").src);
+  for (const name of Object.keys(localStorage)) {
+    if (name.startsWith("webmap key")) localStorage.setItem(name, "lost");
+  }
   page._link.renew();
   page.drive._line.lose();
 }"""
-"""Cut both connections, so that the page has to sign in again."""
+"""Cut both connections and replace the key, so that the page has to sign in again."""
 
 
 class Walk:
@@ -170,8 +173,8 @@ def test_both_stops_are_hit_and_do_not_move_in_every_state(open_console):
     page.evaluate(DRIVE, {"alarm": None})
     expect(page.locator(".webmap-alarm")).to_have_count(0)
     open_console.allowed += ["WebSocket connection to", "401"]
-    page.context.clear_cookies()
-    page.evaluate(CUT)
+    page.evaluate(LOSE_SIGN_IN)
+    expect(page.get_by_text("not signed in")).to_be_visible()
     expect(page.locator("html.disconnected")).to_have_count(1)
     walk.look("sign-in lost")
     assert not walk.wrong, "\n".join(walk.wrong[:20])

@@ -61,6 +61,7 @@ class TestPages:
         others = {t.topic for t in fake.told if t.link == velocity_link}
         assert others == {"/cmd_vel"}, "velocity shares its socket with nothing"
 
+    @pytest.mark.serial
     def test_release_is_zeros_and_then_silence(self, page, fake):
         page.drive_off(fake)
         page.x = 0.0
@@ -73,6 +74,7 @@ class TestPages:
         time.sleep(0.3)
         assert fake.velocities[-1][0] == zeros[-1]
 
+    @pytest.mark.serial
     def test_a_hand_that_vanishes_is_zero_within_250_ms(self, page, fake):
         page.drive_off(fake)
         page.x = None
@@ -80,6 +82,7 @@ class TestPages:
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
 
+    @pytest.mark.serial
     def test_a_page_that_closes_is_a_zero_at_once(self, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
@@ -87,6 +90,7 @@ class TestPages:
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.1 + JITTER
 
+    @pytest.mark.serial
     def test_stop_by_a_viewer_is_a_zero_at_once(self, page, client, fake):
         viewer = Page(client, "Vic", "viewer")
         page.drive_off(fake)
@@ -300,6 +304,7 @@ class TestProgram:
 
         return eventually(attempt, "the lease")
 
+    @pytest.mark.serial
     def test_python_drives_within_the_limits_and_is_told(
         self, client, robot_spec, fake, reports
     ):
@@ -454,6 +459,7 @@ class TestLife:
         with pytest.raises(NoLease, match="the gate has ended"):
             future.result(10)
 
+    @pytest.mark.serial
     def test_its_end_stops_robots_within_half_a_second(self, client, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
@@ -464,6 +470,7 @@ class TestLife:
         assert zero - at < 0.1 + JITTER
         assert fake.moving[-1][0] < zero
 
+    @pytest.mark.serial
     def test_a_display_whose_heart_stops_is_a_zero(self, client, page, fake):
         page.drive_off(fake)
         client._supervisor.end_heartbeat()  # and nothing else
@@ -474,6 +481,7 @@ class TestLife:
         time.sleep(0.3)
         assert len(fake.moving) == moves
 
+    @pytest.mark.serial
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_a_signal_is_zero_and_then_the_end(
         self, client, page, fake, number, reports

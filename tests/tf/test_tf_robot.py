@@ -220,7 +220,9 @@ async def follow(url):
         deadline = time.monotonic() + 15
         while time.monotonic() < deadline:
             await asyncio.sleep(0.02)
-            if not robot.valid or "robot_0/base_link" not in buffer.frames:
+            if not robot.valid or not {"map", "robot_0/base_link"} <= set(
+                buffer.frames
+            ):
                 continue
             truth = buffer.lookup("map", "robot_0/base_link").planar
             off = math.dist((truth.x, truth.y), (robot.position.x, robot.position.y))
