@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from webmap.ros.connection import Lane
+from webmap.ros.connection import MOST_FRAGMENTS, Lane
 from webmap.testing import Sentinel
 
 MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
@@ -39,12 +39,12 @@ async def bridge(talk):
         server.close()
 
 
-def lane(url, heard):
+def lane(url, heard, ended=None):
     return Lane(
         url,
         opened=lambda: heard.append("open"),
         received=heard.append,
-        closed=lambda why: None,
+        closed=(lambda why: None) if ended is None else ended.append,
         failed=lambda error: None,
     )
 
@@ -134,3 +134,22 @@ def test_a_frame_of_many_mebibytes_is_received_whole():
         return heard
 
     assert asyncio.run(story()) == ["open", body, b"after"]
+
+
+def test_a_message_of_too_many_fragments_ends_the_link():
+    async def story():
+        async def talk(reader, writer):
+            writer.write(b"\x82\x05first\x01\x01x" + b"\0\1x" * (MOST_FRAGMENTS + 100))
+            await reader.read()
+
+        heard, why = [], []
+        async with bridge(talk) as url:
+            link = lane(url, heard, why)
+            link.start(asyncio.get_running_loop())
+            await until(lambda: why)
+            await link.stop()
+        return heard, why
+
+    heard, why = asyncio.run(story())
+    assert heard[:2] == ["open", b"first"]
+    assert "too many fragments" in why[0]

@@ -7,6 +7,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
+from webmap.ros.limits import MAX_FRAME
 from webmap.ros.pieces import PIECE, Pieces
 from webmap.ros.turns import turns
 
@@ -58,6 +59,53 @@ def test_wherever_the_network_cuts_no_piece_holds_the_ends_of_two_frames(lengths
     for piece in pieces:
         assert len([end for end in ends if at < end <= at + len(piece)]) <= 1
         at += len(piece)
+
+
+def frames_of(stream):
+    """Return the frames in a stream: first byte and payload."""
+    frames = []
+    while stream:
+        length, head = stream[1], 2
+        if length == 126:
+            length, head = int.from_bytes(stream[2:4], "big"), 4
+        elif length == 127:
+            length, head = int.from_bytes(stream[2:10], "big"), 10
+        frames.append((stream[0], stream[head : head + length]))
+        assert len(frames[-1][1]) == length
+        stream = stream[head + length :]
+    return frames
+
+
+def taken(chunks):
+    """Return the pieces that are taken of what comes in chunks."""
+    pieces, waiting, cutting = [], bytearray(), Pieces()
+    for chunk in chunks:
+        waiting += chunk
+        while piece := cutting.take(waiting, shaken=True):
+            pieces.append(piece)
+    assert not waiting
+    return pieces
+
+
+@given(st.data())
+def test_a_long_frame_is_taken_as_fragments_of_the_same_message(data):
+    long = bytes(data.draw(st.integers(65_530, 200_000)))
+    stream = b"\x01\x01x" + b"\x80\x7f" + len(long).to_bytes(8, "big") + long + frame(3)
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    pieces = taken(stream[a:b] for a, b in itertools.pairwise([0, *cuts, len(stream)]))
+    assert all(len(piece) <= PIECE + 4 for piece in pieces)
+    frames = frames_of(b"".join(pieces))
+    assert [first for first, _ in frames[:-2]] == [1] + [0] * (len(frames) - 3)
+    assert frames[-2][0] == 0x80  # the last fragment ends the message
+    assert b"".join(payload for _, payload in frames[1:-1]) == long
+    assert frames[-1] == (0x81, b"xxx")
+
+
+def test_a_frame_that_is_too_long_or_masked_is_left_to_be_refused_by_its_head():
+    too_long = b"\x82\x7f" + (MAX_FRAME + 1).to_bytes(8, "big")
+    masked = b"\x82\xff" + (100_000).to_bytes(8, "big")
+    for head in (too_long, masked):
+        assert Pieces().take(bytearray(head + b"data"), shaken=True)[:10] == head
 
 
 def test_before_the_handshake_has_ended_each_line_is_a_piece():

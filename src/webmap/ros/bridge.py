@@ -393,7 +393,7 @@ class Bridge:
     def _report(self, error: Exception) -> None:
         self._on_error.call(error)
 
-    def _received(self, frame: bytes) -> None:
+    def _received(self, frame: bytes | bytearray) -> None:
         event = self._protocol.receive(frame, time.monotonic())
         self.stats.frames += 1
         self.stats.bytes += len(frame)

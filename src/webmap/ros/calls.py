@@ -138,7 +138,7 @@ class _CallsLane:
             if not answer.done():
                 answer.set_exception(error)
 
-    def _received(self, frame: bytes) -> None:
+    def _received(self, frame: bytes | bytearray) -> None:
         event = self._protocol.receive(frame, time.monotonic())
         if isinstance(event, Malformed):
             self._unreadable = event.reason[:200]

@@ -13,12 +13,12 @@ _REFUSED = (0, 1, 2, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256)
 _REFUSED_TOO = (258, 260, 261, 1004, 43000, 55799)
 
 
-def looks_like_cbor(frame: bytes) -> bool:
+def looks_like_cbor(frame: bytes | bytearray) -> bool:
     """Return whether the frame begins as a CBOR map, which no JSON text does."""
     return len(frame) > 0 and 0xA0 <= frame[0] <= 0xBF
 
 
-def decode(frame: bytes) -> dict[str, Any]:
+def decode(frame: bytes | bytearray) -> dict[str, Any]:
     """Return the map that ``frame`` holds; typed arrays are ``array.array``.
 
     Raises:

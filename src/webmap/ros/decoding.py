@@ -35,7 +35,7 @@ def _decoder(type: Any) -> "msgspec.json.Decoder[Any]":
     return msgspec.json.Decoder(type, dec_hook=dec_hook)
 
 
-def decode_json(text: bytes, type: Any) -> Any:
+def decode_json(text: bytes | bytearray, type: Any) -> Any:
     """Return the JSON in ``text`` as a value of ``type``.
 
     Raises:

@@ -20,7 +20,7 @@ class Publish:
 
     __slots__ = ("_decoded", "_map", "frame", "in_parts", "topic")
 
-    def __init__(self, topic: str, frame: bytes) -> None:
+    def __init__(self, topic: str, frame: bytes | bytearray) -> None:
         self.topic = topic
         self.frame = frame
         """The whole operation as it came, JSON or CBOR."""

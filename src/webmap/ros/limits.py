@@ -129,7 +129,7 @@ def check_size(size: int, limit: Limit, type: str | None) -> None:
         )
 
 
-def check_count(frame: bytes) -> None:
+def check_count(frame: bytes | bytearray) -> None:
     """Refuse a frame that holds more values than anything would be built for.
 
     Args:
@@ -174,7 +174,7 @@ def check_items(field: str, count: int) -> None:
 _TEXT = re.compile(rb'"(?:[^"\\]++|\\.)*+"', re.DOTALL)
 
 
-def _brackets(text: bytes) -> int:
+def _brackets(text: bytes | bytearray) -> int:
     return text.count(b"{") + text.count(b"[")
 
 
@@ -186,7 +186,7 @@ def _too_many(count: int, most: int) -> TooLarge:
     )
 
 
-def _count_cbor(frame: bytes) -> None:
+def _count_cbor(frame: bytes | bytearray) -> None:
     """Walk from the head of one item to the next, as RFC 8949, 3 has them."""
     at = items = values = 0
     end = len(frame)

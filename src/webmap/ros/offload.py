@@ -69,7 +69,9 @@ class _Worker:
         self.taking_over = asyncio.Lock()
         """Held by whoever takes over a part of an answer; others wait in order."""
 
-    async def ask(self, request: Request, data: bytes | memoryview) -> Reply:
+    async def ask(
+        self, request: Request, data: bytes | bytearray | memoryview
+    ) -> Reply:
         """Have a request answered; what goes wrong with that is an answer, too."""
         async with self._turn:
             began = time.monotonic()
@@ -85,7 +87,7 @@ class _Worker:
             return Reply(answer, parts, time.monotonic() - began)
 
     async def _ask(
-        self, request: Request, data: bytes | memoryview
+        self, request: Request, data: bytes | bytearray | memoryview
     ) -> tuple[Answer, list[bytearray]]:
         process = self._process
         if process is None or process.returncode is not None:
@@ -210,7 +212,9 @@ async def _release(user: object) -> None:
 
 
 async def aside(
-    function: Callable[..., bytes], data: bytes | memoryview, *arguments: object
+    function: Callable[..., bytes],
+    data: bytes | bytearray | memoryview,
+    *arguments: object,
 ) -> bytearray:
     """Return what a function of WebMap's own makes of bytes, in the worker process.
 

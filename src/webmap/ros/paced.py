@@ -81,10 +81,9 @@ class PacedConnection(ClientConnection):
     def _feed(self) -> bool:
         """Deal with one piece; return whether there was one."""
         shaken = self.protocol.state is not State.CONNECTING
-        length = self._pieces.next(self._waiting, shaken=shaken)
-        if not length or self.protocol.state is State.CLOSED:
+        if self.protocol.state is State.CLOSED:
             return False
-        piece = bytes(self._waiting[:length])
-        del self._waiting[:length]
-        super().data_received(piece)
-        return True
+        piece = self._pieces.take(self._waiting, shaken=shaken)
+        if piece:
+            super().data_received(piece)
+        return bool(piece)

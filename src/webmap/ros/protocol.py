@@ -77,7 +77,7 @@ class Protocol:
     def __init__(self, fragments: Fragments | None = None) -> None:
         self._fragments = Fragments() if fragments is None else fragments
 
-    def receive(self, frame: bytes | str, now: float) -> Event | None:
+    def receive(self, frame: bytes | bytearray | str, now: float) -> Event | None:
         """Return what ``frame`` says, or None if it is a part of something.
 
         Args:
@@ -98,7 +98,9 @@ class Protocol:
         except ProtocolError as error:
             return Malformed(str(error), len(frame))
 
-    def _read(self, frame: bytes, now: float, *, nested: bool) -> Event | None:
+    def _read(
+        self, frame: bytes | bytearray, now: float, *, nested: bool
+    ) -> Event | None:
         if len(frame) > MAX_FRAME:
             raise ProtocolError(f"a frame of {len(frame)} bytes, at most {MAX_FRAME}")
         topic = topic_in_head(frame)
@@ -118,7 +120,7 @@ class Protocol:
         return Unknown(op[:64])
 
     def _unwrap(
-        self, op: str, frame: bytes, now: float, *, nested: bool
+        self, op: str, frame: bytes | bytearray, now: float, *, nested: bool
     ) -> Event | None:
         if op == "png":
             inner = png.decode(decode_json(frame, _Png).data)
@@ -133,7 +135,7 @@ class Protocol:
             event.in_parts = True
         return event
 
-    def _read_inner(self, frame: bytes, now: float) -> Event | None:
+    def _read_inner(self, frame: bytes | bytearray, now: float) -> Event | None:
         if topic_in_head(frame) is None and decode_json(frame, _Op).op in (
             "fragment",
             "png",
@@ -142,7 +144,7 @@ class Protocol:
         return self._read(frame, now, nested=True)
 
 
-def _check_other(frame: bytes) -> None:
+def _check_other(frame: bytes | bytearray) -> None:
     """Let a large frame pass that is decoded here and now, and not by the worker."""
     if len(frame) > MAX_OTHER:
         raise ProtocolError(
@@ -158,7 +160,7 @@ def _check_other(frame: bytes) -> None:
         )
 
 
-def topic_in_head(frame: bytes) -> str | None:
+def topic_in_head(frame: bytes | bytearray) -> str | None:
     """Return the topic of a publish operation, told from the frame's first bytes.
 
     None where a closer look is needed. :meth:`~webmap.ros.events.Publish.decode`
@@ -175,7 +177,7 @@ def topic_in_head(frame: bytes) -> str | None:
     return _text(name) if len(name) == length else None
 
 
-def _text(name: bytes) -> str | None:
+def _text(name: bytes | bytearray) -> str | None:
     try:
         return name.decode()
     except UnicodeDecodeError:
@@ -189,7 +191,7 @@ def _flat(event: ServiceResponse | CallService | Status) -> Event:
     return event
 
 
-def _read_map(frame: bytes) -> Event:
+def _read_map(frame: bytes | bytearray) -> Event:
     value = cbor.decode(frame)
     op = value.get("op")
     if not isinstance(op, str):
