@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from safety_bench import pass_time, wait_for
 from safety_load import helper
+from safety_waiting import Stolen
 
 SETTLE = 2.0
 """Seconds for which a peer may do its worst before the good robot is driven."""
@@ -71,6 +72,9 @@ class Driven(NamedTuple):
     stop_jitter: float
     """How long the machine kept a thread waiting from the space bar to that zero."""
 
+    stolen: float
+    """The most that the host took of the machine's processors in a quarter second."""
+
 
 @contextlib.contextmanager
 def beside(bench, *peers, shown=False):
@@ -105,6 +109,12 @@ def beside(bench, *peers, shown=False):
 
 def drive(bench, seconds=DRIVE):
     """Hold W, then press STOP with W held on; return what was measured."""
+    with Stolen() as stolen:
+        driven = _drive(bench, seconds)
+    return driven._replace(stolen=stolen.worst)
+
+
+def _drive(bench, seconds):
     refused = 0
     while True:
         try:
@@ -139,6 +149,7 @@ def drive(bench, seconds=DRIVE):
         stop=zero - pressed,
         moved_after=moved_after,
         stop_jitter=bench.sentinel.stolen(pressed - 0.1, zero),
+        stolen=0.0,
     )
 
 

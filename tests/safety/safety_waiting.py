@@ -1,5 +1,7 @@
 """How long the threads on the way from a key to a robot waited for a processor."""
 
+import threading
+import time
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -47,3 +49,62 @@ class Waiting:
                 if not name.startswith(BESIDE):
                     delays[pid, task.name] = int(delay) * NANO
         return delays
+
+
+class Stolen:
+    """What the host of a virtual machine takes of the machine's processors.
+
+    While a processor is taken no thread runs on it, however urgent, and the machine's
+    own scheduler does not count that. Linux does: it is the steal time of proc_stat(5).
+    """
+
+    PERIOD = 0.02
+    """Seconds between two looks."""
+
+    def __init__(self) -> None:
+        self._looks: list[tuple[float, float]] = []
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="stolen", daemon=True)
+
+    def __enter__(self) -> "Stolen":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._end.set()
+        self._thread.join(5)
+
+    @property
+    def worst(self) -> float:
+        """The most that was taken within a quarter of a second, in seconds."""
+        return most_within(0.25, self._looks)
+
+    def _watch(self) -> None:
+        while not self._end.wait(self.PERIOD):
+            self._looks.append((time.monotonic(), steal(Path("/proc/stat"))))
+
+
+def steal(stat: Path) -> float:
+    """Return the seconds that all processors were taken for; 0 if nobody counts."""
+    try:
+        all_processors = stat.read_text().splitlines()[0].split()
+        return int(all_processors[8]) / 100
+    except (OSError, IndexError, ValueError):
+        return 0.0
+
+
+def most_within(window: float, counts: list[tuple[float, float]]) -> float:
+    """Return by how much a count grew at most within a window.
+
+    Args:
+        window: Its length.
+        counts: The count at several times, oldest first.
+
+    """
+    grown = [0.0]
+    first = 0
+    for at, count in counts:
+        while counts[first][0] < at - window:
+            first += 1
+        grown.append(count - counts[first][1])
+    return max(grown)

@@ -7,13 +7,22 @@ from safety_run import FULL, grace
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
 
-TRIALS = 3
-"""How often the good robot is driven at most until nobody disturbs it. A computer that
-is shared with others may hold up every process; a peer that disturbs does so always."""
+TRIALS = 5
+"""How often the good robot is driven at most, where the computer cannot tell."""
+
+LENT = 0.05
+"""Seconds of the machine's processors, in a quarter second, that its host may take."""
+
+LATE = 0.1
+"""Seconds that the machine may keep a thread waiting that sleeps most of the time."""
 
 
 def check(bench):
-    """Assert that the peers do not disturb the good robot, and never its STOP."""
+    """Assert that the peers do not disturb the good robot, and never its STOP.
+
+    A trial that was disturbed while the host of a virtual machine took its processors
+    says nothing of the peers, and another one follows; not so in a full run.
+    """
     trials = []
     for _ in range(1 if FULL else TRIALS):
         driven = drive(bench)
@@ -28,6 +37,8 @@ def check(bench):
             and driven.tick_gap < 0.15 + late
         ):
             return
+        taken = driven.stolen > LENT or driven.driving_jitter > LATE
+        assert taken, f"disturbed on a machine that had its processors: {driven}"
     raise AssertionError(f"disturbed in each trial: {trials}")
 
 

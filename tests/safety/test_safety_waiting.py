@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from safety_waiting import Waiting
+from safety_waiting import Stolen, Waiting, most_within, steal
 
 pytestmark = [
     pytest.mark.safety,
@@ -51,3 +51,20 @@ def test_who_has_ended_or_sleeps_waits_for_nothing():
         process.wait()
         assert asleep.seconds() == 0
         assert Waiting([process.pid]).seconds() == 0
+
+
+def test_the_most_that_was_taken_within_a_window_is_found():
+    counts = [(0.0, 5.0), (0.1, 5.0), (0.2, 5.04), (0.3, 5.1), (0.4, 5.1), (1.0, 5.15)]
+    assert most_within(0.25, counts) == pytest.approx(0.1)
+    assert most_within(0.25, counts[:2]) == 0
+    assert most_within(0.25, []) == 0
+
+
+def test_what_the_host_takes_is_read_where_it_is_counted(tmp_path):
+    stat = tmp_path / "stat"
+    assert steal(stat) == 0
+    stat.write_text("cpu  1 2 3 4 5 6 7 250 0 0\ncpu0 1 2 3 4 5 6 7 250 0 0\n")
+    assert steal(stat) == 2.5
+    with Stolen() as stolen:
+        time.sleep(0.1)
+    assert stolen.worst >= 0
