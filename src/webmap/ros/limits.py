@@ -88,6 +88,7 @@ ITEMS = {
     "poses": (20_000, "500 of them are drawn"),
     "particles": (20_000, "500 of them are drawn"),
     "markers": (10_000, "5,000 of them are drawn"),
+    "corners": (10_000, "so many corners of a polygon are drawn"),
     "status": (2_000, "1,000 parts of a robot are shown"),
 }
 """Most items of one list of a message, and why, by the name of the field."""

@@ -7,6 +7,7 @@ import msgspec
 
 from webmap.errors import ProtocolError
 from webmap.geometry.reach import FARTHEST
+from webmap.ros.limits import check_items
 from webmap.ros.messages import PointMsg, PoseMsg, Stamped
 
 if TYPE_CHECKING:
@@ -135,6 +136,16 @@ class PolygonStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/PolygonStamped``."""
 
     polygon: PolygonMsg
+
+    def digest(self) -> "PolygonStampedMsg":
+        """Return the polygon if it is not too long; called in the worker process.
+
+        Raises:
+            TooLarge: If it has more corners than are drawn.
+
+        """
+        check_items("corners", len(self.polygon.points))
+        return self
 
 
 class RangeMsg(Stamped, frozen=True, kw_only=True):

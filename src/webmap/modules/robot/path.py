@@ -60,8 +60,7 @@ class Path:
         self.topic = topic
         self.max_points = max_points
         self.age_limit = age_limit
-        self.points: list[tuple[float, float]] = []
-        """The newest path, all of it, in metres in the map's frame."""
+        self._newest: PathMsg | None = None
         self.line = svg.polyline(
             fill="none",
             stroke="#12805c",
@@ -82,6 +81,15 @@ class Path:
         )
 
     @property
+    def points(self) -> list[tuple[float, float]]:
+        """The newest path, all of it, in metres in the map's frame.
+
+        Only the positions that are drawn are known to be finite.
+        """
+        poses = self._newest.poses if self._newest is not None else []
+        return [(p.pose.position.x, p.pose.position.y) for p in poses]
+
+    @property
     def length(self) -> float:
         """How long the path is, in metres; 0 if there is none."""
         return sum(math.dist(one, next) for one, next in pairwise(self.points))
@@ -90,16 +98,17 @@ class Path:
         """Draw a path in place of the one before.
 
         Raises:
-            ProtocolError: If a position is not finite, or farther away than anything
-                can be.
+            ProtocolError: If a position that is to be drawn is not finite, or farther
+                away than anything can be.
 
         """
-        points = [(p.pose.position.x, p.pose.position.y) for p in path.poses]
-        check_finite(points, "a path")
-        kept = thinned(len(points), self.max_points)
-        drawn = in_space(path.poses[index].pose.position for index in kept)
+        # Only these are looked at, so that a long path does not hold up other robots.
+        kept = thinned(len(path.poses), self.max_points)
+        chosen = [path.poses[index].pose.position for index in kept]
+        check_finite([(place.x, place.y) for place in chosen], "a path")
+        drawn = in_space(chosen)
         self._placed.stand_in(path.frame_id, path.stamp, partial(self._draw, drawn))
-        self.points = points
+        self._newest = path
         self.svg.set_age(self._bridge.lag, limit=self.age_limit)
         self.robot.notify_modules("on_path_update", self)
 
