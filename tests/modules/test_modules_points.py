@@ -10,6 +10,8 @@ from test_modules_frames import tell
 from test_modules_tilted import MAP, SLOPE, mount, sensed
 from tilted_frames import frame, taken
 
+from webmap.modules.robot.grid_cells import rows_of
+
 FAR = 1e300
 ENDLESS = {"stamp": {"secs": 10**400, "nsecs": 0}, "frame_id": "map"}
 
@@ -171,6 +173,20 @@ def test_cells_that_touch_along_x_are_one_box_in_whatever_order(link, robot):
         box(8.5, 3.05, 0.95, 0.05),
         box(7.975, 3.1, 2.0, 0.05),
     ]
+
+
+def test_cells_that_are_a_little_off_are_boxes_that_stay_where_the_cells_are():
+    step = 0.1 * 1.0005  # far within the tolerance, which many of them are not
+    middles = np.array([(number * step, 0.0, 0.0) for number in range(200)])
+    rows = rows_of(middles, 0.1, 0.1)
+    assert sum(rows.lengths) == 200
+    assert len(rows.lengths) < 20
+    drawn = [
+        first[0] + number * 0.1
+        for first, length in zip(rows.first, rows.lengths, strict=True)
+        for number in range(length)
+    ]
+    assert np.abs(np.array(drawn) - middles[:, 0]).max() < 0.002
 
 
 def test_tilted_cells_are_turned_in_space_before_they_are_flattened(link, robot):

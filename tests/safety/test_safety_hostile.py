@@ -10,7 +10,7 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 TRIALS = 5
 """How often the good robot is driven at most, where the computer cannot tell."""
 
-LENT = 0.05
+LENT = 0.1
 """Seconds of the machine's processors, in a quarter second, that its host may take."""
 
 LATE = 0.1

@@ -1,22 +1,27 @@
 """Cells of a grid that somebody publishes one by one, such as what is inflated."""
 
-from collections.abc import Sequence
 from functools import cache, partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from webmap.core.from_above import flat, in_space
+from webmap.core.from_above import in_space
 from webmap.core.layer_names import label
 from webmap.core.placed import Placed, check_finite, thinned
 from webmap.core.refusals import refusing
 from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry import Vector3
+from webmap.geometry.reach import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_points import GridCellsMsg
 from webmap.scene import svg
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from webmap.core.robot import Robot
+    from webmap.ros.messages import PointMsg
     from webmap.tf import Transform
+
+    Points: TypeAlias = NDArray[np.float64]
 
 MAX_CELLS = 100_000
 """Cells of which no more are looked at."""
@@ -24,8 +29,15 @@ MAX_CELLS = 100_000
 BESIDE = 0.01
 """Share of a cell by which the next one in a row may be off."""
 
-Row: TypeAlias = tuple[Vector3, int]
-"""The middle of the first cell along x, and how many cells there are."""
+
+class Rows(NamedTuple):
+    """Cells that touch along x."""
+
+    first: "Points"
+    """The middle of the first cell of each row, of shape (N, 3), in metres."""
+
+    lengths: list[int]
+    """How many cells each row has."""
 
 
 class GridCells:
@@ -115,9 +127,8 @@ class GridCells:
             raise ProtocolError(f"{len(given)} cells; {MAX_CELLS} are the limit")
         # Only these are looked at: 100,000 would hold up the other robots for 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_cells)]
-        check_finite([(cell.x, cell.y) for cell in chosen], "cells")
         size = message.size if chosen else (1.0, 1.0)
-        rows = rows_of(in_space(chosen), *size)
+        rows = rows_of(_usable(chosen), *size)
         draw = partial(self._draw, rows, *size)
         self._placed.stand_in(message.frame_id, message.stamp, draw)
         self._message = message
@@ -133,33 +144,45 @@ class GridCells:
         """Keep them where they are while the robot goes along."""
         self._placed.follow()
 
-    def _draw(
-        self, rows: list[Row], width: float, height: float, tilt: "Transform"
-    ) -> None:
-        corners = flat(
-            (
-                Vector3(first.x - width / 2, first.y - height / 2, first.z)
-                for first, _ in rows
-            ),
-            tilt,
-        )
-        (a, b, _, _), (c, d, _, _), _ = tilt.rows
-        aside = f"{_short(b * height)} {_short(d * height)}"
+    def _draw(self, rows: Rows, width: float, height: float, tilt: "Transform") -> None:
+        (a, b, c, x), (d, e, f, y), _ = tilt.rows
+        east, north, up = (rows.first - (width / 2, height / 2, 0)).T
+        aside = f"{_short(b * height)} {_short(e * height)}"
 
         @cache
         def outline(count: int) -> str:
-            along = f"{_short(a * width * count)} {_short(c * width * count)}"
-            back = f"{_short(-a * width * count)} {_short(-c * width * count)}"
+            along = f"{_short(a * width * count)} {_short(d * width * count)}"
+            back = f"{_short(-a * width * count)} {_short(-d * width * count)}"
             return f"l{along} {aside} {back}z"
 
-        parts = [
-            f"M{_short(x)} {_short(y)}{outline(count)}"
-            for (x, y), (_, count) in zip(corners, rows, strict=True)
-        ]
+        corners = zip(
+            ((a * east + b * north + c * up + x).round(4) + 0.0).tolist(),
+            ((d * east + e * north + f * up + y).round(4) + 0.0).tolist(),
+            rows.lengths,
+            strict=True,
+        )
+        parts = [f"M{x:.10g} {y:.10g}{outline(count)}" for x, y, count in corners]
         self.drawn.set(d="".join(parts) or None)
 
 
-def rows_of(cells: Sequence[Vector3], width: float, height: float) -> list[Row]:
+def _usable(cells: "list[PointMsg]") -> "Points":
+    """Return the middles of cells, in metres.
+
+    Raises:
+        ProtocolError: If one is not finite, or farther away than anything can be.
+
+    """
+    import numpy as np
+
+    points = np.array([(cell.x, cell.y, cell.z) for cell in cells]).reshape(-1, 3)
+    points[~np.isfinite(points[:, 2]), 2] = 0.0
+    if not (np.abs(points) <= FARTHEST).all():  # nor is NaN
+        check_finite([(cell.x, cell.y) for cell in cells], "cells")
+        in_space(cells)
+    return points
+
+
+def rows_of(cells: "Points", width: float, height: float) -> Rows:
     """Return cells that touch along x as rows.
 
     Args:
@@ -168,24 +191,27 @@ def rows_of(cells: Sequence[Vector3], width: float, height: float) -> list[Row]:
         height: Of a cell along y, in metres.
 
     """
-    low = min((cell.y for cell in cells), default=0.0)
+    import numpy as np
 
-    def row_by_row(cell: Vector3) -> tuple[int, float]:
-        return round((cell.y - low) / height), cell.x
+    if len(cells) == 0:
+        return Rows(cells, [])
+    x, y, _ = cells.T
+    cells = cells[np.lexsort((x, np.rint((y - y.min()) / height)))]
+    off = np.abs(np.diff(cells, axis=0) - (width, 0, 0))
+    touch = (off <= (BESIDE * width, BESIDE * height, BESIDE * width)).all(axis=1)
+    starts = np.flatnonzero(np.concatenate(([True], ~touch)))
+    # Cells that are a little off add up along a row, which then begins anew.
+    number = np.arange(len(cells)) - np.repeat(starts, _lengths(starts, len(cells)))
+    drift = cells[:, 0] - cells[np.arange(len(cells)) - number, 0] - number * width
+    strays = np.diff(np.rint(drift / (BESIDE * width))) != 0
+    starts = np.flatnonzero(np.concatenate(([True], ~touch | strays)))
+    return Rows(cells[starts], _lengths(starts, len(cells)).tolist())
 
-    rows: list[Row] = []
-    for cell in sorted(cells, key=row_by_row):
-        if rows:
-            first, count = rows[-1]
-            if (
-                abs(cell.x - first.x - count * width) <= BESIDE * width
-                and abs(cell.y - first.y) <= BESIDE * height
-                and abs(cell.z - first.z) <= BESIDE * width
-            ):
-                rows[-1] = first, count + 1
-                continue
-        rows.append((cell, 1))
-    return rows
+
+def _lengths(starts: "NDArray[np.intp]", count: int) -> "NDArray[np.intp]":
+    import numpy as np
+
+    return np.diff(starts, append=count)
 
 
 def _short(value: float) -> str:
