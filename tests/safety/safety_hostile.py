@@ -45,6 +45,10 @@ HEAR_TICKS = """{
 """Notes when each tick of the gate comes to the page, on the page's own socket."""
 
 
+READY = "document.querySelector('.webmap-teleop-title')?.textContent === 'Free'"
+"""Whether the page says that a press drives."""
+
+
 class Driven(NamedTuple):
     """What was measured of the good robot; all times in seconds."""
 
@@ -100,6 +104,7 @@ def beside(bench, *peers, shown=False):
             bench.start_display()
             bench.open_page(before=HEAR_TICKS)
             pass_time(SETTLE)
+            bench.tab.wait(READY)  # until then the page says that it is getting ready
             yield urls
         finally:
             del os.environ["SAFETY_HOSTILE"], os.environ["SAFETY_SHOWN"]
