@@ -19,7 +19,9 @@ PEERS = {
         "long_transforms",
         "long_markers",
     ),
-    "maps, clouds and pictures": ("large_map", "large_cloud", "large_picture"),
+    "a map": ("large_map",),
+    "a cloud": ("large_cloud",),
+    "a picture": ("large_picture",),
     "of other kinds": ("long_line", "many_lists", "fragments", "bombs"),
 }
 """Several robots at a time, each of which sends one of these once a second."""
