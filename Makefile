@@ -17,7 +17,8 @@ INSTALLED := .venv/.installed
 DEV := .venv/.installed-dev
 NODE := node_modules/.installed
 
-JOBS ?= 2
+# Tests that drive a browser wait half of their time, so three fill two processors.
+JOBS ?= 3
 ARGS ?=
 
 ## help: list what there is
