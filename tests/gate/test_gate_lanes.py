@@ -170,7 +170,7 @@ async def test_that_there_is_no_link_is_said_once_for_each_reason(monkeypatch, c
         with noting_lane(url, []):
             await until(lambda: len(attempts) > 6, "seven attempts")
     complaints = [r.getMessage() for r in caplog.records if "no link" in r.getMessage()]
-    assert ["403" in text for text in complaints] == [True, False]
+    assert ["HTTP 403" in text for text in complaints] == [True, False]
 
 
 @in_loop
