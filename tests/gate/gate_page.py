@@ -35,8 +35,9 @@ class Page:
 
     def say(self, **command):
         if command["op"] == "reset" and "stop" not in command:
-            shown = self.robot(command["robot"]).get("stop") or {"id": "none"}
-            command["stop"] = shown["id"]
+            robot = command["robot"]
+            stop = eventually(lambda: self.robot(robot).get("stop"), "a STOP to reset")
+            command["stop"] = stop["id"]
         self.connection.receive(json.dumps(command))
 
     def drive(self, x, robot="r1"):
