@@ -104,6 +104,7 @@ def drive_by_pad(bench: Bench) -> None:
     raise AssertionError("never drove")
 
 
+@pytest.mark.serial  # a page that is kept waiting for a processor lets go
 def test_a_thumb_on_the_stick_drives_and_letting_go_is_neutral(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     touched.until(lambda: touched.gate.moves()[-1]["x"] == 1)
