@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from safety_bench import pass_time, wait_for
 from safety_load import helper
-from safety_waiting import Stolen
+from safety_waiting import Lent
 
 SETTLE = 2.0
 """Seconds for which a peer may do its worst before the good robot is driven."""
@@ -79,6 +79,9 @@ class Driven(NamedTuple):
     stolen: float
     """The most that the host took of the machine's processors in a quarter second."""
 
+    waited: float
+    """The most that a thread from key to robot waited for one in a quarter second."""
+
 
 @contextlib.contextmanager
 def beside(bench, *peers, shown=False):
@@ -114,9 +117,9 @@ def beside(bench, *peers, shown=False):
 
 def drive(bench, seconds=DRIVE):
     """Hold W, then press STOP with W held on; return what was measured."""
-    with Stolen() as stolen:
+    with Lent(bench.waiting()) as lent:
         driven = _drive(bench, seconds)
-    return driven._replace(stolen=stolen.worst)
+    return driven._replace(stolen=lent.stolen, waited=lent.waited)
 
 
 def _drive(bench, seconds):
@@ -136,9 +139,11 @@ def _drive(bench, seconds):
         f"ticks.filter((t) => t > performance.now() - {seconds * 1000})"
     )
     driving_jitter = bench.sentinel.worst(begun, ended)
+    waiting = bench.waiting()
     pressed = time.monotonic()
     bench.space("keyDown")
     zero = wait_for(lambda: bench.robot.log.first_zero(pressed), "a zero")
+    waited = waiting.seconds()
     pass_time(0.5)
     moved_after = len(bench.robot.log.moving_since(zero))
     bench.space("keyUp")
@@ -153,8 +158,9 @@ def _drive(bench, seconds):
         driving_jitter=driving_jitter,
         stop=zero - pressed,
         moved_after=moved_after,
-        stop_jitter=bench.sentinel.stolen(pressed - 0.1, zero),
+        stop_jitter=max(waited, bench.sentinel.stolen(pressed - 0.1, zero)),
         stolen=0.0,
+        waited=0.0,
     )
 
 

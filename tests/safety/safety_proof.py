@@ -85,7 +85,7 @@ class ProvingBench(Bench):
         for trial in range(TRIALS):
             self.hurried = FULL and trial % EVERY != 0
             self._get_under_way(before)
-            waiting = self._waiting()
+            waiting = self.waiting()
             self.fault_at = time.monotonic()
             inflict()
             figure = self._measure(within, stops_by)
@@ -145,7 +145,7 @@ class ProvingBench(Bench):
             self.let_go()
         raise AssertionError("the robot stops again and again") from why
 
-    def _waiting(self):
+    def waiting(self):
         """Begin to see what they wait for a processor whom a key passes."""
         on_the_way = [psutil.Process(), psutil.Process(self.display.popen.pid)]
         if self.gate:

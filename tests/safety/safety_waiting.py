@@ -29,13 +29,14 @@ class Waiting:
 
     def seconds(self) -> float:
         """Return how long since then the thread waited that waited longest."""
-        return max(
-            (
-                delay - self._before.get(thread, 0.0)
-                for thread, delay in self._delays().items()
-            ),
-            default=0.0,
-        )
+        return max(self.of_threads().values(), default=0.0)
+
+    def of_threads(self) -> dict[tuple[int, str], float]:
+        """Return how long since then each thread waited."""
+        return {
+            thread: delay - self._before.get(thread, 0.0)
+            for thread, delay in self._delays().items()
+        }
 
     def _delays(self) -> dict[tuple[int, str], float]:
         delays = {}
@@ -51,22 +52,33 @@ class Waiting:
         return delays
 
 
-class Stolen:
-    """What the host of a virtual machine takes of the machine's processors.
+class Lent:
+    """How much of the processors others took while something was measured.
 
-    While a processor is taken no thread runs on it, however urgent, and the machine's
-    own scheduler does not count that. Linux does: it is the steal time of proc_stat(5).
+    Processes of this machine take a processor while a thread on the way waits for it.
+    The host of a virtual machine takes processors as well: no thread runs on them then,
+    however urgent, and the machine's own scheduler does not count that. Linux does, as
+    the steal time of proc_stat(5).
+
+    Args:
+        waiting: Sees what the threads on the way wait.
+
     """
 
-    PERIOD = 0.02
+    PERIOD = 0.05
     """Seconds between two looks."""
 
-    def __init__(self) -> None:
-        self._looks: list[tuple[float, float]] = []
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name="stolen", daemon=True)
+    WINDOW = 0.25
+    """Seconds within which what was taken is added up."""
 
-    def __enter__(self) -> "Stolen":
+    def __init__(self, waiting: Waiting) -> None:
+        self._waiting = waiting
+        self._steals: list[tuple[float, float]] = []
+        self._waits: dict[tuple[int, str], list[tuple[float, float]]] = {}
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="lent", daemon=True)
+
+    def __enter__(self) -> "Lent":
         self._thread.start()
         return self
 
@@ -75,13 +87,22 @@ class Stolen:
         self._thread.join(5)
 
     @property
-    def worst(self) -> float:
-        """The most that was taken within a quarter of a second, in seconds."""
-        return most_within(0.25, self._looks)
+    def stolen(self) -> float:
+        """The most that the host took within the window, in seconds."""
+        return most_within(self.WINDOW, self._steals)
+
+    @property
+    def waited(self) -> float:
+        """The most that one thread waited within the window, in seconds."""
+        waits = self._waits.values()
+        return max((most_within(self.WINDOW, each) for each in waits), default=0.0)
 
     def _watch(self) -> None:
         while not self._end.wait(self.PERIOD):
-            self._looks.append((time.monotonic(), steal(Path("/proc/stat"))))
+            now = time.monotonic()
+            self._steals.append((now, steal(Path("/proc/stat"))))
+            for thread, waited in self._waiting.of_threads().items():
+                self._waits.setdefault(thread, []).append((now, waited))
 
 
 def steal(stat: Path) -> float:

@@ -7,39 +7,52 @@ from safety_run import FULL, grace
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
 
-TRIALS = 5
+TRIALS = 7
 """How often the good robot is driven at most, where the computer cannot tell."""
 
 LENT = 0.1
 """Seconds of the machine's processors, in a quarter second, that its host may take."""
 
 LATE = 0.1
-"""Seconds that the machine may keep a thread waiting that sleeps most of the time."""
+"""Seconds, in a quarter second, that a thread may wait for a processor."""
 
 
 def check(bench):
     """Assert that the peers do not disturb the good robot, and never its STOP.
 
-    A trial that was disturbed while the host of a virtual machine took its processors
-    says nothing of the peers, and another one follows; not so in a full run.
+    In a full run one trial decides. On a machine that others use too, a trial that was
+    disturbed while others took the processors does not count, and after one that was
+    disturbed for no known reason the next two that count must be undisturbed.
     """
-    trials = []
-    for _ in range(1 if FULL else TRIALS):
+    trials, owed, allowed = [], 1, not FULL
+    while owed and len(trials) < TRIALS:
         driven = drive(bench)
         trials.append(driven)
         assert driven.stop < 0.1 + grace(driven.stop_jitter), driven
         assert driven.moved_after == 0, driven
-        late = grace(driven.driving_jitter)
-        if (
-            driven.refused == 0
-            and driven.zeros == 0
-            and driven.velocity_gap < 0.15 + late
-            and driven.tick_gap < 0.15 + late
-        ):
-            return
-        taken = driven.stolen > LENT or driven.driving_jitter > LATE
-        assert taken, f"disturbed on a machine that had its processors: {driven}"
-    raise AssertionError(f"disturbed in each trial: {trials}")
+        if undisturbed(driven):
+            owed -= 1
+        elif not taken(driven):
+            assert allowed, f"disturbed: {trials}"
+            owed, allowed = 2, False
+    assert not owed, f"disturbed too often: {trials}"
+
+
+def undisturbed(driven):
+    """Return whether the robot drove as if it were alone."""
+    late = grace(driven.driving_jitter)
+    return (
+        driven.refused == 0
+        and driven.zeros == 0
+        and driven.velocity_gap < 0.15 + late
+        and driven.tick_gap < 0.15 + late
+    )
+
+
+def taken(driven):
+    """Return whether others took the processors while the robot was driven."""
+    late = max(driven.driving_jitter, driven.waited)
+    return not FULL and (driven.stolen > LENT or late > LATE)
 
 
 def test_with_nobody_beside_the_good_robot_is_driven_and_stopped(bench):

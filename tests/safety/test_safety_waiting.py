@@ -4,11 +4,11 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from safety_waiting import Stolen, Waiting, most_within, steal
+from safety_waiting import Lent, Waiting, most_within, steal
 
 pytestmark = [
     pytest.mark.safety,
@@ -20,7 +20,9 @@ pytestmark = [
 BUSY = "import os; os.sched_setaffinity(0, {%d}); print(flush=True)\nwhile True: pass"
 
 
-def test_of_three_that_share_a_processor_each_waits_for_it():
+@contextmanager
+def three_busy():
+    """Three processes that never sleep, on one processor."""
     script = BUSY % min(os.sched_getaffinity(0))
     with ExitStack() as stack:
         busy = []
@@ -32,6 +34,11 @@ def test_of_three_that_share_a_processor_each_waits_for_it():
             busy.append(process)
         for process in busy:
             process.stdout.readline()
+        yield busy
+
+
+def test_of_three_that_share_a_processor_each_waits_for_it():
+    with three_busy() as busy:
         one, all_ = Waiting([busy[0].pid]), Waiting([each.pid for each in busy])
         begin = time.monotonic()
         while one.seconds() < 0.1:
@@ -65,6 +72,11 @@ def test_what_the_host_takes_is_read_where_it_is_counted(tmp_path):
     assert steal(stat) == 0
     stat.write_text("cpu  1 2 3 4 5 6 7 250 0 0\ncpu0 1 2 3 4 5 6 7 250 0 0\n")
     assert steal(stat) == 2.5
-    with Stolen() as stolen:
-        time.sleep(0.1)
-    assert stolen.worst >= 0
+
+
+def test_what_one_waits_among_others_is_found_by_the_quarter_second():
+    with three_busy() as busy:
+        with Lent(Waiting([busy[0].pid])) as lent:
+            time.sleep(1)
+        assert 0.02 < lent.waited < 0.5
+        assert lent.stolen >= 0
