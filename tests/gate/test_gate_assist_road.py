@@ -55,6 +55,7 @@ def ranges_seen(bridge):
     return [reach for reach in heard[1].ranges if math.isfinite(reach)]
 
 
+@pytest.mark.serial  # turns for a set time; a program that is kept waiting loses it
 def test_a_robot_that_is_driven_at_a_wall_comes_to_stand_before_it(gate, bridge):
     newest = {}
     reports = gate.on_report(
