@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from safety_bench import pass_time, wait_for
 from safety_load import helper
-from safety_waiting import Lent
+from safety_waiting import Contention
 
 SETTLE = 2.0
 """Seconds for which a peer may do its worst before the good robot is driven."""
@@ -77,10 +77,10 @@ class Driven(NamedTuple):
     """How long the machine kept a thread waiting from the space bar to that zero."""
 
     stolen: float
-    """The most that the host took of the machine's processors in a quarter second."""
+    """The most steal time of all processors in a quarter of a second."""
 
     waited: float
-    """The most that a thread from key to robot waited for one in a quarter second."""
+    """The longest wait of one thread on the way in a quarter of a second."""
 
 
 @contextlib.contextmanager
@@ -117,9 +117,9 @@ def beside(bench, *peers, shown=False):
 
 def drive(bench, seconds=DRIVE):
     """Hold W, then press STOP with W held on; return what was measured."""
-    with Lent(bench.waiting()) as lent:
+    with Contention(bench.waiting()) as contention:
         driven = _drive(bench, seconds)
-    return driven._replace(stolen=lent.stolen, waited=lent.waited)
+    return driven._replace(stolen=contention.stolen, waited=contention.waited)
 
 
 def _drive(bench, seconds):

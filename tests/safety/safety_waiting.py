@@ -52,33 +52,34 @@ class Waiting:
         return delays
 
 
-class Lent:
-    """How much of the processors others took while something was measured.
+class Contention:
+    """How much processor time other processes and the host took during a measurement.
 
-    Processes of this machine take a processor while a thread on the way waits for it.
-    The host of a virtual machine takes processors as well: no thread runs on them then,
-    however urgent, and the machine's own scheduler does not count that. Linux does, as
-    the steal time of proc_stat(5).
+    Other processes use a processor while a thread on the way waits for one. The host of
+    a virtual machine may take a processor away: then no thread runs on that processor,
+    and Linux counts the time as steal time, see proc_stat(5).
 
     Args:
-        waiting: Sees what the threads on the way wait.
+        waiting: Reads how long the threads on the way have waited.
 
     """
 
     PERIOD = 0.05
-    """Seconds between two looks."""
+    """Seconds between two readings."""
 
     WINDOW = 0.25
-    """Seconds within which what was taken is added up."""
+    """Seconds over which time that was taken is added up."""
 
     def __init__(self, waiting: Waiting) -> None:
         self._waiting = waiting
         self._steals: list[tuple[float, float]] = []
         self._waits: dict[tuple[int, str], list[tuple[float, float]]] = {}
         self._end = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name="lent", daemon=True)
+        self._thread = threading.Thread(
+            target=self._watch, name="contention", daemon=True
+        )
 
-    def __enter__(self) -> "Lent":
+    def __enter__(self) -> "Contention":
         self._thread.start()
         return self
 
@@ -88,12 +89,12 @@ class Lent:
 
     @property
     def stolen(self) -> float:
-        """The most that the host took within the window, in seconds."""
+        """The most steal time of all processors within the window, in seconds."""
         return most_within(self.WINDOW, self._steals)
 
     @property
     def waited(self) -> float:
-        """The most that one thread waited within the window, in seconds."""
+        """The longest wait of one thread within the window, in seconds."""
         waits = self._waits.values()
         return max((most_within(self.WINDOW, each) for each in waits), default=0.0)
 
@@ -106,7 +107,7 @@ class Lent:
 
 
 def steal(stat: Path) -> float:
-    """Return the seconds that all processors were taken for; 0 if nobody counts."""
+    """Return the steal time of all processors, in seconds; 0 if Linux counts none."""
     try:
         all_processors = stat.read_text().splitlines()[0].split()
         return int(all_processors[8]) / 100
@@ -115,10 +116,10 @@ def steal(stat: Path) -> float:
 
 
 def most_within(window: float, counts: list[tuple[float, float]]) -> float:
-    """Return by how much a count grew at most within a window.
+    """Return the largest growth of a count within a window.
 
     Args:
-        window: Its length.
+        window: The length of the window.
         counts: The count at several times, oldest first.
 
     """

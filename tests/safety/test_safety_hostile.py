@@ -8,21 +8,21 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
 
 TRIALS = 7
-"""How often the good robot is driven at most, where the computer cannot tell."""
+"""The most trials, if other processes disturb some of them."""
 
-LENT = 0.1
-"""Seconds of the machine's processors, in a quarter second, that its host may take."""
+MOST_STOLEN = 0.1
+"""Steal time, in seconds per quarter second, above which a trial may not count."""
 
-LATE = 0.1
-"""Seconds, in a quarter second, that a thread may wait for a processor."""
+MOST_WAITED = 0.1
+"""Wait for a processor, in seconds per quarter second, above which the same holds."""
 
 
 def check(bench):
     """Assert that the peers do not disturb the good robot, and never its STOP.
 
-    In a full run one trial decides. On a machine that others use too, a trial that was
-    disturbed while others took the processors does not count, and after one that was
-    disturbed for no known reason the next two that count must be undisturbed.
+    In a full run one trial decides. Otherwise a disturbed trial does not count if other
+    processes or the host took the processors during the trial. After one disturbed
+    trial that counts, the next two that count must be undisturbed.
     """
     trials, owed, allowed = [], 1, not FULL
     while owed and len(trials) < TRIALS:
@@ -32,7 +32,7 @@ def check(bench):
         assert driven.moved_after == 0, driven
         if undisturbed(driven):
             owed -= 1
-        elif not taken(driven):
+        elif not contended(driven):
             assert allowed, f"disturbed: {trials}"
             owed, allowed = 2, False
     assert not owed, f"disturbed too often: {trials}"
@@ -49,10 +49,10 @@ def undisturbed(driven):
     )
 
 
-def taken(driven):
-    """Return whether others took the processors while the robot was driven."""
-    late = max(driven.driving_jitter, driven.waited)
-    return not FULL and (driven.stolen > LENT or late > LATE)
+def contended(driven):
+    """Return whether other processes or the host took the processors."""
+    waited = max(driven.driving_jitter, driven.waited)
+    return not FULL and (driven.stolen > MOST_STOLEN or waited > MOST_WAITED)
 
 
 def test_with_nobody_beside_the_good_robot_is_driven_and_stopped(bench):

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from safety_waiting import Lent, Waiting, most_within, steal
+from safety_waiting import Contention, Waiting, most_within, steal
 
 pytestmark = [
     pytest.mark.safety,
@@ -60,23 +60,23 @@ def test_who_has_ended_or_sleeps_waits_for_nothing():
         assert Waiting([process.pid]).seconds() == 0
 
 
-def test_the_most_that_was_taken_within_a_window_is_found():
+def test_the_largest_growth_within_a_window_is_found():
     counts = [(0.0, 5.0), (0.1, 5.0), (0.2, 5.04), (0.3, 5.1), (0.4, 5.1), (1.0, 5.15)]
     assert most_within(0.25, counts) == pytest.approx(0.1)
     assert most_within(0.25, counts[:2]) == 0
     assert most_within(0.25, []) == 0
 
 
-def test_what_the_host_takes_is_read_where_it_is_counted(tmp_path):
+def test_steal_time_is_read_from_proc_stat(tmp_path):
     stat = tmp_path / "stat"
     assert steal(stat) == 0
     stat.write_text("cpu  1 2 3 4 5 6 7 250 0 0\ncpu0 1 2 3 4 5 6 7 250 0 0\n")
     assert steal(stat) == 2.5
 
 
-def test_what_one_waits_among_others_is_found_by_the_quarter_second():
+def test_contention_is_the_longest_wait_in_a_quarter_second():
     with three_busy() as busy:
-        with Lent(Waiting([busy[0].pid])) as lent:
+        with Contention(Waiting([busy[0].pid])) as contention:
             time.sleep(1)
-        assert 0.02 < lent.waited < 0.5
-        assert lent.stolen >= 0
+        assert 0.02 < contention.waited < 0.5
+        assert contention.stolen >= 0

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap")
 
 SWITCH = 0.0001
-"""Seconds after which a thread lets another run that wants to.
+"""Seconds after which a running thread gives way to a waiting one.
 
-A message to a page costs the web thread several such waits while the model's thread is
-busy. With 1 ms, the ticks of drivers came up to 0.3 s late.
+While the model's thread is busy, the web thread waits so long several times for each
+message to a page. With 1 ms, the ticks of drivers came up to 0.3 s late.
 """
 
 TICK = 0.05

@@ -35,8 +35,9 @@ TURN = 64
 """Frames that are read from a link before others get their turn."""
 
 LOOK_PERIOD = 0.25
+
 MOST_FRAGMENTS = 4096
-"""Fragments of one message that end the link; 64 MiB in one frame are 1025 of them."""
+"""Fragments of one message that end the link; a frame of 64 MiB makes 1025."""
 
 MESSAGE_TOO_BIG = 1009
 """The close code of a link that ends for that."""

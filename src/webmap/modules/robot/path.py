@@ -60,7 +60,7 @@ class Path:
         self.topic = topic
         self.max_points = max_points
         self.age_limit = age_limit
-        self._newest: PathMsg | None = None
+        self._message: PathMsg | None = None
         self.line = svg.polyline(
             fill="none",
             stroke="#12805c",
@@ -86,7 +86,7 @@ class Path:
 
         Only the positions that are drawn are known to be finite.
         """
-        poses = self._newest.poses if self._newest is not None else []
+        poses = self._message.poses if self._message is not None else []
         return [(p.pose.position.x, p.pose.position.y) for p in poses]
 
     @property
@@ -108,7 +108,7 @@ class Path:
         check_finite([(place.x, place.y) for place in chosen], "a path")
         drawn = in_space(chosen)
         self._placed.stand_in(path.frame_id, path.stamp, partial(self._draw, drawn))
-        self._newest = path
+        self._message = path
         self.svg.set_age(self._bridge.lag, limit=self.age_limit)
         self.robot.notify_modules("on_path_update", self)
 
