@@ -1,5 +1,6 @@
 """The second look that tests get which failed beside others."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -24,9 +25,14 @@ def run(tmp_path):
     def run(source: str) -> tuple[int, str]:
         (tmp_path / "test_it.py").write_text(source)
         (tmp_path / "pytest.ini").write_text("[pytest]\n")
-        command = [sys.executable, str(TOOL), "2", "test_it.py"]
+        command = [sys.executable, str(TOOL), "2", "-p", "xdist", "test_it.py"]
         done = subprocess.run(
-            command, cwd=tmp_path, capture_output=True, text=True, check=False
+            command,
+            cwd=tmp_path,
+            env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         return done.returncode, done.stdout
 
