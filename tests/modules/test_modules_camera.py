@@ -109,8 +109,11 @@ def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
         large = a_jpeg((number, 0, 0)) + bytes(3 << 20)
         link.say(TOPIC, compressed(large) | {"data": large}, cbor=True)
     assert len(pictures) <= before + 3
+    link.say(TOPIC, compressed(a_jpeg()))
+    last = camera.url
     watching.remove()
     assert len(pictures) == before
+    assert pictures.get(last.rpartition("/")[2]), "a page is still loading the last"
     assert camera.url is None
 
 

@@ -124,5 +124,5 @@ class CameraFeed:
         self.end()
         self.robot.clear_problem(self)
         while self._kept:
-            pictures.withdraw(self._kept.popleft()[0])
+            pictures.leave(self._kept.popleft()[0])
         self.url = self.stamp = None

@@ -20,6 +20,9 @@ KEPT_FOR = 3.0
 MOST_KEPT = 64
 """How many of them, so that what changes often does not pile up."""
 
+LEFT_BYTES = 8 << 20
+"""Bytes of pictures that nobody shows any more and that pages may still load."""
+
 PREFIX = "/_webmap/images/"
 """How the URL of every image begins that has no name of its own."""
 
@@ -51,6 +54,7 @@ class Pictures:
         self._lock = threading.Lock()
         self._images: dict[str, Published] = {}
         self._uses: dict[str, int] = {}
+        self._left: deque[tuple[str, Published, float]] = deque()
 
     def __len__(self) -> int:
         return len(self._images)
@@ -78,10 +82,31 @@ class Pictures:
             else:
                 self._images.pop(tag, None)
 
-    def get(self, tag: str) -> Published | None:
-        """Return the image whose URL ends in ``tag``, if it is published."""
+    def leave(self, url: str) -> None:
+        """Withdraw an image, but let pages load it for ``KEPT_FOR`` seconds more.
+
+        A page that is a little behind still asks for what is no longer shown.
+        """
+        now = time.monotonic()
+        image = self.get(tag := url.removeprefix(PREFIX))
+        self.withdraw(url)
         with self._lock:
-            return self._images.get(tag)
+            if image is not None:
+                self._left.append((tag, image, now))
+            while self._left and (
+                now - self._left[0][2] > KEPT_FOR
+                or sum(len(left.data) for _, left, _ in self._left) > LEFT_BYTES
+            ):
+                self._left.popleft()
+
+    def get(self, tag: str) -> Published | None:
+        """Return the image whose URL ends in ``tag``, if pages may load it."""
+        with self._lock:
+            found = self._images.get(tag)
+            if found is None:
+                left = (image for name, image, _ in self._left if name == tag)
+                found = next(left, None)
+            return found
 
 
 pictures = Pictures()
@@ -131,4 +156,4 @@ class Picture:
 
     def _end(self) -> None:
         while self._urls:
-            pictures.withdraw(self._urls.popleft()[0])
+            pictures.leave(self._urls.popleft()[0])
