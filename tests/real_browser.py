@@ -80,7 +80,8 @@ class Complaints:
 
     def _console(self, message: ConsoleMessage) -> None:
         if message.type in {"error", "warning"}:
-            self._said.append(f"{message.type}: {message.text}")
+            url = message.location["url"]
+            self._said.append(f"{message.type}: {message.text} ({url})")
 
     @property
     def unexpected(self) -> list[str]:

@@ -106,10 +106,14 @@ def test_all_of_a_long_message_comes_in_order(view):
 
 @pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
 def test_no_step_of_a_long_message_holds_the_processor(view):
-    """The steps of all tasks of this thread, by its own processor time."""
+    """The steps of all tasks of this thread, by its own processor time.
+
+    A processor that others use too is slower, so the best of three rounds counts: a
+    step that is too long is too long in each.
+    """
     _, topic, frame = LONG[view]
 
-    async def scenario():
+    async def longest():
         aside, got, steps = Offload(), [], []
         take(aside, Publish("/warm", frame.replace(topic.encode(), b"/warm")), view, [])
         await until(lambda: not aside._waiting)
@@ -124,8 +128,14 @@ def test_no_step_of_a_long_message_holds_the_processor(view):
         take(aside, Publish(topic, frame), view, got)
         await until(lambda: got and topic not in aside._waiting)
         ticking.cancel()
-        assert max(steps) < STEP / 5
         await aside.stop()
+        return max(steps)
+
+    async def scenario():
+        rounds = []
+        while len(rounds) < 3 and not (rounds and rounds[-1] < STEP / 5):
+            rounds.append(await longest())
+        assert min(rounds) < STEP / 5, rounds
 
     run(scenario)
 
