@@ -13,7 +13,7 @@ import sys
 
 import pytest
 
-MOST = 5
+MOST = 10
 """More failures than that are no accident and get no second look."""
 
 

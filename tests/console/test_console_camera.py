@@ -248,6 +248,7 @@ def test_wherever_it_is_neither_stop_nor_the_stick_is_covered(open_page, size):
         assert width == page.viewport_size["width"]
 
 
+@pytest.mark.serial  # a busy machine decodes pictures too late to drive by
 def test_a_driven_robot_stops_when_its_camera_freezes(open_page, camera):
     page = open_page()
     panel = large(page)

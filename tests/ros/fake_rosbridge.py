@@ -8,7 +8,7 @@ from websockets.asyncio.server import serve
 
 from webmap.ros.bridge import Bridge
 
-DEADLINE = 10.0
+DEADLINE = 30.0
 
 
 async def until(condition, what=None):

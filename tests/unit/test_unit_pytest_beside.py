@@ -53,7 +53,7 @@ def test_what_fails_alone_too_has_failed(run):
 
 
 def test_many_failures_get_no_second_look(run):
-    source = "import pytest\n@pytest.mark.parametrize('n', range(6))\n"
+    source = "import pytest\n@pytest.mark.parametrize('n', range(11))\n"
     status, said = run(source + "def test_never(n):\n    assert False\n")
     assert status == 1
     assert "Now alone" not in said

@@ -123,6 +123,7 @@ def test_a_thumb_on_the_stick_drives_and_letting_go_is_neutral(touched: Bench) -
     assert touched.view()["e"] == 400, "the map did not move along"
 
 
+@pytest.mark.serial  # a page that is kept waiting for a processor lets go
 def test_words_that_move_the_pad_under_a_finger_do_not_change_what_it_asks(
     touched: Bench,
 ) -> None:
