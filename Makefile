@@ -90,7 +90,8 @@ test-parallel: $(DEV) $(NODE)
 BESIDE := $(filter-out %_load.py %_soak.py,$(wildcard tests/safety/test_*.py))
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(BESIDE)
-	$(BIN)/pytest -q -m serial $(addprefix --ignore ,$(BESIDE))
+	$(BIN)/pytest -q -m serial $(addprefix --ignore ,$(BESIDE)) tests/safety
+	$(PY) tools/pytest_beside.py 0 -m serial --ignore tests/safety $(addprefix --ignore ,$(OF_GATE))
 
 ## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety

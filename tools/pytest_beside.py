@@ -1,9 +1,9 @@
-"""Run pytest on all cores, and what failed there once more, alone.
+"""Run pytest, and what failed once more, alone.
 
 A browser that shares two cores with another one may be held up for seconds where a
-test allows for less. So a few tests that fail beside others get a second look without
-these. What fails then too has failed, and what passes is named: it waits for too
-little, which is to be mended.
+test allows for less, and a shared machine may stop for a moment. So a few tests that
+fail get a second look. What fails then too has failed, and what passes is named: it
+waits for too little, which is to be mended.
 
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
 """
@@ -44,7 +44,8 @@ def main(jobs: str, *arguments: str) -> int:
     """Run the tests.
 
     Args:
-        jobs: How many of them run at once, as pytest-xdist's ``-n`` takes it.
+        jobs: How many of them run at once, as pytest-xdist's ``-n`` takes it; ``0``
+            runs them one after the other.
         *arguments: Options of pytest and the tests that are meant.
 
     Returns:
@@ -52,18 +53,18 @@ def main(jobs: str, *arguments: str) -> int:
 
     """
     failed = Failed()
-    beside = ["-q", "-rN", "-n", jobs, "--dist", "loadfile", *arguments]
-    status = int(pytest.main(beside, plugins=[failed]))
+    workers = [] if jobs == "0" else ["-n", jobs, "--dist", "loadfile"]
+    status = int(pytest.main(["-q", "-rN", *workers, *arguments], plugins=[failed]))
     if status != pytest.ExitCode.TESTS_FAILED or failed.uncollected:
         return status
     tests = list(failed.tests)
-    print(f"\n{len(tests)} failed beside others:", *tests, sep="\n  ", flush=True)
+    print(f"\n{len(tests)} failed at first:", *tests, sep="\n  ", flush=True)
     if not 0 < len(tests) <= MOST:
         return status
-    print("\nNow alone:", flush=True)
+    print("\nNow once more, alone:", flush=True)
     status = subprocess.call([sys.executable, "-m", "pytest", "-q", "-rA", *tests])
     if status == 0:
-        print("Passed alone, and is to be mended:", *tests, sep="\n  ", flush=True)
+        print("Passed then, and is to be mended:", *tests, sep="\n  ", flush=True)
     return status
 
 
