@@ -21,6 +21,12 @@ settings.load_profile("webmap")
 expect.set_options(timeout=15_000)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take longest: begun last, one of them runs alone."""
+    long = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in long)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def state_folder() -> Iterator[None]:
     """Keep what stands on disk, such as a STOP, from the user's own and from others."""

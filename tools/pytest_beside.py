@@ -13,6 +13,9 @@ import sys
 
 import pytest
 
+BY_FILE = ("--dist", "loadfile", "--no-loadscope-reorder")
+"""A file at a time, in the order of the tests; xdist would begin with files of many."""
+
 MOST = 10
 """More failures than that are no accident and get no second look."""
 
@@ -53,7 +56,7 @@ def main(jobs: str, *arguments: str) -> int:
 
     """
     failed = Failed()
-    workers = [] if jobs == "0" else ["-n", jobs, "--dist", "loadfile"]
+    workers = [] if jobs == "0" else ["-n", jobs, *BY_FILE]
     status = int(pytest.main(["-q", "-rN", *workers, *arguments], plugins=[failed]))
     if status != pytest.ExitCode.TESTS_FAILED or failed.uncollected:
         return status

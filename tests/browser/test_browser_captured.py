@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import expect
 from processes import BRIDGE, WEB, Process, matrix, running
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 CAPTURED = Path(__file__).parents[1] / "sim" / "captured"
 ROBOT = "/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"

@@ -7,7 +7,7 @@ from devtools import Chromium
 from processes import BRIDGE, EXAMPLES, WEB, hold, matrix, reset, running, wait_until
 from robots import Witness
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 ODOM = "/odom"
 

@@ -26,6 +26,8 @@ from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
 from webmap_process import simulator
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "webmap", "view"]
 READY = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
 IMAGE = "sensor_msgs/CompressedImage"

@@ -10,7 +10,7 @@ from websockets.sync.client import connect
 
 from webmap_process import simulator
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def expect_two_robots_on_their_map(page, within=15_000):

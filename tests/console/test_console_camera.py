@@ -15,7 +15,7 @@ from camera_server import CameraServer
 from real_browser import Complaints
 from webmap.testing.loop_thread import LoopThread
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 FLEET = """
 [bridges]

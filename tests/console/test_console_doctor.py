@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from real_browser import watched_tab
 from webmap_process import webmap
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def open_report(page):

@@ -7,7 +7,7 @@ from playwright.sync_api import Locator, expect
 
 from real_browser import end_stops
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 COVERED = """(e, reach) => {
   const box = e.getBoundingClientRect();

@@ -13,6 +13,8 @@ from webmap.discovery.doctor.heard_from import listen
 from webmap.discovery.doctor.measure import observe, tried
 from webmap.discovery.doctor.sampling import ENOUGH
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 0.4
 LONG = 2.0
 """Seconds in which a machine that stops for a moment does not change a rate much."""

@@ -44,6 +44,8 @@ from webmap.gate.rules.ticks import Ticks
 from webmap.gate.shell import STEP
 from webmap.geometry import Twist
 
+pytestmark = pytest.mark.slow
+
 PEOPLE = ("a", "b")
 LATE = STEP + 1e-4
 """One step of the gate's loop, in seconds."""

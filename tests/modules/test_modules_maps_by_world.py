@@ -25,6 +25,8 @@ from real_browser import watched_tab
 from webmap.geometry import Affine
 from webmap_process import page_of
 
+pytestmark = pytest.mark.slow
+
 HERE = Path(__file__).parent
 
 

@@ -28,7 +28,12 @@ from ros_facts import (
 )
 
 # Installing what is real may take its time, once.
-pytestmark = [pytest.mark.peer, pytest.mark.browser, pytest.mark.timeout(300)]
+pytestmark = [
+    pytest.mark.peer,
+    pytest.mark.browser,
+    pytest.mark.slow,
+    pytest.mark.timeout(300),
+]
 
 TOLD = f"Bob:{ROBOT}/odom:{ROBOT}/cmd_vel:{ROBOT}/scan"
 BOB = '.robot[data-name="Bob"]'

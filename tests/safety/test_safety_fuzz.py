@@ -14,6 +14,8 @@ from webmap.gate import actions, messages
 sys.path.insert(0, str(Path(__file__).parents[1] / "gate"))
 from gate_harness import Bench, spec
 
+pytestmark = pytest.mark.slow
+
 MOTION = {
     "drive": {"x": 1.0, "y": 0.0, "turn": 0.0},
     "goal": {"x": 1.0, "y": 2.0, "yaw": 0.5},

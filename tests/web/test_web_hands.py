@@ -6,7 +6,7 @@ import pytest
 from fake_drive import FakeDrive
 from hands_bench import DOUBTS, Bench
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def test_holding_w_takes_the_robot_and_drives_after_neutral(bench: Bench) -> None:

@@ -6,7 +6,7 @@ import pytest
 from hands_bench import DOUBTS, Bench
 from playwright.sync_api import CDPSession, Locator
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 PADS = """
     window.pad = {
