@@ -97,7 +97,7 @@ def test_a_type_without_pictures_is_refused(link, robot):
 
 
 def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
-    link, robot
+    link, robot, monkeypatch
 ):
     before = len(pictures)
     camera = robot.add_module(Camera, link, TOPIC)
@@ -114,6 +114,10 @@ def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
     watching.remove()
     assert len(pictures) == before
     assert pictures.get(last.rpartition("/")[2]), "a page is still loading the last"
+    later = time.monotonic() + 3.1
+    with monkeypatch.context() as then:
+        then.setattr(time, "monotonic", lambda: later)
+        assert pictures.get(last.rpartition("/")[2]) is None
     assert camera.url is None
 
 

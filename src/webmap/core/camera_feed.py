@@ -124,5 +124,5 @@ class CameraFeed:
         self.end()
         self.robot.clear_problem(self)
         while self._kept:
-            pictures.leave(self._kept.popleft()[0])
+            pictures.retire(self._kept.popleft()[0])
         self.url = self.stamp = None

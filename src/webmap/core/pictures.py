@@ -20,8 +20,8 @@ KEPT_FOR = 3.0
 MOST_KEPT = 64
 """How many of them, so that what changes often does not pile up."""
 
-LEFT_BYTES = 8 << 20
-"""Bytes of pictures that nobody shows any more and that pages may still load."""
+RETIRED_BYTES = 8 << 20
+"""The most bytes of retired pictures that pages may still load."""
 
 PREFIX = "/_webmap/images/"
 """How the URL of every image begins that has no name of its own."""
@@ -54,7 +54,8 @@ class Pictures:
         self._lock = threading.Lock()
         self._images: dict[str, Published] = {}
         self._uses: dict[str, int] = {}
-        self._left: deque[tuple[str, Published, float]] = deque()
+        self._retired: dict[str, tuple[Published, float]] = {}
+        """For each tag the image and when it was retired, the oldest first."""
 
     def __len__(self) -> int:
         return len(self._images)
@@ -82,31 +83,33 @@ class Pictures:
             else:
                 self._images.pop(tag, None)
 
-    def leave(self, url: str) -> None:
+    def retire(self, url: str) -> None:
         """Withdraw an image, but let pages load it for ``KEPT_FOR`` seconds more.
 
         A page that is a little behind still asks for what is no longer shown.
         """
-        now = time.monotonic()
-        image = self.get(tag := url.removeprefix(PREFIX))
+        now, tag = time.monotonic(), url.removeprefix(PREFIX)
+        image = self.get(tag)
         self.withdraw(url)
+        if image is None:
+            return
         with self._lock:
-            if image is not None:
-                self._left.append((tag, image, now))
-            while self._left and (
-                now - self._left[0][2] > KEPT_FOR
-                or sum(len(left.data) for _, left, _ in self._left) > LEFT_BYTES
-            ):
-                self._left.popleft()
+            self._retired.pop(tag, None)
+            self._retired[tag] = (image, now)
+            size = sum(len(old.data) for old, _ in self._retired.values())
+            for name, (old, since) in tuple(self._retired.items()):
+                if size <= RETIRED_BYTES and now - since <= KEPT_FOR:
+                    break
+                del self._retired[name]
+                size -= len(old.data)
 
     def get(self, tag: str) -> Published | None:
         """Return the image whose URL ends in ``tag``, if pages may load it."""
         with self._lock:
-            found = self._images.get(tag)
-            if found is None:
-                left = (image for name, image, _ in self._left if name == tag)
-                found = next(left, None)
-            return found
+            if tag in self._images:
+                return self._images[tag]
+            image, since = self._retired.get(tag, (None, 0.0))
+            return image if time.monotonic() - since <= KEPT_FOR else None
 
 
 pictures = Pictures()
@@ -156,4 +159,4 @@ class Picture:
 
     def _end(self) -> None:
         while self._urls:
-            pictures.leave(self._urls.popleft()[0])
+            pictures.retire(self._urls.popleft()[0])
