@@ -84,14 +84,15 @@ OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
 test-parallel: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) -m "not serial" $(addprefix --ignore ,$(OF_GATE))
-# The trials of motion wait most of the time and grant what the machine was late by: two
-# files of them run side by side, on any machine. Under load, and whatever else measures
-# time, alone.
+# Tests that measure time wait most of the time: two files of them run side by side, on
+# any machine. The trials of motion grant what the machine was late by; the others get a
+# second look. The trials under load run alone.
 BESIDE := $(filter-out %_load.py %_soak.py,$(wildcard tests/safety/test_*.py))
+OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*.py' 'mark\.serial' tests)))
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(BESIDE)
 	$(BIN)/pytest -q -m serial $(addprefix --ignore ,$(BESIDE)) tests/safety
-	$(PY) tools/pytest_beside.py 0 -m serial --ignore tests/safety $(addprefix --ignore ,$(OF_GATE))
+	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
 
 ## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety

@@ -1,4 +1,4 @@
-"""Run pytest, and what failed once more, alone.
+"""Run pytest, and run the tests that failed a second time, alone.
 
 A browser that shares two cores with another one may be held up for seconds where a
 test allows for less, and a shared machine may stop for a moment. So a few tests that
@@ -14,7 +14,8 @@ import sys
 import pytest
 
 BY_FILE = ("--dist", "loadfile", "--no-loadscope-reorder")
-"""A file at a time, in the order of the tests; xdist would begin with files of many."""
+"""Workers take whole files, in order. Otherwise xdist begins with the files that have
+most tests."""
 
 MOST = 10
 """More failures than that are no accident and get no second look."""
@@ -47,8 +48,7 @@ def main(jobs: str, *arguments: str) -> int:
     """Run the tests.
 
     Args:
-        jobs: How many of them run at once, as pytest-xdist's ``-n`` takes it; ``0``
-            runs them one after the other.
+        jobs: How many of them run at once, as pytest-xdist's ``-n`` takes it.
         *arguments: Options of pytest and the tests that are meant.
 
     Returns:
@@ -56,18 +56,18 @@ def main(jobs: str, *arguments: str) -> int:
 
     """
     failed = Failed()
-    workers = [] if jobs == "0" else ["-n", jobs, *BY_FILE]
-    status = int(pytest.main(["-q", "-rN", *workers, *arguments], plugins=[failed]))
+    beside = ["-q", "-rN", "-n", jobs, *BY_FILE, *arguments]
+    status = int(pytest.main(beside, plugins=[failed]))
     if status != pytest.ExitCode.TESTS_FAILED or failed.uncollected:
         return status
     tests = list(failed.tests)
     print(f"\n{len(tests)} failed at first:", *tests, sep="\n  ", flush=True)
     if not 0 < len(tests) <= MOST:
         return status
-    print("\nNow once more, alone:", flush=True)
+    print("\nNow a second time, alone:", flush=True)
     status = subprocess.call([sys.executable, "-m", "pytest", "-q", "-rA", *tests])
     if status == 0:
-        print("Passed then, and is to be mended:", *tests, sep="\n  ", flush=True)
+        print("Passed the second time, to be mended:", *tests, sep="\n  ", flush=True)
     return status
 
 

@@ -76,9 +76,11 @@ def test_steal_time_is_read_from_proc_stat(tmp_path):
 
 def test_contention_is_the_longest_wait_in_a_quarter_second():
     with three_busy() as busy:
-        begin = time.monotonic()
-        with Contention(Waiting([busy[0].pid])) as contention:
-            time.sleep(1)
-        # A reading that comes late counts the wait of a longer time.
-        assert 0.02 < contention.waited < time.monotonic() - begin
+        for _ in range(3):
+            with Contention(Waiting([busy[0].pid])) as contention:
+                time.sleep(1)
+            # A reading that comes late counts the wait of a longer time.
+            if contention.waited < 0.5:
+                break
+        assert 0.02 < contention.waited < 0.5
         assert contention.stolen >= 0
