@@ -17,8 +17,8 @@ INSTALLED := .venv/.installed
 DEV := .venv/.installed-dev
 NODE := node_modules/.installed
 
-# Tests that drive a browser wait half of their time, so three fill two processors.
-JOBS ?= 3
+# More at once take as long on two processors, and make tests that need a browser in time fail.
+JOBS ?= 2
 ARGS ?=
 
 ## help: list what there is
