@@ -2,13 +2,15 @@
 
 import re
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from playwright.sync_api import (
     Browser,
     BrowserContext,
     ConsoleMessage,
+    Keyboard,
     Locator,
     Page,
     expect,
@@ -62,6 +64,25 @@ def end_stops(button: Locator) -> None:
     )
     assert asked == "Press again to reset"
     expect(button).to_have_attribute("hidden", "")
+
+
+def hold(keyboard: Keyboard, key: str, has_effect: Callable[[], bool]) -> None:
+    """Hold a key until it has its effect, and keep holding it.
+
+    On a machine that is too busy to run the page at its pace a press does nothing,
+    since nothing may move by a late command. Like a person, this presses again.
+    """
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        time.sleep(0.5)  # hands must be off before a press counts
+        keyboard.down(key)
+        patience = time.monotonic() + 3
+        while time.monotonic() < patience:
+            if has_effect():
+                return
+            time.sleep(0.02)
+        keyboard.up(key)
+    raise AssertionError(f"{key} had no effect")
 
 
 class Complaints:

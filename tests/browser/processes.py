@@ -155,22 +155,3 @@ def reset(tab: Page) -> None:
     button = tab.locator(".webmap-teleop .webmap-reset")
     button.click(trial=True)  # a person could
     end_stops(button)
-
-
-def hold(keyboard, key: str, condition, within: float = 30.0) -> None:
-    """Hold a key until it has its effect, and keep holding it.
-
-    On a machine that is too busy to run the page at its pace a press does nothing,
-    since nothing may move by a late command. Like a person, this presses again.
-    """
-    deadline = time.monotonic() + within
-    while time.monotonic() < deadline:
-        time.sleep(0.5)
-        keyboard.down(key)
-        patience = time.monotonic() + 3.0
-        while time.monotonic() < patience:
-            if condition():
-                return
-            time.sleep(0.02)
-        keyboard.up(key)
-    raise AssertionError(f"{key} had no effect within {within} s")

@@ -11,7 +11,6 @@ import roslibpy
 from playwright.sync_api import expect
 from processes import (
     BRIDGE,
-    hold,
     matrix,
     place_on_screen,
     running,
@@ -19,6 +18,8 @@ from processes import (
     wait_until,
 )
 from robots import Witness
+
+from real_browser import hold
 
 pytestmark = pytest.mark.browser
 

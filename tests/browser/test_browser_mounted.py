@@ -5,8 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from processes import BRIDGE, hold, running, wait_until
+from processes import BRIDGE, running, wait_until
 from robots import Witness
+
+from real_browser import hold
 
 pytestmark = pytest.mark.browser
 

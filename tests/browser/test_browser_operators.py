@@ -6,8 +6,10 @@ import signal
 
 import pytest
 from playwright.sync_api import expect
-from processes import BRIDGE, WEB, hold, running, wait_until
+from processes import BRIDGE, WEB, running, wait_until
 from robots import Witness
+
+from real_browser import hold
 
 pytestmark = pytest.mark.browser
 

@@ -5,7 +5,9 @@ import threading
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, hold, running, wait_until
+from processes import WEB, running, wait_until
+
+from real_browser import hold
 
 pytestmark = pytest.mark.browser
 

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from processes import BRIDGE, WEB, hold, running
+from processes import BRIDGE, WEB, running
 from robots import Witness
+
+from real_browser import hold
 
 pytestmark = pytest.mark.browser
 

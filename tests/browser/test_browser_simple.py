@@ -4,8 +4,10 @@ import math
 
 import pytest
 from devtools import Chromium
-from processes import BRIDGE, EXAMPLES, WEB, hold, matrix, reset, running, wait_until
+from processes import BRIDGE, EXAMPLES, WEB, matrix, reset, running, wait_until
 from robots import Witness
+
+from real_browser import hold
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

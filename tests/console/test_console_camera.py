@@ -12,7 +12,7 @@ from console_ready import wait_until_ready
 from playwright.sync_api import Page, expect
 
 from camera_server import CameraServer
-from real_browser import Complaints
+from real_browser import Complaints, hold
 from webmap.testing.loop_thread import LoopThread
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -149,21 +149,8 @@ def sent(page: Page):
 
 
 def hold_w(page: Page) -> None:
-    """Press W, and see the robot driven by it.
-
-    On a busy machine a picture may be late, which stops the robot as it should: then
-    the key is pressed anew.
-    """
-    for patience in (2000, 2000, 10_000):
-        page.wait_for_timeout(300)  # hands must be off for 200 ms before a press counts
-        page.keyboard.down("w")
-        try:
-            expect(sent(page)).not_to_have_text("0.00", timeout=patience)
-        except AssertionError:
-            page.keyboard.up("w")
-        else:
-            return
-    raise AssertionError(page.locator(".webmap-teleop").inner_text())
+    """Press W, and see the robot driven by it."""
+    hold(page.keyboard, "w", lambda: sent(page).text_content() != "0.00")
 
 
 def test_a_camera_of_the_card_is_shown_large_and_goes_on(open_page, camera):

@@ -5,6 +5,8 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
+from real_browser import hold
+
 pytestmark = pytest.mark.browser
 
 SIZES = [
@@ -159,8 +161,7 @@ def test_both_stops_are_hit_and_do_not_move_in_every_state(open_console):
     walk.look("no robot selected")
     select(page)
     walk.look("selected")
-    page.keyboard.down("a")
-    expect(page.locator("#card .state .you")).to_be_visible()
+    hold(page.keyboard, "a", page.locator("#card .state .you").is_visible)
     walk.look("driving")
     page.keyboard.up("a")
     in_one_state_each(page, walk.look)

@@ -14,7 +14,7 @@ import time
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, hold, matrix, running, wait_until
+from processes import WEB, matrix, running, wait_until
 from ros_facts import (
     ANGLE_MIN,
     ANGLE_STEP,
@@ -26,6 +26,8 @@ from ros_facts import (
     START,
     TOPICS,
 )
+
+from real_browser import hold
 
 # Installing what is real may take its time, once.
 pytestmark = [
@@ -89,7 +91,7 @@ def drive(tab, ros):
         newest = ros.twists()[-1:]
         return bool(newest) and not newest[0].is_zero and away(ros, x, y) > 0.05
 
-    hold(tab.keyboard, "w", comes_along, within=60.0)
+    hold(tab.keyboard, "w", comes_along)
 
 
 def place(ros):
