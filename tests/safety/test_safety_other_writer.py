@@ -55,6 +55,15 @@ def bench(tmp_path):
         yield bench
 
 
+def is_shown(tab, expression: str, within: float) -> bool:
+    """Return whether an expression becomes true in a page."""
+    try:
+        tab.wait(expression, within)
+    except AssertionError:
+        return False
+    return True
+
+
 def test_another_program_is_named_before_driving_while_driving_and_in_the_alarm(bench):
     bench.drive_off()
     bench.let_go()
@@ -62,8 +71,14 @@ def test_another_program_is_named_before_driving_while_driving_and_in_the_alarm(
     bench.others_publish = True
     with OtherProgram(bench.robot.port):
         bench.tab.wait(f"{WORDS}.includes({json.dumps(SAID)})")
-        bench.press()
-        bench.tab.wait(f"{WORDS}.includes('Driving') && {WORDS}.includes('{SAID}')")
-        bench.let_go()
-        bench.tab.wait(f"{ALARM}.includes('{SAID}')")
+        # A machine that stops for 0.3 s lets the robot stand for as long, and then the
+        # robot has obeyed.
+        for within in (5.0, 5.0, 15.0):
+            bench.press()
+            bench.tab.wait(f"{WORDS}.includes('Driving') && {WORDS}.includes('{SAID}')")
+            bench.let_go()
+            if is_shown(bench.tab, f"{ALARM}.includes('{SAID}')", within):
+                break
+        else:
+            raise AssertionError("no alarm")
     bench.tab.wait(f"!{WORDS}.includes('nother program')")
