@@ -35,6 +35,7 @@ def colours(chromium: Browser) -> Iterator:
         shapes = tab.locator(".markers > .marker")
         shapes.nth(len(SHAPES) - 1).wait_for(state="attached")
         assert shapes.count() == len(SHAPES)
+        tab.locator(".webmap-metre-grid").evaluate("grid => grid.remove()")
 
         def found(places) -> list[tuple[int, ...]]:
             picture = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")

@@ -108,6 +108,19 @@ def blank(chromium, request):
     phases=[Phase.explicit, Phase.generate],
 )
 def test_any_history_of_a_scene_gives_the_same_document(blank, history):
+    assert_same(blank, history)
+
+
+def test_dots_keep_a_transform_that_was_given_as_text(blank):
+    add = ("add", 0, 0, 0, 0.0, "")
+    transform = ("transform", 0, 2, 0, 0.0, "")
+    dots = ("dots", 0, 2, 0, 3.0, "")
+    for then in ("frame", "look away"):
+        assert_same(blank, [([add, transform], then), ([dots], then)])
+        assert_same(blank, [([add, dots], then), ([transform], then)])
+
+
+def assert_same(blank, history):
     session = SceneSession()
     frames = [base64.b64encode(f).decode() for f in play(history, session)]
     shown = blank.evaluate(SHOW, frames)

@@ -46,6 +46,8 @@ export class Item {
     this._matrix = null;
     /** @type {SVGTransform | null} */
     this._transform = null;
+    /** @type {string | null} The transform, where it was given as text. */
+    this._text = null;
     /** @type {{unit: number, points: Int16Array} | null} */
     this._dots = null;
     /** @type {number | null} */
@@ -150,12 +152,14 @@ export class Item {
     if (!(element instanceof SVGGraphicsElement)) return;
     const list = element.transform.baseVal;
     this._transform = list.initialize(maker.createSVGTransformFromMatrix(matrix));
+    this._text = null;
     this._scaleDots();
   }
 
   /** @param {string | null} value */
   _setTransform(value) {
     this._transform = null;
+    this._text = value;
     const { element } = this;
     // Chromium does not remove an attribute that was only ever set through its list.
     if (element instanceof SVGGraphicsElement) element.transform.baseVal.clear();
@@ -176,6 +180,7 @@ export class Item {
     if (scaled) return;
     // The list is made anew, so that there is one scale at its end.
     if (this._transform) this._startTransform(this._transform.matrix);
+    else if (this._text !== null) this._setTransform(this._text);
     else this._place(1, 0, 0, 1, 0, 0);
   }
 
