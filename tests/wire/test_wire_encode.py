@@ -126,3 +126,16 @@ def test_an_unset_attribute_is_sent_as_such():
     ops = records_since(fragment, 0)
     assert ops[0] == Op.UNSET
     assert ops.endswith(b"\x09data-name")
+
+
+def test_an_attribute_of_the_page_that_was_unset_is_unset_for_who_comes_later():
+    """The page's own HTML may have it, as a card that is hidden at first."""
+    document = Document()
+    fragment = Fragment(document)
+    card, since = document.bind("card"), fragment.revision
+    card.set(hidden=False)
+    unset = records_since(fragment, since)
+    assert unset[0] in (Op.UNSET, Op.NAMED_UNSET)
+    assert encode_snapshot(fragment).endswith(bytes(unset))
+    card.set(hidden=True)
+    assert bytes(unset) not in encode_snapshot(fragment)

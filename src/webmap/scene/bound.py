@@ -4,6 +4,7 @@ from typing import Any, Self
 
 from webmap.errors import SceneError
 from webmap.scene.element import Child, Element
+from webmap.scene.values import format_value
 
 
 class BoundElement(Element):
@@ -13,7 +14,7 @@ class BoundElement(Element):
     :meth:`clear`, first drops what the page had.
     """
 
-    __slots__ = ("emptied", "html_id")
+    __slots__ = ("dropped", "emptied", "html_id")
 
     def __init__(self, html_id: str) -> None:
         if not isinstance(html_id, str) or not html_id or html_id.split() != [html_id]:
@@ -22,6 +23,8 @@ class BoundElement(Element):
         self._prepare("#bound", "html")
         self.html_id = html_id
         self.emptied = False
+        self.dropped: dict[str, None] = {}
+        """Attributes that were unset: the page's own HTML may have them."""
 
     def __repr__(self) -> str:
         return f"<element #{self.html_id}>"
@@ -40,6 +43,15 @@ class BoundElement(Element):
     def text(self, text: str) -> None:
         self._empty()
         Element.text.fset(self, text)  # type: ignore[attr-defined]
+
+    def _set(self, name: str, value: Any) -> None:
+        if name not in ("class", "transform"):
+            if format_value(name, value) is not None:
+                self.dropped.pop(name, None)
+            elif name not in self.dropped:
+                self.dropped[name] = None
+                self._touch(name)
+        super()._set(name, value)
 
     def _empty(self) -> None:
         if not self.emptied:

@@ -140,8 +140,10 @@ def _put_node(out: bytearray, node: Node, parent: int, place: int) -> None:
 def _slots_of(element: Element) -> list[str]:
     """Return the slots whose values a new element needs to be told."""
     slots = [*element._attributes, *element._styles]
-    if isinstance(element, BoundElement) and element.emptied:
-        slots.append("emptied")
+    if isinstance(element, BoundElement):
+        slots += element.dropped
+        if element.emptied:
+            slots.append("emptied")
     if element._classes:
         slots.append("class")
     if element._transform is not None:
