@@ -65,6 +65,19 @@ async def test_a_robot_has_the_links_that_it_needs_and_only_as_long_as_it_needs_
 
 
 @in_loop
+async def test_a_stamped_velocity_names_the_frame_of_the_newest_robot():
+    async with noting_bridge() as bridge, Noting() as noting:
+        stamped = {"bridge_url": bridge.url, "twist_type": "geometry_msgs/TwistStamped"}
+        key = noting.attach(spec(**stamped, base_frame="base_link"))
+        noting.attach(spec(**stamped, id="r2", base_frame="bob/base_link"))
+        await noting.up("control", "tasks")
+        noting.do(actions.WriteTwist(key, ZERO, None, None))
+        await until(lambda: bridge.of("publish", "/cmd_vel"), "the zero")
+        [told] = bridge.of("publish", "/cmd_vel")
+        assert told.message["msg"]["header"]["frame_id"] == "bob/base_link"
+
+
+@in_loop
 async def test_a_velocity_goes_out_now_or_is_said_to_be_dropped():
     async with noting_bridge() as bridge, Noting() as noting:
         key = Key(bridge.url, "/cmd_vel")

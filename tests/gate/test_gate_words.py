@@ -28,8 +28,9 @@ def goal_by(way, **changes):
     ],
 )
 def test_a_velocity_with_a_header_has_stamp_zero_in_the_dialect(type, stamp):
-    message = said(words.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0)))["msg"]
-    assert message["header"]["stamp"] == stamp
+    velocity = words.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0), "base")
+    message = said(velocity)["msg"]
+    assert message["header"] == {"stamp": stamp, "frame_id": "base"}
     assert message["twist"]["linear"] == {"x": 0.5, "y": 0.25, "z": 0.0}
     assert message["twist"]["angular"] == {"x": 0.0, "y": 0.0, "z": -1.0}
 

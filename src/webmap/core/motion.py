@@ -57,6 +57,8 @@ class MotionRoad:
 
     def __init__(self, name: str, complain: Any) -> None:
         self.id = _id_of(name)
+        self.base_frame = ""
+        """The robot's own frame; the gate hears of a change."""
         self._name = name
         self._complain = complain
         self._twist: TwistTopic | None = None
@@ -237,6 +239,7 @@ class MotionRoad:
             bridge_url=link.bridge.url,
             twist_topic=twist.topic if twist else None,
             twist_type=(twist.type if twist else None) or TWIST_TYPES[0],
+            base_frame=self.base_frame,
             twist_type_assumed=twist is not None and twist.type is None,
             stops_within=twist.stops_within if twist else None,
             v_max=twist.v_max if twist else None,

@@ -105,7 +105,9 @@ class ControlLane:
         if not self._listened:
             self.lane.hurry(IDLE_PING)
 
-    def write(self, topic: str, twist: Twist, until: float = math.inf) -> bool:
+    def write(
+        self, topic: str, twist: Twist, until: float = math.inf, frame: str = ""
+    ) -> bool:
         """Write a velocity now or drop it; return whether it went out.
 
         Zero may wait behind other bytes and is never too late. Anything else may not
@@ -115,12 +117,13 @@ class ControlLane:
             topic: Where to.
             twist: The velocity.
             until: When it is too old, by the gate's clock.
+            frame: The robot's own frame, which a stamped velocity names.
 
         """
         type = self._types.get(topic)
         if type is None or not (twist.is_zero or self._unproven.room(topic)):
             return False
-        data = words.velocity(topic, type, twist)
+        data = words.velocity(topic, type, twist, frame)
         if twist.is_zero:
             until = math.inf
         done = self.lane.write(data, only_if_clear=not twist.is_zero, until=until)

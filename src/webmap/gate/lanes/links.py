@@ -44,7 +44,8 @@ class Links:
         match action:
             case actions.WriteTwist(key, twist, epoch, by, until):
                 lane = self._control.get(key.url)
-                done = lane is not None and lane.write(key.topic, twist, until)
+                frame = self._base_frame(key)
+                done = lane is not None and lane.write(key.topic, twist, until, frame)
                 return Wrote(key, twist, epoch, by, done)
             case actions.SendGoal():
                 return self._send_goal(action)
@@ -81,7 +82,8 @@ class Links:
         """Write zero to whatever may be driven, by itself and without asking."""
         for key in self._watched:
             if key.url in self._control:
-                self._control[key.url].write(key.topic, ZERO)
+                frame = self._base_frame(key)
+                self._control[key.url].write(key.topic, ZERO, frame=frame)
 
     async def settle(self) -> None:
         """Wait until cancels that are under way have arrived, or cannot."""
@@ -109,6 +111,11 @@ class Links:
 
         spec = self._robots[run.key][run.robot]
         self._tasks[spec.bridge_url].run_hook(run.hook, run.stopped, ended)
+
+    def _base_frame(self, key: Key) -> str:
+        """Return the frame that velocity is in, as the newest robot has it."""
+        frames = [spec.base_frame for spec in self._robots.get(key, {}).values()]
+        return next(filter(None, reversed(frames)), "")
 
     # Which lane is needed.
 

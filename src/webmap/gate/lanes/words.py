@@ -19,11 +19,15 @@ from webmap.ros import ops
 from webmap.ros.names import is_type
 
 
-def velocity(topic: str, type: str, twist: Twist) -> bytes:
-    """Return the operation that publishes ``twist``."""
+def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
+    """Return the operation that publishes ``twist``, in the frame of the base.
+
+    The stamp of a TwistStamped is zero. A base compares the stamp with its own clock:
+    a stamp of a clock that is ahead would switch off the base's timeout.
+    """
     message: dict[str, Any] = twist.to_message()
     if is_type(type, "geometry_msgs/TwistStamped"):
-        message = {"header": _header(type, ""), "twist": message}
+        message = {"header": _header(type, frame), "twist": message}
     return ops.publish(topic, message)
 
 

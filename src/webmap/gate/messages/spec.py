@@ -24,6 +24,8 @@ class RobotSpec(
     twist_topic: str | None = None
     twist_type: str = "geometry_msgs/Twist"
     """Twist or TwistStamped, in either dialect; the stamp sent is zero."""
+    base_frame: str = ""
+    """The robot's own frame, which a TwistStamped names."""
     twist_type_assumed: bool = False
     """Whether nobody stated that type and no robot told it: another's word counts."""
     holonomic: bool = False
