@@ -82,6 +82,55 @@ def test_a_file_that_cannot_be_read_means_that_it_was(locks, monkeypatch):
         assert locks.acquire(KEY).driven is True
 
 
+def test_files_of_machines_that_rest_are_removed_and_no_others(locks, folder):
+    resting, driven, held = (Key(f"ws://robot:{n}", "/cmd_vel") for n in range(3))
+    before = Locks(folder)
+    for key in (resting, driven, held):
+        before.acquire(key)
+    before.mark(driven, driven=True)
+    before.release(resting)
+    before.release(driven)
+    path_of(folder, KEY, "lock").mkdir()  # what cannot be opened is left
+    locks.tidy()
+    there = {path for path in folder.glob("*.lock")}
+    assert there == {path_of(folder, key, "lock") for key in (driven, held, KEY)}
+    path_of(folder, KEY, "lock").rmdir()
+    before.release(held)
+
+
+def test_a_file_that_cannot_be_removed_is_left(locks, folder, monkeypatch):
+    locks.acquire(KEY)
+    locks.release(KEY)
+
+    def fail(self):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(module.Path, "unlink", fail)
+    locks.tidy()
+    assert path_of(folder, KEY, "lock").exists()
+
+
+@pytest.mark.parametrize("made_anew", [True, False])
+def test_a_file_that_is_removed_before_it_is_locked_is_no_lock(
+    locks, folder, monkeypatch, made_anew
+):
+    """Between opening and locking, as if another gate tidied up then."""
+    path, try_lock, removed = path_of(folder, KEY, "lock"), module._try_lock, []
+
+    def try_later(file):
+        if not removed:
+            removed.append(path.read_bytes())
+            path.unlink()
+            if made_anew:
+                path.touch()
+        return try_lock(file)
+
+    monkeypatch.setattr(module, "_try_lock", try_later)
+    assert locks.acquire(KEY).held
+    assert removed
+    assert not Locks(folder).acquire(KEY).held
+
+
 def test_a_full_disk_stands_in_the_way_of_nothing(locks, monkeypatch, caplog):
     locks.acquire(KEY)
 
@@ -112,3 +161,24 @@ def test_the_folder_is_named_or_where_the_system_keeps_such_things(monkeypatch):
 
 def test_the_clock_only_grows():
     assert now() <= now()
+
+
+def test_a_file_that_was_made_anew_while_it_is_tidied_stays(tmp_path, monkeypatch):
+    first = Locks(tmp_path)
+    first.acquire(KEY)
+    first.release(KEY)
+    (file,) = tmp_path.glob("*.lock")
+    lock = module._try_lock
+
+    def slow(opened: int) -> bool:
+        # Another gate tidies too, and a third one takes the machine.
+        file.unlink()
+        monkeypatch.setattr(module, "_try_lock", lock)
+        assert other.acquire(KEY).held
+        return lock(opened)
+
+    other = Locks(tmp_path)
+    monkeypatch.setattr(module, "_try_lock", slow)
+    Locks(tmp_path).tidy()
+    assert file.exists()
+    assert not Locks(tmp_path).acquire(KEY).held

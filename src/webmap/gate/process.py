@@ -43,7 +43,9 @@ def main() -> int:
 async def _serve(pipe_in: int, outbox: Outbox) -> int:
     loop = asyncio.get_running_loop()
     folder = state_folder()
-    shell = Shell(outbox, Locks(folder), Disk(Records(folder)))
+    locks = Locks(folder)
+    locks.tidy()
+    shell = Shell(outbox, locks, Disk(Records(folder)))
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         why = f"the gate was ended by {signal.Signals(number).name}"

@@ -7,6 +7,7 @@ stands in the file stays: its first letter says whether the machine was being dr
 import logging
 import os
 import sys
+import time
 from pathlib import Path
 
 from webmap.gate.events import Key, LockState
@@ -15,6 +16,9 @@ from webmap.gate.kept.records import path_of
 log = logging.getLogger("webmap.gate")
 
 _RESTS, _DRIVEN = b"0", b"1"
+
+TRIES, PAUSE = 2, 0.002
+"""How often a lock is tried, and the seconds between."""
 
 # Windows lets nobody else read a locked byte, so the lock lies beyond the text.
 _LOCKED_BYTE = 1 << 20
@@ -49,16 +53,36 @@ class Locks:
         """Try to have a machine."""
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            file = os.open(self._path(key), os.O_RDWR | os.O_CREAT, 0o600)
+            file = _open_locked(self._path(key))
         except OSError as error:
             why = f"{self._folder} cannot be written to ({error.strerror})"
             return LockState(key, held=False, why=why)
-        if not _try_lock(file):
-            os.close(file)
+        if file is None:
             why = self._why_not(key)
             return LockState(key, held=False, why=why, elsewhere=True)
         self._held[key] = file
         return LockState(key, held=True, driven=_was_driven(file, key))
+
+    def tidy(self) -> None:
+        """Remove the files of machines that nobody has and that were not driven.
+
+        Such a file holds nothing that a new one does not. Each port of a bridge makes
+        another file, so they would pile up.
+        """
+        for path in self._folder.glob("*.lock"):
+            try:
+                file = os.open(path, os.O_RDWR)
+            except OSError:
+                continue  # it is gone, or somebody else's
+            try:
+                # Another gate may have removed that file, and made it anew, meanwhile.
+                is_ours = _try_lock(file) and _is_at(file, path)
+                if is_ours and os.read(file, 1) == _RESTS:
+                    path.unlink()
+            except OSError as error:
+                log.debug("%s is left: %s", path, error.strerror)
+            finally:
+                os.close(file)
 
     def release(self, key: Key) -> None:
         """Let others have a machine."""
@@ -86,6 +110,29 @@ class Locks:
 
     def _path(self, key: Key) -> Path:
         return path_of(self._folder, key, "lock")
+
+
+def _open_locked(path: Path) -> int | None:
+    """Open a file, made if there is none, and lock it; None if another has the lock.
+
+    Another process may hold it for a moment and remove it, see :meth:`Locks.tidy`.
+    """
+    for left in reversed(range(TRIES)):
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        if _try_lock(file) and _is_at(file, path):
+            return file
+        os.close(file)
+        if left:
+            time.sleep(PAUSE)
+    return None
+
+
+def _is_at(file: int, path: Path) -> bool:
+    """Return whether an open file is still the one of that name."""
+    try:
+        return os.path.samestat(os.fstat(file), path.stat())
+    except FileNotFoundError:
+        return False
 
 
 def _was_driven(file: int, key: Key) -> bool:
