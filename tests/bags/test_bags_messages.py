@@ -131,6 +131,61 @@ def test_a_fixed_array_of_another_length_does_not_fit(made):
         way_of(made, "nav_msgs/Odometry").bytes_of(odometry)
 
 
+@pytest.mark.parametrize(
+    ("dialect", "type_name", "message"),
+    [
+        (
+            "ros2",
+            "nav2_msgs/msg/ParticleCloud",
+            {
+                "header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "map"},
+                "particles": [
+                    {
+                        "pose": {
+                            "position": {"x": 1.0, "y": 2.0, "z": 0.0},
+                            "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+                        },
+                        "weight": 0.5,
+                    }
+                ],
+            },
+        ),
+        (
+            "ros2",
+            "nav2_msgs/action/NavigateToPose_FeedbackMessage",
+            {
+                "goal_id": {"uuid": list(range(16))},
+                "feedback": {
+                    "current_pose": {
+                        "header": {
+                            "stamp": {"sec": 1, "nanosec": 2},
+                            "frame_id": "map",
+                        },
+                        "pose": {
+                            "position": {"x": 1.0, "y": 2.0, "z": 0.0},
+                            "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+                        },
+                    },
+                    "navigation_time": {"sec": 3, "nanosec": 0},
+                    "estimated_time_remaining": {"sec": 4, "nanosec": 0},
+                    "number_of_recoveries": 1,
+                    "distance_remaining": 2.5,
+                },
+            },
+        ),
+    ],
+)
+def test_how_goals_go_and_particles_are_written(dialect, type_name, message):
+    way = next(types_of(dialect).ways(type_name))
+    data = way.bytes_of(message)
+    assert len(data) > 40
+    read = way.store.deserialize_cdr(data, way.type_name)
+    if "Particle" in type_name:
+        assert read.particles[0].weight == 0.5
+    else:
+        assert read.feedback.distance_remaining == 2.5
+
+
 def test_a_type_that_no_release_has_has_no_way_to_be_written(made):
     types = types_of(made.dialect)
     for name in ("acme_msgs/Arm", "nonsense", "nav2_msgs/action/Wait_Feedback"):

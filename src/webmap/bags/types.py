@@ -24,6 +24,43 @@ MORE = {
 }
 """Definitions that rosbags lacks, the same in ROS 1 and ROS 2."""
 
+MORE_ROS1 = {
+    "move_base_msgs/msg/MoveBaseGoal": "geometry_msgs/PoseStamped target_pose",
+    "move_base_msgs/msg/MoveBaseFeedback": "geometry_msgs/PoseStamped base_position",
+    "move_base_msgs/msg/MoveBaseResult": "",
+    "move_base_msgs/msg/MoveBaseActionGoal": (
+        "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\n"
+        "move_base_msgs/MoveBaseGoal goal"
+    ),
+    "move_base_msgs/msg/MoveBaseActionFeedback": (
+        "std_msgs/Header header\nactionlib_msgs/GoalStatus status\n"
+        "move_base_msgs/MoveBaseFeedback feedback"
+    ),
+    "move_base_msgs/msg/MoveBaseActionResult": (
+        "std_msgs/Header header\nactionlib_msgs/GoalStatus status\n"
+        "move_base_msgs/MoveBaseResult result"
+    ),
+}
+"""Goals of move_base and how they go."""
+
+MORE_ROS2 = {
+    "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight",
+    "nav2_msgs/msg/ParticleCloud": (
+        "std_msgs/Header header\nnav2_msgs/Particle[] particles"
+    ),
+    "nav2_msgs/action/NavigateToPose_Feedback": (
+        "geometry_msgs/PoseStamped current_pose\n"
+        "builtin_interfaces/Duration navigation_time\n"
+        "builtin_interfaces/Duration estimated_time_remaining\n"
+        "int16 number_of_recoveries\nfloat32 distance_remaining"
+    ),
+    "nav2_msgs/action/NavigateToPose_FeedbackMessage": (
+        "unique_identifier_msgs/UUID goal_id\n"
+        "nav2_msgs/action/NavigateToPose_Feedback feedback"
+    ),
+}
+"""Particles of Nav2's AMCL, and how goals of Nav2 go, from Humble on."""
+
 _UNFIT = (struct.error, ValueError, TypeError, AssertionError, OverflowError)
 """What rosbags raises where a value does not fit its type."""
 
@@ -92,8 +129,8 @@ class Types:
             name = ros2_type(type_name)
         except ConfigError:
             return
-        if "/action/" in type_name:  # what an action says is not known under that name
-            return
+        if "/action/" in type_name:
+            name = name.replace("/msg/", "/action/")
         for release in ROS1 if self.dialect == "ros1" else ROS2:
             try:
                 yield Way(self._store(release), name, self.dialect)
@@ -105,7 +142,8 @@ class Types:
 
         if release not in self._stores:
             store = get_typestore(Stores[release])
-            for name, text in MORE.items():
+            more = MORE_ROS1 if self.dialect == "ros1" else MORE_ROS2
+            for name, text in {**MORE, **more}.items():
                 if name not in store.fielddefs:
                     store.register(get_types_from_msg(text, name))
             self._stores[release] = store
