@@ -11,8 +11,9 @@ from webmap.discovery.layers import RULES, FoundLayer
 from webmap.discovery.naming import same_name, unique_names
 from webmap.discovery.words import in_one_line, report
 
+ODOM = "nav_msgs/Odometry"
 TOPICS = {
-    "/odom": "nav_msgs/Odometry",
+    "/odom": ODOM,
     "/cmd_vel": "geometry_msgs/Twist",
     "/scan": "sensor_msgs/LaserScan",
     "/rear/scan": "sensor_msgs/LaserScan",
@@ -33,6 +34,30 @@ def test_the_table_names_each_topic_with_its_rule():
     assert f"not found: {missing}" in text
     assert "--robot NAME:ODOM:CMD_VEL:SCAN" in text
     assert "--set ROBOT.ROLE=TOPIC" in text
+
+
+def test_cancel_is_not_missing_where_the_action_takes_it():
+    action = {
+        "/navigate_to_pose/_action/feedback": "nav2_msgs/NavigateToPose_FeedbackMessage"
+    }
+    (robot,) = discover(TOPICS | action, "bob").robots
+    assert robot.action is not None
+    missing = next(
+        line
+        for line in report("ws://bob:9090", discover(action | {"/odom": ODOM})).split(
+            "\n"
+        )
+        if "not found" in line
+    )
+    assert "cancel" not in missing
+    assert "velocity" in missing
+
+
+def test_a_note_does_not_name_another_frame_than_the_one_above():
+    pose = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
+    text = report("ws://bob:9090", discover(TOPICS | pose, "bob"))
+    assert "/odom is used, in its own frame." in text
+    assert "the usual name of Nav2" not in text
 
 
 def test_a_type_with_control_characters_does_not_reach_the_terminal():

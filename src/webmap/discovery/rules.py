@@ -100,7 +100,7 @@ RULES: tuple[Rule, ...] = (
         "the usual name",
     ),
     Rule("battery", ("sensor_msgs/BatteryState",), r"[^/]+", "its type alone"),
-    Rule("plan", PATH, r"plan", "the usual name of Nav2"),
+    Rule("plan", PATH, r"plan", "the usual name"),
     Rule("plan", PATH, r"[^/]*(?:global|Global|Navfn)[^/]*/[^/]*plan", "a global plan"),
     Rule("plan", PATH, r"[^/]*plan[^/]*", "named a plan"),
     Rule(

@@ -76,6 +76,8 @@ def robot_table(robot: FoundRobot) -> list[str]:
         for role, topic, type, rule in rows
     ]
     missing = [role for role in ROLES if role not in robot.guesses]
+    if robot.action is not None and "cancel" in missing:
+        missing.remove("cancel")  # an action takes cancels itself
     if missing:
         lines.append(f"  not found: {', '.join(missing)}")
     lines += [f"  note: {note}" for note in robot.notes]

@@ -87,8 +87,7 @@ def _openness(seen: Observed) -> Finding:
             ABOUT,
             f"The rosbridge is on this machine and listens at {', '.join(outward)}: it "
             f"asks nobody who they are, so whoever reaches this machine can drive.",
-            "Let it listen on this machine alone (address: 127.0.0.1), or shut its "
-            "port in the firewall.",
+            _listen_advice(seen, "this machine alone (address: 127.0.0.1)"),
         )
     if here:
         return Finding(
@@ -107,9 +106,19 @@ def _openness(seen: Observed) -> Finding:
         ABOUT,
         f"The rosbridge is open to the network ({seen.peer or parts.hostname}): it "
         f"asks nobody who they are, so whoever reaches it can drive; {secret}.{hidden}",
-        "Let it listen on the robot alone or on a VPN (address), hide what nobody "
-        "needs (topics_glob, services_glob), and use wss with a certificate.",
+        f"{_listen_advice(seen, 'the robot alone or on a VPN (address)')} Hide what "
+        f"nobody needs (topics_glob, services_glob), and use wss with a certificate.",
     )
+
+
+def _listen_advice(seen: Observed, where: str) -> str:
+    """Return how to keep others from the port."""
+    if seen.findings.dialect == "ros1":
+        return (
+            "Close its port for others in the firewall: rosbridge 0.11 for ROS 1 "
+            "listens on all addresses, whatever its parameter address is."
+        )
+    return f"Let it listen on {where}, or close its port in the firewall."
 
 
 def _rosapi(seen: Observed) -> Iterator[Finding]:

@@ -123,8 +123,13 @@ def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Fi
             bad,
             name,
             f"{said}, though {', '.join(writers)} could publish it{blind}.",
-            "Look whether that node is waiting for something, and in ROS 2 whether its "
-            "quality of service is one that the bridge takes (ros2 topic info -v).",
+            "Look whether that node is waiting for something"
+            + (
+                ", and whether its quality of service is one that the bridge takes "
+                f"(ros2 topic info -v {topic})."
+                if seen.findings.dialect != "ros1"
+                else f" (rostopic echo {topic})."
+            ),
         )
     if writers == ():
         return Finding(

@@ -198,12 +198,32 @@ def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
             "file, velocity_type of --set), or leave it out, so that it is asked for.",
         )
     stamped = is_type(velocity.type, "geometry_msgs/TwistStamped")
+    if not stamped and seen.findings.dialect == "ros2" and _has_client(velocity, seen):
+        # rosapi names one type of a topic, and of two the first in the alphabet.
+        return Finding(
+            "note",
+            robot.name,
+            f"rosapi names {short} for {velocity.topic}, and a client of a rosbridge, "
+            f"which may be WebMap itself, has announced that type, so rosapi cannot "
+            f"show whether the base takes TwistStamped.",
+            f"Look on the robot: ros2 topic info -v {velocity.topic}. A base that "
+            f"takes another type would neither move nor stop.",
+        )
     return Finding(
         "note" if said else "good",
         robot.name,
         f"{velocity.topic} {verb} {short}, and "
         f"WebMap sends that{', with a stamp of zero' if stamped else ''}.",
     )
+
+
+def _has_client(velocity: Guess, seen: Observed) -> bool:
+    """Return whether a client of a rosbridge writes or listens to a topic."""
+    nodes = [
+        *(seen.publishers.get(velocity.topic) or ()),
+        *(seen.subscribers.get(velocity.topic) or ()),
+    ]
+    return any(word in name for name in nodes for word in BRIDGES)
 
 
 def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Finding]:

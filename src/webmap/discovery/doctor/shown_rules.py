@@ -106,13 +106,31 @@ def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Findin
     }
     level: Level = "warning"
     found = silence(name, topic, seen, level, why[kind])
-    if kind in ("map", "costmap", "cloud") and seen.publishers.get(topic):
+    writers = seen.publishers.get(topic)
+    if kind == "map" and writers:
+        found = replace(found, advice=_map_advice(writers[0], topic, seen))
+    if kind in ("map", "costmap", "cloud") and writers:
         advice = (
             f"{found.advice} If it is larger than max_message_size of "
             f"rosbridge_websocket (10 MB unless set), set that higher."
         )
         found = replace(found, advice=advice)
     yield found
+
+
+def _map_advice(node: str, topic: str, seen: Observed) -> str:
+    """Return the usual reasons why a map that a node publishes does not come."""
+    if seen.findings.dialect == "ros1":
+        return (
+            f"Maps are sent once: look whether {node} has loaded its map, and whether "
+            f"it is latched, so that clients that come later get it (rostopic echo "
+            f"{topic})."
+        )
+    return (
+        f"Maps are sent once: look whether {node} is active (ros2 lifecycle get {node})"
+        f" and has loaded its map, and whether its durability is transient_local, so "
+        f"that clients that come later get it (ros2 topic info -v {topic})."
+    )
 
 
 def _in_words(seconds: float) -> str:

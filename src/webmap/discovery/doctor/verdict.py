@@ -1,9 +1,10 @@
 """All that the readiness check says, in order."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from webmap.discovery.doctor.bridge_rules import bridge_findings
-from webmap.discovery.doctor.observed import LEVELS, Finding, Observed
+from webmap.discovery.doctor.observed import LEVELS, Finding, Level, Observed
 from webmap.discovery.doctor.robot_rules import robot_findings
 from webmap.outside_text import one_line
 
@@ -37,7 +38,12 @@ def report(url: str, findings: Sequence[Finding]) -> str:
         lines.append(f"  {MARKS[finding.level]:<8} {one_line(finding.words)}")
         if finding.advice:
             lines.append(f"           -> {one_line(finding.advice)}")
-    counts = [
-        f"{sum(each.level == level for each in findings)} {level}" for level in LEVELS
-    ]
-    return "\n".join([*lines, "", ", ".join(counts)])
+    counts = Counter(finding.level for finding in findings)
+    words = [_counted(counts[level], level) for level in LEVELS]
+    return "\n".join([*lines, "", ", ".join(words)])
+
+
+def _counted(count: int, level: Level) -> str:
+    """Return how many findings have a level, as in "4 notes"."""
+    is_noun = level in ("warning", "note")
+    return f"{count} {level}{'s' if is_noun and count != 1 else ''}"
