@@ -25,7 +25,7 @@ def test_the_robots_of_ros_1_are_found_by_namespace(ros1):
 def test_the_bare_robot_of_ros_2_is_found_with_its_type_of_velocity(ros2):
     said = discover(ros2)
     assert said.returncode == 0, said.stderr
-    assert "127.0.0.1 (without a namespace)" in said.stdout
+    assert "robot (without a namespace)" in said.stdout
     assert "geometry_msgs/msg/TwistStamped" in said.stdout
 
 

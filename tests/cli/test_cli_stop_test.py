@@ -69,7 +69,7 @@ def test_a_base_without_a_timeout_is_found_although_it_passed_before(folder):
 
 def test_nothing_moves_unless_the_person_agrees(folder):
     with WitnessRobot() as robot:
-        said = run(robot.url, "127.0.0.1", says="n\n")
+        said = run(robot.url, "robot", says="n\n")
         moving = robot.log.moving_since(0.0)
     assert said.returncode == 2
     assert "will creep forward at 0.1 m/s" in said.stdout
@@ -80,7 +80,7 @@ def test_nothing_moves_unless_the_person_agrees(folder):
 def test_it_creeps_and_ends_with_zero_when_it_is_interrupted(folder):
     with WitnessRobot(timeout=None) as robot:
         with subprocess.Popen(
-            command(robot.url, "127.0.0.1", "--yes"),
+            command(robot.url, "robot", "--yes"),
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
@@ -105,7 +105,7 @@ def test_a_robot_whose_stop_stands_is_not_moved(folder):
         Records(folder).keep_latch(
             Key(robot.url, "/cmd_vel"), Press("Ann", "a1"), frozenset()
         )
-        said = run(robot.url, "127.0.0.1", "--yes")
+        said = run(robot.url, "robot", "--yes")
         assert robot.log.moving_since(0.0) == []
     assert said.returncode == 2
     assert "Nothing was found out: STOP" in said.stdout

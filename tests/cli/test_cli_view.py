@@ -83,7 +83,7 @@ def test_robots_of_both_dialects_are_found_before_the_page_opens(ros1, ros2):
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for(r"Found robot_0: odometry /robot_0/odom, velocity /robot_0/")
         view.wait_for(r"Found robot_1: ")
-        view.wait_for(r"Found 127\.0\.0\.1: odometry /odom, velocity /cmd_vel")
+        view.wait_for(r"Found robot: odometry /odom, velocity /cmd_vel")
 
 
 def test_robots_that_are_told_are_all_there_is(ros1):
@@ -204,11 +204,12 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
     came = greet(late, ["BOB"], 0.25)
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
-    assert late.robots[0].name == "bob 2"
+    assert late.robots[0].name == "bob (bob:9090)"
     assert late.robots[0].motion.spec().stops_within == 0.25
     said = capsys.readouterr()
     assert said.out == ""
-    assert "A robot appeared behind ws://bob:9090: bob 2: odometry /odom" in said.err
+    words = "A robot appeared behind ws://bob:9090: bob (bob:9090): odometry /odom"
+    assert words in said.err
     late.robots[0].destroy()
 
 

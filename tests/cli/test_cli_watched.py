@@ -24,7 +24,7 @@ TOPICS = SEEN | {
 
 
 def test_a_robot_that_could_be_driven_is_described_as_one_that_is_seen():
-    (found,) = discover(TOPICS, "127.0.0.1").robots
+    (found,) = discover(TOPICS, "robot").robots
     assert {"velocity", "goal", "action", "initialpose"} <= set(found.guesses)
     about = describe(Watched("office").apply(URL, found), Bridge(URL))
     assert (about.odometry, about.scan) == ("/odom", "/scan")
@@ -36,9 +36,9 @@ def test_topics_that_come_later_do_not_let_it_be_driven_either():
     bridge, late = Bridge(URL), LateRobots(Console())
     watched = Watched("office")
     came = greet(late, [], None, overruling=watched)
-    (bare,) = discover(SEEN, "127.0.0.1").robots
+    (bare,) = discover(SEEN, "robot").robots
     came(News(bare), bridge)
-    (whole,) = discover(TOPICS, "127.0.0.1").robots
+    (whole,) = discover(TOPICS, "robot").robots
     came(News(whole, MOTION), bridge)
     (robot,) = late.robots
     try:
@@ -53,6 +53,6 @@ def test_a_robot_without_a_name_of_its_own_is_called_as_the_recording():
     names = {}
     for prefix in ("", "/bob"):
         topics = {f"{prefix}{topic}": type for topic, type in SEEN.items()}
-        (found,) = discover(topics, "127.0.0.1").robots
+        (found,) = discover(topics, "robot").robots
         names[prefix] = Watched("office").apply(URL, found).name
     assert names == {"": "office", "/bob": "bob"}

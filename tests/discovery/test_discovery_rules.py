@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from webmap.discovery import discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.robots import host_name
+from webmap.discovery.tf_robots import Trees
 
 CAPTURED = Path(__file__).parents[1] / "ros" / "captured"
 
@@ -74,7 +75,7 @@ def test_amcl_is_noted_and_odometry_used():
     robot = only({"/odom": ODOM, "/amcl_pose": POSE})
     assert robot.topic("odometry") == "/odom"
     assert robot.topic("pose") == "/amcl_pose"
-    assert any("amcl_pose says where it is on the map" in n for n in robot.notes)
+    assert any("amcl_pose has the pose on the map" in n for n in robot.notes)
 
 
 @pytest.mark.parametrize(
@@ -322,9 +323,9 @@ def test_captured_systems_have_their_two_robots(file):
     ("url", "name"),
     [
         ("ws://bob.local:9090", "bob"),
-        ("ws://localhost:9090", "localhost"),
-        ("ws://192.168.1.7:9090", "192.168.1.7"),
-        ("ws://[fe80::1]:9090", "fe80::1"),
+        ("ws://localhost:9090", "robot"),
+        ("ws://192.168.1.7:9090", "robot"),
+        ("ws://[fe80::1]:9090", "robot"),
     ],
 )
 def test_a_host_has_a_short_name(url, name):
@@ -361,3 +362,20 @@ def test_whatever_there_is_no_topic_moves_two_robots(topics):
         assert set(robot.guesses) <= set(ROLES)
         for guesses in robot.guesses.values():
             assert all(guess.topic in topics and guess.rule for guess in guesses)
+
+
+def test_a_robot_without_a_namespace_is_called_as_its_frames_are():
+    trees = Trees()
+    trees.take("", "map", "odom")
+    trees.take("", "odom", "base_link")
+    plain = discover({"/odom": ODOM, "/cmd_vel": TWIST}, "robot", trees)
+    assert [robot.name for robot in plain.robots] == ["robot"]
+    trees = Trees()
+    trees.take("", "map", "bob/odom")
+    trees.take("", "bob/odom", "bob/base_link")
+    framed = discover({"/odom": ODOM, "/cmd_vel": TWIST}, "robot", trees)
+    assert [robot.name for robot in framed.robots] == ["bob"]
+    trees.take("", "map", "eve/odom")
+    trees.take("", "eve/odom", "eve/base_link")
+    several = discover({"/odom": ODOM, "/cmd_vel": TWIST}, "robot", trees)
+    assert [robot.name for robot in several.robots] == ["robot", "bob", "eve"]

@@ -3,12 +3,13 @@
 import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from urllib.parse import urlsplit
 
 from webmap.cli.echo import echo
 from webmap.discovery import Findings, discover
 from webmap.discovery.asking import ask_topics
 from webmap.discovery.hearing import hear_frames
-from webmap.discovery.naming import unique_names
+from webmap.discovery.naming import free_name, unique_names
 from webmap.discovery.robots import host_name
 from webmap.errors import BridgeClosed, BridgeError
 
@@ -63,28 +64,28 @@ async def find(
         asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
     else:
         asked = [(await _behind(url, topics), topics, None) for url in urls]
+    names = labels(urls)
     named = unique_names(
-        [(host_name(url), one) for url, (one, _, _) in zip(urls, asked, strict=True)]
+        [(name, one) for name, (one, _, _) in zip(names, asked, strict=True)]
     )
     return [
         Found(url, label, findings, trouble, said)
         for url, label, findings, (_, said, trouble) in zip(
-            urls, labels(urls), named, asked, strict=True
+            urls, names, named, asked, strict=True
         )
     ]
 
 
 def labels(urls: Sequence[str]) -> list[str]:
-    """Return a name for each bridge: its host, with a number where that is taken."""
-    found: list[str] = []
-    for url in urls:
-        host, number = host_name(url), 1
-        label = host
-        while label in found:
-            number += 1
-            label = f"{host}_{number}"
-        found.append(label)
-    return found
+    """Return a name for each bridge: its host, with the port if others have it too."""
+    parts = [urlsplit(url) for url in urls]
+    hosts = [part.hostname or "robot" for part in parts]
+    names = [
+        host if hosts.count(host) == 1 or part.port is None else f"{host}:{part.port}"
+        for host, part in zip(hosts, parts, strict=True)
+    ]
+    taken: set[str] = set()
+    return [free_name(name, taken) for name in names]
 
 
 async def _ask(

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from webmap.cli.draw_layer import shared_map
 from webmap.cli.looking import Looking, say
@@ -123,7 +124,8 @@ def greet(
 ) -> Callable[[News, "Bridge"], None]:
     """Return what shows news, and says so on standard error.
 
-    A newcomer gets a name that nobody has, and one that was told by hand is no news.
+    A newcomer whose name is taken has its bridge behind the name. A robot that was
+    told by hand is no news.
 
     Args:
         late: Where it is shown.
@@ -163,7 +165,10 @@ def greet(
         about = describe(robot, bridge, stops_within=stops_within)
         if any(overrules(other, about) for other in told):
             return
-        robot = replace(robot, name=free_name(robot.name, names))
+        wanted = robot.name
+        if same_name(wanted) in names:
+            wanted = f"{wanted} ({urlsplit(bridge.url).netloc})"
+        robot = replace(robot, name=free_name(wanted, names))
         late.add(robot, replace(about, name=robot.name))
         say(f"A robot appeared behind {bridge.url}: {in_one_line(robot)}")
 

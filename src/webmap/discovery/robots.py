@@ -45,7 +45,7 @@ def discover(
     mine, twists = _owned(spaces, matches), _twists(spaces, topics)
     robots = tuple(
         _robot(name, space, mine[space], twists[space], bases.get(space))
-        for name, space in zip(_names(spaces, host), spaces, strict=True)
+        for name, space in zip(_names(spaces, bases, host), spaces, strict=True)
     )
     return Findings(
         robots,
@@ -59,14 +59,15 @@ def discover(
 def host_name(url: str) -> str:
     """Return what a robot without a namespace behind a bridge is called.
 
-    The first part of the host's name; an address stays whole.
+    The first part of the host's name; "robot" if there is only an address.
     """
     host = urlsplit(url).hostname or "robot"
     try:
         ipaddress.ip_address(host)
     except ValueError:
-        return host.partition(".")[0] or "robot"
-    return host
+        first = host.partition(".")[0]
+        return "robot" if first in ("", "localhost") else first
+    return "robot"
 
 
 def _packed(matches: Sequence[Match]) -> list[Match]:
@@ -158,9 +159,14 @@ def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
     notes = []
     odometry, pose = robot.first("odometry"), robot.first("pose")
     if odometry and pose:
+        where = (
+            f"with the frames from {robot.root_frame} to {robot.base_frame}"
+            if robot.base_frame
+            else "in its own frame"
+        )
         notes.append(
-            f"{pose.topic} says where it is on the map, but mostly speaks only while "
-            f"the robot moves; {odometry.topic} is used, in its own frame."
+            f"{pose.topic} has the pose on the map, but mostly only while the robot "
+            f"moves; {odometry.topic} is used, {where}."
         )
     elif pose:
         notes.append(f"There is no odometry; {pose.topic} is used in its place.")
@@ -191,9 +197,13 @@ def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _names(spaces: Sequence[str], host: str) -> list[str]:
-    """Return a name for each namespace: its last part, where that is enough."""
-    last = [space.rpartition("/")[2] or host for space in spaces]
+def _names(spaces: Sequence[str], bases: Mapping[str, Base], host: str) -> list[str]:
+    """Return a name for each namespace: its last part, where that is enough.
+
+    Without a namespace it is what the name of its base's frame begins with.
+    """
+    framed = bases[""].prefix.rpartition("/")[2] if "" in bases else ""
+    last = [space.rpartition("/")[2] or framed or host for space in spaces]
     often = Counter(name.casefold() for name in last)
     return [
         name if often[name.casefold()] == 1 else space.strip("/") or f"{host} (no name)"

@@ -130,6 +130,9 @@ def owners(
 ) -> tuple[dict[str, Base], list[Base]]:
     """Return whose base each one is, and those that are of robots not known yet.
 
+    The only base is that of the only robot, if both are without a namespace: drivers
+    of one robot often have a prefix for their frames and none for their topics.
+
     Args:
         found: The bases.
         spaces: The namespaces that are robots by their topics.
@@ -143,6 +146,8 @@ def owners(
             new.append(base)
         elif space not in mine:
             mine[space] = base
+    if known == ("",) and not mine and len(new) == 1 and not new[0].namespace:
+        mine[""] = new.pop()
     if len(known) > 1 and "" not in known:
         # Frames without a prefix may be anybody's.
         new = [base for base in new if base.space]
