@@ -386,7 +386,8 @@ def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
     said = [operation["msg"] for operation in log.operations("publish", "/rosout")]
     warn, info = (30, 20) if dialect == "ros2" else (4, 2)
     lines = [(line["level"], line["msg"]) for line in said]
-    assert lines[0] == (warn, "the battery is at 20 %")
+    assert lines[0] == (info, "ready, the battery is at 20 %")
+    assert lines[1] == (warn, "the battery is at 20 %")
     assert (info, "a goal at (2.00, 3.00)") in lines
     assert (info, "the goal canceled: stopped") in lines
     name = "robot_0.base" if dialect == "ros2" else "/robot_0/base"

@@ -1,4 +1,4 @@
-"""What the nodes of the robots log: goals, plans, bumps and the battery."""
+"""What the nodes of the robots log: that they run, goals, plans, bumps, the battery."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,6 +33,7 @@ class Logs:
     def __init__(self, node: "RobotsNode") -> None:
         self._node = node
         self._before = [_Before() for _ in node.world.robots]
+        self._was_wanted = False
 
     def start(self) -> None:
         """Advertise the topic."""
@@ -45,9 +46,13 @@ class Logs:
         """Publish what happened since, if somebody listens."""
         world = self._node.world
         wanted = self._node.graph.is_wanted(TOPIC)
+        begins, self._was_wanted = wanted and not self._was_wanted, wanted
         pairs = zip(world.navigators, self._before, strict=True)
         for navigator, before in pairs:
             robot = navigator.robot
+            if begins:
+                charge = f"{100 * robot.charge:.0f} %"
+                self._say(robot, INFO, "base", f"ready, the battery is at {charge}")
             said = _news(robot, navigator.goal, navigator.path_changes, before)
             for each in said if wanted else ():
                 self._say(robot, *each)
