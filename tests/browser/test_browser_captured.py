@@ -129,12 +129,16 @@ def test_robots_of_both_kinds_of_ros_are_on_one_map_where_they_were_recorded(
             box = tab.locator(f"{robot(name)} .model").bounding_box()
             assert 0 < box["x"] < 1200, "out of sight"
             assert 0 < box["y"] < 800, "out of sight"
-            expect(row(tab, name)).to_contain_text("Free")
+            expect(row(tab, name)).to_contain_text(DRIVEN)
         expect(tab.locator("#bridges summary")).to_have_text("2 bridges open")
         expect(tab.locator(".robot.stale")).to_have_count(0)
         expect(tab.locator(".laserscan.stale")).to_have_count(0)
         assert tab.locator(".webmap-notice").count() == 0
         tab.goto("about:blank")
+
+
+DRIVEN = "Moving, not by WebMap"
+"""What was recorded was driven by somebody else."""
 
 
 def closed_port() -> int:
@@ -163,7 +167,7 @@ def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros
         expect(line).to_contain_text("cannot be reached")
         expect(line).to_contain_text("refused")
         expect(row(tab, "Gone")).to_contain_text("No bridge")
-        expect(row(tab, "Anna")).to_contain_text("Free")
+        expect(row(tab, "Anna")).to_contain_text(DRIVEN)
         assert re.search(f"cannot reach the rosbridge at {gone}", server.log)
         tab.goto("about:blank")
 

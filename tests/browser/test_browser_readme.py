@@ -50,4 +50,21 @@ def test_they_show_a_robot_that_can_be_clicked_and_driven(tab, tmp_path):
             hold(tab.keyboard, "w", lambda: witness.speed("/odom")[0] > 0.9)
             tab.keyboard.up("w")
             witness.close()
+            expect(tab.locator(".webmap-metre-grid")).to_be_attached()
+            tab.mouse.move(300, 200)
+            tab.mouse.wheel(0, -480)
+            tab.wait_for_function(
+                "before => document.querySelector('.robot circle')"
+                ".getBoundingClientRect().width > before * 1.2",
+                arg=16,
+            )
+            # The panel for driving leaves most of a small map free.
+            tab.set_viewport_size({"width": 700, "height": 500})
+            tab.wait_for_function(
+                """() => {
+                  const panel = document.querySelector(".webmap-teleop");
+                  const { width, height } = panel.getBoundingClientRect();
+                  return innerWidth === 700 && width * height < 0.2 * 700 * 500;
+                }"""
+            )
             tab.close()

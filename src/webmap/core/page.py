@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from webmap.core.hand_speeds import HandSpeeds
 from webmap.core.page_ports import PageChannel, Publisher, Viewer
 from webmap.core.tasks import begin
+from webmap.core.view import initial_view
 from webmap.errors import ConfigError
 from webmap.plain_files import resolved
 from webmap.scene.bound import BoundElement, Document
@@ -86,6 +87,12 @@ site = Site()
 """The pages of this process."""
 
 
+MADE_PAGE_MODULES = ("MetreGrid", "MouseViewControl")
+"""Modules that maps have on a page that WebMap makes."""
+
+MADE_PAGE_SCALE = 20.0
+"""Pixels per metre of such a map, unless the page function chooses a view."""
+
 Key = tuple[int, int, str]
 """What is listened to: a mount, an element of it and an event."""
 
@@ -131,6 +138,21 @@ class Page:
         if isinstance(container, BoundElement):
             return self._sizes.get(container.html_id, (0.0, 0.0))
         return (0.0, 0.0)
+
+    def complete(self) -> None:
+        """Complete the maps of the page if WebMap makes the page's HTML.
+
+        Each gets the modules of ``MADE_PAGE_MODULES`` that the page function did not
+        add, and a view if the page function chose none.
+        """
+        for map in self.maps if self.entry.html is None else ():
+            if map.world.tf == initial_view(map.canvas_width, map.canvas_height):
+                map.scale(MADE_PAGE_SCALE)
+            kinds = [kind for module in map.modules for kind in type(module).__mro__]
+            there = {kind.__name__ for kind in kinds}
+            for name in MADE_PAGE_MODULES:
+                if name not in there:
+                    map.add_module(name)
 
     @property
     def mount(self) -> int:

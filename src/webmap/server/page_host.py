@@ -4,7 +4,7 @@ import asyncio
 import inspect
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Protocol
 
 from webmap.core.page import Page, PageEntry
@@ -227,7 +227,9 @@ class PageHost:
             with page.scope.active():
                 result = self._entry.function(page)
                 if inspect.isawaitable(result):
-                    begin(result, self._failed)
+                    begin(_then_complete(result, page), self._failed)
+                else:
+                    page.complete()
         except Exception as error:
             self._failed(error)
         self.tell_speeds()
@@ -252,3 +254,8 @@ class PageHost:
         if self._watching is not None:
             self._watching.remove()
             self._watching = None
+
+
+async def _then_complete(building: Awaitable[Any], page: Page) -> None:
+    await building
+    page.complete()
