@@ -25,13 +25,24 @@ test("one of several drawings of a layer is hidden by itself", () => {
   );
 });
 
+const drawn = (...names) => names.map((layer) => ({ dataset: layer ? { layer } : {} }));
+
 test("a layer is divided when it draws different things, and not for each robot", () => {
-  const drawn = (...names) => names.map((layer) => ({ dataset: layer ? { layer } : {} }));
   assert.deepEqual(several(drawn("rear/scan", "front/scan", "rear/scan")), [
     "front/scan",
     "rear/scan",
   ]);
   assert.deepEqual(several(drawn("scan", "scan", "")), []);
   const many = Array.from({ length: 99 }, (_, number) => `/map_${number}`);
-  assert.equal(several(drawn(...many)).length, 16);
+  assert.equal(several(drawn(...many)).length, many.length);
+});
+
+test("layers of robots are together, and robot_2 comes before robot_10", () => {
+  const topics = ["/robot_10/scan", "/robot_2/rear", "/robot_1/scan", "/robot_2/front"];
+  assert.deepEqual(several(drawn(...topics)), [
+    "/robot_1/scan",
+    "/robot_2/front",
+    "/robot_2/rear",
+    "/robot_10/scan",
+  ]);
 });

@@ -16,6 +16,9 @@ const MOST = 16;
 /** How often an open list looks what there is, in milliseconds. */
 const PERIOD = 1000;
 
+/** Puts the layers of robot_2 before those of robot_10. */
+const order = new Intl.Collator("en", { numeric: true });
+
 let maps = 0;
 
 /**
@@ -54,13 +57,14 @@ export function hiding(layers, shown, scope) {
 
 /**
  * @param {Iterable<{dataset: DOMStringMap}>} drawings What a layer draws at the moment.
- * @returns {string[]} What of it can be switched by itself; nothing if it is one thing.
+ * @returns {string[]} What of it can be switched by itself, in natural order; nothing if
+ *     it is one thing.
  */
 export function several(drawings) {
   const found = new Set();
   for (const { dataset } of drawings) if (dataset.layer) found.add(dataset.layer);
-  const names = [...found].sort();
-  return names.length > 1 ? names.slice(0, MOST) : [];
+  const names = [...found].sort(order.compare);
+  return names.length > 1 ? names : [];
 }
 
 class LayerSwitches {
@@ -83,7 +87,7 @@ class LayerSwitches {
     this._details = html(
       "details",
       "webmap-panel webmap-layers",
-      {},
+      { "data-webmap-menu": "" },
       html("summary", "", {}, "Layers"),
       this._list,
       this._none,
@@ -93,6 +97,9 @@ class LayerSwitches {
     this._take = lay(map, this._details, "top-left");
     /** @type {Map<string, HTMLElement>} */
     this._rows = new Map();
+    /** Below each layer: of how many drawings there is no switch. */
+    /** @type {Map<string, HTMLElement>} */
+    this._notes = new Map();
     this._leave = map.layout.add("layers", {
       read: () => ({ open: this._details.open, shown: { ...this._shown } }),
       write: ({ open, shown }) => this._lay(open, shown),
@@ -119,7 +126,9 @@ class LayerSwitches {
       const drawings = this._map.world.querySelectorAll(selector);
       if (drawings.length === 0) continue;
       there.add(name);
-      for (const one of several(drawings)) there.add(name + OF + one);
+      const names = several(drawings);
+      for (const one of names.slice(0, MOST)) there.add(name + OF + one);
+      this._note(name, names.length - MOST);
     }
     for (const key of there) if (!this._rows.has(key)) this._add(key);
     for (const [key, row] of this._rows) row.hidden = !there.has(key);
@@ -140,13 +149,34 @@ class LayerSwitches {
     const row = html("label", kind, {}, box, html("span", "", {}, one || name));
     if (one) row.title = `${name}: ${one}`;
     this._rows.set(key, row);
-    // In the order of the layers, whichever came first; what is of one follows it.
-    const order = this._layers.map(([known]) => known);
-    const place = (/** @type {string} */ of) => order.indexOf(of.split(OF)[0]);
-    const rows = [...this._rows].sort(
-      ([a], [b]) => place(a) - place(b) || (a < b ? -1 : 1),
-    );
-    this._list.replaceChildren(...rows.map(([, element]) => element));
+    this._arrange();
+  }
+
+  /**
+   * Show that more is drawn than there are switches for.
+   *
+   * @param {string} name Of the layer.
+   * @param {number} more
+   */
+  _note(name, more) {
+    const known = this._notes.get(name);
+    if (more <= 0 && !known) return;
+    const note = known ?? html("p", "webmap-layers-row one");
+    say(note, `${more} more: the switch “${name}” is for all of them`);
+    note.hidden = more <= 0;
+    if (known) return;
+    this._notes.set(name, note);
+    this._arrange();
+  }
+
+  /** In the order of the layers, whichever came first; what is of one follows it. */
+  _arrange() {
+    const rows = this._layers.flatMap(([name]) => {
+      const keys = [...this._rows.keys()].filter((key) => key.split(OF)[0] === name);
+      const found = keys.sort(order.compare).map((key) => this._rows.get(key));
+      return [...found, this._notes.get(name)].filter((row) => row !== undefined);
+    });
+    this._list.replaceChildren(...rows);
   }
 
   /**
