@@ -49,6 +49,8 @@ export async function viewAsSvg(map) {
   const overlay = overlayOf(map);
   for (const child of overlay?.children ?? []) {
     if (child.classList.contains("webmap-frame")) continue;
+    // What is inside does not have this of itself.
+    if (getComputedStyle(child).display === "none") continue;
     if (child instanceof SVGSVGElement) {
       for (const part of child.children) add(part);
     } else if (child instanceof HTMLElement) {
