@@ -9,18 +9,20 @@ beforeEach(() => {
   reported = [];
   globalThis.window = new EventTarget();
   globalThis.Element = class {};
+  globalThis.document = { querySelector: () => null, querySelectorAll: () => [] };
   globalThis.reportError = (error) => reported.push(error);
 });
 
 afterEach(() => {
-  for (const name of ["window", "Element", "reportError"]) delete globalThis[name];
+  for (const name of ["window", "Element", "document", "reportError"]) delete globalThis[name];
 });
 
 /** A desk with these claims on Escape, pressed once; what was stopped. */
 function escapeAt(...claims) {
   const stopped = [];
   const desk = deskOf({
-    status: { driven: null, choice: "r1" },
+    status: { driven: null, taking: false, choice: "r1" },
+    robots: new Map(),
     on: () => () => {},
     stop: (robot) => stopped.push(robot),
     setInput() {},

@@ -143,19 +143,50 @@ export class Desk {
    * @param {KeyboardEvent} event
    */
   _stop(all, event) {
-    const { driven, choice } = this._drive.status;
+    const { driven, taking, choice } = this._drive.status;
     if (all) {
       this._drive.stop("*");
       return true;
     }
-    if (driven === null && keepsKey(event)) return false;
-    if (driven === null && event.code === "Escape") {
+    const drives = driven !== null || taking;
+    if (!drives && keepsKey(event)) return false;
+    if (!drives && event.code === "Escape") {
+      const held = choice !== null && this._drive.robots.get(choice)?.mine;
+      if (!held && leaves(closesMenu)) return true;
       for (const leave of this._escapes) if (leaves(leave)) return true;
     }
     // With none to mean they mean all: a STOP too many is harmless.
     this._drive.stop(driven ?? choice ?? "*");
     return true;
   }
+}
+
+/** Inputs that Escape means something to. */
+const TYPED = "input:not([type=checkbox], [type=radio], [type=button], [type=submit])";
+
+/** What Escape closes: menus that say so, and what the browser itself would close. */
+const MENUS = "[data-webmap-menu], [popover]:not([popover=manual])";
+
+/**
+ * Close an open menu. Not under the alarm, which covers it.
+ *
+ * @returns {boolean} Whether there was one.
+ */
+function closesMenu() {
+  if (document.querySelector(".webmap-alarm")) return false;
+  /** @type {NodeListOf<HTMLElement>} */
+  const found = document.querySelectorAll(MENUS);
+  const open = [...found].filter((one) => one.matches("[open], :popover-open"));
+  const menu = open.find((one) => one.getClientRects().length > 0);
+  if (!menu) return false;
+  const inside = menu.contains(document.activeElement);
+  if (menu instanceof HTMLDialogElement) menu.close();
+  else if (menu instanceof HTMLDetailsElement) menu.open = false;
+  else menu.hidePopover();
+  // On the line that folds a menu out the space bar would be no STOP.
+  const map = /** @type {SVGElement | null} */ (document.querySelector("svg.webmap"));
+  if (inside) map?.focus();
+  return true;
 }
 
 /**
@@ -182,8 +213,8 @@ function keepsKey(event) {
   if (!(target instanceof Element)) return false;
   if (event.code === "Escape") {
     // One that is opened and closed by hand alone, as the alarm is, has no use for it.
-    const closes = "dialog:modal, [popover]:not([popover=manual]), input, textarea";
-    return target.closest(closes) !== null;
+    const closes = "dialog:modal, [popover]:not([popover=manual]), textarea, select";
+    return target.closest(closes) !== null || target.matches(TYPED);
   }
   return target.matches("input[type=checkbox], input[type=radio], select, summary");
 }
