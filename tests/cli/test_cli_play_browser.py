@@ -35,7 +35,36 @@ def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
             re.compile(r"Recording office: \d+\.\d of 19\.9 s, 2 times as fast")
         )
         expect(page.locator("#bridges")).to_contain_text("Bridge open")
+        for name in ("Send to", "Cancel goal", "Set pose"):
+            button = card.get_by_role("button", name=name)
+            expect(button).to_be_disabled()
+            expect(button).to_have_attribute("title", re.compile("^WebMap knows no "))
         page.keyboard.down("w")
         expect(page.locator("#title")).to_have_text(re.compile("Recording office"))
         page.keyboard.up("w")
         expect(card.locator(".state")).to_contain_text("Watched only")
+
+
+def test_a_round_of_a_recording_is_no_jump(chromium, tmp_path):
+    made = Made("ros2")
+    moments = [step / 10 for step in range(20)]
+    bag = made.bag(
+        tmp_path / "round",
+        ("/tf_static", FRAMES, 0.0, made.frame("laser")),
+        *(("/odom", ODOMETRY, at, made.odometry(at, 3 * at)) for at in moments),
+    )
+    with shown(chromium, "play", bag, "--loop") as page:
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(1, timeout=15_000)
+        page.locator("#robots .row").click()
+        page.evaluate(
+            """() => {
+              window.said = new Set();
+              setInterval(() => {
+                const problems = document.querySelector("#card .problems").textContent;
+                const notices = document.querySelector(".webmap-notices")?.textContent;
+                for (const text of [problems, notices]) if (text) window.said.add(text);
+              }, 50);
+            }"""
+        )
+        page.wait_for_timeout(5000)
+        assert page.evaluate("[...window.said]") == []

@@ -120,7 +120,7 @@ def taken(tab: Page, act, said: Locator) -> None:
         tab.wait_for_function(
             """selector => {
               const words = [...document.querySelectorAll(selector)];
-              return words.some(word => /^Not |^Told|^Halted|goes to/.test(
+              return words.some(word => /^Not |^Pose sent|^Halted|goes to/.test(
                 word.textContent)) || document.querySelector(
                 ".webmap-goal-arrow:not(.aimed, .asked)");
             }""",
@@ -269,7 +269,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
             press(tab, *pressed[-1], drag=30)
 
     taken(tab, again, word)
-    expect(word).to_have_text("Told.")
+    expect(word).to_have_text("Pose sent.")
     told = json.loads(robot.recv(timeout=10))["msg"]
     at, turn = (told["pose"]["pose"][part] for part in ("position", "orientation"))
     assert told["header"]["frame_id"] == "map"
@@ -283,7 +283,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     expect(label(tab)).to_contain_text("Under way")
     tab.keyboard.press("i")
     press(tab, *beside(tab, "Old 0", 5), drag=30)
-    expect(word).to_have_text("Not told: it follows a goal: cancel that first")
+    expect(word).to_have_text("Not sent: it follows a goal: cancel that first")
     label(tab).get_by_role("button", name="Cancel the goal").click()
 
 

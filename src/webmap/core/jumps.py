@@ -24,6 +24,10 @@ STANDS = 10.0
 """Seconds for which a jump is said, after the last one."""
 
 
+EXPECTED = 5.0
+"""Seconds after somebody set the pose within which a jump is what they asked for."""
+
+
 class Jumps:
     """Notices when a robot is somewhere else than it can have driven to."""
 
@@ -32,8 +36,12 @@ class Jumps:
         """What happened, in a sentence, as long as it is worth saying."""
         self._last: PoseReading | None = None
         self._came = -math.inf
-        self._jumped = -math.inf
+        self._jumped = self._asked_for = -math.inf
         self._count = 0
+
+    def expect(self, now: float) -> None:
+        """Note that somebody set the pose: the next jumps are what they asked for."""
+        self._asked_for = now
 
     def look(self, reading: PoseReading, now: float, *, timed: bool = True) -> None:
         """Take the next pose, in the frame that all of them are in.
@@ -64,6 +72,8 @@ class Jumps:
         one, other = before.position, reading.position
         went = math.dist((one.x, one.y), (other.x, other.y))
         if not 0 < took < LONGEST or went <= SMALLEST + FASTEST * took:
+            return
+        if now - self._asked_for <= EXPECTED:
             return
         self._jumped = now
         self._count += 1

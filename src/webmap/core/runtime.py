@@ -22,6 +22,7 @@ from webmap.gate.messages import (
     Report,
     RobotReport,
     SentGoal,
+    SentPose,
     SentTwist,
 )
 from webmap.geometry import Quaternion, Twist
@@ -205,6 +206,8 @@ class Runtime:
             robot.on_written("twist", twist_message(report))
         elif isinstance(report, SentGoal):
             robot.on_written("move", goal_message(report))
+        elif isinstance(report, SentPose):
+            robot.expect_jump()
 
 
 def twist_message(sent: SentTwist) -> dict[str, Any]:

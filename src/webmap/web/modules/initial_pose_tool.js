@@ -4,6 +4,8 @@ import { Doubt } from "./initial_pose_doubt.js";
 import { lay } from "./overlay.js";
 import { PressAim } from "./press_aim.js";
 
+const SENT = "Pose sent.";
+
 /** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
@@ -144,12 +146,12 @@ class InitialPoseTool {
   async _tell(robot, pose) {
     try {
       await this._drive.locate(robot, pose);
-      say(this._word, "Told.");
-      setTimeout(() => this._word.textContent === "Told." && say(this._word, ""), 4000);
+      say(this._word, SENT);
+      setTimeout(() => this._word.textContent === SENT && say(this._word, ""), 4000);
       this._send({ told: { robot, ...pose } });
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
-      say(this._word, `Not told: ${why}`);
+      say(this._word, `Not sent: ${why}`);
     }
     this._preview(null);
   }
