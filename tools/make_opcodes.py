@@ -1,7 +1,7 @@
-"""Write the wire's table for the browser, or check that it is up to date.
+"""Write the tables that the browser shares with Python, or check them.
 
-``python tools/make_opcodes.py`` writes ``src/webmap/web/opcodes.js``; with ``--check``
-it only says whether that file is what it would write.
+``python tools/make_opcodes.py`` writes ``opcodes.js`` and ``motion/state_words.js`` of
+``src/webmap/web``; with ``--check`` it only says whether they are what it would write.
 """
 
 import argparse
@@ -10,9 +10,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from webmap.core.robot_state import WORDS
 from webmap.wire.opcodes import TABLES, VERSION
 
-TARGET = Path(__file__).parent.parent / "src/webmap/web/opcodes.js"
+WEB = Path(__file__).parent.parent / "src/webmap/web"
 
 _ABOUT = {
     "OP": "The first byte of each record.",
@@ -39,6 +40,21 @@ def opcodes_js() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def state_words_js() -> str:
+    """Return the text of ``state_words.js``."""
+    rows = "".join(f"  {name}: {json.dumps(text)},\n" for name, text in WORDS.items())
+    return (
+        "// Made by tools/make_opcodes.py from webmap/core/robot_state.py: do not edit."
+        "\n"
+        "\n"
+        "/** What a robot is doing, in words; `{who}` is who holds or drives it. */\n"
+        f"export const WORDS = Object.freeze({{\n{rows}}});\n"
+    )
+
+
+FILES = {"opcodes.js": opcodes_js, "motion/state_words.js": state_words_js}
+
+
 def _literal(table: Any) -> str:
     if isinstance(table, dict):
         rows = "".join(f"  {key}: {value},\n" for key, value in table.items())
@@ -51,14 +67,17 @@ def main() -> int:
     """Write or check; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="only check")
-    text = opcodes_js()
-    if not parser.parse_args().check:
-        TARGET.write_text(text, encoding="utf-8")
-        return 0
-    if TARGET.exists() and TARGET.read_text(encoding="utf-8") == text:
-        return 0
-    print(f"{TARGET} is out of date: run python {Path(__file__).name}", file=sys.stderr)
-    return 1
+    check = parser.parse_args().check
+    status = 0
+    for name, made in FILES.items():
+        target, text = WEB / name, made()
+        if not check:
+            target.write_text(text, encoding="utf-8")
+        elif not target.exists() or target.read_text(encoding="utf-8") != text:
+            again = f"run python {Path(__file__).name}"
+            print(f"{target} is out of date: {again}", file=sys.stderr)
+            status = 1
+    return status
 
 
 if __name__ == "__main__":

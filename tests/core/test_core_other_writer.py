@@ -9,8 +9,9 @@ from webmap import Bridge, Robot
 from webmap.core import motion
 from webmap.core.motion import MotionRoad
 
-SAID = SimpleNamespace(other_writer="another program publishes to /cmd_vel")
-NOTHING = SimpleNamespace(other_writer=None)
+REST = {"doing": "other", "holder": None, "goal": None, "measured": None}
+SAID = SimpleNamespace(other_writer="another program publishes to /cmd_vel", **REST)
+NOTHING = SimpleNamespace(other_writer=None, **REST)
 NODES = ["/rosbridge_websocket", "/teleop", "/webmap_sim", "/joy"]
 
 

@@ -80,7 +80,11 @@ def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
     drivable(robot)
     robot.stop()
     stop = StopReport("Ann", True, "", "s1")
-    robot.on_gate_report(SimpleNamespace(stop=stop, other_writer=None))
+    robot.on_gate_report(
+        SimpleNamespace(
+            stop=stop, other_writer=None, doing="stopped", holder=None, goal=None
+        )
+    )
     robot.reset_stop()
     reset = ("reset", robot.motion.id, "s1")
     assert gate.asked == [("stop", robot.motion.id), reset]
@@ -104,6 +108,8 @@ def test_a_lease_waits_for_the_word_of_a_gate_that_was_started_anew(robot, gate)
         epoch=7,
         reason=None,
         other_writer=None,
+        doing="held",
+        goal=None,
     )
 
     async def scenario():

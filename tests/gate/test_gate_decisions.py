@@ -235,7 +235,7 @@ class TestFreshness:
 
     @pytest.mark.parametrize("x", [0.5, 0.0])
     @pytest.mark.parametrize(
-        ("tick", "why"), [(-7, "older than 300 ms"), (-4000, "another session")]
+        ("tick", "why"), [(-7, "more than 300 ms"), (-4000, "another session")]
     )
     def test_an_old_tick_is_refused_and_zero_goes_at_once(self, driving, x, tick, why):
         driving.drive(x=x, tick=driving.tick + tick)

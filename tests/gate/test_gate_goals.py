@@ -450,7 +450,12 @@ class TestHowItGoes:
 
     def test_a_goal_that_somebody_else_cancelled_says_so(self, bench):
         goal = self.end(bench, "cancelled", "")
-        assert goal.why == "by the robot, or by somebody else"
+        assert goal.why == "by the robot, or by another program"
+
+    def test_a_goal_that_a_person_cancelled_names_them(self, bench):
+        bench.say("b", op="cancel", robot="r1")
+        goal = self.end(bench, "cancelled", "canceled")
+        assert (goal.state, goal.why) == ("cancelled", "by B")
 
     @pytest.mark.parametrize(
         ("act", "why"),

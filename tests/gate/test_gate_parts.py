@@ -54,7 +54,7 @@ class TestTicks:
         ticks = Ticks(7)
         ticks.issue(0.0)
         ticks.check(7, 0.3)
-        with pytest.raises(Refusal, match="older than 300 ms"):
+        with pytest.raises(Refusal, match="more than 300 ms"):
             ticks.check(7, 0.3001)
 
     def test_are_forgotten_in_the_end(self):

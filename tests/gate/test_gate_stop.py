@@ -452,8 +452,16 @@ class TestConfirmation:
         for _ in range(4):
             watch_it(seen, 0.01, 0.0)
             seen.run(0.99)
-        too_seldom = "odometry comes too seldom to tell"
+        too_seldom = "only one odometry message arrives in 1.0 s"
         assert verdict(seen) == ("B", False, too_seldom)
+
+    def test_one_that_has_only_just_come_to_a_standstill_says_so(self, seen):
+        stop(seen)
+        watch_it(seen, 1.9, 0.4)
+        watch_it(seen, 0.2, 0.0)
+        assert verdict(seen) == ("B", False, "it has not been still for 0.3 s yet")
+        watch_it(seen, 0.2, 0.0)
+        assert seen.report().stop.confirmed is True
 
     def test_one_that_moves_again_is_confirmed_no_longer_however_late(self, seen):
         """By a goal that begins late, by a ramp, or by another that publishes."""

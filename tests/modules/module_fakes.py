@@ -23,6 +23,7 @@ class Link:
     """A bridge that decodes as a real one does."""
 
     url = name = "ws://test:9090"
+    state = "open"
     lag = 0.0
 
     def __init__(self) -> None:

@@ -259,7 +259,9 @@ def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
         async with linked(sim["ros1"], services={"/dock": trigger()}) as (bridge, node):
             light = {**DOCK, "label": "Light", "during_stop": True}
             module = robot.add_module("Buttons", bridge, [DOCK, light])
-            robot.on_gate_report(SimpleNamespace(latched=True, other_writer=None))
+            said = {"doing": "stopped", "holder": None, "goal": None}
+            report = SimpleNamespace(latched=True, other_writer=None, **said)
+            robot.on_gate_report(report)
             assert await module["Dock"].press() is False
             assert module["Dock"].words == "Not done: STOP stands: reset it first"
             assert node.calls == []

@@ -12,7 +12,7 @@ from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Page, expect
 
 from real_browser import watched_tab
-from webmap_process import page_of, simulator
+from webmap_process import page_of, simulator, webmap
 
 pytestmark = pytest.mark.browser
 
@@ -198,6 +198,24 @@ def test_a_label_that_is_added_is_on_other_pages_and_there_after_a_restart(
         label(later, "Äpfel <b>").press("Enter")
         expect(later.locator(".webmap-labels-send")).to_be_visible()
         expect(later.locator(".webmap-labels-remove")).to_be_hidden()
+
+
+def test_labels_of_the_demo_are_there_after_a_restart(chromium, tmp_path):
+    demo = ("demo", "--robots", "1", "--port", "0", "--no-browser")
+    for restarted in (False, True):
+        with (
+            webmap(*demo, WEBMAP_STATE_DIR=str(tmp_path)) as url,
+            watched_tab(chromium, 1280, 800) as page,
+        ):
+            page.goto(url)
+            expect(page.locator(".robot:not(.unplaced)")).to_have_count(1)
+            page.locator("svg.webmap-view-control").wait_for()
+            expect(page.locator(".webmap-labels-go")).to_be_visible()
+            if not restarted:
+                page.locator("#show-all").click()
+                added(page, "Dock", 4.0, 3.0)
+            expect(label(page, "Dock")).to_have_count(1)
+            page.allowed.extend(["WebSocket", "ERR_CONNECTION"])
 
 
 def moved(tab: Page, wall) -> None:

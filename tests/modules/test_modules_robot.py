@@ -17,6 +17,7 @@ class Link:
     """A bridge that remembers who subscribed."""
 
     url = "ws://test:9090"
+    state = "open"
     lag = 0.0
 
     def __init__(self) -> None:

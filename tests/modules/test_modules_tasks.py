@@ -214,11 +214,12 @@ class TestOnTheCard:
     def test_the_line_has_the_time_and_how_often_it_got_stuck(self):
         line = GoalLine()
         told = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
-        line.show(SimpleNamespace(report=SimpleNamespace(goal=told)))
+        report = SimpleNamespace(goal=told)
+        line.show(SimpleNamespace(report=report, goal_ended_at=None))
         _, words = line.element.children
         assert line.element.get("hidden") is None
         assert [each.text for each in words.children] == [
-            "On its way",
+            "Goal under way",
             "3.2 m to go, about 12 s, 5 s under way, got stuck 2 times",
         ]
 

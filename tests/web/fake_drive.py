@@ -222,4 +222,20 @@ class FakeDrive:
 
     @staticmethod
     async def _say(socket: ServerConnection, message: dict) -> None:
+        if message["op"] == "robot":
+            message = {"doing": _doing(message), **message}
         await socket.send(json.dumps(message))
+
+
+def _doing(robot: dict) -> str:
+    """Return what a robot does, as the gate reports it."""
+    if robot.get("changing"):
+        return "changing"
+    if robot["state"] == "stopped":
+        confirmed = (robot.get("stop") or {}).get("confirmed")
+        return "unconfirmed" if confirmed is False else "stopped"
+    if robot["state"] == "free":
+        return "free" if robot["armable"] else "barred"
+    if robot["state"] == "held":
+        return "held" if robot["reason"] is None else "barred_held"
+    return "driven" if robot["state"] == "driving" else robot["state"]

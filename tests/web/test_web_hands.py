@@ -149,7 +149,7 @@ def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> Non
     bench.page.keyboard.down("w")
     bench.page.wait_for_timeout(300)
     assert bench.gate.said == []
-    assert "Held by Ann" in bench.page.inner_text(".webmap-teleop")
+    assert "Ann drives" in bench.page.inner_text(".webmap-teleop")
 
 
 def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
@@ -470,7 +470,7 @@ def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> Non
     bench.until(lambda: standing.inner_text() == words)
     assert bench.shown() == "unconfirmed"
     said = bench.page.inner_text(".webmap-teleop-state")
-    assert said == "STOP By Ann, NOT CONFIRMED: no link to ws://bob."
+    assert said == "STOP NOT CONFIRMED By Ann: no link to ws://bob."
     reset = bench.page.get_by_role("button", name="Reset all")
     reset.click()
     bench.page.wait_for_timeout(450)

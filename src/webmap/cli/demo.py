@@ -61,7 +61,9 @@ def demo(
     ):
         bridge = webmap.Bridge(url, name="simulator")
         floor = data / "floor.yaml"
-        opened = console.open_console([bridge], [], floor=floor, title="WebMap demo")
+        opened = console.open_console(
+            [bridge], [], floor=floor, title="WebMap demo", place="demo"
+        )
         for index in range(number):
             opened.add(demo_robot(bridge, index, dialect))
         webmap.run(

@@ -75,11 +75,13 @@ def play(
     told += ["--loop"] if loop else []
     with replay(*told, "--", *files) as (url, begin_anew):
         bridge = webmap.Bridge(url, name=f"recording {name}")
+        bridge.replays = True
         watched = Watched(Path(name).stem)
         fleet = find_fleet(
             [bridge], [], wait=5.0, stops_within=None, overruling=watched
         )
-        opened = console.open_console([bridge], [], title=f"Recording {name}")
+        title = f"Recording {name}"
+        opened = console.open_console([bridge], [], title=title, place=title)
         fleet.show(opened, grid=True)
         draw_layers([bridge], opened.robots, watched, console=opened)
         opened.add_module(RecordingLine, bridge, STATUS, once(begin_anew))

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from webmap import html
 from webmap.console.robot_card import icon
-from webmap.console.words import is_lost
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element
@@ -54,7 +53,9 @@ class BridgeList:
             )
         ]
         element.append(
-            html.details(self._summary, html.ul(*self._lines, class_="bridge-list"))
+            html.details(
+                self._summary, html.ul(*self._lines, class_="bridge-list")
+            ).set("data-webmap-menu", "")
         )
         self.poll()
 
@@ -78,7 +79,7 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
         return "late", f"open, {bridge.lag:.1f} s late"
     if bridge.state == "open":
         return "open", "open"
-    if is_lost(bridge):
+    if bridge.lost:
         why = f": {bridge.trouble}" if bridge.trouble else ""
         return "lost", f"cannot be reached{why}; trying again"
     return "connecting", "connecting"

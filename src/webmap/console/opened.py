@@ -1,5 +1,6 @@
 """The console that is open: what comes later is shown on all its pages."""
 
+import time
 import weakref
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -35,12 +36,30 @@ class Console:
         self._modules: dict[str, dict[str, Any]] = {}
         self._more: list[tuple[Factory, tuple[Any, ...], dict[str, Any]]] = []
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
+        self._removed: dict[Robot, float] = {}
+        """The robots that were taken off the pages, and when."""
 
     def add(self, robot: "Robot") -> None:
         """Show a robot on the pages that are open and on those to come."""
         self.robots.append(robot)
         for page in list(self._pages):
             _show(robot, page)
+
+    def remove(self, robot: "Robot") -> None:
+        """Take a robot off every page until a pose of it comes."""
+        self._removed[robot] = time.monotonic()
+        for page in list(self._pages):
+            for map in page.maps:
+                map.remove_robot(robot)
+
+    def bring_back(self) -> None:
+        """Show the robots again of which a pose has come since they were removed."""
+        now = time.monotonic()
+        for robot, since in list(self._removed.items()):
+            if robot.hears_poses(now - since):
+                del self._removed[robot]
+                for page in list(self._pages):
+                    _show(robot, page)
 
     def add_grid(self, bridge: "Bridge", topic: str, **options: Any) -> bool:
         """Show a map under the robots, likewise; one that is shown stays as it is.
@@ -114,8 +133,9 @@ class Console:
         for image in self.images:
             _show_image(image, page)
         self._show_grids(page)
-        for robot in self.robots:
-            _show(robot, page)
+        for robot in (*self.told, *self.robots):
+            if robot not in self._removed:
+                _show(robot, page)
 
     def _show_grids(
         self, page: "Page", *, only: "tuple[Bridge, str] | None" = None

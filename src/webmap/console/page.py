@@ -26,7 +26,7 @@ from webmap.console.robot_card import RobotCard
 from webmap.console.robot_list import RobotList
 
 if TYPE_CHECKING:
-    from webmap import Bridge, Map, Page, Robot
+    from webmap import Bridge, Map, Page
 
 log = logging.getLogger("webmap.console")
 
@@ -47,6 +47,7 @@ def open_console(
     *,
     floor: Path | None = None,
     title: str = PRODUCT,
+    place: str | None = None,
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -55,6 +56,8 @@ def open_console(
         robots: What is shown on the map and in the list, in that order.
         floor: The YAML file of a floor plan, as map_server takes it.
         title: What this installation is called.
+        place: What labels and views are kept under; the URLs of the bridges, if not
+            given. For bridges whose port is another one at each start.
 
     Returns:
         The console, to add robots that come later.
@@ -66,11 +69,14 @@ def open_console(
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(about) for about in robots]
     opened = Console(fleet)
-    opened.set_module("Labels", name=place_of(bridges))
+    if place is None:
+        place = "\n".join(sorted(bridge.url for bridge in bridges))
+    kept_under = f"console-{hashlib.sha256(place.encode()).hexdigest()[:16]}"
+    opened.set_module("Labels", name=kept_under)
 
     @webmap.page("/", html="console.html", title=title)
     def console(page: "Page") -> None:
-        build(page, bridges, fleet, plan, title)
+        build(page, bridges, opened, plan, title, kept_under)
         opened.opened(page)
 
     return opened
@@ -79,17 +85,16 @@ def open_console(
 def build(
     page: "Page",
     bridges: Sequence["Bridge"],
-    robots: Sequence["Robot"],
+    opened: Console,
     floor: Floor | None,
     title: str,
+    kept_under: str,
 ) -> None:
-    """Fill one viewer's page."""
+    """Fill one viewer's page; its views are kept under a name."""
     page.element("title").text = "" if title == PRODUCT else title
     map = webmap.Map(page.element("map"))
     if floor is not None:
         show_floor(map, floor)
-    for robot in robots:
-        map.add_robot(robot)
     map.add_module("MouseViewControl")
     stops = "#stop-place"
     map.add_module("StopButton", place=stops)
@@ -103,13 +108,14 @@ def build(
     map.add_module("RosoutPanel", bridges)
     saving = {"place": ".map-tools", "classes": "button square"}
     map.add_module("ExportTool", **saving)
-    map.add_module(Layout, of=place_of(bridges), **saving)
+    map.add_module(Layout, of=kept_under, **saving)
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
     frame = map.add_module(Frame, title, floor)
     listed = map.add_module(RobotList, page.element("robots"))
     most = (SPEED, ROTATION_SPEED)
-    card = map.add_module(RobotCard, page.element("card"), goals, poses, most)
+    at = page.element("card")
+    card = map.add_module(RobotCard, at, goals, poses, most, opened.remove)
     cameras = map.add_module(CameraPanel)
     costmaps = map.add_module(CostmapNames)
     health = map.add_module(RobotHealth, page.element("card"))
@@ -118,15 +124,9 @@ def build(
     links = BridgeList(page.element("bridges"), bridges, doctor.buttons)
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
-    polls += [links.poll, refused.poll, doctor.poll, costmaps.poll]
+    polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
-
-
-def place_of(bridges: Sequence["Bridge"]) -> str:
-    """Return what labels and views are kept under: the same robots, the same place."""
-    urls = "\n".join(sorted(bridge.url for bridge in bridges))
-    return f"console-{hashlib.sha256(urls.encode()).hexdigest()[:16]}"
 
 
 def _folder_for_this_process() -> Path:

@@ -9,9 +9,11 @@ from webmap.console.own_stop import OwnStop
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.speeds import SpeedTable
 from webmap.console.tasks import GoalLine
-from webmap.console.words import UNKNOWN, describe, heading, number, sentence
+from webmap.console.words import UNKNOWN, heading, look_of, number, sentence
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from webmap import Element, Map, Robot
 
 ACTIONS = (
@@ -20,11 +22,19 @@ ACTIONS = (
     ("cancel", "icon-cancel", "Cancel goal"),
     ("locate", "icon-locate", "Set pose…"),
     ("release", "icon-release", "Hand back"),
+    ("remove", "icon-close", "Remove from the page"),
 )
 """What ``data-act`` says, the symbol and the words.
 
 console.js follows, cancels and hands back, since that must work over a bad link too.
 """
+
+UNABLE = {
+    "send": "WebMap knows no way to send goals to this robot",
+    "cancel": "WebMap knows no way to cancel goals of this robot",
+    "locate": "WebMap knows no topic for the initial pose of this robot",
+}
+"""Why a button of the card is disabled."""
 
 TEST_WORDS = (
     ("take", "Take it to test its stop"),
@@ -61,6 +71,7 @@ class RobotCard:
         goals: What sends robots somewhere.
         poses: What tells robots where they are.
         most: What this page drives a robot at, in m/s and rad/s.
+        remove: Takes a robot that is gone off all pages.
 
     """
 
@@ -71,8 +82,10 @@ class RobotCard:
         goals: Goals,
         poses: Poses,
         most: tuple[float, float],
+        remove: "Callable[[Robot], object]",
     ) -> None:
         self.map = map
+        self._remove = remove
         self.element = element
         self._goals = goals
         self._poses = poses
@@ -144,18 +157,26 @@ class RobotCard:
         """Show who drives, how fast that may be, and how fast it is."""
         robot = self._robot
         assert robot is not None
-        words = describe(robot)
-        report = robot.report
-        self._shape.show(words.shape)
-        self._state.text = words.text
-        self._mine.text = words.mine or words.text
+        state, report = robot.state, robot.report
+        shape, tone = look_of(robot)
+        self._shape.show(shape)
+        self._state.text, self._mine.text = state.text, state.mine
+        self.element.set("data-state", state.name)
         said = (report.other_writer, report.reason) if report is not None else ()
         self._reason.text = " ".join(sentence(each) for each in said if each)
         self._goal.show(robot)
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
-        self.element.set("data-tone", words.tone or None)
+        self.element.set("data-tone", tone or None)
         self._speeds.show(robot)
         self._own_stop.show(robot)
+        able = {
+            "send": report is not None and report.way is not None,
+            "cancel": report is not None and report.cancels,
+            "locate": report is not None and report.locates,
+        }
+        for name, is_able in able.items():
+            self._buttons[name].set(disabled=not is_able)
+            self._buttons[name].set("title", None if is_able else UNABLE[name])
 
     def show_battery(self, battery: Any) -> None:
         """Show charge and voltage, as far as they are known."""
@@ -188,16 +209,21 @@ class RobotCard:
         )
         head = html.div(*self._shape.elements, self._name, close, class_="card-head")
         state = html.p(
+            html.span(text="Old data", class_="old"),
             self._state,
             self._mine,
-            html.span(text="Old data", class_="old"),
             class_="state",
         )
         state.set("role", "status")
-        buttons = {about[0]: action(*about) for about in ACTIONS}
+        buttons = self._buttons = {about[0]: action(*about) for about in ACTIONS}
         buttons["send"].on("click", lambda event: self._goals.aim())
         buttons["locate"].on("click", lambda event: self._poses.aim())
         buttons["cancel"].on("click", lambda event: self._forget_goal())
+        buttons["remove"].on("click", lambda event: self._remove_robot())
+        buttons["remove"].set(
+            "title",
+            "No data comes from this robot. The robot is shown again when data comes.",
+        )
         actions = html.div(*buttons.values(), stop_test(), class_="actions")
         return [
             head,
@@ -211,6 +237,11 @@ class RobotCard:
             *self._speeds.elements,
             *self._own_stop.elements,
         ]
+
+    def _remove_robot(self) -> None:
+        robot, may = self._robot, self.map.page.viewer.role != "viewer"
+        if may and robot is not None and robot.state.name == "gone":
+            self._remove(robot)
 
     def _forget_goal(self) -> None:
         if self._robot is not None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from webmap import html, svg
 from webmap.console.battery import BatteryMark, Charge
-from webmap.console.words import describe
+from webmap.console.words import look_of
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
@@ -78,9 +78,9 @@ class Row:
             *self._shape.elements,
             html.span(text=robot.name, class_="name"),
             html.span(
+                html.span(text="Old data", class_="old"),
                 self._state,
                 self._mine,
-                html.span(text="Old data", class_="old"),
                 class_="state",
             ),
             self._battery.element,
@@ -109,11 +109,12 @@ class Row:
 
     def on_report(self, report: object = None) -> None:
         """Say who drives."""
-        words = describe(self.robot)
-        self._shape.show(words.shape)
-        self._state.text = words.text
-        self._mine.text = words.mine or words.text
-        self.element.set("data-tone", words.tone or None)
+        state = self.robot.state
+        shape, tone = look_of(self.robot)
+        self._shape.show(shape)
+        self._state.text, self._mine.text = state.text, state.mine
+        self.element.set("data-tone", tone or None)
+        self.element.set("data-state", state.name)
 
     def on_battery_update(self, battery: Charge) -> None:
         """Show the charge."""

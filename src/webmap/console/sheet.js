@@ -24,12 +24,13 @@ export function listenToSheet(signal) {
 export function nameSheet(map) {
   const text = byId("sheet-text");
   const show = () => {
-    const row = document.querySelector(`#robots [data-robot="${map.selected}"]`);
-    const name = row?.querySelector(".name")?.textContent;
-    const who = row?.hasAttribute("data-mine") ? ".you" : ".holder";
-    const state = row?.querySelector(row.querySelector(".age.stale") ? ".state .old" : who);
+    const row = `#robots [data-robot="${map.selected}"]`;
+    const name = document.querySelector(`${row} .name`)?.textContent;
+    const states = [...document.querySelectorAll(`${row} .state > *`)]
+      .filter((one) => getComputedStyle(one).display !== "none")
+      .map((one) => one.textContent);
     const count = byId("robots-count").textContent ?? "";
-    say(text, name ? `${name}: ${state?.textContent ?? ""}` : count);
+    say(text, name ? `${name}: ${states.join(" \u00b7 ")}` : count);
   };
   show();
   const timer = setInterval(show, 500);

@@ -1,5 +1,6 @@
 """How it stands with the selected robot's goal, on its card."""
 
+import time
 from typing import TYPE_CHECKING, Protocol
 
 from webmap import html, svg
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
 LOOKS = {
     "sent": ("Goal sent", "goal-sent", "active"),
     "accepted": ("Goal accepted", "goal-sent", "active"),
-    "under way": ("On its way", "goal-way", "active"),
+    "under way": ("Goal under way", "goal-way", "active"),
     "cancelling": ("Cancelling its goal", "goal-cancelled", "warn"),
     "unknown": ("Goal: not known how it goes", "goal-unknown", "warn"),
     "reached": ("Reached its goal", "goal-reached", "good"),
@@ -18,6 +19,11 @@ LOOKS = {
     "cancelled": ("Goal cancelled", "goal-cancelled", ""),
 }
 """The words, the symbol of console.html and the tone of each state."""
+
+
+LINGER = 30.0
+"""Seconds for which a goal that was reached or cancelled is shown; one that failed is
+shown until the next."""
 
 
 class Goal(Protocol):
@@ -59,9 +65,12 @@ class GoalLine:
     def show(self, robot: "Robot") -> None:
         """Show how it stands with the goal of a robot; nothing if it has none."""
         goal = None if robot.report is None else robot.report.goal
-        self.element.set(hidden=goal is None)
-        if goal is None:
+        ended = robot.goal_ended_at
+        past = ended is not None and time.monotonic() - ended > LINGER
+        if goal is None or (past and goal.state != "failed"):
+            self.element.set(hidden=True)
             return
+        self.element.set(hidden=False)
         words, shape, tone = LOOKS[goal.state]
         self._use.set(href=f"#{shape}")
         self.element.set("data-tone", tone or None)

@@ -1,13 +1,11 @@
-"""What is said of a robot: a word, a shape and a tone that always go together."""
+"""How a robot's state looks, and how numbers and sentences are written."""
 
 import math
-from dataclasses import dataclass, replace
+import re
 from typing import TYPE_CHECKING
 
-from webmap.geometry import Twist
-
 if TYPE_CHECKING:
-    from webmap import Bridge, Robot
+    from webmap import Robot
 
 UNKNOWN = "\N{EN DASH}"
 """What stands where a number would."""
@@ -16,92 +14,44 @@ LOW, EMPTY = 0.2, 0.1
 """Charges below which a battery is low, and as good as empty."""
 
 
-MOVES, TURNS = 0.05, 0.1
-"""Speeds in m/s and rad/s from which on a robot moves: the driving panel's too."""
+NAME = re.compile(r"[\d/_:.]")
+"""What is in a URL, a topic or the name of a robot, and in no plain word."""
 
-GOING = ("sent", "accepted", "under way", "cancelling", "unknown")
-"""States of a goal that may still move the robot."""
+LOOKS = {
+    "no_bridge": ("state-down", "bad"),
+    "connecting": ("state-waiting", ""),
+    "gone": ("state-old", ""),
+    "watched": ("state-watched", ""),
+    "stopped": ("state-stopped", "bad"),
+    "unconfirmed": ("state-stopped", "bad"),
+    "down": ("state-down", "bad"),
+    "changing": ("state-stopping", "warn"),
+    "stopping": ("state-stopping", "warn"),
+    "blocked": ("state-driving", "warn"),
+    "driven": ("state-driving", "active"),
+    "navigating": ("goal-way", "active"),
+    "navigating_held": ("goal-way", "active"),
+    "settling": ("state-stopping", "warn"),
+    "moving": ("goal-way", "active"),
+    "barred": ("state-down", "warn"),
+    "barred_held": ("state-down", "warn"),
+    "other": ("state-driving", "warn"),
+    "held": ("state-held", "active"),
+    "free": ("state-free", ""),
+}
+"""For each state of a robot a symbol of console.html, and a tone."""
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
-    """How a state reads and looks."""
+def look_of(robot: "Robot") -> tuple[str, str]:
+    """Return the symbol and the tone of what a robot is doing.
 
-    text: str
-    shape: str
-    """A symbol of console.html."""
-    tone: str = ""
-    """``active``, ``warn``, ``bad`` or nothing."""
-    mine: str = ""
-    """The text where it is the reader who drives, if that differs."""
-
-
-def describe(robot: "Robot") -> Words:
-    """Return what there is to say of a robot, the most pressing first.
-
-    That its data is old is not said here: the page sees that by itself, also when it
-    cannot reach this process.
+    The tone is ``active``, ``warn``, ``bad`` or nothing.
     """
-    bridge = robot.feed.bridge if robot.feed is not None else None
-    if bridge is not None and bridge.state != "open":
-        if is_lost(bridge):
-            return Words("No bridge", "state-down", "bad")
-        return Words("Connecting", "state-waiting")
-    report = robot.report
-    if report is None:
-        return Words("Watched only", "state-watched")
-    words = _of_report(robot)
-    if report.other_writer is None or report.link == "down":
-        return words
-    if report.state in ("free", "stopping"):
-        return Words("Another program drives it", "state-driving", "warn")
-    driven = report.state == "driving"
-    also = ", another program too" if driven else ", another publishes"
-    mine = words.mine and words.mine + also
-    return replace(words, text=words.text + also, mine=mine, tone="bad")
-
-
-def _of_report(robot: "Robot") -> Words:
-    report = robot.report
-    assert report is not None
-    who = report.holder.name if report.holder is not None else "Somebody"
-    if report.state == "stopped":
-        return Words("Stopped", "state-stopped", "bad")
-    if report.link == "down":
-        return Words("No way to drive it", "state-down", "bad")
-    if report.state == "stopping":
-        return Words("Stopping", "state-stopping", "warn")
-    if report.state == "driving":
-        return Words(f"{who} drives", "state-driving", "active", "You drive")
-    if report.state == "held":
-        return Words(f"{who} holds it", "state-held", "active", "You hold it")
-    moves = _moves(report.measured)
-    if _goes(robot, moves):
-        return Words("On its way", "goal-way", "active")
-    if moves:
-        return Words("Still moving", "state-stopping", "warn")
-    return Words("Free", "state-free")
-
-
-def _goes(robot: "Robot", moves: bool) -> bool:
-    """Return whether a goal moves a robot; of a plain topic only its motion tells."""
-    report = robot.report
-    if report is None or report.goal is None or report.goal.state not in GOING:
-        return False
-    return report.goal.way != "topic" or (report.cancels and moves)
-
-
-def _moves(measured: tuple[float, ...] | None) -> bool:
-    """Return whether odometry that is fresh shows a robot in motion."""
-    if measured is None:
-        return False
-    twist = Twist(*measured)
-    return twist.speed >= MOVES or twist.turn >= TURNS
-
-
-def is_lost(bridge: "Bridge") -> bool:
-    """Return whether a bridge is away, and not merely not reached yet."""
-    return bridge.state == "closed" or bridge.trouble is not None
+    shape, tone = LOOKS[robot.state.name]
+    another = robot.report is not None and robot.report.other_writer is not None
+    if another and robot.state.name not in ("no_bridge", "connecting", "other"):
+        tone = "bad"
+    return shape, tone
 
 
 def battery_tone(charge: float) -> str:
@@ -127,5 +77,12 @@ def heading(yaw: float) -> str:
 
 
 def sentence(text: str) -> str:
-    """Return words of the gate as a sentence."""
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}." if text else ""
+    """Return words of the gate as a sentence.
+
+    A name at the beginning, such as a URL or a topic, keeps its small letter.
+    """
+    if not text.strip():
+        return ""
+    first = text.split(maxsplit=1)[0].rstrip(".,:;")
+    start = text[:1] if NAME.search(first) else text[:1].upper()
+    return f"{start}{text[1:].rstrip('.')}."

@@ -23,6 +23,7 @@ from webmap.core.twist_topic import TwistTopic
 from webmap.errors import ConfigError, MotionError
 from webmap.gate.messages import AssistSpec, RobotReport
 from webmap.gate.rules.assist import polygon_around
+from webmap.gate.rules.goals import OVER
 from webmap.geometry import Quaternion, Twist
 from webmap.ros.bridge import Bridge
 from webmap.scope import no_scope
@@ -45,6 +46,9 @@ class Driven(Extendable):
         self.name = str(name)
         self.motion = MotionRoad(self.name, self.report_error)
         self.report: RobotReport | None = None
+        self.goal_ended_at: float | None = None
+        """When the newest goal ended, in seconds of ``time.monotonic()``; None if none
+        has."""
         self._report_is_old = False
 
     @property
@@ -421,8 +425,15 @@ class Driven(Extendable):
     def on_gate_report(self, report: RobotReport) -> None:
         """Keep what the gate says of this robot and fire ``on_report``."""
         self.report, self._report_is_old = report, False
+        if report.goal is None or report.goal.state not in OVER:
+            self.goal_ended_at = None
+        elif self.goal_ended_at is None:
+            self.goal_ended_at = time.monotonic()
         self.motion.heed(report)
         self.notify_modules("on_report", report)
+
+    def expect_jump(self) -> None:
+        """Expect that the robot is somewhere else from here on."""
 
     def on_written(self, kind: str, message: dict[str, Any]) -> None:
         """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote.

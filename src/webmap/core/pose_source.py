@@ -52,6 +52,8 @@ class PoseSource:
         """When the newest was sent, in seconds of :func:`time.monotonic`."""
         self.heard_at: float | None = None
         """When the newest came in, by the same clock."""
+        self.expected_at: float | None = None
+        """When the newest came in of those that come also while the robot stands."""
         self.feed: OdometryFeed | None = None
         """The topic, if there is one."""
         self._owner = owner
@@ -115,6 +117,7 @@ class PoseSource:
         frames = frames_of(bridge, namespace)
         self._frames = frames
         self._placing = Placing(frames.buffer, map_frame, base_frame, frames.namespace)
+        self._motion.base_frame = self._placing.base_frame
         self._quiet = quiet
         self._hears_frames = frames.join(self._on_frames)
         self._find_bridge()
@@ -153,6 +156,7 @@ class PoseSource:
         now = self._hear(0.0 if feed is None else feed.bridge.lag)
         if feed is not None and feed.type == ODOMETRY:
             # Other poses may come only while the robot moves.
+            self.expected_at = now
             self._silence.hear(feed.bridge, feed.topic, feed.throttle / 1000)
         if self._placing is not None:
             reading = self._placing.of_reading(reading, now)
@@ -166,8 +170,9 @@ class PoseSource:
             reading = placing.of_base(time.monotonic())
             if reading is not None:
                 # It may have waited to be told with others.
-                self._hear(frames.bridge.lag, frames.heard_at)
+                now = self._hear(frames.bridge.lag, frames.heard_at)
                 if reading.stamp:  # else it is fixed to the map, and told once
+                    self.expected_at = now
                     self._silence.hear(frames.bridge, f"{frames.namespace}/tf")
                 self._take(reading)
         self._tell_trouble()
@@ -197,6 +202,7 @@ class PoseSource:
         self.whereabouts.forget()
         self._troubles.forget()
         self._silence.forget()
+        self.expected_at = None
         source = self._frames if self.feed is None else self.feed
         bridge = None if source is None else source.bridge
         if bridge is not self.whereabouts.bridge:

@@ -1,10 +1,12 @@
 """Robots: who they are, where they are and how they are moved."""
 
+import asyncio
 import logging
 import math
 import time
 import weakref
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.alignment import alignment
@@ -16,6 +18,8 @@ from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
 from webmap.core.robot_model import checked_model
+from webmap.core.robot_state import RobotState, since_when, state_of
+from webmap.gate.messages import RobotReport
 from webmap.geometry import Quaternion, Twist, Vector3
 from webmap.ros.bridge import Bridge
 from webmap.scene import svg
@@ -30,6 +34,9 @@ log = logging.getLogger("webmap.robot")
 
 POSE_LIMIT = 1.0
 """Seconds after which a pose is drawn as old."""
+
+STATE_EVERY = 0.5
+"""Seconds between two looks at the state."""
 
 robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary()
 """All robots that were made and not destroyed, by their id."""
@@ -63,7 +70,7 @@ class Robot(Driven):
     ) -> None:
         model = checked_model(name, model, robots)
         super().__init__(name, namespace)
-        self.base_link = base_link
+        self.base_link = self.motion.base_frame = base_link
         self.model = model
         self._told: Problems[Map] = Problems(log, lambda text: f"{self.name}: {text}")
         self.maps = self._told.maps
@@ -74,6 +81,8 @@ class Robot(Driven):
         self.orientation = Quaternion()
         self.measured_twist: Twist | None = None
         self.valid = False
+        self._state_shown = ""
+        self._state_timer: asyncio.TimerHandle | None = None
         self._poses = PoseSource(self, self.motion, self._on_heard, self._show)
         self.whereabouts = self._poses.whereabouts
         """Where it is and was, on its own map and on the common one."""
@@ -90,6 +99,14 @@ class Robot(Driven):
 
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}>"
+
+    @property
+    def state(self) -> RobotState:
+        """What the robot is doing, in words.
+
+        Its element in the scene has the state's name as ``data-state``.
+        """
+        return state_of(self)
 
     @property
     def feed(self) -> OdometryFeed | None:
@@ -121,6 +138,15 @@ class Robot(Driven):
         stamp = self.pose_stamp
         return None if stamp is None else time.monotonic() - stamp
 
+    @property
+    def silent_for(self) -> float | None:
+        """Seconds since a pose of those that come also while the robot stands.
+
+        None if none has come: a pose of AMCL, for example, comes only after motion.
+        """
+        heard = self._poses.expected_at
+        return None if heard is None else time.monotonic() - heard
+
     def hears_poses(self, within: float) -> bool:
         """Return whether a pose came in the last seconds, however old it was then."""
         heard = self._poses.heard_at
@@ -131,6 +157,8 @@ class Robot(Driven):
         if self._destroyed:
             return
         self._destroyed = True
+        if self._state_timer is not None:
+            self._state_timer.cancel()
         for map in tuple(self.maps):
             map.remove_robot(self)
         self.remove_modules()
@@ -305,8 +333,36 @@ class Robot(Driven):
             self.selected = selected
             self.notify_modules("on_select", selected)
 
+    def on_gate_report(self, report: RobotReport) -> None:
+        """Keep the gate's report of this robot and fire ``on_report``."""
+        super().on_gate_report(report)
+        self._show_state()
+
+    def expect_jump(self) -> None:
+        """Expect that the robot is somewhere else: somebody set its pose.
+
+        A jump of its poses within the next seconds is then no problem.
+        """
+        self.whereabouts.jumps.expect(time.monotonic())
+
     def _on_heard(self) -> None:
         self.svg.set_age(self.pose_age or 0.0, limit=POSE_LIMIT)
+        if self._state_timer is None:
+            self._watch_state()
+
+    def _watch_state(self) -> None:
+        """Show the state now and then: no message comes when a robot is gone."""
+        self._show_state()
+        with suppress(RuntimeError):  # outside of an event loop
+            loop = asyncio.get_running_loop()
+            self._state_timer = loop.call_later(STATE_EVERY, self._watch_state)
+
+    def _show_state(self) -> None:
+        name = self.state.name
+        if name != self._state_shown:
+            self._state_shown = name
+            self.svg.set("data-state", name)
+            self.svg.set("data-since", since_when(self) if name == "gone" else None)
 
     def _show(self, reading: PoseReading) -> None:
         """Draw the robot at a pose on the common map, if that is news."""

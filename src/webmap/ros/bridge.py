@@ -68,6 +68,8 @@ class Bridge:
         self.url = normalise_url(url)
         """The one spelling of the address."""
         self.name = name or self.url
+        self.replays = False
+        """Whether a recording is played behind it, whose robots may pause and end."""
         self.stats = BridgeStats()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._lane: Lane | None = None
@@ -100,6 +102,13 @@ class Bridge:
     def trouble(self) -> str | None:
         """Why the link is not open: how the last attempt failed or the link ended."""
         return self._trouble.why
+
+    @property
+    def lost(self) -> bool:
+        """Whether the link is away, rather than open or not reached yet."""
+        if self.state == "open":
+            return False
+        return self.state == "closed" or self.trouble is not None
 
     @property
     def last_heard(self) -> float | None:

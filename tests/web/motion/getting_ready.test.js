@@ -10,6 +10,7 @@ const REPORT = {
   robot: "r1",
   name: "Bob",
   state: "free",
+  doing: "free",
   holder: null,
   mine: false,
   epoch: null,
@@ -31,6 +32,7 @@ const MINE = {
   epoch: 3,
   armed: true,
   state: "held",
+  doing: "held",
 };
 const FORWARD = { x: 1, y: 0, turn: 0 };
 

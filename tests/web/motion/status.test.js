@@ -1,7 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { capOf, describe } from "../../../src/webmap/web/motion/status.js";
+import { doingOf } from "../../../src/webmap/web/motion/report.js";
+import { capOf, describe, sentence } from "../../../src/webmap/web/motion/status.js";
 
 const STATUS = {
   link: "open",
@@ -20,6 +21,7 @@ const REPORT = {
   robot: "r1",
   name: "Bob",
   state: "free",
+  doing: "free",
   holder: null,
   mine: false,
   epoch: null,
@@ -39,67 +41,60 @@ const ME = {
   mine: true,
   epoch: 3,
   state: "held",
+  doing: "held",
 };
+const DRIVING = { state: "driving", doing: "driven" };
+const ANN = { connection: "c2", name: "Ann" };
 
 const cases = [
   ["connecting", { link: "connecting" }, REPORT],
-  ["lost", { link: "lost", driven: "r1" }, { ...REPORT, ...ME, state: "driving" }],
-  ["late", { link: "late", driven: "r1" }, { ...REPORT, ...ME, state: "driving" }],
+  ["lost", { link: "lost", driven: "r1" }, { ...REPORT, ...ME, ...DRIVING }],
+  ["late", { link: "late", driven: "r1" }, { ...REPORT, ...ME, ...DRIVING }],
   ["fixed", {}, null],
   ["free", {}, REPORT],
-  ["fixed", {}, { ...REPORT, armable: false, reason: "no link" }],
-  [
-    "held",
-    {},
-    { ...REPORT, holder: { connection: "c2", name: "Ann" }, state: "driving" },
-  ],
+  ["fixed", {}, { ...REPORT, armable: false, doing: "barred", reason: "no link" }],
+  ["held", {}, { ...REPORT, holder: ANN, ...DRIVING }],
   ["hands-off", { pressed: true, dead: true }, REPORT],
+  ["hands-off", { pressed: true, dead: true }, { ...REPORT, doing: "moving" }],
   ["taking", { taking: true }, REPORT],
   ["taking", { driven: "r1" }, { ...REPORT, ...ME }],
   ["ready", { driven: "r1", settled: true }, { ...REPORT, ...ME }],
-  ["driving", { driven: "r1", settled: true }, { ...REPORT, ...ME, state: "driving" }],
+  ["driving", { driven: "r1", settled: true }, { ...REPORT, ...ME, ...DRIVING }],
   [
-    "stopping",
+    "blocked",
     { driven: "r1", settled: true },
-    { ...REPORT, ...ME, state: "stopping" },
+    { ...REPORT, ...ME, ...DRIVING, doing: "blocked" },
   ],
   [
     "stopping",
     { driven: "r1", settled: true },
-    { ...REPORT, ...ME, measured: [0, 0.06, 0] },
-  ],
-  [
-    "ready",
-    { driven: "r1", settled: true },
-    { ...REPORT, ...ME, measured: [0.04, 0, 0.09] },
-  ],
-  [
-    "ready",
-    { driven: "r1", settled: true },
-    { ...REPORT, ...ME, measured: [0.4, 0, 0], goal: { state: "under way" } },
+    { ...REPORT, ...ME, state: "stopping", doing: "stopping" },
   ],
   [
     "stopping",
     { driven: "r1", settled: true },
-    {
-      ...REPORT,
-      ...ME,
-      measured: [0.4, 0, 0],
-      cancels: false,
-      goal: { state: "sent", way: "topic" },
-    },
+    { ...REPORT, ...ME, doing: "settling" },
   ],
-  ["stopping", {}, { ...REPORT, measured: [0, 0, -0.2], goal: { state: "cancelled" } }],
-  ["stopping", {}, { ...REPORT, measured: [0, 0, 0, -0.2, 0, 0] }],
-  ["stopping", {}, { ...REPORT, measured: [0, 0, 0, 0, 0.2, 0] }],
+  [
+    "moving",
+    { driven: "r1", settled: true },
+    { ...REPORT, ...ME, doing: "navigating_held" },
+  ],
+  ["moving", {}, { ...REPORT, doing: "navigating" }],
+  ["moving", {}, { ...REPORT, doing: "moving" }],
+  ["moving", {}, { ...REPORT, doing: "other" }],
   ["hands-off", { driven: "r1", pressed: true, dead: true }, { ...REPORT, ...ME }],
-  ["fixed", { driven: "r1" }, { ...REPORT, ...ME, reason: "no odometry for 1 s" }],
-  ["stopped", {}, { ...REPORT, state: "stopped" }],
+  [
+    "fixed",
+    { driven: "r1" },
+    { ...REPORT, ...ME, doing: "barred_held", reason: "no odometry for 1 s" },
+  ],
+  ["stopped", {}, { ...REPORT, state: "stopped", doing: "stopped" }],
 ];
 
 for (const [state, status, report] of cases) {
-  const { state: robot, measured } = report ?? {};
-  const told = JSON.stringify({ ...status, robot, measured });
+  const { doing = null } = report ?? {};
+  const told = JSON.stringify({ ...status, doing });
   test(`${told} is shown as ${state}`, () => {
     const description = describe({ ...STATUS, ...status }, "r1", report, true);
     assert.equal(description.state, state);
@@ -111,9 +106,78 @@ test("without a selection nothing can be driven", () => {
   assert.equal(describe(STATUS, null, null, true).state, "none");
 });
 
-test("the name of who drives is said", () => {
-  const report = { ...REPORT, holder: { connection: "c2", name: "Ann" } };
-  assert.equal(describe(STATUS, "r1", report, true).title, "Held by Ann");
+test("the name of who drives is shown", () => {
+  const title = (more) =>
+    describe(STATUS, "r1", { ...REPORT, holder: ANN, ...more }, true).title;
+  assert.equal(title({ doing: "held" }), "Ann holds it");
+  assert.equal(title(DRIVING), "Ann drives");
+  const odd = { connection: "c2", name: "$& {since}" };
+  assert.equal(title({ ...DRIVING, holder: odd }), "$& {since} drives");
+  const nameless = { connection: "c2", name: "" };
+  assert.equal(title({ ...DRIVING, holder: nameless }), "c2 drives");
+});
+
+test("who holds a robot is shown where the state does not name anybody", () => {
+  const report = { ...REPORT, holder: ANN, state: "stopping", doing: "stopping" };
+  const words = describe(STATUS, "r1", report, true);
+  assert.deepEqual([words.title, words.detail], ["Stopping", "Ann holds it."]);
+});
+
+test("a speed has its sign, and a robot that does not move is not driven in green", () => {
+  const driven = { ...STATUS, driven: "r1", settled: true };
+  const report = { ...REPORT, ...ME, ...DRIVING, sent: [-1, 0, 0] };
+  const back = describe(driven, "r1", { ...report, measured: [-0.98, 0, 0.1] }, true);
+  assert.equal(back.detail, "\u22120.98 m/s, 0.10 rad/s");
+  const wall = describe(driven, "r1", { ...report, doing: "blocked" }, true);
+  assert.equal(wall.title, "Not moving: blocked?");
+  assert.equal(
+    wall.detail,
+    "Sent: \u22121.00 m/s, 0.00 rad/s. Measured: 0.00 m/s, 0.00 rad/s.",
+  );
+});
+
+test("who holds a robot without driving it reads so", () => {
+  const { title, detail } = describe(STATUS, "r1", { ...REPORT, ...ME }, true);
+  assert.equal(title, "You hold it");
+  assert.equal(detail, "Ready: hold W A S D or the arrows. Space stops.");
+  const barred = { ...ME, armable: false, doing: "barred_held", reason: "no link" };
+  const held = describe(STATUS, "r1", { ...REPORT, ...barred }, true);
+  assert.equal(held.title, "Cannot be driven, you hold it");
+  assert.equal(held.detail, "No link.");
+});
+
+test("the title is the state of the gate, or what the display alone knows", () => {
+  const title = (doing, seen) => {
+    const armable = doing === "free";
+    const more = { seen, since: "10:32" };
+    return describe(STATUS, "r1", { ...REPORT, doing, armable }, true, more).title;
+  };
+  assert.equal(title("free", "free"), "Free");
+  assert.equal(title("free", "moving"), "Moving, not by WebMap");
+  assert.equal(title("free", "navigating"), "Navigating");
+  assert.equal(title("free", "gone"), "Gone since 10:32");
+  assert.equal(title("barred", "gone"), "Gone since 10:32");
+  assert.equal(title("down", "no_bridge"), "No bridge");
+  assert.equal(title("down", "down"), "No way to drive it");
+  // What the display showed a moment ago is older than the report of the gate.
+  assert.equal(title("free", "driven"), "Free");
+  assert.equal(title("navigating", "gone"), "Navigating");
+  assert.equal(title("settling", "no_bridge"), "Still moving");
+  assert.equal(doingOf({ ...REPORT, doing: "driven" }, "gone"), "driven");
+});
+
+test("a robot without a velocity topic has the words of the display", () => {
+  const title = (more) => describe(STATUS, "r1", null, true, more).title;
+  assert.equal(title({}), "Watched only");
+  assert.equal(title({ seen: "watched" }), "Watched only");
+  assert.equal(title({ seen: "gone", since: "10:32" }), "Gone since 10:32");
+});
+
+test("a name at the beginning of a sentence keeps its small letter", () => {
+  assert.equal(sentence("no link to ws://a"), "No link to ws://a.");
+  assert.equal(sentence("ws://a:9090 is lost."), "ws://a:9090 is lost.");
+  assert.equal(sentence("robot_0 is free"), "robot_0 is free.");
+  assert.equal(sentence("zero sent, still moving"), "Zero sent, still moving.");
 });
 
 test("the cap says why it is in force", () => {
@@ -130,10 +194,10 @@ test("a stop hook that failed is said, whatever else there is to say", () => {
   const detail = (more, status = {}) =>
     describe({ ...STATUS, ...status }, "r1", { ...REPORT, hooks, ...more }, true).detail;
   const stop = { by: "Ann", confirmed: true, why: "" };
-  const latched = { state: "stopped", latched: true, stop };
+  const latched = { state: "stopped", doing: "stopped", latched: true, stop };
   assert.equal(detail(latched), `By Ann, confirmed by odometry. ${words}`);
   assert.equal(detail({}, { taking: true }), words);
-  const driving = detail({ ...ME, state: "driving" }, { driven: "r1" });
+  const driving = detail({ ...ME, ...DRIVING }, { driven: "r1" });
   assert.equal(driving, `0.00 m/s, 0.00 rad/s. ${words}`);
   assert.equal(detail({}, { link: "connecting" }), "Connecting.");
 });
@@ -144,10 +208,10 @@ test("another program that publishes velocities is said in every state", () => {
   const mine = { ...STATUS, driven: "r1", settled: true };
   const stop = { by: "Ann", confirmed: true, why: "", id: "s1" };
   const states = [
-    [STATUS, {}, "Free"],
-    [mine, ME, "Ready"],
-    [mine, { ...ME, state: "driving" }, "Driving"],
-    [STATUS, { state: "stopped", latched: true, stop }, "Stopped"],
+    [STATUS, { doing: "other" }, "Another program drives it"],
+    [mine, ME, "You hold it"],
+    [mine, { ...ME, ...DRIVING }, "You drive"],
+    [STATUS, { state: "stopped", doing: "stopped", latched: true, stop }, "Stopped"],
   ];
   for (const [status, more, title] of states) {
     const words = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);

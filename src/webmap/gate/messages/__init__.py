@@ -28,6 +28,7 @@ from webmap.gate.messages.from_gate import (
 )
 from webmap.gate.messages.robot_report import (
     AskerReport,
+    Doing,
     GoalReport,
     Holder,
     RobotGone,
@@ -70,6 +71,7 @@ __all__ = [
     "CloseConnection",
     "Connect",
     "Disconnect",
+    "Doing",
     "Forget",
     "FromBrowser",
     "FromGate",

@@ -76,6 +76,27 @@ class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
     """How often the robot had to free itself."""
 
 
+Doing = Literal[
+    "stopped",
+    "unconfirmed",
+    "down",
+    "changing",
+    "other",
+    "stopping",
+    "blocked",
+    "driven",
+    "navigating",
+    "navigating_held",
+    "settling",
+    "moving",
+    "held",
+    "free",
+    "barred",
+    "barred_held",
+]
+"""What a robot does, as far as the gate knows."""
+
+
 class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     """Everything a page shows about a robot's motion."""
 
@@ -83,6 +104,8 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     name: str
     state: Literal["free", "held", "driving", "stopping", "stopped"]
     """``stopping``: zeros are being sent; ``stopped``: STOP stands."""
+    doing: Doing
+    """The same in the words of an operator, see ``webmap.core.robot_state``."""
     latched: bool
     """Whether STOP stands, and will after a restart: until a reset nothing moves."""
     stop: StopReport | None

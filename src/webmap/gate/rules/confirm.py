@@ -1,6 +1,13 @@
 """Whether a machine has stopped after STOP: confirmed, not confirmed, not known yet."""
 
-from webmap.gate.rules.standstill import STILL_V, STILL_W, Standstill, moves
+from webmap.gate.rules.standstill import (
+    GAP,
+    STILL_FOR,
+    STILL_V,
+    STILL_W,
+    Standstill,
+    moves,
+)
 from webmap.geometry import Twist
 
 PATIENCE = 2.0
@@ -53,15 +60,18 @@ class Confirmation:
         elif now - self.since < PATIENCE:
             self.confirmed, self.why = None, ""
         else:
-            self.confirmed, self.why = False, self._reason(delivered, silent)
+            self.confirmed, self.why = False, self._reason(delivered, silent, now)
 
-    def _reason(self, delivered: bool, silent: bool) -> str:
+    def _reason(self, delivered: bool, silent: bool, now: float) -> str:
         if not delivered:
             return self._since_then("its bridge does not answer")
         if self._still.speed is None or silent:
             return self._since_then("no odometry")
         if self._still.speed < STILL_V and self._still.turn < STILL_W:
-            return "odometry comes too seldom to tell"
+            gap = max(self._still.gap, now - self._still.heard_at)
+            if gap > GAP:
+                return f"only one odometry message arrives in {gap:.1f} s"
+            return f"it has not been still for {STILL_FOR:g} s yet"
         return self._moving()
 
     def _since_then(self, trouble: str) -> str:

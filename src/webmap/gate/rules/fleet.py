@@ -327,7 +327,7 @@ class Fleet:
 
     def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
         if goals := self._goals_of(event.robot):
-            goals.ended(event)
+            goals.ended(event, now)
 
     def _goal_lost(self, event: events.GoalLost, now: float) -> None:
         if goals := self._goals_of(event.robot):

@@ -24,6 +24,9 @@ noticed after 4 s; where nobody answers a cancel it is said once more after that
 INSIST = 1.0
 """Seconds between two cancels of a goal that is said to go on all the same."""
 
+BRAKES = 2.0
+"""Seconds after the end of a goal in which a robot may still move because of it."""
+
 OVER = ("reached", "failed", "cancelled")
 """The states of a goal that nothing follows any more."""
 
@@ -55,6 +58,7 @@ class Goals:
         self._cancel_owed = False
         self._cancelled_at = self._insisted_at = float("-inf")
         self._made_way_at: float | None = None
+        self._over_at = float("-inf")
         self._no_actions = False
         """Whether the bridge said that it takes no goals of actions."""
 
@@ -85,6 +89,20 @@ class Goals:
     def following(self) -> bool:
         """Whether the robot follows a goal, as far as is known."""
         return self.report is not None and self.report.state not in OVER
+
+    def navigates(self, *, moving: bool) -> bool:
+        """Return whether the robot follows a goal.
+
+        A plain topic has no feedback: its goal counts while the robot moves.
+        """
+        report = self.report
+        return (
+            self.following and report is not None and (report.way != "topic" or moving)
+        )
+
+    def brakes(self, now: float) -> bool:
+        """Return whether motion at ``now`` may come from a goal that has ended."""
+        return now - self._over_at < BRAKES
 
     def send(self, x: float, y: float, yaw: float, by: str, now: float) -> None:
         """Send a goal; metres and radians in the robot's goal frame.
@@ -152,7 +170,7 @@ class Goals:
         }
         self.report = msgspec.structs.replace(report, **told)
 
-    def ended(self, end: GoalEnded) -> None:
+    def ended(self, end: GoalEnded, now: float) -> None:
         """Note that the action ended a goal; the newest one is what counts."""
         if end.id == self._running:
             self._running, self._by, self._perhaps = None, None, False
@@ -165,7 +183,7 @@ class Goals:
                 why = f"{why}; the next one goes to {self.spec.goal_topic}"
             if end.outcome == "cancelled":
                 why = report.why if report.state == "cancelling" else why
-            self._show(end.outcome, why or _OTHERWISE[end.outcome])
+            self._show(end.outcome, why or _OTHERWISE[end.outcome], now)
 
     def gone_dark(self, lost: GoalLost, now: float) -> None:
         """Note that nobody tells any more how a goal goes."""
@@ -175,14 +193,14 @@ class Goals:
         if report.state == "cancelling":  # it may not have heard of that
             self.cancel(now, report.why)
         else:
-            self._show("unknown", lost.why)
+            self._show("unknown", lost.why, now)
 
-    def cancel(self, now: float, why: str = "") -> None:
+    def cancel(self, now: float, why: str) -> None:
         """Cancel every goal, now or as soon as there is a link.
 
         Args:
             now: The time.
-            why: Whose doing it is, in words.
+            why: By whom or for what reason, in words.
 
         Raises:
             Refusal: If the robot has no way to do that.
@@ -197,7 +215,7 @@ class Goals:
         if self.following:
             assert self.report is not None  # only then does it follow one
             waits = self._cancel_owed or self.report.way != "topic"
-            self._show("cancelling" if waits else "cancelled", why)
+            self._show("cancelling" if waits else "cancelled", why, now)
 
     def insist(self, news: GoalProgress, stopped: bool, now: float) -> None:
         """Cancel again, because a goal is said to go on that should not.
@@ -259,7 +277,7 @@ class Goals:
             return
         if self.following:
             self.stop(now)
-            self._show("failed", ELSEWHERE)
+            self._show("failed", ELSEWHERE, now)
         # Of the new place nothing is known.
         self._perhaps, self._cancel_owed, self._no_actions = True, False, False
         self._cancelled_at = float("-inf")
@@ -275,21 +293,23 @@ class Goals:
             return
         self._cancel_owed, report = True, self.report
         if report is not None and (report.state, report.way) == ("cancelled", "topic"):
-            self._show("cancelling", report.why)
+            self._show("cancelling", report.why, now)
 
     def _about(self, id: str) -> GoalReport | None:
         report = self.report
         return report if report is not None and report.id == id else None
 
-    def _show(self, state: str, why: str) -> None:
+    def _show(self, state: str, why: str, now: float) -> None:
         assert self.report is not None  # there is something to be said
+        if state in OVER:
+            self._over_at = now
         self.report = msgspec.structs.replace(self.report, state=state, why=why)
 
 
 _OTHERWISE = {
     "reached": "",
     "failed": "the robot does not say why",
-    "cancelled": "by the robot, or by somebody else",
+    "cancelled": "by the robot, or by another program",
 }
 
 

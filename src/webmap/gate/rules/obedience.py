@@ -1,8 +1,8 @@
-"""Whether a machine does what it is told when it is told zero (S19). No I/O."""
+"""Whether a machine does what velocity asks of it, zero above all (S19). No I/O."""
 
 import math
 
-from webmap.gate.rules.standstill import Standstill
+from webmap.gate.rules.standstill import Standstill, moves
 from webmap.geometry import Twist
 
 GRACE = 1.0
@@ -13,6 +13,9 @@ MOVES = 0.05
 
 TURNS = 0.1
 """Radians per second above which it is said to turn on."""
+
+BLOCKED_AFTER = 1.0
+"""Seconds without motion after which a machine that should move counts as blocked."""
 
 LASTING = 60.0
 """Seconds without odometry for which the alarm goes on about a machine that was seen
@@ -35,9 +38,15 @@ class Obedience:
         self._calm = Standstill(math.nextafter(MOVES, 1), math.nextafter(TURNS, 1))
         self._moving: Twist | None = None
         self._moving_at = self._seen_at = float("-inf")
+        self._told_to_move = False
+        self._stuck: tuple[float, float] | None = None
+        """When odometry first and last showed a standstill that no zero asked for."""
 
     def wrote(self, twist: Twist, last: Twist, now: float) -> None:
         """Note that ``twist`` went out after ``last``."""
+        self._told_to_move = moves(twist, MOVES, TURNS)
+        if not self._told_to_move:
+            self._stuck = None
         if not twist.is_zero:
             self.excuse()
         elif not last.is_zero:
@@ -65,6 +74,10 @@ class Obedience:
         """Take in a message of odometry."""
         if twist is None:
             return
+        if moves(twist):
+            self._stuck = None
+        elif self._told_to_move:
+            self._stuck = (self._stuck[0] if self._stuck else now, now)
         if self._zero_at is None:
             return
         if not self._firm and not self.watching(now):
@@ -79,6 +92,16 @@ class Obedience:
             self._firm |= now - self._zero_at >= GRACE
         elif self._moving_at < self._zero_at + GRACE:
             self._moving = None  # it braked in time, unless it moves again
+
+    def blocked(self, now: float) -> bool:
+        """Return whether the machine does not move although a velocity was sent.
+
+        It may take :data:`BLOCKED_AFTER` to speed up.
+        """
+        if self._stuck is None:
+            return False
+        first, last = self._stuck
+        return last - first >= BLOCKED_AFTER and now - last <= GRACE
 
     def watching(self, now: float) -> bool:
         """Return whether odometry could still tell something."""

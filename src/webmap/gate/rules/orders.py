@@ -88,7 +88,8 @@ class Orders:
     def cancel(self, connection: Connection, robot: str, now: float) -> None:
         """Call off a robot's goals; that needs no lease."""
         check_role(connection.role)
-        self._fleet.find(robot).robots.goals[robot].cancel(now)
+        why = f"by {connection.name or connection.id}"
+        self._fleet.find(robot).robots.goals[robot].cancel(now, why)
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
         """STOP a robot or, with ``None``, all."""

@@ -6,6 +6,7 @@ import msgspec
 
 from webmap.gate.messages import (
     AskerReport,
+    Doing,
     Holder,
     RobotReport,
     RobotSpec,
@@ -14,7 +15,10 @@ from webmap.gate.messages import (
     Velocity,
 )
 from webmap.gate.rules.base import Base
+from webmap.gate.rules.health import Health
 from webmap.gate.rules.loopage import reaction
+from webmap.gate.rules.obedience import MOVES, TURNS
+from webmap.gate.rules.standstill import moves
 from webmap.geometry import Twist
 
 INTERVAL = 0.1
@@ -32,14 +36,13 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     speed = base.speeds.own if lease is None else base.speeds.speed
     age, test = base.speeds.ages.p95, base.tests.last
     echoed, measured = base.sight.echoed, base.sight.shown(now)
-    unarmable = base.hands.unarmable(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
     goals = base.robots.goals[spec.id]
-    link = base.control if spec.twist_topic else goals.link
     return RobotReport(
         robot=spec.id,
         name=spec.name,
         state=base.state,
+        doing=_doing(base, spec, now),
         latched=base.latch.acknowledged,
         stop=_stop(base),
         holder=holder,
@@ -50,7 +53,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         v=speed.v,
         w=speed.w,
         why=speed.why + base.guard.why,
-        link="up" if link.up else "down",
+        link="up" if _link(base, spec).up else "down",
         sent=_velocity(base.motion.sent),
         echoed=None if echoed is None else _velocity(echoed),
         measured=None if measured is None else _velocity(measured),
@@ -63,14 +66,55 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         stop_source=_stop_source(base),
         stop_date=None if base.speeds.tested is None else base.speeds.tested.date,
         test=None if test is None else TestReport(test.state, test.text),
-        armable=unarmable is None,
-        reason=unarmable if lease is None else base.arming.doubt(now),
+        armable=base.hands.unarmable(now) is None,
+        reason=_reason(base, now),
         way=goals.way,
         cancels=goals.can_cancel,
         locates=spec.pose_topic is not None,
         goal=goals.report,
         hooks=base.robots.hook_failures,
     )
+
+
+def _doing(base: Base, spec: RobotSpec, now: float) -> Doing:
+    """Return what one robot does: the first that is true."""
+    state, goals = base.state, base.robots.goals[spec.id]
+    if state == "stopped":
+        confirmed = base.latch.shown and base.standing.confirmation.confirmed
+        return "unconfirmed" if confirmed is False else "stopped"
+    if not _link(base, spec).up:
+        return "down"
+    if base.hands.handover.heir is not None:
+        return "changing"
+    if base.other_writer.words(base.key.topic) and state in ("free", "stopping"):
+        return "other"
+    if state == "stopping":
+        return "stopping"
+    if state == "driving":
+        return "blocked" if base.obedience.blocked(now) else "driven"
+    measured, held = base.sight.shown(now), state == "held"
+    moving = measured is not None and moves(measured, MOVES, TURNS)
+    if goals.navigates(moving=moving):
+        return "navigating_held" if held else "navigating"
+    if moving:
+        braking = base.obedience.watching(now) or goals.brakes(now)
+        return "settling" if braking else "moving"
+    barred = _reason(base, now) is not None
+    if held:
+        return "barred_held" if barred else "held"
+    return "barred" if barred else "free"
+
+
+def _reason(base: Base, now: float) -> str | None:
+    """Return why nobody can move the machine now, in words."""
+    if base.hands.lease is None:
+        return base.hands.unarmable(now)
+    return base.arming.doubt(now)
+
+
+def _link(base: Base, spec: RobotSpec) -> Health:
+    """Return the link that moves the robot."""
+    return base.control if spec.twist_topic else base.robots.goals[spec.id].link
 
 
 def _stop_source(base: Base) -> Literal["stated", "tested"] | None:

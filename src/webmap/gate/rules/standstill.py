@@ -44,18 +44,23 @@ class Standstill:
         """The newest speed of turning in rad/s, whatever the axis."""
         self.heard_at = float("-inf")
         """When odometry last told a velocity."""
+        self.gap = 0.0
+        """Seconds between the newest two messages; 0 before there are two."""
         self.since: float | None = None
         """When it was first seen to stand, if it has been seen so ever since."""
 
     def begin(self) -> None:
         """Forget what was heard before."""
         self.speed, self.heard_at, self.since = None, float("-inf"), None
+        self.gap = 0.0
 
     def saw(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry; ``None`` is one without a velocity."""
         if twist is None:
             return
-        if now - self.heard_at > GAP:
+        if self.speed is not None:
+            self.gap = now - self.heard_at
+        if self.gap > GAP:
             self.since = None
         self.speed, self.turn, self.heard_at = twist.speed, twist.turn, now
         if moves(twist, self._still_v, self._still_w):

@@ -64,5 +64,5 @@ class Ticks:
         if age is None:
             raise Refusal("its tick is unknown: too old, or of another session")
         if age > MAX_AGE:
-            raise Refusal(f"it is older than {MAX_AGE * 1000:.0f} ms")
+            raise Refusal(f"it took more than {MAX_AGE * 1000:.0f} ms to arrive")
         return age

@@ -92,7 +92,7 @@ class RosoutPanel {
     this._details = html(
       "details",
       "webmap-panel webmap-rosout",
-      {},
+      { "data-webmap-menu": "" },
       html("summary", "", {}, "Log", this._badge),
       html("label", "webmap-rosout-level", {}, "Show", this._choice),
       this._count,

@@ -51,7 +51,7 @@ class Stop {
      */
     this._refused = new Map();
     this._alarm = new Alarm(() => this._drive.stop("*"));
-    this._verdicts = html("ul", "webmap-stop-verdicts", { role: "status" });
+    this._verdicts = html("div", "webmap-stop-verdicts", { role: "status" });
     this._close = button("webmap-stop-close", "Close", () => {
       this._drive.dismissVerdicts();
       this._show();
@@ -169,7 +169,7 @@ class Stop {
     this._shown = shown;
     this._verdicts.replaceChildren(
       ...verdicts.map(({ name, state, text }) => {
-        const item = html("li", "webmap-stop-verdict", {}, `${name}: ${text}`);
+        const item = html("p", "webmap-stop-verdict", {}, `${name}: ${text}`);
         item.dataset.state = state;
         return item;
       }),

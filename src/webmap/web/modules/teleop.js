@@ -162,7 +162,11 @@ class Teleop {
     this._stick.show(useful, status.pressed && status.dead);
     const hands = { touch: this._touch.matches, stick: this._stick.wanted };
     const inputs = inputsOf({ ...hands, gamepad: this._desk.gamepad });
-    const words = describe(status, robot, report, active, { verdict, request, inputs });
+    const drawn = this._map.world.querySelector(".robot.selected");
+    const seen = drawn?.getAttribute("data-state") ?? "";
+    const since = drawn?.getAttribute("data-since") ?? "";
+    const more = { verdict, request, inputs, seen, since };
+    const words = describe(status, robot, report, active, more);
     this._panel.showState(withoutKeys(words, hands, inputs), report, status.delay);
     const asking = request?.by === status.connection;
     this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);

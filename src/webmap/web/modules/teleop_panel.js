@@ -77,7 +77,8 @@ export class Panel {
     say(this._title, title);
     say(this._detail, detail);
     const told = report?.why.some((why) => why.startsWith("slow link"));
-    say(this._cap, report ? capOf(report) + (told ? "" : slowness(delay)) : "");
+    const age = report?.age ?? delay;
+    say(this._cap, report ? capOf(report) + (told ? "" : slowness(age)) : "");
   }
 
   /**
@@ -92,8 +93,10 @@ export class Panel {
     this._figures.classList.toggle("idle", !report?.mine);
     if (report === null) return;
     const all = [...motions(report), ...timings(report, loop, moving)];
-    for (const { name, kind, text, more = "" } of all) {
-      const [value, rest] = this._figure(name, kind).children;
+    for (const { name, kind, text, more = "", title = "" } of all) {
+      const figure = this._figure(name, kind);
+      set(figure, "title", title);
+      const [value, rest] = figure.querySelectorAll("dd > span");
       say(value, text);
       say(rest, more);
     }
@@ -107,9 +110,10 @@ export class Panel {
     const known = this._values.get(name);
     if (known) return known;
     const value = html("dd", "", {}, html("span", ""), html("span", "more"));
-    this._figures.append(html("div", kind, {}, html("dt", "", {}, name), value));
-    this._values.set(name, value);
-    return value;
+    const figure = html("div", kind, {}, html("dt", "", {}, name), value);
+    this._figures.append(figure);
+    this._values.set(name, figure);
+    return figure;
   }
 
   /** Forget the first presses of what takes two. */

@@ -161,6 +161,8 @@ export class Reach {
   refuse(robot, what, why, now) {
     if (what === "ask" && robot !== null) this._begged.delete(robot);
     if (robot !== this.choice) return;
+    // The tool that sent a goal or a pose shows why.
+    if (what === "goal" || what === "locate") return;
     // A command that met the end of its lease on the way is no news.
     if (what === "drive" && !this._stream.lease) return;
     this.refusal = why;

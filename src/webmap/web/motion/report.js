@@ -5,6 +5,7 @@
  * @property {string} robot
  * @property {string} name
  * @property {'free' | 'held' | 'driving' | 'stopping' | 'stopped'} state
+ * @property {string} doing The same in the words of an operator: a name of `WORDS`.
  * @property {{connection: string, name: string} | null} holder
  * @property {boolean} mine Whether this page's connection holds the lease.
  * @property {number | null} epoch
@@ -79,14 +80,6 @@
 
 /** @typedef {{state: 'creeping' | 'waiting' | 'done' | 'failed', text: string}} StopTest */
 
-const GOING = new Set(["sent", "accepted", "under way", "cancelling", "unknown"]);
-
-/** From here on a robot moves, in m/s: the gate's alarm begins there, too. */
-const MOVES = 0.05;
-
-/** From here on it turns, in rad/s. */
-const TURNS = 0.1;
-
 /**
  * @param {readonly number[]} velocity As a report has it.
  * @returns {number} Metres per second, whatever the direction.
@@ -144,14 +137,26 @@ export function mayReach(report) {
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }
 
+/** What a robot does for the gate where the display may know better. */
+const QUIET = new Set(["free", "barred", "down"]);
+
+/** What the display knows of its bridge and its poses. */
+const SEEN = new Set([
+  "no_bridge",
+  "connecting",
+  "gone",
+  "navigating",
+  "settling",
+  "moving",
+]);
+
 /**
+ * Return what a robot is doing. Python has the same rule (`state_of`).
+ *
  * @param {RobotReport} report
- * @returns {boolean} Whether the robot moves although nobody drives it and no goal of
- *     ours is under way: it coasts, or something else moves it. Of a goal that nobody
- *     tells of and nobody can call off there is no end to see, so it does not count.
+ * @param {string} seen The state that the display shows.
+ * @returns {string} A name of `WORDS`.
  */
-export function rolls({ measured, goal, cancels }) {
-  const told = goal && (goal.way !== "topic" || cancels);
-  if (!measured || (told && GOING.has(goal.state))) return false;
-  return linearSpeed(measured) >= MOVES || angularSpeed(measured) >= TURNS;
+export function doingOf({ doing }, seen) {
+  return QUIET.has(doing) && SEEN.has(seen) ? seen : doing;
 }

@@ -1,5 +1,6 @@
-import { isTested } from "./figures.js";
-import { heldByAnother, isLatched, rolls, linearSpeed } from "./report.js";
+import { isTested, signed, speedAlong } from "./figures.js";
+import { doingOf, heldByAnother, isLatched } from "./report.js";
+import { WORDS } from "./state_words.js";
 import { stopWords } from "./stopping.js";
 
 /** @typedef {import('./asking.js').Request} Request */
@@ -9,14 +10,24 @@ import { stopWords } from "./stopping.js";
 
 /**
  * How it stands with driving a robot from this page, to be shown as words, a shape and
- * a colour: the state names all three.
+ * a colour: the state names all three. Every page has the same words for what
+ * a robot is doing.
  *
  * @typedef {'none' | 'connecting' | 'lost' | 'late' | 'fixed' | 'held' | 'free' |
- *     'taking' | 'ready' | 'hands-off' | 'driving' | 'stopping' | 'stopped' |
- *     'unconfirmed'} State
+ *     'taking' | 'ready' | 'hands-off' | 'driving' | 'blocked' | 'moving' |
+ *     'stopping' | 'stopped' | 'unconfirmed'} State
  */
 
 /** @typedef {{state: State, title: string, detail: string}} Description */
+
+/**
+ * @typedef {object} More
+ * @property {Verdict} [verdict] The result of a STOP of this page.
+ * @property {Request} [request] Who asks for the robot.
+ * @property {string} [inputs] What there is to drive with.
+ * @property {string} [seen] The state that the display shows: a name of `WORDS`.
+ * @property {string} [since] When the display had the newest pose of a robot that is gone.
+ */
 
 /** @typedef {import('../drive.js').Drive['status']} Status */
 
@@ -41,9 +52,7 @@ export function inputsOf({ touch, stick, gamepad }) {
  * @param {string | null} robot The robot that is selected where this is shown.
  * @param {RobotReport | null} report The gate's word on it.
  * @param {boolean} active Whether the page's keys belong to that map.
- * @param {{verdict?: Verdict, request?: Request, inputs?: string}} [more] What became
- *     of a STOP for it that was said here, who asks for it, and what there is to drive
- *     with.
+ * @param {More} [more]
  * @returns {Description}
  */
 export function describe(status, robot, report, active, more = {}) {
@@ -63,27 +72,51 @@ export function describe(status, robot, report, active, more = {}) {
  * @param {string | null} robot
  * @param {RobotReport | null} report
  * @param {boolean} active
- * @param {{verdict?: Verdict, request?: Request, inputs?: string}} more
+ * @param {More} more
  */
 function ofRobot(status, robot, report, active, more) {
-  const { verdict, request, inputs = KEYS } = more;
+  const { verdict, inputs = KEYS, seen = "", since = "" } = more;
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
-    return say("unconfirmed", "STOP NOT CONFIRMED", reasonOf(verdict));
+    return say("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
   }
   if (robot === null) {
     return say("none", "No robot selected", "Click on one to drive it.");
   }
-  if (report === null) return say("fixed", "Not drivable", "It has no velocity topic.");
-  if (isLatched(report)) return ofStopped(status, report);
-  if (report.changing) {
-    return say("taking", "Handing over", "It is brought to a standstill first.");
+  if (report === null) {
+    const title = wordsOf(seen in WORDS ? seen : "watched", { since });
+    return say("fixed", title, "It has no velocity topic.");
   }
-  if (heldByAnother(report)) return ofOther(status, report, request);
+  const name = doingOf(report, seen);
+  const title = wordsOf(name, { report, since });
+  if (isLatched(report)) return ofStopped(title, status, report);
+  if (name === "changing") {
+    return say("taking", title, "It is brought to a standstill first.");
+  }
+  if (heldByAnother(report)) return ofOther(title, status, report, more.request);
   if (!active) {
     return say("free", "Not driven here", "Click on this map to drive from it.");
   }
-  if (status.driven === robot) return ofMine(status, report, inputs);
-  return ofFree(status, report, inputs);
+  const driven = status.driven === robot;
+  const kept = driven ? ofHands(status, report, title) : ofReach(status, report, title);
+  if (kept) return kept;
+  const ready = status.settled && !status.early;
+  if (name === "held" && driven && !ready) return gettingReady();
+  return ofDoing(name, title, report, inputs);
+}
+
+/**
+ * Return the words of a state, for this page.
+ *
+ * @param {string} name Of `WORDS`.
+ * @param {{report?: RobotReport, since?: string}} about
+ */
+function wordsOf(name, { report, since = "" }) {
+  /** @type {Readonly<Record<string, string>>} */
+  const words = WORDS;
+  const text = (report?.mine && words[`${name}_by_you`]) || words[name];
+  const holder = report?.holder;
+  const who = holder?.name || holder?.connection || "Somebody";
+  return text.replace(/\{(who|since)\}/, (_, key) => (key === "who" ? who : since));
 }
 
 /**
@@ -104,7 +137,15 @@ export function capOf(report) {
  */
 export function speedOf({ measured }) {
   if (!measured) return "No speed known";
-  return `${linearSpeed(measured).toFixed(2)} m/s, ${measured[2].toFixed(2)} rad/s`;
+  return velocityWords(measured);
+}
+
+/**
+ * @param {readonly number[]} velocity As a report has it.
+ * @returns {string} Backwards and clockwise are below zero.
+ */
+function velocityWords(velocity) {
+  return `${signed(speedAlong(velocity) ?? 0)} m/s, ${signed(velocity[2])} rad/s`;
 }
 
 /** @param {Status} status */
@@ -128,17 +169,18 @@ function ofLink({ link }) {
 }
 
 /**
+ * @param {string} title
  * @param {Status} status
  * @param {RobotReport} report
  */
-function ofStopped(status, report) {
+function ofStopped(title, status, report) {
   const { confirmed, text } = stopWords(report);
   const detail = text || report.reason || "";
   // That commands are refused now is no news.
   const refused = status.refused === "reset" ? status.refusal : null;
   const refusal = refused ? ` ${sentence(refused)}` : "";
-  if (confirmed === false) return say("unconfirmed", "STOP", `${detail}${refusal}`);
-  return say("stopped", "Stopped", `${detail}${refusal}`);
+  const state = confirmed === false ? "unconfirmed" : "stopped";
+  return say(state, title, `${detail}${refusal}`);
 }
 
 /** @param {Verdict} verdict */
@@ -147,62 +189,84 @@ function reasonOf({ text }) {
 }
 
 /**
+ * @param {string} title
  * @param {Status} status
  * @param {RobotReport} report
  * @param {Request} [request]
  */
-function ofOther(status, report, request) {
-  const who = report.holder?.name || report.holder?.connection || "somebody else";
-  const words = [];
-  if (report.state === "driving") words.push("It is being driven.");
+function ofOther(title, status, report, request) {
+  const who = report.holder?.name || report.holder?.connection || "Somebody";
+  const words = title.includes(who) ? [] : [`${who} holds it.`];
   if (request && request.by === status.connection) {
     words.push(`You asked for it: yours in ${request.left} s, unless ${who} keeps it.`);
   } else if (request) words.push(`${request.who} asks for it.`);
   else if (status.refusal) words.push(sentence(status.refusal));
-  return say("held", `Held by ${who}`, words.join(" "));
+  return say("held", title, words.join(" "));
 }
 
 /**
+ * Describe why the hands of this page do not move the robot that it holds.
+ *
  * @param {Status} status
  * @param {RobotReport} report
- * @param {string} inputs
+ * @param {string} title
+ * @returns {Description | null} null if they do.
  */
-function ofMine(status, report, inputs) {
+function ofHands(status, report, title) {
   if (isTested(report)) return say("driving", "Testing its stop", "Touch nothing.");
-  if (report.state === "driving") return say("driving", "Driving", speedOf(report));
-  if (report.reason) return say("fixed", "Cannot move", sentence(report.reason));
-  if (status.pressed && status.dead) return handsOff();
-  if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
-  if (rolls(report)) return rolling(report);
-  if (!status.settled || status.early) return gettingReady();
-  return say("ready", "Ready", `Hold ${inputs}. Space stops.`);
+  if (report.state === "driving") return null;
+  if (report.reason) return say("fixed", title, sentence(report.reason));
+  return status.pressed && status.dead ? handsOff() : null;
 }
 
 /**
+ * Describe what keeps a press from taking a robot.
+ *
  * @param {Status} status
  * @param {RobotReport} report
- * @param {string} inputs
+ * @param {string} title
+ * @returns {Description | null} null if nothing does.
  */
-function ofFree(status, report, inputs) {
+function ofReach(status, report, title) {
   if (status.taking) return gettingReady();
+  if (report.state === "stopping") return null;
   if (!report.armable) {
-    return say(
-      "fixed",
-      "Cannot be driven",
-      sentence(report.reason ?? "no reason given"),
-    );
+    return say("fixed", title, sentence(report.reason ?? "no reason given"));
   }
-  if (report.state === "stopping") return say("stopping", "Stopping", speedOf(report));
-  if (rolls(report)) return rolling(report);
-  if (status.refusal) return say("free", "Free", sentence(status.refusal));
+  if (status.refusal) return say("free", title, sentence(status.refusal));
   if (status.pressed && status.dead) return handsOff();
-  if (status.early) return gettingReady();
-  return say("free", "Free", `Hold ${inputs} to drive.`);
+  return status.early ? gettingReady() : null;
 }
 
-/** @param {RobotReport} report */
-function rolling(report) {
-  return say("stopping", "Still moving", speedOf(report));
+/**
+ * Describe what the robot is doing.
+ *
+ * @param {string} name Of `WORDS`.
+ * @param {string} title
+ * @param {RobotReport} report
+ * @param {string} inputs
+ * @returns {Description}
+ */
+function ofDoing(name, title, report, inputs) {
+  switch (name) {
+    case "blocked": {
+      const sent = `Sent: ${velocityWords(report.sent)}.`;
+      return say("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
+    }
+    case "driven":
+      return say("driving", title, speedOf(report));
+    case "stopping":
+    case "settling":
+      return say("stopping", title, speedOf(report));
+    case "moving":
+    case "other":
+      return say("moving", title, report.measured ? speedOf(report) : "");
+    case "navigating":
+    case "navigating_held":
+      return say("moving", title, `To drive, hold ${inputs}. This cancels its goal.`);
+  }
+  if (name !== "held") return say("free", title, `Hold ${inputs} to drive.`);
+  return say("ready", title, `Ready: hold ${inputs}. Space stops.`);
 }
 
 function gettingReady() {
@@ -223,9 +287,16 @@ function say(state, title, detail) {
   return { state, title, detail };
 }
 
-/** @param {string} text */
-function sentence(text) {
-  return `${text.charAt(0).toUpperCase()}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
+/**
+ * Return words of the gate as a sentence. A name at the beginning, such as a URL or a
+ * topic, keeps its small letter.
+ *
+ * @param {string} text
+ */
+export function sentence(text) {
+  const [first] = text.split(/[.,:;]*(?:\s|$)/, 1);
+  const start = /[\d/_:.]/.test(first) ? text.charAt(0) : text.charAt(0).toUpperCase();
+  return `${start}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
 }
 
 /** @param {number} value */

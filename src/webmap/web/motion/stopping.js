@@ -237,10 +237,10 @@ export function stopWords({ stop }) {
   const more = besides(stop.why);
   const what = {
     true: ["confirmed by odometry", ...more].join("; "),
-    false: `NOT CONFIRMED: ${stop.why}`,
+    false: stop.why,
     null: ["looking whether it stands", ...more].join("; "),
   }[`${stop.confirmed}`];
-  const text = [by, what].filter(Boolean).join(", ");
+  const text = [by, what].filter(Boolean).join(stop.confirmed === false ? ": " : ", ");
   return { confirmed: stop.confirmed, text: `${text[0].toUpperCase()}${text.slice(1)}.` };
 }
 

@@ -1,0 +1,132 @@
+"""What a robot is doing, in words."""
+
+import time
+from datetime import datetime, timedelta
+from types import SimpleNamespace
+from typing import get_args
+
+import pytest
+
+from webmap.console.words import LOOKS
+from webmap.core.robot_state import WORDS, state_of
+from webmap.gate.limits import PLANE
+from webmap.gate.messages.robot_report import Doing
+from webmap.geometry import Twist
+
+MOVES = (0.4, 0.0, 0.0)
+ANN = SimpleNamespace(connection="c2", name="Ann")
+
+
+def robot(doing="free", *, seen=None, age=0.1, silent=0.1, ended=None, **changes):
+    """Return a robot with a report, and what the display itself has seen of it."""
+    report = None
+    if doing is not None:
+        changes = {"holder": None, "goal": None, "measured": None, **changes}
+        report = SimpleNamespace(doing=doing, **changes)
+    bridge = SimpleNamespace(state="open", lost=False, replays=False)
+    return SimpleNamespace(
+        feed=SimpleNamespace(bridge=bridge, throttle=0),
+        report=report,
+        pose_age=age,
+        silent_for=silent,
+        goal_ended_at=ended,
+        measured_twist=None if seen is None else Twist(*seen),
+        motion=SimpleNamespace(axes=PLANE),
+    )
+
+
+def test_every_state_of_the_gate_has_words_and_a_look():
+    for doing in get_args(Doing):
+        found = state_of(robot(doing, holder=ANN))
+        assert found.name == doing
+        assert "{" not in found.text + found.mine
+    assert set(LOOKS) == {name for name in WORDS if not name.endswith("_by_you")}
+
+
+@pytest.mark.parametrize(
+    ("doing", "text", "mine"),
+    [
+        ("free", "Free", "Free"),
+        ("held", "Ann holds it", "You hold it"),
+        ("driven", "Ann drives", "You drive"),
+        ("navigating_held", "Navigating, Ann holds it", "Navigating, you hold it"),
+        ("blocked", "Not moving: blocked?", "Not moving: blocked?"),
+        ("stopped", "Stopped", "Stopped"),
+    ],
+)
+def test_the_words_name_who_holds_the_robot(doing, text, mine):
+    found = state_of(robot(doing, holder=ANN))
+    assert (found.text, found.mine) == (text, mine)
+
+
+def test_somebody_without_a_name_has_the_name_of_the_connection():
+    holder = SimpleNamespace(connection="c7", name="")
+    assert state_of(robot("driven", holder=holder)).text == "c7 drives"
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"seen": MOVES}, "Moving, not by WebMap"),
+        ({"seen": (0.04, 0.0, -0.09)}, "Free"),
+        ({"seen": (0.0, 0.0, -0.11)}, "Moving, not by WebMap"),
+        ({"seen": MOVES, "age": 1.1}, "Free"),
+        ({"seen": MOVES, "age": None}, "Free"),
+        ({"seen": MOVES, "measured": (0.0,) * 6}, "Free"),
+        ({"seen": MOVES, "doing": "barred"}, "Moving, not by WebMap"),
+        ({"seen": MOVES, "doing": "down"}, "No way to drive it"),
+        ({"seen": MOVES, "doing": "held", "holder": ANN}, "Ann holds it"),
+        ({"seen": MOVES, "goal": SimpleNamespace(state="sent")}, "Navigating"),
+        ({"seen": MOVES, "goal": SimpleNamespace(state="reached")}, "Moving, not by"),
+        ({"seen": MOVES, "ended": 1.0}, "Still moving"),
+        ({"seen": MOVES, "ended": 3.0}, "Moving, not by WebMap"),
+    ],
+)
+def test_the_display_sees_motion_that_the_gate_does_not_look_at(changes, text):
+    if changes.get("ended"):
+        changes = {**changes, "ended": time.monotonic() - changes["ended"]}
+    assert state_of(robot(**changes)).text.startswith(text)
+
+
+def test_a_robot_that_the_gate_does_not_know_is_only_watched():
+    assert state_of(robot(None)).text == "Watched only"
+    assert state_of(robot(None, seen=MOVES)).text == "Watched only"
+
+
+@pytest.mark.parametrize("doing", [None, "free", "barred", "down"])
+def test_a_bridge_that_is_lost_has_words_of_its_own(doing):
+    one = robot(doing)
+    one.feed.bridge.state = "connecting"
+    assert state_of(one).text == "Connecting"
+    one.feed.bridge.lost = True
+    assert state_of(one).text == "No bridge"
+
+
+def test_a_robot_whose_poses_ceased_is_gone_since_then():
+    one = robot(silent=31.0)
+    then = datetime.now() - timedelta(seconds=31)
+    assert state_of(one).text in {
+        f"Gone since {then + timedelta(seconds=s):%H:%M}" for s in (0, 1)
+    }
+    assert state_of(robot(silent=29.0)).text == "Free"
+    assert state_of(robot(None, silent=31.0)).name == "gone"
+
+
+def test_a_robot_that_sends_poses_seldom_or_only_in_motion_is_not_gone():
+    assert state_of(robot(silent=None)).text == "Free"
+    one = robot(silent=100.0)
+    one.feed.throttle = 60_000
+    assert state_of(one).text == "Free"
+    one.feed.throttle = 30_000
+    assert state_of(one).name == "gone"
+
+
+def test_a_robot_of_a_recording_that_ended_is_not_gone():
+    one = robot(None, silent=100.0)
+    one.feed.bridge.replays = True
+    assert state_of(one).text == "Watched only"
+
+
+@pytest.mark.parametrize("doing", ["held", "driven", "stopping", "stopped"])
+def test_a_robot_that_somebody_has_or_stopped_is_not_gone(doing):
+    assert state_of(robot(doing, holder=ANN, silent=31.0)).name == doing

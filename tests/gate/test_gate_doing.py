@@ -1,0 +1,130 @@
+"""What the gate reports that a robot does, in the words of an operator."""
+
+import pytest
+from gate_harness import KEY, Bench, spec
+
+from webmap.gate import events
+from webmap.gate.rules.goals import BRAKES
+from webmap.gate.rules.other_writer import GRACE
+from webmap.geometry import Twist
+
+OTHERS = Twist(0.1, 0.0, -0.2)
+
+
+@pytest.fixture
+def bench():
+    return Bench().begin(spec(odometry_topic="/odom", action="/navigate_to_pose"))
+
+
+def run(bench, seconds, speed=0.0, x=None, turn=0.0):
+    """Let time pass with odometry, driven or not."""
+
+    def each():
+        bench.tell(events.Measured(KEY, Twist(speed, 0.0, turn)))
+        if x is not None:
+            bench.drive(x=x)
+
+    bench.run(seconds, each)
+    return bench.report().doing
+
+
+def drive_off(bench):
+    bench.take("a")
+    run(bench, 0.4, x=0.0)
+    assert run(bench, 0.3, 0.5, x=0.5) == "driven"
+
+
+def test_a_robot_is_free_or_cannot_be_driven(bench):
+    assert run(bench, 0.2) == "free"
+    bench.break_links()
+    bench.run(0.1)
+    assert bench.report().doing == "down"
+
+
+def test_a_robot_that_another_webmap_has_cannot_be_driven():
+    bench = Bench(lock_held=False).begin(spec())
+    bench.run(0.1)
+    assert bench.report().doing == "barred"
+
+
+def test_it_is_held_driven_and_stopped(bench):
+    bench.take("a")
+    assert bench.report().doing == "barred_held", "before there is odometry"
+    assert run(bench, 0.4, x=0.0) == "held"
+    assert run(bench, 0.3, 0.5, x=0.5) == "driven"
+    assert run(bench, 0.1, 0.4, x=0.0) == "stopping"
+    assert run(bench, 2.0, 0.0, x=0.0) == "held"
+    bench.say("b", op="stop", robot="r1")
+    assert run(bench, 0.1) == "stopped"
+    assert run(bench, 2.5) == "stopped"
+    assert bench.report().stop.confirmed
+    assert run(bench, 0.2, 0.3) == "unconfirmed", "it moves again"
+
+
+def test_after_it_was_driven_it_may_still_move(bench):
+    drive_off(bench)
+    assert run(bench, 0.6, 0.2, x=0.0) == "settling"
+    assert run(bench, 0.6, 0.0, x=0.0) == "held"
+    assert run(bench, 0.3, 0.2, x=0.0) == "moving"
+
+
+def test_a_driven_robot_that_does_not_move_for_a_second_is_blocked(bench):
+    drive_off(bench)
+    assert run(bench, 0.9, 0.0, x=0.5) == "driven"
+    assert run(bench, 0.3, 0.0, x=0.5) == "blocked"
+    assert run(bench, 0.1, 0.3, x=0.5) == "driven"
+    assert run(bench, 1.2, 0.0, x=0.5) == "blocked"
+    assert run(bench, 0.6, 0.0, x=0.0) == "held"
+
+
+def test_without_odometry_nothing_shows_that_a_robot_is_blocked(bench):
+    drive_off(bench)
+    assert run(bench, 1.2, 0.0, x=0.5) == "blocked"
+    bench.run(0.9, lambda: bench.drive(x=0.5))
+    assert bench.report().state == "driving"
+    bench.run(0.3, lambda: bench.drive(x=0.5))
+    assert bench.report().doing != "blocked"
+
+
+def test_it_is_handed_over(bench):
+    drive_off(bench)
+    bench.say("b", op="ask", robot="r1")
+    bench.say("a", op="grant", robot="r1")
+    assert run(bench, 0.1, 0.4) == "changing"
+
+
+def test_another_program_drives_a_robot_that_nobody_drives(bench):
+    bench.run(GRACE)
+    bench.run(0.5, lambda: bench.tell(events.Echoed(KEY, OTHERS)))
+    assert bench.report().doing == "other"
+    bench.take("a")
+    assert run(bench, 0.1) == "held"
+
+
+@pytest.mark.parametrize("released", [False, True])
+def test_a_robot_with_a_goal_navigates_until_it_has_come_to_rest(bench, released):
+    bench.take("a")
+    run(bench, 0.3, x=0.0)
+    bench.goal("a")
+    held = "navigating" if released else "navigating_held"
+    if released:
+        bench.say("a", op="release", robot="r1")
+    assert run(bench, 0.3, 0.5) == held
+    assert run(bench, 0.3, 0.0) == held, "it may wait for a way"
+    id = bench.report().goal.id
+    bench.tell(events.GoalEnded("r1", id, "reached", ""))
+    rest = "free" if released else "held"
+    assert run(bench, 0.1, 0.0) == rest
+    if not released:  # else the gate does not look at the odometry
+        assert run(bench, BRAKES - 0.5, 0.3) == "settling"
+        assert run(bench, 0.6, 0.3) == "moving"
+
+
+def test_a_goal_on_a_plain_topic_counts_while_the_robot_moves():
+    bench = Bench().begin(spec(odometry_topic="/odom"))
+    bench.take("a")
+    run(bench, 0.3, x=0.0)
+    bench.goal("a")
+    assert run(bench, 0.2, 0.0) == "held"
+    assert run(bench, 0.2, 0.5) == "navigating_held"
+    assert run(bench, 0.2, 0.0) == "held"
