@@ -75,9 +75,12 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     expect(page.locator(".webmap-stop-standing")).to_contain_text("10 robots")
     expect(help_).to_be_hidden()
     reset()
-    # Esc is STOP there, too.
+    # Esc closes the help first, and is STOP then.
     page.keyboard.press("?")
     expect(help_).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(help_).to_be_hidden()
+    expect(page.locator("#card .state .holder")).to_have_text("Free")
     page.keyboard.press("Escape")
     expect(page.locator("#card .state .holder")).to_have_text("Stopped")
     expect(page.locator(".webmap-stop-standing")).to_contain_text("Robot 1 stays")

@@ -3,17 +3,15 @@ import { byId, say } from "./dom.js";
 /** @typedef {import('./console.js').Drive} Drive */
 
 /**
- * Say whether commands would arrive, how long they take, and which robots are "yours".
+ * Show whether commands would arrive, and which robots are "yours". How long they take
+ * depends on the robot, too, so the driving panel has that figure.
  *
  * @param {Drive} drive
  */
 export function showConnection(drive) {
   const link = byId("link");
-  const delay = byId("delay");
   const show = () => {
     link.dataset.link = drive.state;
-    const { delay: ms } = drive.status;
-    say(delay, drive.state === "open" && ms !== null ? `${Math.round(ms)} ms` : "");
   };
   const mark = () => {
     for (const element of document.querySelectorAll("[data-robot]")) {

@@ -28,12 +28,14 @@ class RefusedList:
     def __init__(self, element: "Element", role: str) -> None:
         self._may = role != "viewer"
         self._text = html.span()
+        self._newest = html.span(class_="newest")
         self._list = html.ul(class_="bridge-list refused-list")
-        summary = html.summary(self._text, icon("icon-chevron"))
+        summary = html.summary(self._text, self._newest, icon("icon-chevron"))
         summary.set(
             "title", "Messages of pages that were not taken. They moved nothing."
         )
         self._details = html.details(summary, self._list).set(hidden=True)
+        self._details.set("data-webmap-menu", "")
         element.append(self._details)
         self._shown: object = ()
         self.poll()
@@ -46,6 +48,7 @@ class RefusedList:
         self._shown = rows
         self._details.set(hidden=not rows)
         self._text.text = f"{refusals.total} refused"
+        self._newest.text = rows[0].last if rows else ""
         self._list.clear()
         for row in rows[:SHOWN]:
             self._list.append(line(row.by, row.count, row.last, row.at))
