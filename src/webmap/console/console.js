@@ -1,6 +1,7 @@
 import { listenToActions } from "./card_actions.js";
 import { showConnection } from "./connection.js";
 import { listenToHelp } from "./help.js";
+import { listenToList } from "./into_view.js";
 import { spreadNames } from "./names.js";
 import { listenToSearch } from "./search.js";
 import { listenToSheet, nameSheet } from "./sheet.js";
@@ -20,7 +21,6 @@ import { keepSizes, listenToTools } from "./view_tools.js";
  *
  * @typedef {object} Drive
  * @property {string} state
- * @property {{delay: number | null}} status
  * @property {ReadonlyMap<string, Report>} robots
  * @property {(kind: string, fn: () => void) => () => void} on
  * @property {(robot: string) => void} cancel
@@ -64,6 +64,7 @@ export default function attach(map, options, send) {
   ];
   listenToTools(map, options, signal);
   listenToSearch(signal);
+  listenToList(map, signal);
   listenToSheet(signal);
   return {
     destroy() {

@@ -19,6 +19,7 @@ PARTS = (
     "connection.js",
     "dom.js",
     "help.js",
+    "into_view.js",
     "names.js",
     "search.js",
     "sheet.js",
