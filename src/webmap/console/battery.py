@@ -28,8 +28,10 @@ class BatteryMark:
             viewBox="0 0 26 13",
         )
         picture.set("aria-hidden", "true")
-        self.element = html.span(picture, self._text, class_="battery", hidden=True)
-        self.element.set("aria-label", "Battery")
+        name = html.span(text="battery ", class_="unseen")
+        self.element = html.span(
+            picture, name, self._text, class_="battery", hidden=True
+        )
 
     def show(self, battery: Charge) -> None:
         """Show a charge; nothing is shown of one that is not known."""
