@@ -1,14 +1,19 @@
 """How it stands with the bridges, in words."""
 
-from types import SimpleNamespace
-
 import pytest
 
+from webmap import Bridge
 from webmap.console.bridge_list import describe_link, summary
 
 
+class FakeBridge(Bridge):
+    state, lag, trouble = "open", 0.0, None
+
+
 def bridge(state="open", lag=0.0, trouble=None):
-    return SimpleNamespace(state=state, lag=lag, trouble=trouble)
+    made = FakeBridge("ws://bob:9090")
+    made.state, made.lag, made.trouble = state, lag, trouble
+    return made
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ def test_the_first_press_drives_as_soon_as_the_page_does_not_say_so(chromium, de
     page.keyboard.down("a")
     title = page.locator(".webmap-teleop-title")
     seen, deadline = set(), time.monotonic() + 10
-    while "Driving" not in seen:
+    while "You drive" not in seen:
         assert time.monotonic() < deadline, seen
         seen.add(title.text_content())
         page.wait_for_timeout(20)

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from webmap import Bridge
-from webmap.console import RobotDescription, open_console
+from webmap import Bridge, Robot
+from webmap.console import Console, RobotDescription, open_console
 from webmap.console.fleet import make_robot
 from webmap.console.page import build
 from webmap.core.page import Page, PageEntry, site
 from webmap.errors import ConfigError
+from webmap.scene.element import Element
 from webmap.server.viewer import Viewer
 from webmap.wire.session import SceneSession
 
@@ -60,7 +61,9 @@ def on_a_page(scenario, bridge, robots):
     async def run() -> None:
         page = open_page()
         with page.scope.active():
-            build(page, [bridge], robots, None, "test")
+            opened = Console(robots)
+            build(page, [bridge], opened, None, "test", "test")
+            opened.opened(page)
         await asyncio.sleep(0)
         try:
             scenario(page)
@@ -166,3 +169,49 @@ def test_a_camera_is_asked_for_pictures_while_its_robot_is_selected(bridge, robo
 
     on_a_page(scenario, bridge, robots)
     assert not camera.watched
+
+
+def test_a_robot_that_is_gone_is_removed_until_it_is_heard_of_again(
+    bridge, robots, monkeypatch
+):
+    silent = {"Bob": 31.0, "Ann": 0.1}
+    monkeypatch.setattr(
+        Robot, "silent_for", property(lambda robot: silent.get(robot.name))
+    )
+    monkeypatch.setattr(
+        Robot, "hears_poses", lambda robot, within: silent[robot.name] < within
+    )
+    monkeypatch.setattr(Bridge, "state", "open")
+
+    async def run() -> None:
+        opened, pages = Console(robots), []
+
+        def another() -> Page:
+            page = open_page()
+            with page.scope.active():
+                build(page, [bridge], opened, None, "test", "test")
+                opened.opened(page)
+            pages.append(page)
+            return page
+
+        page = another()
+        map = page.maps[0]
+        map.set_selected(robots[0])
+        card = page.element("card")
+        assert card.get("data-state") == "gone"
+        assert "Gone since " in card.text
+        elements = (e for e in card.walk() if isinstance(e, Element))
+        button = next(e for e in elements if e.get("data-act") == "remove")
+        (press,) = button.handlers("click")
+        press(None)
+        assert map.robots == [robots[1]]
+        assert another().maps[0].robots == [robots[1]]
+        opened.bring_back()
+        assert map.robots == [robots[1]]
+        silent["Bob"] = 0.0
+        opened.bring_back()
+        assert [set(each.maps[0].robots) for each in pages] == [set(robots)] * 2
+        for each in pages:
+            each.close()
+
+    asyncio.run(run())

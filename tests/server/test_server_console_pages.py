@@ -85,10 +85,10 @@ def test_a_hundred_consoles_opened_and_closed_leave_nothing_behind(
     loop, bridge, robots, monkeypatch
 ):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
-    opened, held, names = Console(), {}, []
+    opened, held, names = Console(robots), {}, []
 
     def build(page):
-        build_console(page, [bridge], robots, None, "test")
+        build_console(page, [bridge], opened, None, "test", "test")
         opened.opened(page)
         (map,) = page.maps
         # The card with its feed and its camera, and the log: all that listens.
