@@ -162,8 +162,10 @@ describe("a refusal", () => {
   test("is shown of the chosen robot, until something else is asked for", () => {
     it.reach.refuse("r2", "take", "no", 0);
     assert.equal(it.reach.refusal, null);
-    it.reach.refuse("r1", "goal", "too far", 0);
-    assert.deepEqual([it.reach.refusal, it.reach.refused], ["too far", "goal"]);
+    it.reach.refuse("r1", "goal", "too far", 0); // shown by the tool that sent it
+    assert.equal(it.reach.refusal, null);
+    it.reach.refuse("r1", "ask", "too often", 0);
+    assert.deepEqual([it.reach.refusal, it.reach.refused], ["too often", "ask"]);
     for (const ask of [
       () => it.reach.take("r1", 0),
       () => it.reach.ask("r1"),
@@ -171,7 +173,7 @@ describe("a refusal", () => {
       () => it.reach.reset("*"),
       () => it.reach.choose("r1"),
     ]) {
-      it.reach.refuse("r1", "goal", "too far", 0);
+      it.reach.refuse("r1", "ask", "too often", 0);
       ask();
       assert.equal(it.reach.refusal, null);
     }
