@@ -251,6 +251,7 @@ class Alarm {
     };
     document.addEventListener("toggle", raise, options);
     document.addEventListener("fullscreenchange", () => this._raise(), options);
+    window.addEventListener("resize", () => this._place(), options);
   }
 
   /**
