@@ -19,6 +19,7 @@ class Link:
 
     url, name = "ws://test:9090", "test"
     lag = 0.0
+    state, replays = "open", False
 
     def __init__(self):
         self.subscribed = []
