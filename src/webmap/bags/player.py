@@ -109,7 +109,7 @@ class Player:
             self._again, self._ended = False, False
             self._woken.clear()
             self._pace = Pace(self._first, self._now(), self._rate)
-            self.replay.say(self.words)  # before what is somewhere else in a new round
+            self.replay.say(self.words)  # first, as poses jump in a new round
             soonest = self._now() + round(ROUND * SECOND)
             try:
                 await self._once()

@@ -53,7 +53,7 @@ class PoseSource:
         self.heard_at: float | None = None
         """When the newest came in, by the same clock."""
         self.expected_at: float | None = None
-        """When the newest came in of those that come also while the robot stands."""
+        """When the newest pose came that would also come from a robot at rest."""
         self.feed: OdometryFeed | None = None
         """The topic, if there is one."""
         self._owner = owner

@@ -140,7 +140,7 @@ class Robot(Driven):
 
     @property
     def silent_for(self) -> float | None:
-        """Seconds since a pose of those that come also while the robot stands.
+        """Seconds since the newest pose that would also come from a robot at rest.
 
         None if none has come: a pose of AMCL, for example, comes only after motion.
         """

@@ -47,8 +47,8 @@ FRESH = 1.0
 """Seconds for which the velocity of a pose counts."""
 
 QUIET = ("free", "barred", "down")
-"""What a robot does for the gate where the display may know better. The page has the
-same rule (``seenHere`` of web/motion/report.js)."""
+"""States of the gate that the display may replace by what it knows. The page has the
+same rule (``doingOf`` of web/motion/report.js)."""
 
 
 class RobotState(NamedTuple):

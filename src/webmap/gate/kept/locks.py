@@ -73,7 +73,7 @@ class Locks:
             try:
                 file = os.open(path, os.O_RDWR)
             except OSError:
-                continue  # it is gone, or somebody else's
+                continue  # it is gone, or another user's
             try:
                 # Another gate may have removed that file, and made it anew, meanwhile.
                 is_ours = _try_lock(file) and _is_at(file, path)

@@ -161,10 +161,10 @@ export class Desk {
   }
 }
 
-/** Inputs that Escape means something to. */
+/** Inputs in which Escape has a use of its own. */
 const TYPED = "input:not([type=checkbox], [type=radio], [type=button], [type=submit])";
 
-/** What Escape closes: menus that say so, and what the browser itself would close. */
+/** What Escape closes: elements with the attribute, and popovers of the browser. */
 const MENUS = "[data-webmap-menu], [popover]:not([popover=manual])";
 
 /**

@@ -49,7 +49,7 @@ export async function viewAsSvg(map) {
   const overlay = overlayOf(map);
   for (const child of overlay?.children ?? []) {
     if (child.classList.contains("webmap-frame")) continue;
-    // What is inside does not have this of itself.
+    // Its children have a display of their own, and would be drawn.
     if (getComputedStyle(child).display === "none") continue;
     if (child instanceof SVGSVGElement) {
       for (const part of child.children) add(part);

@@ -97,7 +97,7 @@ class LayerSwitches {
     this._take = lay(map, this._details, "top-left");
     /** @type {Map<string, HTMLElement>} */
     this._rows = new Map();
-    /** Below each layer: of how many drawings there is no switch. */
+    /** For each layer the line with the number of drawings that have no switch. */
     /** @type {Map<string, HTMLElement>} */
     this._notes = new Map();
     this._leave = map.layout.add("layers", {
@@ -169,7 +169,7 @@ class LayerSwitches {
     this._arrange();
   }
 
-  /** In the order of the layers, whichever came first; what is of one follows it. */
+  /** Sort the rows: each layer, then the drawings of that layer, then its note. */
   _arrange() {
     const rows = this._layers.flatMap(([name]) => {
       const keys = [...this._rows.keys()].filter((key) => key.split(OF)[0] === name);

@@ -137,10 +137,10 @@ export function mayReach(report) {
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }
 
-/** What a robot does for the gate where the display may know better. */
+/** States of the gate that the display may replace by what it knows. */
 const QUIET = new Set(["free", "barred", "down"]);
 
-/** What the display knows of its bridge and its poses. */
+/** States that the display derives from the bridge and the poses of a robot. */
 const SEEN = new Set([
   "no_bridge",
   "connecting",
