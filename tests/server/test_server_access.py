@@ -1,12 +1,18 @@
 import pytest
 from server_fakes import TOKEN
 
+from webmap.core.page import Viewer
 from webmap.errors import ConfigError
-from webmap.server.door import Door, GoOn, Refusal, SignedIn
+from webmap.server.access import (
+    AccessControl,
+    Redirect,
+    Refusal,
+    RequestHead,
+    Settings,
+    SignedIn,
+    redact,
+)
 from webmap.server.origins import Hosts, checked_origin
-from webmap.server.request import Request, redact
-from webmap.server.settings import Settings
-from webmap.server.viewer import Viewer
 
 HOST = "127.0.0.1:8080"
 
@@ -42,14 +48,14 @@ def scope(
     return {**made, "subprotocols": list(keys)}
 
 
-def status(door, **kwargs):
-    refusal = door.check_address(Request.of(scope(**kwargs)))
+def status(access, **kwargs):
+    refusal = access.check_address(RequestHead.of(scope(**kwargs)))
     return None if refusal is None else refusal.status
 
 
 @pytest.fixture
-def door():
-    return Door(Settings(token=TOKEN))
+def access():
+    return AccessControl(Settings(token=TOKEN))
 
 
 # The table of origins. The page is http://127.0.0.1:8080.
@@ -82,19 +88,19 @@ ORIGINS = [
 @pytest.mark.parametrize(("origin", "expected"), ORIGINS)
 @pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
 def test_only_the_very_origin_may_open_sockets_and_change_things(
-    door, origin, expected, opening
+    access, origin, expected, opening
 ):
-    assert status(door, origin=origin, **opening) == expected
+    assert status(access, origin=origin, **opening) == expected
 
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS"])
-def test_reading_needs_no_origin(door, method):
-    assert status(door, method=method) is None
+def test_reading_needs_no_origin(access, method):
+    assert status(access, method=method) is None
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "FOO", "get"])
-def test_every_other_method_needs_one(door, method):
-    assert status(door, method=method) == 403
+def test_every_other_method_needs_one(access, method):
+    assert status(access, method=method) == 403
 
 
 @pytest.mark.parametrize(
@@ -112,17 +118,19 @@ def test_every_other_method_needs_one(door, method):
         ("localhost", "https://localhost", "ws", 403),
     ],
 )
-def test_the_origin_follows_scheme_host_and_port(door, host, origin, scheme, expected):
-    got = status(door, host=[host], origin=[origin], scheme=scheme, type="websocket")
+def test_the_origin_follows_scheme_host_and_port(
+    access, host, origin, scheme, expected
+):
+    got = status(access, host=[host], origin=[origin], scheme=scheme, type="websocket")
     assert got == expected
 
 
 def test_an_origin_that_was_named_may_open_sockets():
     origin = checked_origin("https://Robots.example.com:443")
-    door = Door(Settings(token=TOKEN, origins=frozenset({origin})))
+    access = AccessControl(Settings(token=TOKEN, origins=frozenset({origin})))
     good, bad = "https://robots.example.com", "https://x.robots.example.com"
-    assert status(door, origin=[good], type="websocket") is None
-    assert status(door, origin=[bad], type="websocket") == 403
+    assert status(access, origin=[good], type="websocket") is None
+    assert status(access, origin=[bad], type="websocket") == 403
 
 
 @pytest.mark.parametrize(
@@ -165,9 +173,9 @@ HOSTS = [
 
 @pytest.mark.parametrize(("host", "expected"), HOSTS)
 @pytest.mark.parametrize("type", ["http", "websocket"])
-def test_only_known_hosts_are_answered(door, host, expected, type):
+def test_only_known_hosts_are_answered(access, host, expected, type):
     origin = [f"http://{host[0].lower()}"] if host else []
-    assert status(door, host=host, origin=origin, type=type) == expected
+    assert status(access, host=host, origin=origin, type=type) == expected
 
 
 def test_the_address_that_is_listened_on_is_a_host_and_so_are_the_extra_names():
@@ -198,22 +206,22 @@ def cookie_of(signed_in):
     return signed_in.cookie.partition(";")[0]
 
 
-def sign_in(door, *, now=0.0, **kwargs):
-    query = f"webmap_code={door.codes.issue(now)}"
-    return door.identify(Request.of(scope(query=query, **kwargs)), now)
+def sign_in(access, *, now=0.0, **kwargs):
+    query = f"webmap_code={access.codes.issue(now)}"
+    return access.identify(RequestHead.of(scope(query=query, **kwargs)), now)
 
 
-def offer(door, token, **kwargs):
-    return door.identify(Request.of(scope(query=f"token={token}", **kwargs)), 0.0)
+def offer(access, token, **kwargs):
+    return access.identify(RequestHead.of(scope(query=f"token={token}", **kwargs)), 0.0)
 
 
-def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(door):
+def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(access):
     query = f"a=1&token={TOKEN}&b=%2F"
-    to = door.identify(Request.of(scope(path="/lab", query=query)), 0.0)
-    assert isinstance(to, GoOn)
+    to = access.identify(RequestHead.of(scope(path="/lab", query=query)), 0.0)
+    assert isinstance(to, Redirect)
     assert to.location.startswith("/lab?a=1&b=%2F&webmap_code=")
     query = to.location.partition("?")[2]
-    got = door.identify(Request.of(scope(path="/lab", query=query)), 1.0)
+    got = access.identify(RequestHead.of(scope(path="/lab", query=query)), 1.0)
     assert isinstance(got, SignedIn)
     assert got.cookie.startswith("webmap_8080=")
     assert got.cookie.endswith("; Path=/; HttpOnly; SameSite=Strict")
@@ -222,100 +230,108 @@ def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(door):
     assert got.key not in got.cookie
 
 
-def test_a_code_is_good_once_and_for_two_minutes(door):
-    query = f"webmap_code={door.codes.issue(0.0)}"
-    assert isinstance(door.identify(Request.of(scope(query=query)), 119.9), SignedIn)
-    assert door.identify(Request.of(scope(query=query)), 119.9).status == 401
-    query = f"webmap_code={door.codes.issue(0.0)}"
-    assert door.identify(Request.of(scope(query=query)), 120.0).status == 401
+def test_a_code_is_good_once_and_for_two_minutes(access):
+    query = f"webmap_code={access.codes.issue(0.0)}"
+    assert isinstance(
+        access.identify(RequestHead.of(scope(query=query)), 119.9), SignedIn
+    )
+    assert access.identify(RequestHead.of(scope(query=query)), 119.9).status == 401
+    query = f"webmap_code={access.codes.issue(0.0)}"
+    assert access.identify(RequestHead.of(scope(query=query)), 120.0).status == 401
 
 
 @pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
-def test_the_key_opens_sockets_and_the_cookie_does_not(door, opening):
-    got = sign_in(door)
+def test_the_key_opens_sockets_and_the_cookie_does_not(access, opening):
+    got = sign_in(access)
     cookie = [cookie_of(got)]
-    with_cookie = Request.of(scope(cookie=cookie, **opening))
-    assert door.identify(with_cookie, 0.0).status == 401
-    with_key = Request.of(scope(keys=["webmap", got.key], **opening))
-    assert door.identify(with_key, 0.0) == got.viewer
-    assert door.identify(Request.of(scope(cookie=cookie)), 0.0) == got.viewer
+    with_cookie = RequestHead.of(scope(cookie=cookie, **opening))
+    assert access.identify(with_cookie, 0.0).status == 401
+    with_key = RequestHead.of(scope(keys=["webmap", got.key], **opening))
+    assert access.identify(with_key, 0.0) == got.viewer
+    assert access.identify(RequestHead.of(scope(cookie=cookie)), 0.0) == got.viewer
 
 
-def test_the_key_reads_no_page(door):
-    got = sign_in(door)
-    assert door.identify(Request.of(scope(keys=[got.key])), 0.0).status == 401
+def test_the_key_reads_no_page(access):
+    got = sign_in(access)
+    assert access.identify(RequestHead.of(scope(keys=[got.key])), 0.0).status == 401
 
 
-def test_the_cookie_is_bound_to_prefix_and_port_and_to_tls(door):
-    got = sign_in(door, host=["localhost"], scheme="https", root="/robots", path="/x")
+def test_the_cookie_is_bound_to_prefix_and_port_and_to_tls(access):
+    got = sign_in(access, host=["localhost"], scheme="https", root="/robots", path="/x")
     assert got.cookie.startswith("webmap_443=")
     assert got.cookie.endswith("; Path=/robots/; HttpOnly; SameSite=Strict; Secure")
 
 
-def test_the_cookie_tells_who_it_is(door):
-    cookie = cookie_of(sign_in(door))
-    got = door.identify(Request.of(scope(cookie=[f"a=b; {cookie}; c=d"])), 0.0)
+def test_the_cookie_tells_who_it_is(access):
+    cookie = cookie_of(sign_in(access))
+    got = access.identify(RequestHead.of(scope(cookie=[f"a=b; {cookie}; c=d"])), 0.0)
     assert isinstance(got, Viewer)
     assert got.role == "operator"
-    again = door.identify(Request.of(scope(cookie=["x=y", cookie])), 9.0)
+    again = access.identify(RequestHead.of(scope(cookie=["x=y", cookie])), 9.0)
     assert again == got
 
 
-def test_a_cookie_of_another_path_before_ours_does_no_harm(door):
-    cookie = cookie_of(sign_in(door))
+def test_a_cookie_of_another_path_before_ours_does_no_harm(access):
+    cookie = cookie_of(sign_in(access))
     cookies = [f"webmap_8080=old; {cookie}"]
-    assert isinstance(door.identify(Request.of(scope(cookie=cookies)), 0.0), Viewer)
+    assert isinstance(
+        access.identify(RequestHead.of(scope(cookie=cookies)), 0.0), Viewer
+    )
 
 
-def test_two_browsers_are_two_viewers(door):
+def test_two_browsers_are_two_viewers(access):
     first, second = (
-        door.identify(Request.of(scope(cookie=[cookie_of(sign_in(door))])), 0.0)
+        access.identify(RequestHead.of(scope(cookie=[cookie_of(sign_in(access))])), 0.0)
         for _ in range(2)
     )
     assert first.id != second.id
 
 
 @pytest.mark.parametrize("cookie", [[], ["webmap_8080="], ["webmap_8080=a.b"], ["="]])
-def test_without_a_cookie_nobody_comes_in(door, cookie):
-    got = door.identify(Request.of(scope(cookie=cookie)), 0.0)
+def test_without_a_cookie_nobody_comes_in(access, cookie):
+    got = access.identify(RequestHead.of(scope(cookie=cookie)), 0.0)
     assert isinstance(got, Refusal)
     assert got.status == 401
 
 
-def test_the_token_itself_is_no_cookie(door):
-    got = door.identify(Request.of(scope(cookie=[f"webmap_8080={TOKEN}"])), 0.0)
+def test_the_token_itself_is_no_cookie(access):
+    got = access.identify(RequestHead.of(scope(cookie=[f"webmap_8080={TOKEN}"])), 0.0)
     assert got.status == 401
 
 
 @pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
-def test_a_token_opens_no_socket_and_changes_nothing(door, opening):
-    assert offer(door, TOKEN, **opening).status == 401
-    assert sign_in(door, **opening).status == 401
+def test_a_token_opens_no_socket_and_changes_nothing(access, opening):
+    assert offer(access, TOKEN, **opening).status == 401
+    assert sign_in(access, **opening).status == 401
 
 
-def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_always_works(door):
+def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_always_works(access):
     for _ in range(10):
-        assert offer(door, "wrong").status == 401
-    got = offer(door, "wrong")
+        assert offer(access, "wrong").status == 401
+    got = offer(access, "wrong")
     assert (got.status, got.retry_after) == (429, 60)
-    assert isinstance(offer(door, TOKEN), GoOn)
-    assert isinstance(sign_in(door), SignedIn)
-    assert offer(door, "wrong").status == 429
+    assert isinstance(offer(access, TOKEN), Redirect)
+    assert isinstance(sign_in(access), SignedIn)
+    assert offer(access, "wrong").status == 429
 
 
-def test_who_has_signed_in_is_not_kept_out_by_the_wall(door):
-    cookie = cookie_of(sign_in(door))
+def test_who_has_signed_in_is_not_kept_out_by_the_wall(access):
+    cookie = cookie_of(sign_in(access))
     for _ in range(20):
-        door.identify(Request.of(scope(query="token=wrong")), 0.0)
-    assert isinstance(door.identify(Request.of(scope(cookie=[cookie])), 0.0), Viewer)
+        access.identify(RequestHead.of(scope(query="token=wrong")), 0.0)
+    assert isinstance(
+        access.identify(RequestHead.of(scope(cookie=[cookie])), 0.0), Viewer
+    )
 
 
-def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(door):
-    cookie = cookie_of(sign_in(door))
+def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(access):
+    cookie = cookie_of(sign_in(access))
     for _ in range(20):
-        request = Request.of(scope(query="token=wrong", cookie=[cookie], path="/lab"))
-        assert door.identify(request, 0.0) == GoOn("/lab")
-    assert offer(door, "wrong").status == 401
+        request = RequestHead.of(
+            scope(query="token=wrong", cookie=[cookie], path="/lab")
+        )
+        assert access.identify(request, 0.0) == Redirect("/lab")
+    assert offer(access, "wrong").status == 401
 
 
 @pytest.mark.parametrize(
@@ -327,14 +343,14 @@ def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(door):
         ("/é?#", "/%C3%A9%3F%23"),
     ],
 )
-def test_the_redirect_stays_on_this_origin(door, path, expected):
-    location = offer(door, TOKEN, path=path).location
+def test_the_redirect_stays_on_this_origin(access, path, expected):
+    location = offer(access, TOKEN, path=path).location
     assert location.partition("?webmap_code=")[0] == expected
 
 
-def test_refusals_never_repeat_what_was_sent(door):
+def test_refusals_never_repeat_what_was_sent(access):
     secret = "wrong-but-nearly-right"
-    got = door.identify(Request.of(scope(query=f"token={secret}")), 0.0)
+    got = access.identify(RequestHead.of(scope(query=f"token={secret}")), 0.0)
     assert secret not in got.text
 
 

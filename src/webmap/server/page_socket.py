@@ -1,17 +1,22 @@
-"""One open WebSocket: bounded both ways, and always ended with a reason."""
+"""The WebSockets of pages: bounded both ways, and always ended with a reason.
+
+Which pages have a socket, how much each may send, and how one is read and written. The
+two sockets of a page are in ``scene_socket`` and ``drive_socket``.
+"""
 
 import asyncio
 import contextlib
 import logging
+import re
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from webmap.server.bounds import Allowance, Bounds
-from webmap.server.hop import Hop
-from webmap.server.queues import Queue
-from webmap.server.request import PROTOCOL
+from webmap.server.access import PROTOCOL
+from webmap.server.outbox import BatchedCalls, DriveQueue, FrameQueue
 
 log = logging.getLogger("webmap.server")
 
@@ -34,6 +39,62 @@ _REST_PAUSE_S = 0.01
 # up itself, as its pings were not answered.
 _GONE = (WebSocketDisconnect, OSError, RuntimeError)
 
+_PAGE_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
+
+Key = tuple[str, str]
+"""A viewer and one of its pages."""
+
+REPLACED = 4001
+"""The close code of a socket whose page has opened another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What one socket may send."""
+
+    max_bytes: int
+    """The largest message, in bytes of UTF-8."""
+
+    rate: float
+    """Messages a second, over any long time."""
+
+    burst: float
+    """Messages at once. A link that stalled delivers what it held back in one go."""
+
+
+SCENE = Bounds(max_bytes=16 * 1024, rate=120.0, burst=240.0)
+# 20 commands a second for the 6 s after which a silent link is given up.
+DRIVE = Bounds(max_bytes=1024, rate=60.0, burst=120.0)
+
+
+class Allowance:
+    """What one socket has left of its bounds: a bucket that fills at a rate."""
+
+    __slots__ = ("_bounds", "_left", "_then")
+
+    def __init__(self, bounds: Bounds, now: float) -> None:
+        self._bounds = bounds
+        self._left = bounds.burst
+        self._then = now
+
+    def spend(self, text: str, now: float) -> str | None:
+        """Count one message; return why the socket must end, None if it need not.
+
+        Args:
+            text: The message.
+            now: Seconds, monotonic.
+
+        """
+        bounds = self._bounds
+        size = len(text) if text.isascii() else len(text.encode(errors="replace"))
+        if size > bounds.max_bytes:
+            return f"a message of {size} bytes, at most {bounds.max_bytes} are taken"
+        filled = self._left + (now - self._then) * bounds.rate
+        self._left, self._then = min(bounds.burst, filled) - 1.0, now
+        if self._left < 0.0:
+            return f"more than {bounds.rate:.0f} messages a second"
+        return None
+
 
 async def accept(socket: WebSocket) -> None:
     """Accept a socket, with our subprotocol if the page offers it."""
@@ -48,24 +109,29 @@ async def close(socket: WebSocket, code: int, reason: str) -> None:
             await socket.close(code, short(reason))
 
 
-class Line:
+class PageSocket:
     """A socket that has been accepted.
 
     Args:
         socket: The socket, accepted.
         name: What it is called in the log.
-        hop: The way into the socket's event loop.
+        calls: Calls functions in the socket's event loop.
         bounds: What the page may send.
         queue: Where messages for the page wait.
 
     """
 
     def __init__(
-        self, socket: WebSocket, name: str, hop: Hop, bounds: Bounds, queue: Queue
+        self,
+        socket: WebSocket,
+        name: str,
+        calls: BatchedCalls,
+        bounds: Bounds,
+        queue: FrameQueue | DriveQueue,
     ) -> None:
         self._socket = socket
         self._name = name
-        self._hop = hop
+        self._calls = calls
         self._allowance = Allowance(bounds, time.monotonic())
         self._queue = queue
         self._wake = asyncio.Event()
@@ -75,11 +141,11 @@ class Line:
 
     def offer(self, item: bytes | str) -> None:
         """Send a message soon; callable from any thread."""
-        self._hop.call(self._put, item)
+        self._calls.call(self._put, item)
 
     def end(self, code: int, reason: str) -> None:
         """End the socket and say why; callable from any thread."""
-        self._hop.call(self._end, code, reason)
+        self._calls.call(self._end, code, reason)
 
     async def refuse(self, code: int, reason: str) -> None:
         """End the socket before anything was carried, and say why."""
@@ -208,6 +274,59 @@ class Line:
         await close(self._socket, code, reason)
 
 
+def page_id_of(query: Mapping[str, str]) -> str | None:
+    """Return what a page calls itself; None if it is not an identifier."""
+    page_id = query.get("id", "")
+    return page_id if _PAGE_ID.fullmatch(page_id) else None
+
+
 def short(reason: str) -> str:
     """Return a reason that fits into a close frame, which has room for 123 bytes."""
     return reason.encode()[:123].decode(errors="ignore")
+
+
+class OpenSockets:
+    """The sockets of one kind that are open now: one for each page.
+
+    Args:
+        limit: How many pages may have one at once.
+
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._sockets: dict[Key, PageSocket] = {}
+
+    def __len__(self) -> int:
+        return len(self._sockets)
+
+    def add(self, key: Key, socket: PageSocket) -> bool:
+        """Add a page's socket; False if too many other pages have one.
+
+        It replaces the socket that this page had before, which may be one that the
+        network has lost while nobody has noticed yet.
+        """
+        before = self._sockets.get(key)
+        if before is None and len(self._sockets) >= self._limit:
+            return False
+        self._sockets[key] = socket
+        if before is not None:
+            before.end(REPLACED, "this page has been opened again")
+        return True
+
+    def remove(self, key: Key, socket: PageSocket) -> None:
+        """Remove a page's socket, unless another has replaced it."""
+        if self._sockets.get(key) is socket:
+            del self._sockets[key]
+
+    @asynccontextmanager
+    async def holding(self, key: Key, socket: PageSocket) -> AsyncIterator[bool]:
+        """Count a socket as open within an ``async with`` block.
+
+        Gives False if too many other pages have one.
+        """
+        added = self.add(key, socket)
+        try:
+            yield added
+        finally:
+            self.remove(key, socket)

@@ -1,7 +1,16 @@
-"""What waits to be sent to one page: decisions without I/O."""
+"""What waits to be sent to a page, and how other threads hand it over.
 
+Nothing here does I/O but to wake the event loop of the sockets.
+"""
+
+import asyncio
+import logging
+import weakref
 from collections import deque
-from typing import Protocol
+from collections.abc import Callable
+from functools import partial
+
+log = logging.getLogger("webmap.server")
 
 FRAMES = 8
 FRAME_BYTES = 1024 * 1024
@@ -9,16 +18,6 @@ MESSAGES = 1024
 MESSAGE_BYTES = 1024 * 1024
 
 _TICK = '{"op":"tick"'
-
-
-class Queue(Protocol):
-    """A bounded queue of finished messages."""
-
-    def put(self, item: bytes | str) -> bool:
-        """Take one; False if there is no room, and the page must go."""
-
-    def pop(self) -> bytes | str | None:
-        """Return what is sent next; None if nothing waits."""
 
 
 class FrameQueue:
@@ -85,3 +84,56 @@ class DriveQueue:
         item = self._waiting.popleft()
         self._size -= len(item)
         return item
+
+
+class BatchedCalls:
+    """Calls functions in one event loop, in order, waking it once for many.
+
+    A tick of the model offers frames to every viewer: fifty wake-ups would cost more
+    than the frames.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = weakref.ref(loop)
+        self._calls: deque[Callable[[], object]] = deque()
+        self._woken = False
+
+    def call(self, fn: Callable[..., object], /, *args: object) -> None:
+        """Call ``fn`` soon; callable from any thread, nothing if the loop has ended."""
+        self._calls.append(partial(fn, *args))
+        # Set after appending and cleared before draining, so no call is left behind.
+        if self._woken:
+            return
+        self._woken = True
+        loop = self._loop()
+        try:
+            if loop is None:
+                raise RuntimeError("the loop is gone")
+            loop.call_soon_threadsafe(self._drain)
+        except RuntimeError:
+            self._calls.clear()
+            self._woken = False
+
+    def _drain(self) -> None:
+        self._woken = False
+        for _ in range(len(self._calls)):
+            try:
+                self._calls.popleft()()
+            except Exception:
+                log.exception("a message to a page failed")
+
+
+class BatchedCallsByLoop:
+    """One :class:`BatchedCalls` for each event loop that serves."""
+
+    def __init__(self) -> None:
+        self._by_loop: weakref.WeakKeyDictionary[
+            asyncio.AbstractEventLoop, BatchedCalls
+        ] = weakref.WeakKeyDictionary()
+
+    def of_this_loop(self) -> BatchedCalls:
+        """Return the one whose functions are called in the running loop."""
+        loop = asyncio.get_running_loop()
+        if loop not in self._by_loop:
+            self._by_loop[loop] = BatchedCalls(loop)
+        return self._by_loop[loop]

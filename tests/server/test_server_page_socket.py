@@ -4,11 +4,24 @@ import threading
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.server.bounds import DRIVE, SCENE, Allowance, Bounds
-from webmap.server.hop import Hop, Hops
-from webmap.server.line import short
-from webmap.server.queues import FRAME_BYTES, FRAMES, MESSAGES, DriveQueue, FrameQueue
-from webmap.server.seats import REPLACED, Seats
+from webmap.server.outbox import (
+    FRAME_BYTES,
+    FRAMES,
+    MESSAGES,
+    BatchedCalls,
+    BatchedCallsByLoop,
+    DriveQueue,
+    FrameQueue,
+)
+from webmap.server.page_socket import (
+    DRIVE,
+    REPLACED,
+    SCENE,
+    Allowance,
+    Bounds,
+    OpenSockets,
+    short,
+)
 
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
@@ -107,32 +120,32 @@ class Guest:
         self.told.append(code)
 
 
-def test_a_page_that_opens_again_takes_its_own_seat_over():
-    seats, old, new = Seats(1), Guest(), Guest()
-    assert seats.take(("v", "p"), old)
-    assert seats.take(("v", "p"), new)
+def test_a_page_that_opens_again_replaces_its_own_socket():
+    sockets, old, new = OpenSockets(1), Guest(), Guest()
+    assert sockets.add(("v", "p"), old)
+    assert sockets.add(("v", "p"), new)
     assert (old.told, new.told) == ([REPLACED], [])
-    seats.leave(("v", "p"), old)
-    assert len(seats) == 1
-    seats.leave(("v", "p"), new)
-    assert len(seats) == 0
+    sockets.remove(("v", "p"), old)
+    assert len(sockets) == 1
+    sockets.remove(("v", "p"), new)
+    assert len(sockets) == 0
 
 
-def test_there_are_so_many_seats_and_no_more():
-    seats, first, second = Seats(1), Guest(), Guest()
-    assert seats.take(("v", "p"), first)
-    assert not seats.take(("w", "p"), second)
-    seats.leave(("w", "p"), second)
-    seats.leave(("v", "p"), first)
-    assert seats.take(("w", "p"), second)
+def test_there_are_so_many_sockets_and_no_more():
+    sockets, first, second = OpenSockets(1), Guest(), Guest()
+    assert sockets.add(("v", "p"), first)
+    assert not sockets.add(("w", "p"), second)
+    sockets.remove(("w", "p"), second)
+    sockets.remove(("v", "p"), first)
+    assert sockets.add(("w", "p"), second)
 
 
-def test_a_hop_keeps_order_over_threads_and_wakes_the_loop_once():
+def test_calls_keep_order_over_threads_and_wakes_the_loop_once():
     async def scenario():
         seen = []
-        hop = Hops().here()
+        calls = BatchedCallsByLoop().of_this_loop()
         thread = threading.Thread(
-            target=lambda: [hop.call(seen.append, n) for n in range(1000)]
+            target=lambda: [calls.call(seen.append, n) for n in range(1000)]
         )
         thread.start()
         thread.join()
@@ -147,9 +160,9 @@ def test_a_hop_keeps_order_over_threads_and_wakes_the_loop_once():
 def test_a_call_that_fails_does_not_stop_the_next(caplog):
     async def scenario():
         seen = []
-        hop = Hops().here()
-        hop.call(lambda: 1 / 0)
-        hop.call(seen.append, 1)
+        calls = BatchedCallsByLoop().of_this_loop()
+        calls.call(lambda: 1 / 0)
+        calls.call(seen.append, 1)
         await asyncio.sleep(0)
         await asyncio.sleep(0)
         return seen
@@ -158,21 +171,21 @@ def test_a_call_that_fails_does_not_stop_the_next(caplog):
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_a_hop_into_a_loop_that_has_ended_does_nothing_and_keeps_nothing():
+def test_a_call_into_a_loop_that_has_ended_does_nothing_and_keeps_nothing():
     loop = asyncio.new_event_loop()
-    hop = Hop(loop)
+    calls = BatchedCalls(loop)
     loop.close()
-    hop.call(print, "never")
-    hop.call(print, "never")
-    assert not hop._calls
+    calls.call(print, "never")
+    calls.call(print, "never")
+    assert not calls._calls
 
 
 def test_each_loop_has_one_hop():
-    hops = Hops()
+    hops = BatchedCallsByLoop()
 
     async def same():
-        assert hops.here() is hops.here()
-        return hops.here()
+        assert hops.of_this_loop() is hops.of_this_loop()
+        return hops.of_this_loop()
 
     assert asyncio.run(same()) is not asyncio.run(same())
 
