@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.cli.fleet.lines import Lines
+from webmap.config.toml_text import Lines
 
 # Each number is the line that it stands on.
 EVERYTHING = r'''# a comment with [brackets] = "and" {more}

@@ -1,16 +1,16 @@
 """What a button does, from its configuration: one call, one message or one value."""
 
-import difflib
+import json
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from webmap.core.motion import roads
-from webmap.core.parameter_values import value_kind
+from webmap.config.checks import Mistakes, Way, did_you_mean
 from webmap.errors import ConfigError
-from webmap.ros import ops
-from webmap.ros.form_fields import UnknownType, fields_of
-from webmap.ros.message_forms import FormError, checked
+from webmap.ros.conforming import Misfit
+from webmap.ros.definitions import UnknownType
+from webmap.ros.message_forms import checked, fields_of
 from webmap.ros.moving import moved_by_both, moved_by_name, moved_by_type
 from webmap.ros.names import normalise_topic, split_type
 
@@ -29,6 +29,40 @@ _KEYS: dict[Kind, tuple[str, ...]] = {
     "topic": (*_COMMON, "topic", "type", "message"),
     "parameter": (*_COMMON, "parameter", "node", "value"),
 }
+
+
+def value_kind(value: Any) -> tuple[int, str]:
+    """Return how ROS 2 calls the kind of a parameter's value: number and field.
+
+    Raises:
+        ConfigError: If a parameter cannot have such a value.
+
+    """
+    for cls, number, name in (
+        (bool, 1, "bool_value"),
+        (int, 2, "integer_value"),
+        (float, 3, "double_value"),
+        (str, 4, "string_value"),
+    ):
+        if isinstance(value, cls):
+            _check_number(value)
+            return number, name
+    if isinstance(value, list) and value:
+        kinds = {value_kind(each)[0] for each in value}
+        if kinds <= {1, 2, 3, 4} and (len(kinds) == 1 or kinds == {2, 3}):
+            kind = 3 if kinds == {2, 3} else kinds.pop()
+            names = {1: "bool", 2: "integer", 3: "double", 4: "string"}
+            return kind + 5, f"{names[kind]}_array_value"
+    raise ConfigError(
+        f"got {value!r}, expected true, false, a number, a text or a list of one kind"
+    )
+
+
+def _check_number(value: Any) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(f"got {value}, expected a finite number")
+    if isinstance(value, int) and abs(value) >= 2**63:
+        raise ConfigError("a whole number has 64 bits")
 
 
 class ButtonMistake(ConfigError):
@@ -99,6 +133,28 @@ def read_buttons(data: Iterable[Mapping[str, Any]]) -> list[ButtonSpec]:
     return specs
 
 
+def check_buttons(buttons: Iterable[Any], way: Way, mistakes: Mistakes) -> None:
+    """Note all mistakes in buttons.
+
+    Args:
+        buttons: A table for each.
+        way: The way to all of them.
+        mistakes: Where every mistake goes.
+
+    """
+    first: dict[str, int] = {}
+    for index, each in enumerate(buttons):
+        try:
+            label = read_button(each).label
+        except ButtonMistake as error:
+            key = tuple(part for part in error.key.split(".") if part)
+            mistakes.add((*way, index, *key), error.words)
+            continue
+        if first.setdefault(label, index) != index:
+            words = f'got "{label}", expected a label that no other button has'
+            mistakes.add((*way, index, "label"), words)
+
+
 def read_button(data: Mapping[str, Any]) -> ButtonSpec:
     """Return what one button does.
 
@@ -117,8 +173,7 @@ def read_button(data: Mapping[str, Any]) -> ButtonSpec:
     kind = kinds[0]
     for key in data:
         if key not in _KEYS[kind]:
-            near = difflib.get_close_matches(str(key), _KEYS[kind], n=1)
-            hint = f'; did you mean "{near[0]}"?' if near else ""
+            hint = did_you_mean(key, _KEYS[kind])
             listed = ", ".join(_KEYS[kind])
             raise ButtonMistake(str(key), f"no such key{hint}; there are {listed}")
     form = _flag(data, "form")
@@ -167,26 +222,6 @@ def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
         f"{what} carries {moved}, and a button may not write that: it goes through "
         "the gate, by driving, by a goal or by STOP"
     )
-
-
-def declared_motion(spec: ButtonSpec, url: str) -> str | None:
-    """Return why a button may not act, by what robots were declared to be moved by.
-
-    Args:
-        spec: What it would do.
-        url: The address of its bridge.
-
-    """
-    if spec.kind == "parameter":
-        return None
-    for road in list(roads):
-        carried = road.writes(url).get(spec.name)
-        if carried is not None:
-            return (
-                f"{spec.name} carries {carried}, and a button may not write that: "
-                "the gate does"
-            )
-    return None
 
 
 def _label(data: Mapping[str, Any]) -> str:
@@ -289,9 +324,11 @@ def _check_values(spec: ButtonSpec) -> None:
     try:
         if fields is not None:
             checked(fields, spec.values)
-        ops.publish("/", spec.values)
-    except FormError as error:
+        json.dumps(spec.values, allow_nan=False, ensure_ascii=False).encode()
+    except Misfit as error:
         raise ButtonMistake(f"{key}.{error.path}", error.words) from None
+    except RecursionError:
+        raise ButtonMistake(key, "it is nested too deeply") from None
     except (TypeError, ValueError) as error:
         raise ButtonMistake(key, f"no JSON can hold it: {error}") from None
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.cli.fleet.secrets import readable_secret
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare
+from webmap.config.secrets import readable_secret
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "b"\n'
 CAMERA = 'cameras = ["http://{}"]\n'

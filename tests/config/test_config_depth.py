@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.cli.fleet.checks import MOST_MISTAKES
-from webmap.cli.fleet.depth import DEEPEST, too_deep
-from webmap.cli.fleet.file import LARGEST, FleetText, read_fleet
-from webmap.cli.fleet.lines import Lines
+from webmap.cli.fleet import prepare
+from webmap.config.checks import MOST_MISTAKES
+from webmap.config.toml_text import DEEPEST, LARGEST, FleetText, Lines, too_deep
 from webmap.errors import ConfigError
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n'
@@ -37,7 +36,7 @@ def test_what_is_nested_very_deep_is_refused_at_once_with_its_line(tmp_path, lin
     file.write_text(f"{HEAD}\n{line}\n")
     began = time.process_time()
     with pytest.raises(ConfigError) as refused:
-        read_fleet(file)
+        prepare(file)
     assert time.process_time() - began < 0.5
     assert f"fleet.toml:4: keys and values are nested {DEEPEST} deep" in str(
         refused.value
@@ -71,14 +70,14 @@ def test_a_file_that_is_too_large_is_refused(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text("#" * (LARGEST + 1))
     with pytest.raises(ConfigError, match="the file is larger than 512 KiB"):
-        read_fleet(file)
+        prepare(file)
 
 
 def test_of_very_many_mistakes_the_first_are_named_and_the_others_counted(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(HEAD + "[[robots]]\n" + "".join(f"k{n} = 1\n" for n in range(5000)))
     with pytest.raises(ConfigError) as refused:
-        read_fleet(file)
+        prepare(file)
     lines = str(refused.value).splitlines()
     assert len(lines) == MOST_MISTAKES + 1
     assert "robots[0].k0: there is no key" in lines[0]
