@@ -3,7 +3,7 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.robot_and_pose import robot_and_pose
+from webmap.core.given_pose import robot_and_pose
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

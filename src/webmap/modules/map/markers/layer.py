@@ -3,52 +3,117 @@
 import asyncio
 import logging
 import time
-from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
-import msgspec
-
-from webmap.core.layer import Layer
-from webmap.core.layer_names import short
-from webmap.core.marker_frames import MarkerFrames
-from webmap.core.marker_shapes import lies_unturned, look_of, place, shape_of
-from webmap.core.refusals import refusing
-from webmap.errors import ConfigError, ProtocolError, WebMapError
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages_marker import (
+from webmap.core.declaration import TopicKind, layer
+from webmap.core.layer_frames import LayerFrames, not_known
+from webmap.core.map_layer import MapLayer
+from webmap.errors import ProtocolError, WebMapError
+from webmap.geometry import Pose
+from webmap.modules.map.markers.messages import (
     ADD,
     DELETE,
     DELETE_ALL,
+    MarkerArrayMsg,
     MarkerMsg,
 )
-from webmap.ros.names import split_type
+from webmap.modules.map.markers.shapes import lies_unturned, look_of, place, shape_of
 from webmap.scene.element import Element
 from webmap.scope import Removal, keep
-from webmap.tf import Transform
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
+from webmap.tf import Transform, TransformError
 
 log = logging.getLogger("webmap.modules")
 
+Put = Callable[[Transform], object]
+"""Puts a marker where its frame is now."""
+
+
+@dataclass(slots=True)
+class _Moving:
+    frame: str
+    stamp: float
+    locked: bool
+    put: Put
+
+
+class MarkerFrames(LayerFrames):
+    """Tells where the frames of markers are on the map, and which of them move."""
+
+    def _begin(self) -> None:
+        self._moving: dict[object, _Moving] = {}
+        self._lost: dict[str, str] = {}
+
+    def place(
+        self, key: object, frame_id: str, stamp: float, locked: bool, put: Put
+    ) -> Transform:
+        """Return what takes coordinates of a marker's frame to those of the map.
+
+        Args:
+            key: Of the marker.
+            frame_id: Its frame; empty if it does not say.
+            stamp: When the frame is meant, in seconds of the robot's clock; 0 for now.
+            locked: Whether the marker goes on moving with the frame.
+            put: Called when the frame has moved, or is known at last.
+
+        """
+        self._moving.pop(key, None)
+        source = self._source(frame_id)
+        if source is None:
+            return Transform()
+        stamp = 0.0 if locked else stamp
+        found, settled = self._find(source, stamp)
+        if locked or not settled:
+            self._moving[key] = _Moving(source, stamp, locked, put)
+        return found
+
+    def forget(self, key: object) -> None:
+        """Forget a marker that is gone."""
+        self._moving.pop(key, None)
+
+    def say(self) -> None:
+        """Say which frames nobody tells of, or take that back."""
+        needed = {moving.frame for moving in self._moving.values()}
+        self._lost = {f: words for f, words in self._lost.items() if f in needed}
+        words = ""
+        if self._lost:
+            frame, why = next(iter(self._lost.items()))
+            more = len(self._lost) - 1
+            words = not_known(frame, why) + f" (and {more} more)" * bool(more)
+        self._say(words)
+
+    def _news(self) -> None:
+        if not self._moving:
+            return
+        places: dict[tuple[str, float], tuple[Transform, bool]] = {}
+        for key, each in tuple(self._moving.items()):
+            asked = (each.frame, each.stamp)
+            if asked not in places:
+                places[asked] = self._find(*asked)
+            found, settled = places[asked]
+            each.put(found)
+            if settled and not each.locked:
+                self.forget(key)
+        self.say()
+
+    def _find(self, source: str, stamp: float) -> tuple[Transform, bool]:
+        """Return where a frame is, and whether news would not change that."""
+        try:
+            found = self._look(source, stamp)
+        except TransformError as error:
+            if source not in self._lost:
+                self._lost[source] = str(error)
+            return Transform(), False
+        self._lost.pop(source, None)
+        return found
+
+    def _align(self, aligned: Pose) -> None:
+        self._layer.svg.set_pose(aligned.x, aligned.y, aligned.yaw)
+
+
 MAX_MARKERS = 5000
 """The most markers that one topic may show."""
-
-NEVER = 1e9
-"""Seconds after which markers without an age limit are drawn as old."""
-
-
-class FramedMarkerMsg(MarkerMsg, frozen=True, kw_only=True):
-    """A marker that says whether it moves with its frame."""
-
-    frame_locked: bool = False
-
-
-class FramedMarkerArrayMsg(msgspec.Struct, frozen=True):
-    """``visualization_msgs/MarkerArray``."""
-
-    separable: ClassVar = True
-    markers: list[FramedMarkerMsg]
 
 
 MarkerType: TypeAlias = Literal[
@@ -59,9 +124,9 @@ MarkerType: TypeAlias = Literal[
 ]
 """The types that have markers, in either dialect."""
 
-VIEWS: dict[str, type[FramedMarkerMsg] | type[FramedMarkerArrayMsg]] = {
-    "visualization_msgs/MarkerArray": FramedMarkerArrayMsg,
-    "visualization_msgs/Marker": FramedMarkerMsg,
+VIEWS: dict[str, type[MarkerMsg] | type[MarkerArrayMsg]] = {
+    "visualization_msgs/MarkerArray": MarkerArrayMsg,
+    "visualization_msgs/Marker": MarkerMsg,
 }
 
 Key = tuple[str, int]
@@ -82,8 +147,15 @@ _MOVED = "moved"
 """The problem of markers that cannot be drawn where their frames have got to."""
 
 
-class Markers:
-    """Draws ``visualization_msgs/MarkerArray`` or ``Marker`` as it looks from above.
+@layer(
+    *VIEWS,
+    view=VIEWS,
+    kinds=[TopicKind("markers")],
+    switch="Markers",
+    rank=120,
+)
+class Markers(MapLayer):
+    """What ROS programs draw to show what they think, as it looks from above.
 
     Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and
     texts are drawn, with their colours; meshes are not. A marker that makes no sense
@@ -98,68 +170,22 @@ class Markers:
     Style it by CSS: ``.markers > .marker``, with the type as a further class
     (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in
     ``data-ns``: ``.marker[data-ns="goals"] { display: none }``.
-
-    Args:
-        map: The map.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic.
-        type: ``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``.
-        age_limit: Seconds after which all of them are drawn as old; None for what is
-            sent but once.
-        map_frame: The map's own frame, to which ``/tf`` of the bridge leads; None to
-            draw all markers with the numbers that they come with.
-        namespace: ``/robot_0`` where frames are told on ``/robot_0/tf``.
-        robot: Whose markers they are: they lie as it is aligned, and as their bridge is
-            if they are nobody's own.
-        order: What lies over what: greater is nearer; robots have 100.
-
-    Raises:
-        ConfigError: If the type has no markers.
-
     """
 
-    def __init__(
-        self,
-        map: "Map",
-        bridge: Bridge,
-        topic: str,
-        *,
-        type: MarkerType = "visualization_msgs/MarkerArray",
-        age_limit: float | None = None,
-        map_frame: str | None = "map",
-        namespace: str = "",
-        robot: "Robot | None" = None,
-        order: float = 50.0,
-    ) -> None:
-        known = str(split_type(type))
-        if known not in VIEWS:
-            raise ConfigError(f"type is one of {', '.join(VIEWS)}, got {type!r}")
-        self.map = map
-        self.layer = MarkerLayer.shared(
-            bridge, topic, known, age_limit, map_frame, namespace, robot
+    # Every message counts: one may take away what another has put there.
+    queue_length = 100
+
+    type: MarkerType = "visualization_msgs/MarkerArray"
+    """``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``."""
+
+    def lay(self) -> None:
+        """Lay the layer onto the common map, and each marker where its frame is."""
+        self.frames = MarkerFrames(
+            self, self.bridge, self.map_frame, self.namespace, self.robot
         )
-        self.layer.show_on(map, order=order)
 
-
-class MarkerLayer(Layer):
-    """The markers of one topic, for all maps that show them."""
-
-    def __init__(
-        self,
-        bridge: Bridge,
-        topic: str,
-        type: str,
-        age_limit: float | None,
-        map_frame: str | None,
-        namespace: str,
-        robot: "Robot | None" = None,
-    ) -> None:
-        super().__init__()
-        self.frames = MarkerFrames(self, bridge, map_frame, namespace, robot)
-        self.bridge = bridge
-        self.topic = topic
-        self.type = type
-        self.age_limit = NEVER if age_limit is None else age_limit
+    def build(self) -> None:
+        """Make ready; there are no markers yet."""
         self.shapes: dict[Key, Element] = {}
         """What is drawn, by namespace and number."""
         self._looks: dict[Key, tuple[object, ...]] = {}
@@ -169,34 +195,20 @@ class MarkerLayer(Layer):
         self._left_out: set[Key] = set()
         """Markers that would be beyond :data:`MAX_MARKERS`."""
         self._count_timer: asyncio.TimerHandle | None = None
-        self.svg.classes.add("markers")
-        self.svg.set("data-layer", short(topic, "" if robot is None else robot.name))
-        self.svg.set(pointer_events="none")
-
-    def start(self) -> None:
-        """Subscribe to the markers."""
         keep(Removal(self._forget_timer))
         keep(Removal(self._forget_count))
         keep(Removal(lambda: self.clear_problem(_MOVED)))
         keep(Removal(lambda: self.clear_problem(_LEFT_OUT)))
-        # Every message counts: one may take away what another has put there.
-        self.bridge.subscribe(
-            self.topic,
-            refusing(self, self.topic, self.on_markers),
-            self.type,
-            decode=VIEWS[self.type],
-            queue_length=100,
-        )
 
-    def on_markers(self, message: FramedMarkerArrayMsg | FramedMarkerMsg) -> None:
+    def take(self, message: MarkerArrayMsg | MarkerMsg) -> None:
         """Add, change and delete as the markers say.
 
         Raises:
             ProtocolError: If there is one that makes no sense; the others are drawn.
 
         """
-        single = isinstance(message, FramedMarkerMsg)
-        markers = [message] if isinstance(message, FramedMarkerMsg) else message.markers
+        single = isinstance(message, MarkerMsg)
+        markers = [message] if isinstance(message, MarkerMsg) else message.markers
         wrong: list[str] = []
         self.clear_problem(_MOVED)
         for marker in markers:
@@ -206,12 +218,12 @@ class MarkerLayer(Layer):
                 wrong.append(_wrong(marker, error))
         self.frames.say()
         self._set_timer()
-        self.svg.set_age(self.bridge.lag, limit=self.age_limit)
+        self.be_new()
         if wrong:
             more = "" if single else f" ({len(wrong)} of {len(markers)} are left out)"
             raise ProtocolError(wrong[0] + more)
 
-    def _take(self, marker: FramedMarkerMsg) -> None:
+    def _take(self, marker: MarkerMsg) -> None:
         key = (marker.ns, marker.id)
         if len(marker.ns) > LONGEST_NAME:
             raise ProtocolError(
@@ -233,7 +245,7 @@ class MarkerLayer(Layer):
                 f"{marker.action}"
             )
 
-    def _put(self, key: Key, marker: FramedMarkerMsg) -> None:
+    def _put(self, key: Key, marker: MarkerMsg) -> None:
         if key not in self.shapes and len(self.shapes) >= MAX_MARKERS:
             self._leave_out(key)
             return

@@ -1,12 +1,15 @@
-"""What lies in space, as it is seen from above."""
+"""Points, outlines and numbers for what layers draw; public as ``webmap.drawing``.
+
+Lengths are in metres and angles in radians.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from webmap.errors import ProtocolError
-from webmap.geometry import Vector3
-from webmap.geometry.reach import FARTHEST
+from webmap.geometry import FARTHEST, Vector3
+from webmap.ros.messages import PointMsg
 from webmap.tf import Transform
 
 if TYPE_CHECKING:
@@ -16,19 +19,16 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 RIM = 24
-"""Points that stand for what is round."""
+"""Points of the outline of something round."""
+
+UNIT = 0.001
+"""Metres per unit of dots, as long as all points fit in 16 bits."""
+
+MOST = 32767
+"""Units that a number of 16 bits holds."""
 
 
-class _Numbers(Protocol):
-    @property
-    def x(self) -> float: ...
-    @property
-    def y(self) -> float: ...
-    @property
-    def z(self) -> float: ...
-
-
-def in_space(points: Iterable[_Numbers]) -> list[Vector3]:
+def in_space(points: Iterable[Vector3 | PointMsg]) -> list[Vector3]:
     """Return points with a height; one whose height is no number lies in the plane.
 
     Raises:
@@ -169,6 +169,74 @@ def ellipsoid(size: Sequence[float], tilt: Transform) -> tuple[float, float, flo
     middle, apart = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
     yaw = 0.5 * math.atan2(2 * xy, xx - yy)
     return math.sqrt(middle + apart), math.sqrt(max(0.0, middle - apart)), yaw
+
+
+def in_units(points: "NDArray[np.float64]") -> "tuple[NDArray[np.int16], float]":
+    """Return points in whole units, and how many metres a unit is.
+
+    Args:
+        points: Of shape (N, 2), in metres.
+
+    Returns:
+        Little-endian numbers of the same shape; their bytes and the unit are what
+        :meth:`webmap.Element.set_dots` takes.
+
+    """
+    farthest = float(abs(points).max()) if len(points) else 0.0
+    unit = max(UNIT, farthest / MOST)
+    return (points / unit).round().astype("<i2"), unit
+
+
+def rounded(value: float) -> float:
+    """Return metres to the millimetre, which is short on the wire."""
+    return round(value, 3) + 0.0
+
+
+def check_finite(points: list[tuple[float, float]], what: str) -> None:
+    """Let points pass that can be drawn.
+
+    Raises:
+        ProtocolError: If one is not finite, or farther away than anything can be; it
+            is named by its number.
+
+    """
+    for number, (x, y) in enumerate(points):
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise ProtocolError(
+                f"{what} must be of finite numbers, got ({x}, {y}) as point {number} "
+                f"of {len(points)}"
+            )
+        if max(abs(x), abs(y)) > FARTHEST:
+            raise ProtocolError(
+                f"{what} must be within {FARTHEST:g} m of the origin, got ({x:g}, "
+                f"{y:g}) as point {number} of {len(points)}"
+            )
+
+
+def thinned(count: int, most: int) -> range | list[int]:
+    """Return which of ``count`` things to keep: evenly chosen, and the last one."""
+    if count <= most:
+        return range(count)
+    step = count / most
+    return [*(int(i * step) for i in range(most - 1)), count - 1]
+
+
+def sector(radius: float, half: float) -> str | None:
+    """Return the path of a sector about x; None if it has no size.
+
+    Args:
+        radius: Metres.
+        half: Half its angle, in radians; all round from pi on.
+
+    """
+    if radius <= 0 or half < 1e-4:
+        return None
+    half = min(half, math.pi - 1e-3)
+    x, y = radius * math.cos(half), radius * math.sin(half)
+    large = int(half > math.pi / 2)
+    return (
+        f"M0 0L{x:.4f} {-y:.4f}A{radius:.4f} {radius:.4f} 0 {large} 1 {x:.4f} {y:.4f}z"
+    )
 
 
 _BOTH = (-1.0, 1.0)
