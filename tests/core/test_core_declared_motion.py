@@ -3,7 +3,8 @@
 import pytest
 
 import webmap
-from webmap.core.button_spec import ButtonSpec, declared_motion
+from webmap.config.buttons import ButtonSpec
+from webmap.core.robot_button import declared_motion
 
 HALL = "ws://core-buttons:9090"
 
