@@ -58,7 +58,8 @@ types: $(DEV) $(NODE)
 .PHONY: contracts
 contracts: $(DEV)
 	$(BIN)/lint-imports --no-logo
-	$(PY) tools/make_opcodes.py --check
+	$(PY) tools/make_javascript.py --check
+	$(PY) tools/make_layers_page.py --check
 
 ## test-fast: the tests that need neither a browser nor a peer nor a quiet machine
 .PHONY: test-fast

@@ -10,9 +10,12 @@ import json
 import sys
 import threading
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.frames import ODOM, TYPES
+
+if TYPE_CHECKING:
+    from webmap.ros.subscriptions import Encoding
 
 WARM = 200
 """Frames that are not counted."""
@@ -63,14 +66,14 @@ def listen_with_roslibpy(port: int, topic: str, meter: Meter) -> None:
 
 
 def listen_with_webmap(
-    port: int, topic: str, meter: Meter, compression: str | None
+    port: int, topic: str, meter: Meter, encoding: "Encoding | None"
 ) -> None:
     """Take the messages as WebMap's own modules do: typed, the ranges an array."""
-    asyncio.run(_listen_with_webmap(port, topic, meter, compression))
+    asyncio.run(_listen_with_webmap(port, topic, meter, encoding))
 
 
 async def _listen_with_webmap(
-    port: int, topic: str, meter: Meter, compression: str | None
+    port: int, topic: str, meter: Meter, encoding: "Encoding | None"
 ) -> None:
     from webmap import Bridge
     from webmap.ros.messages import LaserScanMsg, OdometryMsg
@@ -96,7 +99,7 @@ async def _listen_with_webmap(
         on_odometry if topic == ODOM else on_scan,
         TYPES[topic],
         decode=OdometryMsg if topic == ODOM else LaserScanMsg,
-        compression=compression,
+        encoding=encoding,
     )
     bridge.start(asyncio.get_running_loop())
     async with asyncio.timeout(120):
@@ -110,8 +113,8 @@ def main(client: str, port: int, topic: str, count: int) -> None:
     if client == "roslibpy":
         listen_with_roslibpy(port, topic, meter)
     else:
-        compression = "none" if client == "webmap-json" else None
-        listen_with_webmap(port, topic, meter, compression)
+        encoding: Encoding | None = "text" if client == "webmap-json" else None
+        listen_with_webmap(port, topic, meter, encoding)
     print(json.dumps(meter.figures()), flush=True)
 
 

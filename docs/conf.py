@@ -27,7 +27,8 @@ nitpick_ignore_regex = [
     ("py:.*", r"(?!webmap\b).*"),
     # Types in signatures that nobody makes or holds.
     ("py:class", r"webmap\.core\.page\.PageEntry"),
-    ("py:class", r"webmap\.core\.page_ports\.(PageChannel|Publisher)"),
+    ("py:class", r"webmap\.core\.pictures\.Publisher"),
+    ("py:class", r"webmap\.wire\.session\.SceneSession"),
     ("py:class", r"webmap\.core\.given_pose\.(Position|Orientation)"),
     ("py:class", r"webmap\.scene\.(node\.Node|live\.Live)"),
     ("py:class", r"webmap(\.\w+)+\.[A-Z]"),  # type variables

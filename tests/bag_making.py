@@ -4,8 +4,8 @@ from functools import cache
 
 from webmap.bags.bag_file import new_bag
 from webmap.bags.types import Types
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.schema import Schema
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.schema import Schema
 
 BEGIN = 1_700_000_000 * 10**9
 """When what is in them was recorded, in nanoseconds since 1970."""
@@ -63,10 +63,10 @@ class Made:
         channels = {}
         for topic, type_name, moment, message in messages:
             if topic not in channels:
-                way = next(types.ways(type_name))
-                channels[topic] = bag.add(topic, way), way
-            channel, way = channels[topic]
+                version = next(types.versions(type_name))
+                channels[topic] = bag.add(topic, version), version
+            channel, version = channels[topic]
             time = BEGIN + round(moment * 1e9)
-            bag.write(channel, time, way.bytes_of(message))
+            bag.write(channel, time, version.bytes_of(message))
         bag.close()
         return bag.path

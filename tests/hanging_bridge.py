@@ -2,16 +2,18 @@
 
 import asyncio
 import contextlib
+from importlib.resources import files
 
 from websockets.asyncio.client import connect
 
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import parse_quirks
-from webmap.sim.rosbridge.rosapi import Rosapi
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.server import RosbridgeServer
+from webmap.ros.definitions import split_texts
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
 
 
 class HangingBridge:
@@ -20,6 +22,10 @@ class HangingBridge:
     def __init__(self, dialect, types):
         quirks = parse_quirks("real,spinning_queue", dialect)
         schema = Schema(Dialect(dialect))
+        # The types of move_base exist in ROS 1 only. A bridge of either version has
+        # them here, so that the same goals end at both.
+        move_base = files("webmap.ros").joinpath("msg/move_base_msgs.msg")
+        schema.define(split_texts(move_base.read_text("utf-8"), ros2=False))
         self.graph = Graph(schema)
         Rosapi(self.graph, quirks).start()
         self.types = types

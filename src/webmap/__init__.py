@@ -25,22 +25,32 @@ guard_loggers()
 
 if TYPE_CHECKING:
     from webmap import geometry, modules
+    from webmap.config.robot import RobotConfig
+    from webmap.core import drawing
+    from webmap.core import layer_options as options
     from webmap.core.alignment import align_bridge
+    from webmap.core.declaration import FoundTopic, TopicKind, layer
     from webmap.core.extendable import Extendable
     from webmap.core.layer import Layer
     from webmap.core.map import Map
+    from webmap.core.map_layer import MapLayer
     from webmap.core.page import Page
+    from webmap.core.pictures import Picture
+    from webmap.core.placed import Placed
     from webmap.core.refused import refusals
     from webmap.core.registry import Namespace
     from webmap.core.robot import Robot
+    from webmap.core.robot_layer import RobotLayer
     from webmap.errors import WebMapError
     from webmap.identifiers import generate_id
+    from webmap.ros import messages
     from webmap.ros.bridge import Bridge
     from webmap.scene import html, svg
     from webmap.scene.element import Element
     from webmap.scene.svg import namespace as svg_ns
     from webmap.scene.svg import xlink_namespace as xlink_ns
     from webmap.server.application import asgi_app, call, page, run, start, stop
+    from webmap.tf import Transform
 
 __version__ = "0.1.0"
 
@@ -48,19 +58,31 @@ __all__ = [
     "Bridge",
     "Element",
     "Extendable",
+    "FoundTopic",
     "Layer",
     "Map",
+    "MapLayer",
     "Namespace",
     "Page",
+    "Picture",
+    "Placed",
     "Robot",
+    "RobotConfig",
+    "RobotLayer",
+    "TopicKind",
+    "Transform",
     "WebMapError",
     "align_bridge",
     "asgi_app",
     "call",
+    "drawing",
     "generate_id",
     "geometry",
     "html",
+    "layer",
+    "messages",
     "modules",
+    "options",
     "page",
     "refusals",
     "run",
@@ -75,19 +97,31 @@ _HOMES = {
     "Bridge": "webmap.ros.bridge:Bridge",
     "Element": "webmap.scene.element:Element",
     "Extendable": "webmap.core.extendable:Extendable",
+    "FoundTopic": "webmap.core.declaration:FoundTopic",
     "Layer": "webmap.core.layer:Layer",
     "Map": "webmap.core.map:Map",
+    "MapLayer": "webmap.core.map_layer:MapLayer",
     "Namespace": "webmap.core.registry:Namespace",
     "Page": "webmap.core.page:Page",
+    "Picture": "webmap.core.pictures:Picture",
+    "Placed": "webmap.core.placed:Placed",
     "Robot": "webmap.core.robot:Robot",
+    "RobotConfig": "webmap.config.robot:RobotConfig",
+    "RobotLayer": "webmap.core.robot_layer:RobotLayer",
+    "TopicKind": "webmap.core.declaration:TopicKind",
+    "Transform": "webmap.tf:Transform",
     "WebMapError": "webmap.errors:WebMapError",
     "align_bridge": "webmap.core.alignment:align_bridge",
     "asgi_app": "webmap.server.application:asgi_app",
     "call": "webmap.server.application:call",
+    "drawing": "webmap.core.drawing",
     "generate_id": "webmap.identifiers:generate_id",
     "geometry": "webmap.geometry",
     "html": "webmap.scene.html",
+    "layer": "webmap.core.declaration:layer",
+    "messages": "webmap.ros.messages",
     "modules": "webmap.modules",
+    "options": "webmap.core.layer_options",
     "page": "webmap.server.application:page",
     "refusals": "webmap.core.refused:refusals",
     "run": "webmap.server.application:run",

@@ -5,7 +5,7 @@
     WebMapError
     ├── BridgeError            a link to a ROS system
     │   ├── BridgeClosed       the link is not open now
-    │   ├── ProtocolError      bytes that are not rosbridge
+    │   ├── ProtocolError      bytes that cannot be understood
     │   └── ServiceError       a ROS service failed, or did not answer
     ├── MotionError            a command that the gate did not take
     │   ├── NoLease            somebody else drives, or nobody took the robot
@@ -33,7 +33,7 @@ class BridgeClosed(BridgeError):
 
 
 class ProtocolError(BridgeError):
-    """Bytes came in that are not rosbridge messages."""
+    """Bytes came in that cannot be understood."""
 
 
 class ServiceError(BridgeError):

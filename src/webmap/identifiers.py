@@ -6,7 +6,7 @@ _numbers = itertools.count(1)
 
 
 def generate_id() -> str:
-    """Return an identifier for rosbridge that no other part of the process uses.
+    """Return an identifier for a link that no other part of the process uses.
 
     Returns:
         ``"WebMap-"`` and a number, as the WebMap report of 2012 has it, so that

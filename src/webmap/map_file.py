@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from webmap.errors import ConfigError
-from webmap.geometry import Pose
-from webmap.geometry.reach import FARTHEST
+from webmap.geometry import FARTHEST, Pose
 from webmap.lined_yaml import LinedYaml
 from webmap.plain_files import resolved
 

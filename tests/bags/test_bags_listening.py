@@ -8,13 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from webmap.bags import incoming, listening
+from webmap.bags import listening, recorder
 from webmap.bags.listening import Listening
 from webmap.bags.replay import STATUS
 from webmap.errors import BridgeClosed
 from webmap.ros.bridge import Bridge
-from webmap.ros.events import Publish
 from webmap.ros.offload import LARGE
+from webmap.ros.rosbridge.events import Publish
 
 ODOMETRY = "nav_msgs/Odometry"
 STRING = "std_msgs/String"
@@ -252,7 +252,7 @@ def test_what_cannot_be_read_is_counted():
 
 
 def test_what_is_too_much_to_wait_is_counted(monkeypatch):
-    monkeypatch.setattr(incoming, "HELD", 3 * incoming.ASIDE)
+    monkeypatch.setattr(recorder, "HELD", 3 * recorder.ASIDE)
     story = Story({"/odom": ODOMETRY})
     all_came, write = threading.Event(), story.recorder.take
 
@@ -283,7 +283,7 @@ class HandFed(Bridge):
 
     def says(self, topic, message):
         operation = {"op": "publish", "topic": topic, "msg": message}
-        self._received(json.dumps(operation).encode())
+        self._link._received(json.dumps(operation).encode())
 
 
 def test_no_large_message_is_lost_nor_a_small_one_behind_it():

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from webmap.bags.pace import LAST, SECOND, Pace
+from webmap.bags.times import LAST, SECOND, Pace
 
 THEN, NOW = 1_500_000_000 * SECOND, 1_700_000_000 * SECOND
 

@@ -86,12 +86,14 @@ def test_a_lone_mcap_file_is_read_without_its_folder(tmp_path):
 
 
 def test_a_bag_of_sqlite3_is_read_too(tmp_path):
-    made, way = Made("ros2"), next(types_of("ros2").ways(ODOMETRY))
+    made, version = Made("ros2"), next(types_of("ros2").versions(ODOMETRY))
     with Writer2(
         tmp_path / "office", version=8, storage_plugin=StoragePlugin.SQLITE3
     ) as writer:
-        odom = writer.add_connection("/odom", way.type_name, typestore=way.store)
-        writer.write(odom, BEGIN, way.bytes_of(made.odometry(0.0, 1.0)))
+        odom = writer.add_connection(
+            "/odom", version.type_name, typestore=version.store
+        )
+        writer.write(odom, BEGIN, version.bytes_of(made.odometry(0.0, 1.0)))
     for path in (tmp_path / "office", tmp_path / "office" / "office.db3"):
         recording = Recording([path])
         (only,) = recording.messages(BEGIN)
@@ -193,15 +195,17 @@ def test_a_bag_without_a_message_says_so(made, tmp_path):
 
 
 def test_a_topic_of_a_type_without_a_definition_is_named_and_left_out(tmp_path):
-    way = next(types_of("ros2").ways(ODOMETRY))
+    version = next(types_of("ros2").versions(ODOMETRY))
     with Writer2(
         tmp_path / "office", version=8, storage_plugin=StoragePlugin.MCAP
     ) as writer:
         lacking = {"msgdef": "acme_msgs/Joint[] joints\n", "rihs01": "RIHS01_0"}
         arm = writer.add_connection("/arm", "acme_msgs/msg/Arm", **lacking)
-        odom = writer.add_connection("/odom", way.type_name, typestore=way.store)
+        odom = writer.add_connection(
+            "/odom", version.type_name, typestore=version.store
+        )
         writer.write(arm, BEGIN, bytes(8))
-        writer.write(odom, BEGIN + 1, way.bytes_of(Made("ros2").odometry(0.0, 1.0)))
+        writer.write(odom, BEGIN + 1, version.bytes_of(Made("ros2").odometry(0.0, 1.0)))
     said = []
     # The file alone, since with its folder rosbags checks the definitions, too.
     recording = Recording([tmp_path / "office" / "office.mcap"], warn=said.append)
@@ -214,10 +218,34 @@ def test_a_topic_of_a_type_without_a_definition_is_named_and_left_out(tmp_path):
     recording.close()
 
 
+def test_a_topic_of_a_type_that_holds_itself_is_named_and_left_out(tmp_path):
+    version = next(types_of("ros2").versions(ODOMETRY))
+    with Writer2(
+        tmp_path / "office", version=8, storage_plugin=StoragePlugin.MCAP
+    ) as writer:
+        endless = {"msgdef": "acme_msgs/Arm[] arms\n", "rihs01": "RIHS01_0"}
+        arm = writer.add_connection("/arm", "acme_msgs/msg/Arm", **endless)
+        odom = writer.add_connection(
+            "/odom", version.type_name, typestore=version.store
+        )
+        writer.write(arm, BEGIN, bytes(8))
+        writer.write(odom, BEGIN + 1, version.bytes_of(Made("ros2").odometry(0.0, 1.0)))
+    said = []
+    recording = Recording([tmp_path / "office" / "office.mcap"], warn=said.append)
+    assert list(recording.topics) == ["/odom"]
+    assert said == [
+        "office.mcap: /arm (acme_msgs/msg/Arm) is left out: acme_msgs/Arm is nested "
+        "too deep: in acme_msgs/Arm"
+    ]
+    recording.close()
+
+
 def test_bytes_that_are_not_of_their_type_are_left_out_and_said_once(tmp_path):
-    way = next(types_of("ros1").ways(ODOMETRY))
+    version = next(types_of("ros1").versions(ODOMETRY))
     with Writer1(tmp_path / "bad.bag") as writer:
-        odom = writer.add_connection("/odom", way.type_name, typestore=way.store)
+        odom = writer.add_connection(
+            "/odom", version.type_name, typestore=version.store
+        )
         for moment in range(3):
             writer.write(odom, BEGIN + moment, b"\x01\x02")
     said = []

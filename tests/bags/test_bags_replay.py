@@ -10,14 +10,14 @@ import pytest
 
 from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, TWIST
 from webmap.bags import player as player_module
-from webmap.bags.pace import SECOND
 from webmap.bags.player import Player
 from webmap.bags.recording import Recording
 from webmap.bags.replay import REFUSED, STATUS
+from webmap.bags.times import SECOND
 from webmap.errors import ConfigError
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.quirks import POLITE
-from webmap.sim.rosbridge.session import Session
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.quirks import POLITE
+from webmap.ros.rosbridge.server.session import Session
 
 NOW = 1_800_000_000 * SECOND
 

@@ -7,16 +7,16 @@ import re
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import cbor2
 import pytest
 from playwright.sync_api import expect
 from processes import BRIDGE, WEB, Process, matrix, running
 
+from captured_frames import PLAYER, frame_file, played
+
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-CAPTURED = Path(__file__).parents[1] / "sim" / "captured"
 ROBOT = "/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"
 
 
@@ -34,8 +34,8 @@ def ros2():
 
 @contextmanager
 def playing(dialect: str) -> Iterator[str]:
-    command = (CAPTURED / dialect, "--port", 0)
-    with running(*command, pattern=BRIDGE, module="webmap.sim.player") as process:
+    command = (*played(dialect), "--port", 0)
+    with running(*command, pattern=BRIDGE, **PLAYER) as process:
         yield process.url
 
 
@@ -49,7 +49,7 @@ def viewing(*urls: str, robots: list[str]) -> Iterator:
 
 def recorded_pose(dialect: str) -> tuple[float, float, float]:
     """Where the captured odometry has the robot: x, y, yaw."""
-    frame = json.loads((CAPTURED / dialect / "publish_odom.json").read_text())
+    frame = json.loads(frame_file(dialect, "publish_odom.json").read_text())
     pose = frame["msg"]["pose"]["pose"]
     q = pose["orientation"]
     assert (q["x"], q["y"]) == (0, 0)
@@ -58,7 +58,7 @@ def recorded_pose(dialect: str) -> tuple[float, float, float]:
 
 def recorded_dots(dialect: str) -> list[tuple[float, float]]:
     """Where the rays of the captured scan end, in the robot's frame, in metres."""
-    frame = (CAPTURED / dialect / "cbor_scan_inf_nan.bin").read_bytes()
+    frame = frame_file(dialect, "cbor_scan_inf_nan.bin").read_bytes()
     scan = cbor2.loads(frame)["msg"]
     little_endian_floats = 85
     assert scan["ranges"].tag == little_endian_floats

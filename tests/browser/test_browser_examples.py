@@ -177,6 +177,19 @@ def test_the_tutorials_own_module_names_the_selected_robot(tab, module):
     expect(shown).to_have_text("No selection")
 
 
+def test_the_tutorials_own_layer_shows_the_voltage_beside_the_robot(
+    tab, simulator, tmp_path
+):
+    with serving("module/voltage.py", simulator, tmp_path) as server:
+        opened(tab, server, robots=1)
+        text = tab.locator(".robot .voltage > text")
+        expect(text).to_have_text(re.compile(r"^\d+\.\d V$"))
+        tab.locator(".webmap-layers summary").click()
+        tab.get_by_role("checkbox", name="Voltages").uncheck()
+        expect(text).to_be_hidden()
+        tab.goto("about:blank")
+
+
 @contextmanager
 def driven(ros, topic, x, turn):
     """Publish a velocity at 20 Hz, as another program of the robot's system would."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare
 from webmap.errors import ConfigError
 
 GOOD = """\
@@ -85,7 +85,7 @@ def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
         "ws://north:9090",
         "wss://south/ros",
     ]
-    assert fleet.fleet.maps == [{"bridge": "north", "topic": "/map"}]
+    assert fleet.fleet.to_dict()["map"] == [{"bridge": "north", "topic": "/map"}]
     bob, ann = fleet.robots
     spec = bob.motion.spec()
     assert (bob.name, spec.twist_topic, spec.stops_within) == (
@@ -118,7 +118,7 @@ def test_the_only_bridge_need_not_be_said_and_a_topic_is_enough(ready):
         '[bridges]\nhall = "ws://hall:9090"\n'
         '[[robots]]\nname = "Bob"\ntwist = "/cmd_vel"\nscan = "/scan"\n'
     )
-    assert fleet.robots[0].motion.twist_topic.bridge.url == "ws://hall:9090"
+    assert fleet.robots[0].motion.bridge("twist").url == "ws://hall:9090"
 
 
 def changed(old, new):
@@ -137,7 +137,7 @@ def changed(old, new):
         (
             changed("v_max = 0.5", 'v_max = "0.5"'),
             'FILE:22: robots[0].twist.v_max: got the text "0.5", expected a number of '
-            "metres per second above 0",
+            "metres per second from 0 on",
         ),
         (changed("0.25", "0"), "FILE:21: robots[0].twist.stops_within: got the whole"),
         (changed("0.25", "-1.5"), "got the number -1.5, expected a number of seconds"),
@@ -266,7 +266,7 @@ def changed(old, new):
         ),
         (
             '[bridges]\na = "ws://a"\n[[robots]]\nname = "B"\n[robots.modules]\n',
-            "expected an array of tables: [[robots.modules]] in two brackets for each",
+            "expected a table [[robots.modules]] in two brackets for each",
         ),
         (
             b"\xef\xbb\xbf" + GOOD.encode(),
@@ -305,3 +305,56 @@ def test_where_there_is_no_bridge_robots_are_not_asked_for_theirs(write):
     assert said[0].startswith(
         "FILE:1: bridges: got nothing, expected a table [bridges]"
     )
+
+
+ONE = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
+
+
+def test_goals_may_name_the_only_bridge(tmp_path):
+    file = tmp_path / "fleet.toml"
+    move = (
+        'move = { topic = "/goal", bridge = "hall" }\ninitial_pose = "/initialpose"\n'
+    )
+    file.write_text(f"{ONE}{move}")
+    (robot,) = prepare(file).robots
+    assert robot.motion.config.initial_pose.bridge == "ws://hall:9090"
+    robot.destroy()
+    file.write_text(f"{ONE}{move}".replace("[[rob", 'yard = "ws://yard:9090"\n[[rob'))
+    with pytest.raises(ConfigError, match="several bridges"):
+        prepare(file)
+
+
+@pytest.mark.parametrize(
+    "last",
+    [
+        "[[image]]\nwidth = 4.0\nheight = 2.0\n",
+        '[tiles]\nsource = "tiles"\nlatitude = "north"\nlongitude = 8.0\n',
+        "[[robots]]\nname = 'Ann'\nscan_assist = { topic = '/scan' }\n",
+    ],
+)
+def test_parts_with_a_mistake_are_left_out_behind_a_hundred_others(tmp_path, last):
+    file = tmp_path / "fleet.toml"
+    wrong = "".join(f"k{number} = 1\n" for number in range(120))
+    file.write_text(f"{ONE}{wrong}{last}")
+    with pytest.raises(ConfigError) as error:
+        prepare(file)
+    lines = str(error.value).splitlines()
+    assert len(lines) == 101
+    assert "mistakes more" in lines[-1]
+
+
+def test_mistakes_in_other_parts_of_a_robot_with_a_mistake_are_named_too(tmp_path):
+    file = tmp_path / "fleet.toml"
+    parts = (
+        'twist = { topic = "/cmd_vel", v_max = "fast" }\n'
+        "nonsense = 1\n"
+        'model = { tag = "script" }\n'
+        'modules = [{ name = "Trial" }]\n'
+    )
+    file.write_text(f"{ONE}{parts}")
+    with pytest.raises(ConfigError) as error:
+        prepare(file)
+    lines = str(error.value).splitlines()
+    assert len(lines) == 4
+    for number, key in ((6, "twist.v_max"), (7, "nonsense"), (8, "model"), (9, "mod")):
+        assert any(f".toml:{number}: robots[0].{key}" in line for line in lines), key

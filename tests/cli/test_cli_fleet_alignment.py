@@ -5,8 +5,7 @@ import math
 import pytest
 
 from webmap import Robot
-from webmap.cli.fleet.alignments import restore
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare, restore
 from webmap.core.alignment import alignments
 from webmap.core.alignment_store import AlignmentStore
 from webmap.errors import ConfigError
@@ -84,7 +83,7 @@ def test_what_people_saved_holds_until_the_file_says_otherwise(
     )
     for text, wanted in ((FILE, 7.0), (FILE.replace("12.5", "13.5"), 13.5)):
         fresh = AlignmentStore(tmp_path / "state")
-        monkeypatch.setattr("webmap.cli.fleet.alignments.store", fresh)
+        monkeypatch.setattr("webmap.cli.fleet.store", fresh)
         robots = ready(text).robots
         restore(robots)
         assert alignments.of(robots[0].whereabouts.bridge).x == wanted

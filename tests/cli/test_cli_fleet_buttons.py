@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare
 from webmap.errors import ConfigError
 
 HEAD = """\

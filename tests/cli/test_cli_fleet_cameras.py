@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.errors import ConfigError

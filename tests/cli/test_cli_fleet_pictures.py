@@ -8,7 +8,7 @@ from cli_shown import shown
 from PIL import Image
 from playwright.sync_api import expect
 
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare
 from webmap.core.pictures import pictures
 from webmap.errors import ConfigError
 

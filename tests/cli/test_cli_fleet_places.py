@@ -6,7 +6,7 @@ import os
 import pytest
 from PIL import Image
 
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare
 from webmap.errors import ConfigError
 
 HEAD = """\

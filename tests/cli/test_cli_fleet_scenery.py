@@ -3,8 +3,7 @@
 import pytest
 from PIL import Image
 
-from webmap.cli.fleet.scenery import show_scenery
-from webmap.cli.fleet.show import prepare
+from webmap.cli.fleet import prepare, show_scenery
 from webmap.console import Console
 from webmap.errors import ConfigError
 
@@ -71,14 +70,9 @@ def ready(write):
         robot.destroy()
 
 
-def show(console, ready):
-    maps = ready.fleet.maps
-    show_scenery(console, maps, ready.images, ready.others, ready.bridges)
-
-
 def test_several_maps_pictures_and_modules_of_the_map_are_shown(ready, tmp_path):
     console = Console()
-    show(console, ready)
+    show_scenery(console, ready)
     north, south = ready.bridges.values()
     (first, second), options = console.grids, list(console.grids.values())
     assert (first, second) == ((north, "/map"), (south, "/map"))
@@ -92,7 +86,7 @@ def test_several_maps_pictures_and_modules_of_the_map_are_shown(ready, tmp_path)
 def test_a_page_gets_all_of_it(ready):
     console, page = Console(), FakePage()
     console.opened(page)  # before, and another one after
-    show(console, ready)
+    show_scenery(console, ready)
     after = FakePage()
     console.opened(after)
     for (map,) in (page.maps, after.maps):
@@ -135,7 +129,11 @@ class FakeMap:
             'bridge = "nort"\ntopic',
             'FILE:14: map[1].bridge: got the text "nort", expected the name of a b',
         ),
-        ('bridge = "south"\ntopic', 'bridge = "north"\ntopic', "stands there already"),
+        (
+            'bridge = "south"\ntopic',
+            'bridge = "north"\ntopic',
+            "is in the file already",
+        ),
         ("order = 12", 'order = "12"', "FILE:17: map[1].order: got the text"),
         ("width = 40\n", "", 'image[0]: the key "width" is missing'),
         (

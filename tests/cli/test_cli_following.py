@@ -6,13 +6,13 @@ from itertools import pairwise
 import pytest
 
 from webmap import Bridge
-from webmap.cli.found_layers import DrawnLayers
-from webmap.cli.latecomers import LateRobots, greet
+from webmap.cli.looking import LookingForLayers
 from webmap.cli.overruling import Overruling, parse_setting
-from webmap.console import Console, RobotDescription
-from webmap.console.fleet import make_robot
-from webmap.discovery import discover
-from webmap.discovery.late_frames import late_frames
+from webmap.cli.shown import ShownRobot, ShownRobots
+from webmap.cli.told import Candidate
+from webmap.console import Console, make_robot
+from webmap.discovery import FoundRobot, Guess, discover
+from webmap.discovery.hearing import late_frames
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
 
@@ -27,6 +27,11 @@ AT_FIRST = "bob/odom bob/base_link"
 LATER = f"bob/map {AT_FIRST}"
 
 
+def candidate(bridge, **topics):
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in topics.items()}
+    return Candidate(bridge, FoundRobot("Al", "", guesses))
+
+
 def trees(chain):
     found = Trees()
     for parent, child in pairwise(chain.split()):
@@ -39,10 +44,8 @@ class Watched:
 
     def __init__(self, bridge, *settings, told=()):
         self.bridge = bridge
-        self.late = LateRobots(Console())
         said = Overruling([parse_setting(text) for text in settings])
-        names = [about.name for about in told]
-        self.came = greet(self.late, names, None, overruling=said, told=told)
+        self.late = ShownRobots(Console(), said, told=told)
         self.newcomers = Newcomers()
 
     def look(self, topics, chain=""):
@@ -50,7 +53,7 @@ class Watched:
         for _ in range(3):
             findings = discover(topics, "host", trees(chain))
             for news in self.newcomers.look(findings):
-                self.came(news, self.bridge)
+                self.late.came(news, self.bridge)
 
     @property
     def robot(self):
@@ -192,14 +195,14 @@ def test_a_robot_that_a_person_wants_nowhere_is_not_placed_by_a_pose(bridge):
     ("said", "shown"),
     [
         ({"odometry": "/bob/odom"}, []),
-        ({"twist": "/bob/cmd_vel"}, []),
+        ({"velocity": "/bob/cmd_vel"}, []),
         ({"odometry": "/al/odom"}, ["bob"]),
     ],
 )
 def test_a_told_robot_takes_the_place_of_one_that_comes_later(
     bridge, said, shown, capsys
 ):
-    told = RobotDescription(name="Al", bridge=bridge, **said)
+    told = candidate(bridge, **said)
     watched = Watched(bridge, told=[told])
     watched.look(DRIVEN | ODOM)
     watched.look(DRIVEN | ODOM | POSE | TF, LATER)
@@ -210,11 +213,11 @@ def test_a_told_robot_takes_the_place_of_one_that_comes_later(
 
 
 def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, capsys):
-    about = RobotDescription(
-        name="Al", bridge=bridge, odometry="/bob/odom", goal="/bob/goal_pose"
-    )
-    robot = make_robot(about)
-    drawing = DrawnLayers(bridge, [], Overruling(), told=[(about, robot)])
+    about = candidate(bridge, odometry="/bob/odom", goal="/bob/goal_pose")
+    config = about.found.config(bridge.url)
+    robot = make_robot(config, [bridge])
+    told = [ShownRobot(*about, robot, config)]
+    drawing = LookingForLayers(bridge, ShownRobots(Console()), told=told)
     frames = late_frames(bridge)
     heard = []
 

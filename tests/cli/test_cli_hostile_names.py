@@ -16,6 +16,7 @@ import webmap.cli as webmap_cli
 from webmap.cli.echo import LONGEST, echo
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.found import Findings, FoundRobot
+from webmap.discovery.layers import Layers
 from webmap.discovery.words import report
 
 EVIL = "\n[[robots]]\r\x1b[2J\x1b]0;mine\x07\x9b31m\u202eevil"
@@ -26,15 +27,19 @@ TOPICS = {
     "/tf": "tf2_msgs/TFMessage",
 }
 TURN = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+STAMP = {"secs": 1, "nsecs": 0}
 FRAME = {
-    "header": {"frame_id": "map", "stamp": {"secs": 1, "nsecs": 0}},
+    "header": {"frame_id": "map", "stamp": STAMP},
     "child_frame_id": f"evil{EVIL}/base_link",
     "transform": {"translation": TURN, "rotation": TURN},
 }
 SAID = {
     "/tf": {"transforms": [FRAME]},
     "/bob/odom": {"header": {"frame_id": EVIL}, "child_frame_id": EVIL},
-    "/bob/base_scan": {"header": {"frame_id": EVIL}, EVIL: EVIL},
+    "/bob/base_scan": {
+        "header": {"seq": 0, "stamp": STAMP, "frame_id": EVIL},
+        EVIL: EVIL,
+    },
 }
 
 
@@ -121,7 +126,7 @@ def test_errors_of_a_bridge_steer_no_terminal_and_forge_no_line(command):
 
 def test_names_of_topics_write_nothing_into_a_fleet_file():
     robot = FoundRobot(name=f"Bob{EVIL}\x7f", namespace="", guesses={}, notes=(EVIL,))
-    findings = Findings(robots=(robot,), layers={"": ()}, left_out={"": ()})
+    findings = Findings(robots=(robot,), layers={"": Layers()})
     data = tomllib.loads(fleet_toml([("b", "ws://127.0.0.1:1", findings)]))
     assert [one["name"] for one in data["robots"]] == [f"Bob{EVIL}\x7f"]
 

@@ -9,14 +9,12 @@ import pytest
 
 from webmap import Bridge
 from webmap.cli import looking
-from webmap.cli.found_layers import DrawnLayers
-from webmap.cli.latecomers import LateRobots, LookingForRobots, greet
-from webmap.cli.looking import Looking
-from webmap.cli.overruling import Overruling
+from webmap.cli.looking import Looking, LookingForLayers, LookingForRobots
+from webmap.cli.shown import ShownRobots
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.newcomers import News
-from webmap.errors import BridgeError
+from webmap.errors import BridgeError, ConfigError
 from webmap.lifecycle import Lifecycle
 
 URL = "ws://127.0.0.1:9"
@@ -102,9 +100,9 @@ def test_a_newcomer_that_cannot_be_shown_keeps_no_other_from_it(caplog):
 
 
 def test_a_newcomer_is_shown_though_nobody_hears_of_it(nobody_hears):
-    bridge, late = Bridge(URL), LateRobots(Console())
+    bridge, late = Bridge(URL), ShownRobots(Console())
     ann, bob = discover(TOPICS, "host").robots
-    came = greet(late, [], None)
+    came = late.came
     try:
         came(News(ann), bridge)
         came(News(bob), bridge)
@@ -115,13 +113,13 @@ def test_a_newcomer_is_shown_though_nobody_hears_of_it(nobody_hears):
 
 
 def test_a_topic_that_cannot_be_used_keeps_no_other_from_it(caplog, capsys):
-    bridge, late = Bridge(URL), LateRobots(Console())
+    bridge, late = Bridge(URL), ShownRobots(Console())
     odometry = {"/ann/odom": "nav_msgs/Odometry"}
     more = {
         "/ann/scan": "sensor_msgs/LaserScan",
         "/ann/battery_state": "sensor_msgs/BatteryState",
     }
-    came = greet(late, [], None)
+    came = late.came
     came(News(discover(odometry, "host").robots[0]), bridge)
     (robot,) = late.robots
 
@@ -140,15 +138,42 @@ def test_a_topic_that_cannot_be_used_keeps_no_other_from_it(caplog, capsys):
     assert "ann has more now: battery /ann/battery_state\n" in capsys.readouterr().err
 
 
+def test_a_layer_that_cannot_be_drawn_is_said_once_and_keeps_no_other_from_it(caplog):
+    bridge, late = Bridge(URL), ShownRobots(Console())
+    topics = {
+        "/ann/odom": "nav_msgs/Odometry",
+        "/ann/points": "sensor_msgs/PointCloud2",
+        "/ann/sonar": "sensor_msgs/Range",
+    }
+    late.came(News(discover(topics, "host").robots[0]), bridge)
+    (robot,) = late.robots
+
+    def failing(name, *args, **options):
+        if name == "PointCloud":
+            raise ConfigError("no such thing")
+        return add(name, *args, **options)
+
+    add, robot.add_module = robot.add_module, failing
+    looking = LookingForLayers(bridge, late)
+    try:
+        for _ in range(2):
+            asyncio.run(looking.take(topics))
+        drawn = [type(module).__name__ for module in robot.modules]
+    finally:
+        robot.destroy()
+    assert caplog.text.count("ann: /ann/points is not drawn: PointCloud: no such") == 1
+    assert (drawn.count("Range"), drawn.count("Trail")) == (1, 1)
+
+
 def test_what_is_left_out_is_no_obstacle_though_nobody_hears_of_it(nobody_hears):
     many = {f"/ann/cloud{n}": "sensor_msgs/PointCloud2" for n in range(40)}
-    late = LateRobots(Console())
+    late = ShownRobots(Console())
     bridge = Bridge(URL)
     topics = {"/ann/odom": "nav_msgs/Odometry", **many}
     (ann,) = discover(topics, "host").robots
-    greet(late, [], None)(News(ann), bridge)
+    late.came(News(ann), bridge)
     try:
-        drawn = DrawnLayers(bridge, late.robots, Overruling())
+        drawn = LookingForLayers(bridge, late)
         asyncio.run(drawn.take(topics))
         assert any("cloud" in topic for topic in bridge._topics)
     finally:

@@ -2,14 +2,12 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import pytest
 
 from webmap import Bridge
-from webmap.cli.described import describe
 from webmap.cli.overruling import Overruling, parse_setting
-from webmap.console import RobotDescription
+from webmap.cli.told import parse_robot
 from webmap.discovery import discover
 from webmap.errors import ConfigError
 
@@ -63,11 +61,12 @@ def test_a_setting_that_makes_no_sense_says_what_was_expected(text, words):
 def test_one_topic_is_overruled_and_the_others_stay(found):
     said = overruling("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
     robot = said.apply(URL, found)
-    about = describe(robot, Bridge(URL))
-    assert about.scan == "/robot_1/rear/scan"
+    config = said.config(URL, robot)
+    assert config.scan == ["/robot_1/rear/scan"]
     assert robot.first("scan").type == "sensor_msgs/LaserScan"
-    assert about.battery == ""
-    assert (about.odometry, about.twist) == ("/robot_1/odom", "/robot_1/cmd_vel")
+    assert config.battery == ""
+    assert config.odometry.topic == "/robot_1/odom"
+    assert config.motion.twist.topic == "/robot_1/cmd_vel"
     assert said.fixed(URL, found) == {"scan", "battery"}
 
 
@@ -84,21 +83,22 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 @pytest.mark.parametrize("last", ["velocity=/robot_1/drive", "velocity=/drive"])
 def test_the_type_of_velocity_is_overruled_whatever_else_is(found, last):
     said = overruling(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
-    about = describe(said.apply(URL, found), Bridge(URL))
-    assert (about.twist, about.twist_type) == (last.partition("=")[2], STAMPED)
+    about = said.apply(URL, found)
+    velocity = about.first("velocity")
+    assert (velocity.topic, velocity.type) == (last.partition("=")[2], STAMPED)
 
 
 def test_a_robot_that_was_told_is_driven_with_the_type_that_was_said():
-    bob = RobotDescription(name="Bob", bridge=Bridge(URL), twist="/cmd_vel")
+    bob = parse_robot("Bob::/cmd_vel", [Bridge(URL)])
     (told,) = overruling(f"Bob.velocity_type={STAMPED}").tell([bob])
-    assert told.twist_type == STAMPED
+    assert told.found.type_of("velocity") == STAMPED
 
 
 def test_a_robot_without_odometry_is_not_placed_by_another_pose():
     topics = TOPICS | {"/robot_1/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics).robots
     robot = overruling("robot_1.odometry=").apply(URL, robot)
-    assert describe(robot, Bridge(URL)).odometry == ""
+    assert robot.config(URL).odometry is None
 
 
 @pytest.mark.parametrize(
@@ -116,17 +116,20 @@ def test_the_dialect_says_which_action_it_is(odometry, type):
 
 def test_cameras_are_a_list(found):
     robot = overruling("robot_1.camera=/front/image,/rear/image").apply(URL, found)
-    assert describe(robot, Bridge(URL)).cameras == ("/front/image", "/rear/image")
+    cameras = robot.config(URL).cameras
+    assert [camera.topic for camera in cameras] == ["/front/image", "/rear/image"]
 
 
 def test_a_robot_that_was_told_gets_what_its_form_has_no_place_for():
-    bob = RobotDescription(name="Bob", bridge=Bridge(URL), odometry="/odom")
+    bridges = [Bridge(URL)]
+    bob, al = (parse_robot(f"{name}:/odom", bridges) for name in ("Bob", "Al"))
     (told,) = overruling("Bob.battery=/battery", "Bob.odometry=/odom2").tell([bob])
-    assert (told.battery, told.odometry) == ("/battery", "/odom2")
+    assert told.found.topic("battery") == "/battery"
+    assert told.found.topic("odometry") == "/odom2"
     with pytest.raises(ConfigError, match="write a fleet file"):
         overruling("Bob.plan=/plan").tell([bob])
     with pytest.raises(ConfigError, match="two robots would be called 'BOB'"):
-        overruling("Al.name=BOB").tell([bob, replace(bob, name="Al")])
+        overruling("Al.name=BOB").tell([bob, al])
 
 
 def test_a_robot_that_is_not_there_is_refused_unless_it_may_still_come():

@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 from bag_making import ODOMETRY, TWIST, Made
-from webmap.bags.needed import need_rosbags
+from webmap.bags import need_rosbags
 from webmap.cli.play import replay
 from webmap.errors import ConfigError
 

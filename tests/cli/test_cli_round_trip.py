@@ -5,12 +5,10 @@ import asyncio
 import pytest
 
 from webmap import Bridge
-from webmap.cli.described import describe
-from webmap.cli.draw_layer import shared_map
-from webmap.cli.fleet.show import prepare
-from webmap.cli.found_layers import DrawnLayers
-from webmap.cli.latecomers import LateRobots
-from webmap.cli.overruling import Overruling
+from webmap.cli.fleet import prepare
+from webmap.cli.looking import LookingForLayers
+from webmap.cli.shown import ShownRobots
+from webmap.cli.told import Candidate
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
@@ -62,13 +60,11 @@ def topics(*spaces):
 def viewed(found):
     """What ``webmap view`` makes of this: its robots, and the maps under them."""
     bridge, console = Bridge(URL), Console()
-    late = LateRobots(console)
+    late = ShownRobots(console)
     findings = discover(found, "bob")
     for robot in findings.robots:
-        late.show_grid(bridge, shared_map(robot))
-        late.add(robot, describe(robot, bridge))
-    layers = DrawnLayers(bridge, console.robots, Overruling(), console)
-    asyncio.run(layers.take(found))
+        late.add(Candidate(bridge, robot))
+    asyncio.run(LookingForLayers(bridge, late).take(found))
     return console.robots, {topic for _, topic in console.grids}
 
 
@@ -102,7 +98,7 @@ def test_the_file_that_discover_prints_shows_what_view_shows(tmp_path, spaces):
             assert kept.name == seen.name
             assert shown(kept) == shown(seen)
             assert len(shown(seen)) > 20, "this is about all of it"
-        assert {line["topic"] for line in ready.fleet.maps} == maps
+        assert {line.topic for line in ready.fleet.map} == maps
     finally:
         for robot in (*robots, *ready.robots):
             robot.destroy()

@@ -8,16 +8,22 @@ from click.testing import CliRunner
 import webmap
 import webmap.console
 from webmap import Bridge
-from webmap.cli import found_layers
+from webmap.cli import found_fleet
 from webmap.cli.finding import Found
 from webmap.cli.found_fleet import FoundFleet
-from webmap.cli.found_layers import DrawnLayers
-from webmap.cli.overruling import Overruling
-from webmap.cli.told import namespace_of, offer, same_robot, told_robots
+from webmap.cli.looking import LookingForLayers
+from webmap.cli.shown import ShownRobot, ShownRobots
+from webmap.cli.told import (
+    Candidate,
+    namespace_of,
+    offer,
+    parse_robot,
+    same_robot,
+    told_robots,
+)
 from webmap.cli.view import view
-from webmap.console import Console, RobotDescription
-from webmap.console.fleet import make_robot
-from webmap.discovery import discover
+from webmap.console import Console, make_robot
+from webmap.discovery import FoundRobot, Guess, discover
 from webmap.errors import ConfigError
 from webmap.modules.robot.on_maps import OnMaps
 
@@ -45,14 +51,22 @@ def bridge():
 
 
 def described(bridge, name="Bob", **topics):
-    return RobotDescription(name=name, bridge=bridge, **topics)
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in topics.items()}
+    return Candidate(bridge, FoundRobot(name, "", guesses))
+
+
+def made(robot):
+    return make_robot(robot.found.config(robot.bridge.url), [robot.bridge])
 
 
 def drawn(bridge, topics, *told):
     """Draw what is behind a bridge of robots that were told; return all of it."""
-    console = Console([make_robot(about) for about in told])
-    pairs = list(zip(told, console.told, strict=True))
-    layers = DrawnLayers(bridge, console.robots, Overruling(), console, told=pairs)
+    console = Console([made(about) for about in told])
+    known = [
+        ShownRobot(*about, robot, about.found.config(about.bridge.url))
+        for about, robot in zip(told, console.told, strict=True)
+    ]
+    layers = LookingForLayers(bridge, ShownRobots(console), told=known)
     asyncio.run(layers.take(topics))
     return console
 
@@ -69,7 +83,7 @@ def what_of(robot):
 
 def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
     told = described(
-        bridge, odometry="/a/odom", twist="/a/cmd_vel", scan="/a/rear/scan"
+        bridge, odometry="/a/odom", velocity="/a/cmd_vel", scan="/a/rear/scan"
     )
     console = drawn(bridge, TOPICS, told)
     (robot,) = console.told
@@ -90,22 +104,22 @@ def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
 def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
     asked = []
 
-    def draw_layers(bridges, robots, overruling, *, told, **options):
-        asked.extend(robot.name for _, robot in told)
+    def looking(bridge, shown, *, told, **options):
+        asked.extend(each.robot.name for each in told)
 
     def open_console(bridges, told, floor):
-        return Console([make_robot(about) for about in told])
+        return Console([make_robot(config, bridges) for config in told])
 
     monkeypatch.setattr(webmap.console, "open_console", open_console)
     monkeypatch.setattr(webmap, "run", lambda **options: None)
-    monkeypatch.setattr(found_layers, "draw_layers", draw_layers)
+    monkeypatch.setattr(found_fleet, "LookingForLayers", looking)
     done = CliRunner().invoke(view, [URL, "--robot", "Bob:/a/odom", *said])
     assert (done.exit_code, asked) == (0, drawn_of)
 
 
 def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(bridge):
     placed = described(bridge, odometry="/a/odom")
-    nowhere = described(bridge, name="b", twist="/b/cmd_vel")
+    nowhere = described(bridge, name="b", velocity="/b/cmd_vel")
     console = drawn(bridge, TOPICS | FRAMES, placed, nowhere)
     one, other = console.told
     assert (one.tf["map_frame"], one.tf["quiet"]) == ("map", True)
@@ -117,7 +131,7 @@ def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(brid
 def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge):
     topics = TOPICS | {"/c/where": "geometry_msgs/Pose", "/c/plan": "nav_msgs/Path"}
     told = described(bridge, odometry="/c/where")
-    assert offer(told, topics, discover(topics)).found is None
+    assert offer(told.found, topics, discover(topics)).found is None
     console = drawn(bridge, topics, told)
     assert what_of(console.told[0]) == [("Path", "/c/plan")]
     console.told[0].destroy()
@@ -150,7 +164,7 @@ def test_robots_behind_another_bridge_are_left_alone(bridge):
     [
         ({"odometry": "/a/ekf/odometry/filtered"}, "/a"),  # not the best of its role
         ({"odometry": "a/odom/"}, "/a"),
-        ({"twist": "/b/cmd_vel"}, "/b"),
+        ({"velocity": "/b/cmd_vel"}, "/b"),
         ({"name": "b", "scan": "/scan"}, "/b"),
         ({"scan": "/a/front/scan"}, None),
         ({"odometry": "/none of a topic"}, None),
@@ -159,24 +173,24 @@ def test_robots_behind_another_bridge_are_left_alone(bridge):
 def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
     bridge, told, namespace
 ):
-    found = same_robot(described(bridge, **told), discover(TOPICS).robots)
+    found = same_robot(described(bridge, **told).found, discover(TOPICS).robots)
     assert (None if found is None else found.namespace) == namespace
 
 
 @pytest.mark.parametrize(
     ("told", "namespace"),
     [
-        ({"odometry": "/c/odom", "twist": "/c/cmd_vel", "scan": "/c/scan"}, "/c"),
-        ({"odometry": "/c/base/odom", "twist": "/c/cmd_vel"}, "/c"),
+        ({"odometry": "/c/odom", "velocity": "/c/cmd_vel", "scan": "/c/scan"}, "/c"),
+        ({"odometry": "/c/base/odom", "velocity": "/c/cmd_vel"}, "/c"),
         ({"odometry": "/c/platform/odom"}, "/c"),
-        ({"odometry": "/c/odom", "twist": "/d/cmd_vel"}, ""),
-        ({"odometry": "/odom", "twist": "/c/cmd_vel"}, ""),
+        ({"odometry": "/c/odom", "velocity": "/d/cmd_vel"}, ""),
+        ({"odometry": "/odom", "velocity": "/c/cmd_vel"}, ""),
     ],
 )
 def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
     bridge, told, namespace
 ):
-    assert namespace_of(described(bridge, **told)) == namespace
+    assert namespace_of(described(bridge, **told).found) == namespace
 
 
 @pytest.mark.parametrize(
@@ -191,15 +205,15 @@ def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
 )
 def test_robots_that_are_told_amiss_are_refused_with_what_was_said(bridge, texts, said):
     with pytest.raises(ConfigError) as refused:
-        told_robots(texts, [bridge], None)
+        told_robots(texts, [bridge])
     assert said in str(refused.value)
 
 
 def test_robots_of_one_topic_behind_two_bridges_are_two(bridge):
     bridges = [bridge, Bridge("ws://al:9090")]
-    told = told_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges, 0.2)
-    assert [robot.name for robot in told] == ["Bob", "Al"]
-    assert told_robots(["Bob:/a", "Al:/b"], [bridge], None)[1].twist == ""
+    told = told_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
+    assert [robot.found.name for robot in told] == ["Bob", "Al"]
+    assert told_robots(["Bob:/a", "Al:/b"], [bridge])[1].found.topic("velocity") == ""
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1", "x"])
@@ -208,3 +222,44 @@ def test_seconds_are_a_finite_number(option, number):
     done = CliRunner().invoke(view, [URL, option, number])
     assert done.exit_code == 2
     assert f"Invalid value for '{option}'" in done.output
+
+
+@pytest.fixture
+def bridges():
+    return [Bridge("ws://localhost:9090"), Bridge("ws://localhost:9091")]
+
+
+def test_a_robot_is_a_name_and_three_topics(bridges):
+    told = parse_robot("Bob:/odom:/cmd_vel:/scan", bridges)
+    assert told == described(
+        bridges[0], odometry="/odom", velocity="/cmd_vel", scan="/scan"
+    )
+
+
+def test_topics_may_be_empty_or_left_out(bridges):
+    told = parse_robot("Bob:/odom::/scan", bridges)
+    assert told == described(bridges[0], odometry="/odom", scan="/scan")
+    told = parse_robot("Bob:/odom", bridges)
+    assert told == described(bridges[0], odometry="/odom")
+
+
+def test_a_number_says_behind_which_bridge_it_is(bridges):
+    assert parse_robot("2@Bob:/odom", bridges).bridge is bridges[1]
+
+
+def test_an_at_sign_in_a_topic_is_no_number_of_a_bridge(bridges):
+    assert parse_robot("Bob:/a@b", bridges).found.topic("odometry") == "/a@b"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "Bob", ":/odom", "Bob:::", "Bob:/a:/b:/c:/d", "  :/odom"]
+)
+def test_another_form_is_refused_with_the_right_one(bridges, text):
+    with pytest.raises(ConfigError, match="NAME:ODOM:CMD_VEL:SCAN"):
+        parse_robot(text, bridges)
+
+
+@pytest.mark.parametrize("number", ["0", "3", "-1", "x", "", "²"])
+def test_a_bridge_that_is_not_there_is_refused(bridges, number):
+    with pytest.raises(ConfigError, match="there are 2"):
+        parse_robot(f"{number}@Bob:/odom", bridges)

@@ -13,15 +13,14 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import Bridge
-from webmap.cli.described import describe, overrules
 from webmap.cli.found_fleet import find_fleet
-from webmap.cli.found_layers import DrawnLayers
-from webmap.cli.latecomers import LateRobots, greet
+from webmap.cli.looking import LookingForLayers
 from webmap.cli.overruling import Overruling, parse_setting
-from webmap.console import Console, RobotDescription
-from webmap.console.fleet import make_robot
+from webmap.cli.shown import ShownRobots
+from webmap.cli.told import Candidate
+from webmap.console import Console, make_robot
 from webmap.core.layer import Layer
-from webmap.discovery import discover
+from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
 from webmap_process import simulator
@@ -173,6 +172,11 @@ class FakePage:
         self.maps = [FakeMap()]
 
 
+def candidate(bridge, name, **topics):
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in topics.items()}
+    return Candidate(bridge, FoundRobot(name, "", guesses))
+
+
 def found(name="bob", **more):
     (robot,) = discover(TOPICS | more, name).robots
     return robot
@@ -180,14 +184,12 @@ def found(name="bob", **more):
 
 def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
     console = Console()
-    late = LateRobots(console)
+    late = ShownRobots(console)
     early = FakePage()
     console.opened(early)
-    late.add(found(), describe(found(), bridge))
-    late.show_grid(bridge, "")
-    late.show_grid(bridge, "/map")
-    late.show_grid(bridge, "/other/map")
-    late.show_grid(bridge, "/map")  # the same again
+    late.add(Candidate(bridge, found()))
+    for topic in ("/map", "/other/map", "/map"):  # the first one comes again
+        late.came(News(found(**{topic: GRID}), ("map",)), bridge)
     after = FakePage()
     console.opened(after)
     for page in (early, after):
@@ -200,8 +202,9 @@ def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
 
 
 def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
-    late = LateRobots(Console())
-    came = greet(late, ["BOB"], 0.25)
+    told = [candidate(Bridge("ws://al:9090"), "BOB")]
+    late = ShownRobots(Console(), Overruling(stops_within=0.25), told=told)
+    came = late.came
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
     assert late.robots[0].name == "bob (bob:9090)"
@@ -214,11 +217,11 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
 
 
 def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge):
-    late = LateRobots(Console())
+    late = ShownRobots(Console())
     more = {"/tf": "tf2_msgs/TFMessage", "/plan": "nav_msgs/Path"}
     more |= {f"/cam{n}/image_raw/compressed": IMAGE for n in range(6)}
     robot = found(**more)
-    late.add(robot, describe(robot, bridge))
+    late.add(Candidate(bridge, robot))
     (made,) = late.robots
     assert made.tf["namespace"] == ""
     assert made.tf["quiet"]
@@ -231,13 +234,13 @@ def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge):
 def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
     topics = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics, "bob").robots
-    assert describe(robot, bridge).odometry == "/amcl_pose"
+    assert robot.config(bridge.url).odometry.topic == "/amcl_pose"
 
 
 def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     console = Console()
-    late = LateRobots(console)
-    came = greet(late, [], 0.25)
+    late = ShownRobots(console, Overruling(stops_within=0.25))
+    came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
     more = {"/scan": "sensor_msgs/LaserScan", "/tf": "tf2_msgs/TFMessage"}
@@ -262,8 +265,8 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
 
 
 def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, capsys):
-    late = LateRobots(Console())
-    came = greet(late, [], 0.25)
+    late = ShownRobots(Console(), Overruling(stops_within=0.25))
+    came = late.came
     newcomers = Newcomers()
 
     def look(cameras):
@@ -296,8 +299,8 @@ def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, c
 
 
 def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
-    late = LateRobots(Console())
-    greet(late, ["Al"], None)(News(found(), ("velocity",)), bridge)
+    late = ShownRobots(Console())
+    late.came(News(found(), ("velocity",)), bridge)
     assert late.robots == []
     assert capsys.readouterr().err == ""
 
@@ -307,7 +310,7 @@ def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
     [
         ({"name": "bob"}, True),
         ({"name": "Al", "odometry": "/odom"}, True),
-        ({"name": "Al", "twist": "/cmd_vel"}, True),
+        ({"name": "Al", "velocity": "/cmd_vel"}, True),
         ({"name": "Al", "scan": "/scan"}, False),
     ],
 )
@@ -315,10 +318,9 @@ def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
     bridge, told, is_it
 ):
     (robot,) = discover(TOPICS, "bob").robots
-    found = describe(robot, bridge)
-    assert overrules(RobotDescription(bridge=bridge, **told), found) is is_it
-    elsewhere = RobotDescription(bridge=Bridge("ws://al:9090"), **told)
-    assert not overrules(elsewhere, found)
+    found = Candidate(bridge, robot)
+    assert candidate(bridge, **told).is_also(found) is is_it
+    assert not candidate(Bridge("ws://al:9090"), **told).is_also(found)
 
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -327,15 +329,13 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 def fleet_of(bridge, *told, topics, settings=()):
     """What is shown of a list of topics, where there is no rosapi to ask."""
     said = Overruling([parse_setting(text) for text in settings])
-    return find_fleet(
-        [bridge], told, wait=0.0, stops_within=None, topics=topics, overruling=said
-    )
+    return find_fleet([bridge], told, wait=0.0, topics=topics, overruling=said)
 
 
 def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
     fleet = fleet_of(bridge, topics=TOPICS | {"/cmd_vel": STAMPED})
-    ((_, about),) = fleet.robots
-    robot = make_robot(about)
+    ((_, found),) = fleet.robots
+    robot = make_robot(found.config(bridge.url), [bridge])
     assert robot.motion.spec().twist_type == STAMPED
     robot.destroy()
 
@@ -346,9 +346,9 @@ def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
 def test_a_robot_that_is_told_has_the_type_of_a_list_if_that_drives(
     bridge, listed, type
 ):
-    told = RobotDescription(name="Al", bridge=bridge, twist="al/go")
+    told = candidate(bridge, "Al", velocity="al/go")
     fleet = fleet_of(bridge, told, topics=TOPICS | {"/al/go": listed})
-    assert fleet.told[0].twist_type == type
+    assert fleet.told[0].found.type_of("velocity") == type
     assert ("/go  " + type in fleet.table(grid=True, as_told=True)) == bool(type)
 
 
@@ -356,18 +356,35 @@ def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     settings = ["bob.velocity=/cmd_vel_nav"]
     fleet = fleet_of(bridge, topics=topics, settings=settings)
-    ((_, about),) = fleet.robots
-    assert (about.twist, about.twist_type) == ("/cmd_vel_nav", STAMPED)
+    ((_, found),) = fleet.robots
+    velocity = found.first("velocity")
+    assert (velocity.topic, velocity.type) == ("/cmd_vel_nav", STAMPED)
 
 
 def test_velocity_that_comes_later_is_sent_in_its_type(bridge):
-    late = LateRobots(Console())
-    came = greet(late, [], 0.25)
+    late = ShownRobots(Console(), Overruling(stops_within=0.25))
+    came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
     came(News(found(**{"/cmd_vel": STAMPED}), ("velocity",)), bridge)
     assert late.robots[0].motion.spec().twist_type == STAMPED
     late.robots[0].destroy()
+
+
+def test_what_comes_later_leaves_alone_what_drives_the_robot(bridge):
+    settings = [parse_setting("bob.velocity=/cmd_vel_nav")]
+    topics = TOPICS | {"/cmd_vel_nav": STAMPED}
+    fleet = fleet_of(bridge, topics=topics, settings=["bob.velocity=/cmd_vel_nav"])
+    late = ShownRobots(Console(), Overruling(settings))
+    late.add(fleet.robots[0])
+    (robot,) = late.robots
+    twist = robot.motion.config.twist
+    assert twist.type == STAMPED
+    whole = found(**{"/battery": "sensor_msgs/BatteryState"})
+    late.came(News(whole, ("battery",)), bridge)
+    assert robot.motion.config.twist is twist
+    assert "Battery" in [type(module).__name__ for module in robot.modules]
+    robot.destroy()
 
 
 SCAN, GRID, PATH = "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid", "nav_msgs/Path"
@@ -386,11 +403,11 @@ RICH = {
 def drawing_of(bridge, topics, *settings):
     """Draw what is found of one robot; return it, the console and what is drawn."""
     console = Console()
-    late = LateRobots(console)
     said = Overruling([parse_setting(text) for text in settings])
+    late = ShownRobots(console, said)
     (found_,) = said.findings(bridge.url, discover(topics, "bob")).robots
-    late.add(found_, describe(found_, bridge))
-    layers = DrawnLayers(bridge, console.robots, said, console)
+    late.add(Candidate(bridge, found_))
+    layers = LookingForLayers(bridge, late)
     asyncio.run(layers.take(topics))
     return late.robots[0], console, layers
 

@@ -1,9 +1,9 @@
 """Robots of a recording are seen, and nothing of them is told anything."""
 
 from webmap import Bridge
-from webmap.cli.described import describe
-from webmap.cli.latecomers import LateRobots, greet
-from webmap.cli.watched import MOTION, Watched
+from webmap.cli.overruling import MOTION, Watched
+from webmap.cli.shown import ShownRobots
+from webmap.config.motion import MotionConfig
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.newcomers import News
@@ -26,25 +26,22 @@ TOPICS = SEEN | {
 def test_a_robot_that_could_be_driven_is_described_as_one_that_is_seen():
     (found,) = discover(TOPICS, "robot").robots
     assert {"velocity", "goal", "action", "initialpose"} <= set(found.guesses)
-    about = describe(Watched("office").apply(URL, found), Bridge(URL))
-    assert (about.odometry, about.scan) == ("/odom", "/scan")
-    assert (about.twist, about.goal, about.cancel, about.initial_pose) == ("",) * 4
-    assert about.action is None
+    watched = Watched("office")
+    config = watched.config(URL, watched.apply(URL, found))
+    assert (config.odometry.topic, config.scan) == ("/odom", ["/scan"])
+    assert config.motion == MotionConfig()
 
 
 def test_topics_that_come_later_do_not_let_it_be_driven_either():
-    bridge, late = Bridge(URL), LateRobots(Console())
-    watched = Watched("office")
-    came = greet(late, [], None, overruling=watched)
+    bridge, late = Bridge(URL), ShownRobots(Console(), Watched("office"))
+    came = late.came
     (bare,) = discover(SEEN, "robot").robots
     came(News(bare), bridge)
     (whole,) = discover(TOPICS, "robot").robots
     came(News(whole, MOTION), bridge)
     (robot,) = late.robots
     try:
-        assert robot.motion.twist_topic is None
-        assert robot.motion.move_topic is None
-        assert robot.motion.pose_topic is None
+        assert robot.motion.config == MotionConfig()
     finally:
         robot.destroy()
 

@@ -3,7 +3,7 @@
 import pytest
 
 from webmap import Bridge
-from webmap.console.bridge_list import describe_link, summary
+from webmap.console.bar import describe_link, summary
 
 
 class FakeBridge(Bridge):

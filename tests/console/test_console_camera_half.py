@@ -1,15 +1,14 @@
 """The half of the camera's panel that has the pictures, without a browser."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from webmap import Map, Robot
-from webmap.console.camera_panel import PARTS, CameraPanel, camera_number
-from webmap.console.cameras import CameraViews
+from webmap.console.cameras import PARTS, CameraPanel, CameraViews, camera_number
 from webmap.core.camera_feed import CameraFeed
-from webmap.core.page import Page, PageEntry
-from webmap.server.viewer import Viewer
+from webmap.core.page import Page, PageEntry, Viewer
 from webmap.wire.session import SceneSession
 
 CONSOLE = Path(__file__).parents[2] / "src" / "webmap" / "console"
@@ -67,9 +66,9 @@ def test_every_file_that_it_imports_is_published():
     imported = "".join(
         (CONSOLE / f"camera_{n}.js").read_text() for n in ("panel", "view")
     )
-    for line in imported.splitlines():
-        if line.startswith("import "):
-            assert line.split('"./')[1].removesuffix('";') in PARTS
+    names = re.findall(r'^(?:import .*|\}) from "\./(.+)";$', imported, re.M)
+    assert names
+    assert set(names) <= set(PARTS)
 
 
 def test_the_page_hears_of_the_cameras_of_the_selected_robot(map, robot, panel, said):

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from webmap import Bridge
-from webmap.console.checkup import Checkup, checkup_of
-from webmap.console.doctor import groups
+from webmap.console.doctor import Checkup, checkup_of, groups
 from webmap.discovery.doctor import Finding, MeantRobot, Observed
+from webmap.ros.rosbridge.checks import LinkFacts
 
 
 async def until(condition):
@@ -110,7 +110,7 @@ def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told()
 
     async def tried(seen):
         told.append(checkup.doing)
-        return replace(seen, calls_in_threads=False, tried=True)
+        return replace(seen, link=LinkFacts(calls_in_threads=False, tried=True))
 
     checkup = Checkup("ws://bob:9090", observe=seen_at, tried=tried)
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import svg
-from webmap.console.costmaps import CostmapNames
+from webmap.console.page import CostmapNames
 
 
 def grid(topic, palette="costmap"):

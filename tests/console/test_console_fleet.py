@@ -1,71 +1,29 @@
-"""Robots as they are told on the command line."""
+"""Robots as the console shows them."""
 
 import pytest
 
-from webmap import Bridge, Robot
-from webmap.console import RobotDescription, parse_robot
-from webmap.console.fleet import make_robot
-from webmap.errors import ConfigError
+from webmap import Bridge, Robot, RobotConfig
+from webmap.console import make_robot
 
 
 @pytest.fixture
-def bridges():
-    return [Bridge("ws://localhost:9090"), Bridge("ws://localhost:9091")]
+def bridge():
+    return Bridge("ws://localhost:9090")
 
 
-def test_a_robot_is_a_name_and_three_topics(bridges):
-    about = parse_robot("Bob:/odom:/cmd_vel:/scan", bridges, stops_within=0.25)
-    assert about == RobotDescription(
-        name="Bob",
-        bridge=bridges[0],
+def robot_of(bridge, **parts):
+    config = RobotConfig.from_dict({"name": "Bob", "bridge": bridge.url, **parts})
+    return make_robot(config, [bridge])
+
+
+def test_a_described_robot_has_what_its_topics_need(bridge):
+    robot = robot_of(
+        bridge,
         odometry="/odom",
-        twist="/cmd_vel",
+        twist={"topic": "/cmd_vel", "stops_within": 0.25},
         scan="/scan",
-        stops_within=0.25,
-    )
-
-
-def test_topics_may_be_empty_or_left_out(bridges):
-    about = parse_robot("Bob:/odom::/scan", bridges)
-    assert (about.odometry, about.twist, about.scan) == ("/odom", "", "/scan")
-    assert parse_robot("Bob:/odom", bridges).scan == ""
-
-
-def test_a_number_says_behind_which_bridge_it_is(bridges):
-    assert parse_robot("2@Bob:/odom", bridges).bridge is bridges[1]
-
-
-def test_an_at_sign_in_a_topic_is_no_number_of_a_bridge(bridges):
-    assert parse_robot("Bob:/a@b", bridges).odometry == "/a@b"
-
-
-@pytest.mark.parametrize(
-    "text", ["", "Bob", ":/odom", "Bob:::", "Bob:/a:/b:/c:/d", "  :/odom"]
-)
-def test_another_form_is_refused_with_the_right_one(bridges, text):
-    with pytest.raises(ConfigError, match="NAME:ODOM:CMD_VEL:SCAN"):
-        parse_robot(text, bridges)
-
-
-@pytest.mark.parametrize("number", ["0", "3", "-1", "x", "", "²"])
-def test_a_bridge_that_is_not_there_is_refused(bridges, number):
-    with pytest.raises(ConfigError, match="there are 2"):
-        parse_robot(f"{number}@Bob:/odom", bridges)
-
-
-def test_a_described_robot_has_what_its_topics_need(bridges):
-    robot = make_robot(
-        RobotDescription(
-            name="Bob",
-            bridge=bridges[0],
-            odometry="/odom",
-            twist="/cmd_vel",
-            scan="/scan",
-            battery="/battery",
-            goal="/goal",
-            cancel="/cancel",
-            stops_within=0.25,
-        )
+        battery="/battery",
+        move={"topic": "/goal", "cancel_topic": "/cancel"},
     )
     names = [type(module).__name__ for module in robot.modules]
     assert names == ["LaserScanner", "Battery", "NameLabel"]
@@ -76,15 +34,15 @@ def test_a_described_robot_has_what_its_topics_need(bridges):
     robot.destroy()
 
 
-def test_a_scan_is_drawn_under_the_robot_s_body(bridges):
-    robot = make_robot(RobotDescription(name="Bob", bridge=bridges[0], scan="/scan"))
+def test_a_scan_is_drawn_under_the_robot_s_body(bridge):
+    robot = robot_of(bridge, scan="/scan")
     order = [child for child in robot.svg.children]
     assert order.index(robot.modules[0].svg) < order.index(robot.model)
     robot.destroy()
 
 
-def test_a_name_stays_upright_wherever_the_robot_looks(bridges):
-    robot = make_robot(RobotDescription(name="Bob", bridge=bridges[0]))
+def test_a_name_stays_upright_wherever_the_robot_looks(bridge):
+    robot = robot_of(bridge)
     robot.orientation = type(robot.orientation).from_yaw(1.0)
     robot.notify_modules("on_odometry_update")
     label = robot.modules[-1].svg
@@ -92,10 +50,10 @@ def test_a_name_stays_upright_wherever_the_robot_looks(bridges):
     robot.destroy()
 
 
-def test_a_page_is_told_which_base_moves_sideways(bridges):
+def test_a_page_is_told_which_base_moves_sideways(bridge):
     robot = Robot("Bob")
-    robot.set_twist_topic(bridges[0], "/cmd_vel", holonomic=True)
+    robot.set_twist_topic(bridge, "/cmd_vel", holonomic=True)
     assert "data-holonomic" in robot.svg.attributes
-    robot.set_twist_topic(bridges[0], "/cmd_vel")
+    robot.set_twist_topic(bridge, "/cmd_vel")
     assert "data-holonomic" not in robot.svg.attributes
     robot.destroy()

@@ -22,12 +22,9 @@ from webmap.core import robot_state
 
 robot_state.GONE = 3.0
 bridge = webmap.Bridge({url!r})
-robots = [
-    console.RobotDescription(
-        name="Ghost", bridge=bridge, odometry="/ghost/odom", twist={twist!r}
-    ),
-    console.RobotDescription(name="Robot", bridge=bridge, odometry="/odom"),
-]
+ghost = dict(name="Ghost", bridge=bridge.url, odometry="/ghost/odom", **{more!r})
+robot = dict(name="Robot", bridge=bridge.url, odometry="/odom")
+robots = [webmap.RobotConfig.from_dict(each) for each in (ghost, robot)]
 console.open_console([bridge], robots)
 """
 
@@ -67,7 +64,7 @@ def test_a_robot_that_is_gone_fades_and_can_be_removed_until_it_is_back(
     file = tmp_path / "gone.py"
     with simulator("--flat") as url, watched_tab(chromium, 1280, 800) as page:
         page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
-        file.write_text(PROGRAM.format(url=url, twist=""))
+        file.write_text(PROGRAM.format(url=url, more={}))
         with page_of(file) as address:
             row = page.locator("#robots .row", has_text="Ghost")
             drawn = page.locator('.robot[data-name="Ghost"]')
@@ -100,7 +97,7 @@ def test_a_robot_that_moves_by_itself_is_not_called_free(chromium, tmp_path):
     file = tmp_path / "moves.py"
     with simulator("--flat") as url, watched_tab(chromium, 1280, 800) as page:
         page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
-        file.write_text(PROGRAM.format(url=url, twist="/ghost/cmd_vel"))
+        file.write_text(PROGRAM.format(url=url, more={"twist": "/ghost/cmd_vel"}))
         with page_of(file) as address, odometry(url, speed=0.3):
             page.goto(address)
             row = page.locator("#robots .row", has_text="Ghost")

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import html
-from webmap.console.health import MOST, RobotHealth
+from webmap.console.card_parts import MOST, RobotHealth
 
 
 class Diagnosing:

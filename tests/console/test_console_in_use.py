@@ -5,18 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from webmap import Bridge, Map, Robot
-from webmap.console import RobotDescription
-from webmap.console.checkup import checkup_of
-from webmap.console.doctor import DoctorReports
-from webmap.console.fleet import make_robot
+from webmap import Bridge, Map, Robot, RobotConfig
+from webmap.console import make_robot
+from webmap.console.doctor import DoctorReports, checkup_of
 from webmap.console.in_use import in_use
-from webmap.core.page import Page, PageEntry
+from webmap.core.page import Page, PageEntry, Viewer
 from webmap.discovery import discover
 from webmap.discovery.doctor import Observed
 from webmap.discovery.doctor.meant import lay_over
 from webmap.scene.events import Event
-from webmap.server.viewer import Viewer
 from webmap.wire.session import SceneSession
 
 
@@ -36,24 +33,26 @@ def only(found):
 
 
 def test_a_described_robot_uses_what_it_was_given(bridge):
-    about = RobotDescription(
-        name="Bob",
-        bridge=bridge,
-        odometry="/odom",
-        twist="/cmd_vel",
-        twist_type="geometry_msgs/TwistStamped",
-        scan="/scan",
-        battery="/battery",
-        cameras=("/front/image_raw", "/rear/image_raw/compressed"),
-        action=("/navigate_to_pose", "nav2_msgs/action/NavigateToPose"),
+    cameras = ["/front/image_raw", "/rear/image_raw/compressed"]
+    config = RobotConfig.from_dict(
+        {
+            "name": "Bob",
+            "bridge": bridge.url,
+            "odometry": "/odom",
+            "twist": {"topic": "/cmd_vel", "type": "geometry_msgs/TwistStamped"},
+            "scan": "/scan",
+            "battery": "/battery",
+            "cameras": cameras,
+            "move": {"action": "/navigate_to_pose"},
+        }
     )
-    bob = only(in_use([make_robot(about)], bridge))
+    bob = only(in_use([make_robot(config, [bridge])], bridge))
     assert bob.name == "Bob"
     assert bob.topics["odometry"] == (("/odom", ""),)
     assert bob.topics["velocity"] == (("/cmd_vel", "geometry_msgs/TwistStamped"),)
     assert bob.topics["scan"] == (("/scan", ""),)
     assert bob.topics["battery"] == (("/battery", ""),)
-    assert [topic for topic, _ in bob.topics["camera"]] == list(about.cameras)
+    assert [topic for topic, _ in bob.topics["camera"]] == cameras
     assert bob.topics["action"] == (("/navigate_to_pose/_action/feedback", ""),)
     assert bob.topics["cloud"] == bob.topics["plan"] == ()
     assert "tf" not in bob.topics, "frames are told of as they are found"

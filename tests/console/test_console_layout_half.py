@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 
 from webmap import Map, Robot
-from webmap.console.frame import MARGIN, Frame
-from webmap.console.layout import Layout
-from webmap.core.page import Page, PageEntry
-from webmap.server.viewer import Viewer
+from webmap.console.page import MARGIN, Frame, Layout
+from webmap.core.page import Page, PageEntry, Viewer
 from webmap.wire.session import SceneSession
 
 

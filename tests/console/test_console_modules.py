@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 
 from webmap import Map, Robot
-from webmap.core.page import Page, PageEntry
+from webmap.core.page import Page, PageEntry, Viewer
 from webmap.modules.map.follow import Follow
 from webmap.modules.map.goal_tool import GoalTool
 from webmap.modules.map.pointer_readout import PointerReadout
 from webmap.modules.map.scale_bar import ScaleBar
 from webmap.modules.map.stop_button import StopButton
-from webmap.server.viewer import Viewer
 from webmap.wire.session import SceneSession
 
 WEB = Path(__file__).parents[2] / "src" / "webmap" / "web"

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from webmap.console.own_stop import NOBODY_KNOWS, OwnStop, bound
+from webmap.console.card_parts import NOBODY_KNOWS, OwnStop, bound
 
 
 def report(**changes):

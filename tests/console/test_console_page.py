@@ -5,14 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from webmap import Bridge, Robot
-from webmap.console import Console, RobotDescription, open_console
-from webmap.console.fleet import make_robot
+from webmap import Bridge, Robot, RobotConfig
+from webmap.console import Console, make_robot, open_console
 from webmap.console.page import build
-from webmap.core.page import Page, PageEntry, site
+from webmap.core.page import Page, PageEntry, Viewer, site
 from webmap.errors import ConfigError
 from webmap.scene.element import Element
-from webmap.server.viewer import Viewer
 from webmap.wire.session import SceneSession
 
 
@@ -38,9 +36,16 @@ def robots(bridge):
     names = ("Bob", "Ann")
     made = [
         make_robot(
-            RobotDescription(
-                name=name, bridge=bridge, odometry="/odom", scan="/scan", battery="/b"
-            )
+            RobotConfig.from_dict(
+                {
+                    "name": name,
+                    "bridge": bridge.url,
+                    "odometry": "/odom",
+                    "scan": "/scan",
+                    "battery": "/b",
+                }
+            ),
+            [bridge],
         )
         for name in names
     ]

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from webmap.console.battery import BatteryMark
-from webmap.console.bridge_list import summary
-from webmap.console.speeds import cap, linear
+from webmap.console.bar import summary
+from webmap.console.card_parts import cap, linear
+from webmap.console.robot_list import BatteryMark
 from webmap.console.words import (
     LOOKS,
     battery_tone,
@@ -87,9 +87,9 @@ def test_a_low_battery_is_more_than_a_number(charge, tone):
 
 def test_a_charge_that_is_not_known_is_not_shown():
     mark = BatteryMark()
-    mark.show(SimpleNamespace(charge=0.84))
+    mark.show(0.84)
     assert mark.element.text == "battery 84 %"
-    mark.show(SimpleNamespace(charge=None))
+    mark.show(None)
     assert mark.element.get("hidden") is not None
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from webmap import Map
-from webmap.core.page import Page, PageEntry
-from webmap.server.viewer import Viewer
+from webmap.core.page import Page, PageEntry, Viewer
 from webmap.wire.session import SceneSession
 
 

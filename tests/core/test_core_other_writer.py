@@ -47,12 +47,13 @@ def driven(robot, answers):
     """Give a robot a topic on a bridge whose rosapi answers so."""
     asked = []
 
-    async def publishers(topic):
+    async def nodes(kind, topic):
+        assert kind == "publishers"
         asked.append(topic)
         return answers.pop(0)
 
     bridge = Bridge("ws://robot:9090")
-    bridge.publishers = publishers
+    bridge._graph.nodes = nodes
     robot.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
     return asked
 

@@ -5,11 +5,11 @@ import asyncio
 import pytest
 
 from webmap import Map, Robot, html, svg
+from webmap.config.buttons import read_button
 from webmap.core import robot_button
-from webmap.core.button_spec import read_button
-from webmap.core.button_view import ButtonView
 from webmap.core.robot_button import RobotButton
 from webmap.lifecycle import lifecycle
+from webmap.modules.robot.buttons import ButtonView
 from webmap.scene.events import Event
 from webmap.scope import Scope
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.core.part_owners import PartOwners
+from webmap.modules.robot.diagnostics import PartOwners
 from webmap.scope import Scope
 
 

@@ -5,8 +5,7 @@ import logging
 import pytest
 
 from webmap import Map, Robot
-from webmap.core.problems import Problems
-from webmap.core.recurring import wording
+from webmap.core.problems import Problems, wording
 
 log = logging.getLogger("webmap.test")
 

@@ -1,8 +1,9 @@
-"""What can be the model of a robot."""
+"""What can be the model of a robot, and the image files in it."""
 
 import pytest
 
-from webmap import Robot, svg
+from webmap import Map, Robot, svg
+from webmap.core.page import Page
 from webmap.errors import ConfigError
 
 
@@ -26,4 +27,89 @@ def test_the_model_of_a_robot_that_is_gone_may_be_used_again():
     Robot("Ann", circle).destroy()
     bob = Robot("Bob", circle)
     assert circle in bob.svg.children
+    bob.destroy()
+
+
+# Image files: found beside the program, and there while the model is shown.
+
+
+@pytest.fixture
+def picture(tmp_path):
+    (tmp_path / "robot.png").write_bytes(b"png")
+    return svg.image(href="robot.png", width=1, height=1)
+
+
+@pytest.fixture
+def other_page(page, channel, publisher):
+    """A page of another viewer."""
+    return Page(page.entry, type(channel)(), page.viewer, publisher, {})
+
+
+def shown(page, robot):
+    map = Map(page.element("webmap_container"), 700, 500)
+    map.add_robot(robot)
+    return map
+
+
+def test_the_image_of_a_model_is_a_file_of_the_folder_of_the_page(page, picture):
+    bob = Robot("Bob", svg.g(picture))
+    assert picture.get("href") == "robot.png"
+    shown(page, bob)
+    assert picture.get("href") == "/_webmap/images/robot.png"
+    bob.destroy()
+
+
+def test_the_image_of_a_shared_robot_outlives_the_page_that_showed_it_first(
+    page, other_page, picture, publisher
+):
+    bob = Robot("Bob", picture)
+    shown(page, bob)
+    shown(other_page, bob)
+    page.close()
+    assert publisher.images == ["robot.png"]
+    assert picture.get("href") == "/_webmap/images/robot.png"
+    other_page.close()
+    assert publisher.images == []
+    assert picture.get("href") == "robot.png"
+    bob.destroy()
+
+
+def test_an_image_that_came_later_is_there_for_the_next_page(
+    page, other_page, picture, publisher
+):
+    bob = Robot("Bob", svg.g())
+    shown(page, bob)
+    bob.model.append(picture)
+    shown(other_page, bob)
+    assert picture.get("href") == "/_webmap/images/robot.png"
+    bob.destroy()
+
+
+@pytest.mark.parametrize(
+    "href", ["/static/robot.png", "nowhere.png", "../robot.png", "#part"]
+)
+def test_what_is_no_file_of_the_folder_is_left_to_the_browser(page, publisher, href):
+    image = svg.image(href=href)
+    bob = Robot("Bob", image)
+    shown(page, bob)
+    assert image.get("href") == href
+    assert publisher.images == []
+    bob.destroy()
+
+
+def test_another_image_that_a_program_sets_meanwhile_stays(page, picture):
+    bob = Robot("Bob", picture)
+    shown(page, bob)
+    picture.set(href="/static/other.png")
+    page.close()
+    assert picture.get("href") == "/static/other.png"
+    bob.destroy()
+
+
+def test_plain_data_name_the_file_also_while_a_page_shows_it(page, picture):
+    bob = Robot("Bob", svg.g(picture))
+    before = bob.to_dict()
+    shown(page, bob)
+    assert bob.to_dict() == before
+    assert before["model"]["children"][0]["attributes"]["href"] == "robot.png"
     bob.destroy()

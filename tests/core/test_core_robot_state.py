@@ -1,6 +1,5 @@
 """What a robot is doing, in words."""
 
-import time
 from datetime import datetime, timedelta
 from types import SimpleNamespace
 from typing import get_args
@@ -8,8 +7,7 @@ from typing import get_args
 import pytest
 
 from webmap.console.words import LOOKS
-from webmap.core.robot_state import WORDS, state_of
-from webmap.gate.limits import PLANE
+from webmap.core.robot_state import WORDS, Facts, state_of
 from webmap.gate.messages.robot_report import Doing
 from webmap.geometry import Twist
 
@@ -17,21 +15,20 @@ MOVES = (0.4, 0.0, 0.0)
 ANN = SimpleNamespace(connection="c2", name="Ann")
 
 
-def robot(doing="free", *, seen=None, age=0.1, silent=0.1, ended=None, **changes):
-    """Return a robot with a report, and what the display itself has seen of it."""
+def robot(doing="free", *, seen=None, age=0.1, silent=0.1, over=None, **changes):
+    """Return what is known of a robot: its report, and what the display has seen."""
     report = None
     if doing is not None:
         changes = {"holder": None, "goal": None, "measured": None, **changes}
         report = SimpleNamespace(doing=doing, **changes)
-    bridge = SimpleNamespace(state="open", lost=False, replays=False)
-    return SimpleNamespace(
-        feed=SimpleNamespace(bridge=bridge, throttle=0),
+    return Facts(
         report=report,
-        pose_age=age,
+        bridge=SimpleNamespace(state="open", lost=False, replays=False),
+        period=0.0,
         silent_for=silent,
-        goal_ended_at=ended,
-        measured_twist=None if seen is None else Twist(*seen),
-        motion=SimpleNamespace(axes=PLANE),
+        pose_age=age,
+        twist=None if seen is None else Twist(*seen),
+        goal_over_for=over,
     )
 
 
@@ -78,13 +75,11 @@ def test_somebody_without_a_name_has_the_name_of_the_connection():
         ({"seen": MOVES, "doing": "held", "holder": ANN}, "Ann holds it"),
         ({"seen": MOVES, "goal": SimpleNamespace(state="sent")}, "Navigating"),
         ({"seen": MOVES, "goal": SimpleNamespace(state="reached")}, "Moving, not by"),
-        ({"seen": MOVES, "ended": 1.0}, "Still moving"),
-        ({"seen": MOVES, "ended": 3.0}, "Moving, not by WebMap"),
+        ({"seen": MOVES, "over": 1.0}, "Still moving"),
+        ({"seen": MOVES, "over": 3.0}, "Moving, not by WebMap"),
     ],
 )
 def test_the_display_sees_motion_that_the_gate_does_not_look_at(changes, text):
-    if changes.get("ended"):
-        changes = {**changes, "ended": time.monotonic() - changes["ended"]}
     assert state_of(robot(**changes)).text.startswith(text)
 
 
@@ -96,9 +91,9 @@ def test_a_robot_that_the_gate_does_not_know_is_only_watched():
 @pytest.mark.parametrize("doing", [None, "free", "barred", "down"])
 def test_a_bridge_that_is_lost_has_words_of_its_own(doing):
     one = robot(doing)
-    one.feed.bridge.state = "connecting"
+    one.bridge.state = "connecting"
     assert state_of(one).text == "Connecting"
-    one.feed.bridge.lost = True
+    one.bridge.lost = True
     assert state_of(one).text == "No bridge"
 
 
@@ -115,15 +110,13 @@ def test_a_robot_whose_poses_ceased_is_gone_since_then():
 def test_a_robot_that_sends_poses_seldom_or_only_in_motion_is_not_gone():
     assert state_of(robot(silent=None)).text == "Free"
     one = robot(silent=100.0)
-    one.feed.throttle = 60_000
-    assert state_of(one).text == "Free"
-    one.feed.throttle = 30_000
-    assert state_of(one).name == "gone"
+    assert state_of(one._replace(period=60.0)).text == "Free"
+    assert state_of(one._replace(period=30.0)).name == "gone"
 
 
 def test_a_robot_of_a_recording_that_ended_is_not_gone():
     one = robot(None, silent=100.0)
-    one.feed.bridge.replays = True
+    one.bridge.replays = True
     assert state_of(one).text == "Watched only"
 
 

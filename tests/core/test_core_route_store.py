@@ -5,14 +5,14 @@ import os
 
 import pytest
 
-from webmap.core.route_store import (
+from webmap.errors import ConfigError
+from webmap.modules.map.route_tool import (
     MOST_POINTS,
     MOST_ROUTES,
     RouteStore,
     read_name,
     read_route,
 )
-from webmap.errors import ConfigError
 
 POINT = {"x": 1.0, "y": 2.0, "yaw": 0.5}
 
@@ -68,7 +68,7 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
 
 
 def test_there_is_an_end_to_how_many_are_kept(store, monkeypatch):
-    monkeypatch.setattr("webmap.core.route_store.MOST_ROUTES", 2)
+    monkeypatch.setattr("webmap.modules.map.route_tool.MOST_ROUTES", 2)
     store.save("1", route())
     store.save("2", route())
     with pytest.raises(ConfigError, match="delete one first"):

@@ -182,7 +182,9 @@ def test_numbers_of_numpy_are_numbers_that_the_gate_can_be_told(robot, size):
 
 @pytest.mark.parametrize("size", ["0.3", [1.0, 2.0], None])
 def test_a_footprint_that_is_neither_radius_nor_corners_is_refused(robot, size):
-    with pytest.raises(ConfigError, match=r"is a radius or corners \(x, y\)"):
+    with pytest.raises(
+        ConfigError, match="robot's radius in metres, above 0, or 3 corners"
+    ):
         drivable(robot).set_scan_assist("/scan", size)
 
 
@@ -194,17 +196,19 @@ def test_a_robot_without_them_says_nothing_of_them(robot):
 
 @pytest.mark.parametrize("radius", [0, -0.3, math.nan, math.inf, True, np.float64(-1)])
 def test_a_radius_that_is_not_above_zero_is_refused(robot, radius):
-    with pytest.raises(ConfigError, match="footprint for scan assist"):
+    with pytest.raises(
+        ConfigError, match=r"footprint: got the .* radius in metres, above 0"
+    ):
         robot.set_scan_assist("/scan", radius)
 
 
 def test_an_outline_that_crosses_itself_is_refused_and_the_one_before_stays(robot):
     corners = [(0.3, 0.2), (-0.3, -0.2), (0.3, -0.2), (-0.3, 0.2)]
     robot.set_scan_assist("/scan", 0.3)
-    before = robot.motion._assist
+    before = robot.motion.config.scan_assist
     with pytest.raises(ConfigError, match="edge from corner 1 meets the edge from"):
         robot.set_scan_assist("/scan", corners)
-    assert robot.motion._assist == before
+    assert robot.motion.config.scan_assist == before
 
 
 def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):
@@ -218,16 +222,28 @@ def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):
 @pytest.mark.parametrize(
     ("hooks", "said"),
     [
-        ([{"topic": 5}], "the topic of a stop hook is a name such as '/lock', got 5"),
-        ([{"topic": ""}], "is a name such as"),
-        ([{"topic": "/lock", "type": 5}], "is of type std_msgs/Bool, got 5"),
-        ([{"service": "/e_stop", "type": "std_msgs/Bool"}], "std_srvs/Trigger, got"),
-        ([{"topik": "/lock"}], "the key 'topic' or the key 'service'"),
-        ([{"topic": "/lock", "data": True}], "and besides 'type' no other"),
-        (["/lock"], "a stop hook is a table such as"),
-        (LOCK, "stop_hooks is a list of hooks, got"),
-        ("/lock", "stop_hooks is a list of hooks, got '/lock'"),
-        (5, "stop_hooks is a list of hooks, got 5"),
+        (
+            [{"topic": 5}],
+            r'\[0\].topic: got the whole number 5, expected a name, such as "/lock"',
+        ),
+        ([{"topic": ""}], r'\[0\].topic: got the text "", expected a name, such as'),
+        (
+            [{"topic": "/lock", "type": 5}],
+            r"\[0\].type: got the whole number 5, expected a text",
+        ),
+        (
+            [{"service": "/e_stop", "type": "std_msgs/Bool"}],
+            "expected one of the types std_srvs/Trigger",
+        ),
+        ([{"topik": "/lock"}], 'there is no key "topik" here; did you mean "topic"'),
+        (
+            [{"topic": "/lock", "data": True}],
+            'no key "data" here; there are topic, service, type',
+        ),
+        (["/lock"], 'the text "/lock", expected a table such as {topic = "/lock"}'),
+        (LOCK, "stop_hooks: got the table .* expected an array such as"),
+        ("/lock", 'stop_hooks: got the text "/lock", expected an array such as'),
+        (5, "stop_hooks: got the whole number 5, expected an array such as"),
         ([{"topic": "cmd_vel"}], "its velocity goes to /cmd_vel"),
     ],
 )
@@ -260,7 +276,7 @@ def test_plain_scan_assist_that_is_wrong_is_named(data, said):
 def test_a_robot_that_is_destroyed_is_never_declared_as_one_with_goals_alone(
     robot, gate
 ):
-    drivable(robot).set_move_topic(robot.motion.twist_topic.bridge, "/goal")
+    drivable(robot).set_move_topic(robot.motion.bridge("twist"), "/goal")
     gate.spec = None
     robot.motion.close()
     assert gate.spec is None

@@ -8,14 +8,14 @@ import pytest
 from webmap import Bridge, Robot
 from webmap.core.motion import MotionRoad
 from webmap.core.type_asking import FEW, LATER, SHARE, SOON
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.scope import Removal
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import parse_quirks
-from webmap.sim.rosbridge.rosapi import Rosapi
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.server import RosbridgeServer
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
 

@@ -13,15 +13,14 @@ from frames_only import telling
 from webmap.discovery import discover
 from webmap.discovery.doctor import Heard, Observed, is_ready, judge
 from webmap.discovery.doctor.frames import FrameListening
-from webmap.discovery.doctor.listening import Listening
+from webmap.discovery.doctor.listening import MOST_BYTES, Listening, Sampling
 from webmap.discovery.doctor.measure import observe
 from webmap.discovery.doctor.observed import Clock, Way
-from webmap.discovery.doctor.ports import is_loopback, listening_addresses
-from webmap.discovery.doctor.sampling import MOST_BYTES, Sampling
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
 from webmap.geometry import Pose
-from webmap.ros.events import Publish
+from webmap.ros.rosbridge.checks import LinkFacts, is_loopback, listening_addresses
+from webmap.ros.rosbridge.events import Publish
 
 TOPICS = {
     "/odom": "nav_msgs/Odometry",
@@ -34,8 +33,7 @@ LISTENED = {
 }
 GOOD = Observed(
     "ws://localhost:9090",
-    peer="127.0.0.1",
-    listens=("127.0.0.1",),
+    link=LinkFacts("127.0.0.1", ("127.0.0.1",)),
     findings=discover(TOPICS, "bob"),
     clock=Clock(0.01, 0.004),
     publishers={"/cmd_vel": ()},
@@ -94,7 +92,7 @@ def test_why_a_bridge_is_away_says_what_to_do(trouble, advice):
     ],
 )
 def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
-    findings = judge(replace(GOOD, url=url, peer=peer, listens=()))
+    findings = judge(replace(GOOD, url=url, link=LinkFacts(peer)))
     (found,) = [f for f in findings if "open to the" in f.words or "reached" in f.words]
     assert found.level == level
     assert ("topics_glob" in found.advice) is (not url.startswith("ws://localhost"))
@@ -110,7 +108,7 @@ def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
     ],
 )
 def test_a_bridge_on_this_machine_may_be_open_to_others(listens, level, words):
-    assert said(replace(GOOD, listens=listens), words) == level
+    assert said(replace(GOOD, link=LinkFacts("127.0.0.1", listens)), words) == level
 
 
 TCP = """\
@@ -165,7 +163,8 @@ def test_only_some_addresses_are_of_this_machine_alone(address, here):
 
 
 def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():
-    seen = replace(GOOD, url="ws://bob:9090", peer="192.168.1.7", shown=("/rosout",))
+    link = LinkFacts("192.168.1.7")
+    seen = replace(GOOD, url="ws://bob:9090", link=link, shown=("/rosout",))
     assert said(seen, "Nothing is hidden from anybody either (/rosout") == "warning"
     at_home = replace(GOOD, shown=("/rosout",))
     assert not any("hidden" in each.words for each in judge(at_home))
@@ -276,7 +275,7 @@ def test_the_status_of_goals_is_asked_for_by_the_action_that_the_robot_has():
 
 
 def test_a_bridge_without_rosapi_is_told_what_to_do():
-    bare = Observed("ws://localhost:9090", rosapi="no answer")
+    bare = Observed("ws://localhost:9090", unlisted="no answer")
     assert said(bare, "rosapi does not say") == "warning"
     assert said(bare, "is not known") == "note"
 
@@ -321,7 +320,7 @@ def test_an_offset_within_half_the_way_is_no_offset():
 )
 def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
     findings = replace(GOOD.findings, dialect=dialect)
-    seen = replace(GOOD, findings=findings, calls_in_threads=threads)
+    seen = replace(GOOD, findings=findings, link=LinkFacts(calls_in_threads=threads))
     (found,) = [f for f in judge(seen) if "hangs" in f.words or "of its own" in f.words]
     assert found.level == level
 

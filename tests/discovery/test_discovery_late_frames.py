@@ -7,11 +7,11 @@ import pytest
 from frames_only import TF, telling
 
 from webmap import Bridge
-from webmap.cli.found_layers import DrawnLayers, _services, draw_layers
-from webmap.cli.latecomers import LateRobots, LookingForRobots, greet
+from webmap.cli.looking import LookingForLayers, LookingForRobots
+from webmap.cli.shown import ShownRobots
 from webmap.console import Console
 from webmap.discovery import discover
-from webmap.discovery.late_frames import LateFrames, late_frames
+from webmap.discovery.hearing import LateFrames, late_frames
 from webmap.discovery.tf_robots import Trees
 from webmap.geometry import Pose
 
@@ -35,7 +35,7 @@ async def until(condition, seconds: float = 30.0) -> None:
 def quick(monkeypatch):
     """Looks that follow one another quickly."""
     monkeypatch.setattr(LookingForRobots, "period", 0.05)
-    monkeypatch.setattr(DrawnLayers, "period", 0.05)
+    monkeypatch.setattr(LookingForLayers, "period", 0.05)
     monkeypatch.setitem(LateFrames.listen.__kwdefaults__, "seconds", 0.3)
 
 
@@ -51,15 +51,14 @@ def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
             loop = asyncio.get_running_loop()
             bridge = Bridge(url)
             console = Console()
-            late = LateRobots(console)
+            late = ShownRobots(console)
             topics = {"/tf": TF, **extra}
             trees = Trees()
             for parent, child, _ in told["/tf"]:
                 trees.take("", parent, child)
             (ann,) = discover(topics, "host", trees).robots
-            looking = LookingForRobots(bridge, [ann], greet(late, ["ann"], None))
-            draw_layers([bridge], console.robots)
-            drawing = _services[-1]
+            looking = LookingForRobots(bridge, [ann], late.came)
+            drawing = LookingForLayers(bridge, late)
             bridge.start(loop)
             for service in (looking, drawing):
                 service.start(loop)
@@ -99,8 +98,8 @@ def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
         async def scenario() -> None:
             loop = asyncio.get_running_loop()
             bridge = Bridge(url)
-            late = LateRobots(Console())
-            looking = LookingForRobots(bridge, [], greet(late, [], None))
+            late = ShownRobots(Console())
+            looking = LookingForRobots(bridge, [], late.came)
             bridge.start(loop)
             looking.start(loop)
             try:

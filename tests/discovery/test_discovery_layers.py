@@ -1,13 +1,19 @@
 """Which topics are drawn besides, by rules of names and types."""
 
-import inspect
-
 import pytest
 
+from webmap import Bridge
+from webmap.core.declaration import declarations
+from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules, robot_modules
-from webmap.discovery.drawing import Drawing, drawing
-from webmap.discovery.layers import RULES, FoundLayer, find_layers, left_out
+from webmap.discovery.layers import (
+    Drawing,
+    FoundLayer,
+    drawing,
+    find_layers,
+)
 
+URL = "ws://hall:9090"
 FRAMES = {"map_frame": "map", "namespace": "/a"}
 
 NAV2 = {
@@ -41,7 +47,7 @@ def kinds(found) -> dict[str, str]:
 def test_what_an_aggregator_says_is_shown_where_nobody_else_does(first):
     topics = {"/diagnostics_agg": "diagnostic_msgs/DiagnosticArray"}
     topics[first] = "diagnostic_msgs/DiagnosticArray"
-    assert [layer.topic for layer in find_layers(topics, [""])[""]] == [first]
+    assert [layer.topic for layer in find_layers(topics, [""])[""].drawn] == [first]
 
 
 @pytest.mark.parametrize("space", ["/a", "/z"])
@@ -49,7 +55,7 @@ def test_a_robots_own_diagnostics_come_before_those_that_all_share(space):
     topics = dict.fromkeys(
         ["/diagnostics", f"{space}/diagnostics"], "diagnostic_msgs/DiagnosticArray"
     )
-    (layer,) = find_layers(topics, [space])[space]
+    (layer,) = find_layers(topics, [space])[space].drawn
     assert layer.topic == f"{space}/diagnostics"
     assert drawing(layer, space, None).options == {"namespace": ""}
 
@@ -63,16 +69,16 @@ def test_of_a_topic_that_robots_share_each_gets_what_is_in_its_namespace():
 @pytest.mark.parametrize("type", ["gps_common/GPSFix", "gps_msgs/msg/GPSFix"])
 def test_a_gps_fix_is_drawn_where_there_is_no_other(type):
     topics = {"/gps/detailed": type}
-    (layer,) = find_layers(topics, [""])[""]
+    (layer,) = find_layers(topics, [""])[""].drawn
     assert (layer.kind, layer.topic) == ("fix", "/gps/detailed")
     assert drawing(layer, "", None) == Drawing("NavSatFix", {"type": type})
     topics["/gps/plain"] = "sensor_msgs/NavSatFix"
-    (layer,) = find_layers(topics, [""])[""]
+    (layer,) = find_layers(topics, [""])[""].drawn
     assert drawing(layer, "", None) == Drawing("NavSatFix")
 
 
 def test_what_nav2_publishes_is_drawn_once_each():
-    found = find_layers(NAV2, ["/tb"])["/tb"]
+    found = find_layers(NAV2, ["/tb"])["/tb"].drawn
     assert kinds(found) == {
         "/local_costmap/costmap": "costmap",
         "/global_costmap/costmap": "global costmap",
@@ -98,7 +104,7 @@ def test_what_nav2_publishes_is_drawn_once_each():
 @pytest.mark.parametrize("above", ["", "/move_base"])
 def test_the_global_costmap_is_one_of_its_own_also_without_a_local_one(space, above):
     topic = f"{space}{above}/global_costmap/costmap"
-    (found,) = find_layers({topic: "nav_msgs/OccupancyGrid"}, [space])[space]
+    (found,) = find_layers({topic: "nav_msgs/OccupancyGrid"}, [space])[space].drawn
     assert (found.kind, found.topic) == ("global costmap", topic)
 
 
@@ -109,7 +115,7 @@ def test_move_base_has_other_names():
         "/move_base/DWAPlannerROS/local_plan": "nav_msgs/Path",
         "/particlecloud": "geometry_msgs/PoseArray",
     }
-    found = find_layers(topics, [""])[""]
+    found = find_layers(topics, [""])[""].drawn
     assert sorted(layer.kind for layer in found) == [
         "costmap",
         "footprint",
@@ -126,18 +132,18 @@ def test_inflated_cells_of_a_local_costmap_come_first_and_the_unknown_is_none():
         for costmap in costmaps
         for name in names
     }
-    assert [layer.topic for layer in find_layers(topics, ["/a"])["/a"]] == [
+    assert [layer.topic for layer in find_layers(topics, ["/a"])["/a"].drawn] == [
         "/a/local_costmap/inflated_obstacles",
         "/a/local_costmap/obstacles",
         "/a/global_costmap/inflated_obstacles",
     ]
-    (other,) = left_out(topics, ["/a"])["/a"]
+    (other,) = find_layers(topics, ["/a"])["/a"].left_out
     assert other.topic == "/a/global_costmap/obstacles"
 
 
 def test_what_a_controller_steers_to_is_on_the_robot_where_no_frames_are_told():
     topics = {"/lookahead_point": "geometry_msgs/msg/PointStamped"}
-    (layer,) = find_layers(topics, [""])[""]
+    (layer,) = find_layers(topics, [""])[""].drawn
     options = drawing(layer, "", None).options
     assert (options["name"], options["frame"]) == ("lookahead", "robot")
 
@@ -161,7 +167,7 @@ def test_what_has_an_odd_name_is_drawn_by_its_type():
         "/a/ekf_pose": "geometry_msgs/PoseWithCovarianceStamped",
         "/a/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
     }
-    found = find_layers(topics, ["/a"])["/a"]
+    found = find_layers(topics, ["/a"])["/a"].drawn
     assert {layer.topic.removeprefix("/a/"): layer.kind for layer in found} == {
         "front": "scan",
         "rear": "scan",
@@ -179,7 +185,7 @@ def test_what_has_an_odd_name_is_drawn_by_its_type():
         "frontiers": "cells",
         "ekf_pose": "doubt",
     }
-    (other,) = left_out(topics, ["/a"])["/a"]
+    (other,) = find_layers(topics, ["/a"])["/a"].left_out
     assert other.topic == "/a/move_base_simple/goal"
 
 
@@ -190,7 +196,7 @@ def test_every_map_is_drawn_a_robots_own_with_it_and_a_shared_one_once():
     drawn = {
         (layer.topic, drawing(layer, space, FRAMES).shared)
         for space, layers in found.items()
-        for layer in layers
+        for layer in layers.drawn
     }
     assert drawn == {
         ("/map", True),
@@ -198,20 +204,27 @@ def test_every_map_is_drawn_a_robots_own_with_it_and_a_shared_one_once():
         ("/b/map", False),
         ("/b/static_map", False),
     }
-    own = drawing(found["/a"][0], "/a", FRAMES)
+    own = drawing(found["/a"].drawn[0], "/a", FRAMES)
     assert (own.module, own.of_maps, own.options) == ("OccupancyGrid", True, FRAMES)
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{rule.kind} {rule.name}")
-def test_every_rule_has_a_module_that_takes_its_arguments(rule):
-    type = rule.types[0]
-    layer = FoundLayer(rule.kind, "/a/topic", type, rule.words)
+KINDS = [
+    (kind, type)
+    for declared in declarations()
+    for kind in declared.kinds
+    for type in kind.types
+]
+
+
+@pytest.mark.parametrize(("kind", "type"), KINDS, ids=str)
+def test_every_kind_has_a_module_that_takes_its_arguments(kind, type):
+    layer = FoundLayer(kind.name, "/a/topic", type)
     drawn = drawing(layer, "/a", FRAMES, 2)
     factory = (map_modules if drawn.of_maps or drawn.shared else robot_modules)[
         drawn.module
     ]
-    inspect.signature(factory).bind(None, None, "/a/topic", **drawn.options)
-    assert rule.words, "it is shown to people"
+    check_arguments(factory, (Bridge(URL), "/a/topic"), drawn.options)
+    assert all(kind.names.values()), "they are shown to people"
 
 
 def test_each_robot_gets_its_own_and_health_is_everybodys():
@@ -223,8 +236,9 @@ def test_each_robot_gets_its_own_and_health_is_everybodys():
     }
     found = find_layers(topics, ["/a", "/b"])
     for space, layers in found.items():
-        assert [layer.topic for layer in layers] == [f"{space}/sonar", "/diagnostics"]
-    alone = find_layers({"/sonar": "sensor_msgs/Range"}, ["/a"])["/a"]
+        drawn = [layer.topic for layer in layers.drawn]
+        assert drawn == [f"{space}/sonar", "/diagnostics"]
+    alone = find_layers({"/sonar": "sensor_msgs/Range"}, ["/a"])["/a"].drawn
     assert [layer.topic for layer in alone] == ["/sonar"], "whose else could it be"
 
 
@@ -238,7 +252,7 @@ def test_each_robot_gets_its_own_and_health_is_everybodys():
 )
 def test_a_robot_gets_so_many_of_a_kind_and_no_more(type, most):
     topics = {f"/cloud_points_{number}": type for number in range(20)}
-    assert len(find_layers(topics, [""])[""]) == most
+    assert len(find_layers(topics, [""])[""].drawn) == most
 
 
 def test_without_robots_nothing_is_drawn():

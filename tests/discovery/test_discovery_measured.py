@@ -9,9 +9,9 @@ from faulty_site import site
 from websockets.asyncio.server import serve
 
 from webmap.discovery.doctor import Observed, judge, measure
-from webmap.discovery.doctor.heard_from import listen
+from webmap.discovery.doctor.listening import ENOUGH
 from webmap.discovery.doctor.measure import observe, tried
-from webmap.discovery.doctor.sampling import ENOUGH
+from webmap.ros.rosbridge.checks import LinkFacts, look
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +79,7 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
 
 def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
     _, findings, seen = looked_at(site("ros2", limit=8000))
-    assert seen.heard["/map"].not_in_cbor
+    assert seen.link.too_large["/map"] > 8000
     (found,) = [each for each in findings if each.words.startswith("/map comes")]
     assert found.level == "warning"
     assert "larger than max_message_size of the bridge" in found.words
@@ -89,13 +89,13 @@ def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
 def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named(
     monkeypatch,
 ):
-    monkeypatch.setattr(measure, "IN_JSON", 0.3)
+    monkeypatch.setattr(measure, "AS_TEXT", 0.3)
 
     def mute(name, message):
         return None if name == "/map" else message
 
     _, findings, seen = looked_at(site("ros2", change=mute))
-    assert not seen.heard["/map"].not_in_cbor
+    assert not seen.link.too_large
     (found,) = [each for each in findings if "Nothing came on /map" in each.words]
     assert "max_message_size" in found.advice
 
@@ -120,7 +120,7 @@ def test_the_type_of_velocity_is_the_one_that_the_base_takes(dialect, twist):
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux tells it there")
 def test_where_a_bridge_of_this_machine_listens_is_seen():
     _, findings, seen = looked_at(site())
-    assert seen.listens == ("127.0.0.1",)
+    assert seen.link.listens == ("127.0.0.1",)
     assert said(findings, "listens on this machine alone") == "good"
 
 
@@ -264,7 +264,7 @@ def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
         there.graph.serve = lambda *arguments, **named: None
 
     _, findings, seen = looked_at(site("ros2"), deaf, try_call=True)
-    assert seen.calls_in_threads is None
+    assert seen.link.calls_in_threads is None
     words = "was tried, and is not known: the bridge offers no services of its clients"
     assert said(findings, words) == "note"
 
@@ -284,7 +284,8 @@ def test_a_call_is_tried_again_without_looking_at_the_rest_again():
             return there.called[asked:], seen, again
 
     called, seen, again = asyncio.run(run())
-    assert (seen.tried, again.tried, again.calls_in_threads) == (False, True, True)
+    assert not seen.link.tried
+    assert (again.link.tried, again.link.calls_in_threads) == (True, True)
     assert again.heard == seen.heard
     ours = [name for name in called if name.startswith("/webmap_doctor_")]
     assert len(ours) == len(called) - 1, called
@@ -292,9 +293,10 @@ def test_a_call_is_tried_again_without_looking_at_the_rest_again():
 
 
 def test_what_trying_told_before_is_not_said_of_a_bridge_that_went_away():
-    blocking = Observed("ws://127.0.0.1:1", calls_in_threads=False, tried=True)
+    facts = LinkFacts(calls_in_threads=False, tried=True)
+    blocking = Observed("ws://127.0.0.1:1", link=facts)
     seen = asyncio.run(tried(blocking))
-    assert (seen.calls_in_threads, seen.tried) == (None, False)
+    assert (seen.link.calls_in_threads, seen.link.tried) == (None, False)
     assert said(judge(seen), "was tried, and is not known") == "note"
 
 
@@ -314,7 +316,7 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     assert said(findings, "rosapi does not say") == "note"
     assert said(findings, "The topics are those that were given") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
-    assert said(findings, "cannot be told: rosapi did not say") == "note"
+    assert said(findings, "cannot be told: the bridge did not say") == "note"
 
 
 def test_without_rosapi_and_without_a_list_the_list_is_asked_for():
@@ -339,7 +341,6 @@ def test_whether_the_socket_could_be_compressed_is_seen(compression, offered):
             lambda link: link.wait_closed(), "127.0.0.1", 0, compression=compression
         ) as server:
             port = server.sockets[0].getsockname()[1]
-            _, deflate, _ = await listen(f"ws://127.0.0.1:{port}", {}, 0.0)
-            return deflate
+            return (await look(f"ws://127.0.0.1:{port}")).deflate
 
     assert asyncio.run(run()) is offered

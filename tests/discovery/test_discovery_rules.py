@@ -2,18 +2,16 @@
 
 import json
 import time
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from captured_frames import CAPTURED
 from webmap.discovery import discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.robots import host_name
 from webmap.discovery.tf_robots import Trees
-
-CAPTURED = Path(__file__).parents[1] / "ros" / "captured"
 
 ODOM, TWIST = "nav_msgs/Odometry", "geometry_msgs/Twist"
 STAMPED = "geometry_msgs/msg/TwistStamped"

@@ -10,6 +10,7 @@ import pytest
 from frames_only import telling
 
 from webmap import Bridge, Robot
+from webmap.config.robot import TfConfig
 from webmap.core.frames import frames_of
 from webmap.discovery import discover
 from webmap.discovery.hearing import frame_topics, hear_frames
@@ -50,12 +51,7 @@ def test_a_tree_from_map_to_base_link_is_a_robot():
     assert (robot.base_frame, robot.root_frame) == ("base_link", "map")
     assert robot.tf_alone
     assert robot.topic("scan") == "/scan"
-    assert robot.tf_options == {
-        "namespace": "",
-        "quiet": False,
-        "base_frame": "base_link",
-        "map_frame": "map",
-    }
+    assert robot.tf == TfConfig(base_frame="base_link", map_frame="map")
     assert "it is drawn where its frames have base_link in map" in robot.notes[0]
 
 
@@ -78,11 +74,7 @@ def test_a_robot_with_odometry_keeps_it_and_learns_the_name_of_its_base():
     (robot,) = discover(topics, "host", shared("bob/odom bob/base_footprint")).robots
     assert robot.topic("odometry") == "/Bob/odom"
     assert not robot.tf_alone
-    assert robot.tf_options == {
-        "namespace": "",
-        "quiet": True,
-        "base_frame": "bob/base_footprint",
-    }
+    assert robot.tf == TfConfig(quiet=True, base_frame="bob/base_footprint")
 
 
 def test_maps_of_one_world_are_drawn_where_they_are_in_it():
@@ -92,7 +84,7 @@ def test_maps_of_one_world_are_drawn_where_they_are_in_it():
     )
     topics = {"/tf": TF, "/bob/odom": ODOM, "/ann/odom": ODOM}
     for robot in discover(topics, "host", trees).robots:
-        assert robot.tf_options["map_frame"] == "world"
+        assert robot.tf.map_frame == "world"
         assert robot.map_frame == "world"
 
 
@@ -100,13 +92,12 @@ def test_the_map_is_the_one_of_that_name_whatever_it_hangs_from():
     topics = {"/tf": TF, "/odom": ODOM}
     trees = shared("earth map odom base_link")
     (robot,) = discover(topics, "host", trees).robots
-    assert "map_frame" not in robot.tf_options
-    assert robot.map_frame == "map"
+    assert robot.tf.map_frame == robot.map_frame == "map"
 
 
 def test_without_a_map_a_robot_is_drawn_from_where_its_odometry_began():
     (robot,) = discover({"/tf": TF}, "bob", shared("odom base_link")).robots
-    assert robot.tf_options["map_frame"] == "odom"
+    assert robot.tf.map_frame == "odom"
 
 
 def test_namespaces_with_frames_of_their_own_are_robots_even_unheard():
@@ -116,7 +107,7 @@ def test_namespaces_with_frames_of_their_own_are_robots_even_unheard():
         ("a", True),
         ("b", False),
     ]
-    assert robots[0].tf_options == {"namespace": "/a", "quiet": False}
+    assert robots[0].tf == TfConfig(namespace="/a")
 
 
 @pytest.mark.parametrize(
@@ -217,8 +208,8 @@ def test_what_was_found_is_drawn_where_its_frames_have_it():
         async def scenario() -> None:
             heard = await hear_frames(url, {"/tf": TF})
             (found,) = discover({"/tf": TF}, "host", heard).robots
-            robot, bridge = Robot(found.name), Bridge(url)
-            robot.set_tf(bridge, **found.tf_options)
+            bridge = Bridge(url)
+            robot = Robot.from_config(found.config(url), {url: bridge})
             bridge.start(asyncio.get_running_loop())
             try:
                 await until(lambda: robot.valid)
@@ -254,9 +245,8 @@ def test_ten_namespaces_on_one_bridge_are_ten_robots_by_their_own_frames(dialect
                     f"r{n}" for n in range(10)
                 ]
                 for each in findings.robots:
-                    robot = Robot(each.name)
-                    robots.append(robot)
-                    robot.set_tf(bridge, **each.tf_options)
+                    config = each.config(url)
+                    robots.append(Robot.from_config(config, {url: bridge}))
                 await until(lambda: all(robot.valid for robot in robots))
                 for n, robot in enumerate(robots):
                     place = (robot.position.x, robot.position.y)

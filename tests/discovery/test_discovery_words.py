@@ -4,11 +4,11 @@ import re
 import tomllib
 from pathlib import Path
 
+from webmap.config.checks import same_name
+from webmap.core.declaration import declarations
 from webmap.discovery import discover, rules
-from webmap.discovery.drawing import drawing
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.discovery.layers import RULES, FoundLayer
-from webmap.discovery.naming import same_name, unique_names
+from webmap.discovery.naming import unique_names
 from webmap.discovery.words import in_one_line, report
 
 ODOM = "nav_msgs/Odometry"
@@ -113,15 +113,15 @@ def test_every_rule_of_what_a_robot_is_driven_by_is_in_the_documentation():
 
 
 def test_every_layer_rule_is_in_the_documentation():
-    rows = rows_of_the_documentation()
-    for rule in RULES:
-        type = rule.types[0].partition("/")[2]
-        module = drawing(FoundLayer(rule.kind, "/a/x", ""), "/a", None).module
-        found = [row for row in rows if f"`{type}`" in row and f"`{module}`" in row]
-        assert found, rule
-        plain = re.fullmatch(r"/([\w/]+)\\Z", rule.name)
-        if plain:
-            assert any(plain[1] in row for row in found), rule
+    page = PAGE.parents[1] / "reference/layers.md"
+    rows = [line for line in page.read_text().splitlines() if line.startswith("| `")]
+    said = [(each, kind) for each in declarations() for kind in each.kinds]
+    for declared, kind in said:
+        named = f"`{kind.types[0]}`", f"`{declared.name}`"
+        found = [row for row in rows if all(name in row for name in named)]
+        assert any(row.endswith(f"| {kind.most} |") for row in found), kind
+        for name in kind.names:
+            assert any(name.replace("|", "\\|") in row for row in found), kind
 
 
 def test_the_file_is_toml_with_every_topic_that_is_used():

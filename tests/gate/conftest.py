@@ -1,6 +1,7 @@
 """A robot's side, and a running gate in front of it."""
 
 import pytest
+from decisions import Decisions
 from gate_page import Page
 from gate_robot import FakeRobot
 
@@ -14,6 +15,15 @@ def state_folder(tmp_path, monkeypatch):
     folder = tmp_path / "state"
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(folder))
     return folder
+
+
+@pytest.fixture(autouse=True)
+def decisions(request, monkeypatch):
+    """Compare what the gate decides with what it decided when that was recorded."""
+    found = Decisions(request.node.nodeid.removeprefix("tests/gate/"))
+    found.listen(monkeypatch)
+    yield found
+    found.end()
 
 
 @pytest.fixture(autouse=True)

@@ -16,10 +16,16 @@ class FakeRobot(Noting):
 
     It echoes what is published on a topic to whoever subscribes to it, and sends
     odometry at 20 Hz to whoever subscribes to ``/odom``.
+
+    Args:
+        port: Where it listens; 0 lets the kernel choose.
+        answers_services: Whether calls are answered.
+
     """
 
-    def __init__(self, *, answers_services=True):
+    def __init__(self, port=0, *, answers_services=True):
         self.told = []
+        self._port = port
         self.answers_services = answers_services
         self.sends_odometry = True
         self.at_rest = False
@@ -48,7 +54,11 @@ class FakeRobot(Noting):
     async def _run(self):
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
         server = await serve(
-            self._serve, "127.0.0.1", 0, compression=None, ping_interval=None
+            self._serve,
+            "127.0.0.1",
+            self._port,
+            compression=None,
+            ping_interval=None,
         )
         self._port = server.sockets[0].getsockname()[1]
         beating = asyncio.create_task(self._odometry())

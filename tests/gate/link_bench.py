@@ -15,7 +15,7 @@ from bridge_notes import Noting, Told
 
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.sockets import Ears
-from webmap.testing.rosbridge import WitnessBridge
+from webmap.testing.witness import WitnessBridge
 
 TIMEOUT = 30.0
 """Seconds until something that has not come is taken never to come."""

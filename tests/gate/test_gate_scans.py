@@ -4,22 +4,20 @@ import contextlib
 import json
 import math
 from array import array
-from pathlib import Path
 
 import cbor2
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
+from captured_frames import frame_file
 from webmap.errors import ProtocolError
 from webmap.gate.lanes.scans import hear_scan, subscribe
-
-CAPTURED = Path(__file__).parents[1] / "sim" / "captured"
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_a_real_bridge_s_scan_keeps_nothing_apart_from_unknown(dialect):
-    frame = (CAPTURED / dialect / "cbor_scan_inf_nan.bin").read_bytes()
+    frame = frame_file(dialect, "cbor_scan_inf_nan.bin").read_bytes()
     topic, sweep = hear_scan(frame, 5.0)
     assert topic.endswith("base_scan")
     assert any(map(math.isnan, sweep.ranges))
@@ -97,6 +95,7 @@ def test_a_scan_without_ranges_is_empty():
 
 
 @given(st.binary(max_size=200))
+@example(b"\xa0[\x80" + bytes(7))  # a byte string that claims 2**63 bytes
 def test_no_bytes_do_any_harm(frame):
     with contextlib.suppress(ProtocolError):
         hear_scan(frame, 1.0)

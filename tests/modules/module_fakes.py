@@ -15,7 +15,7 @@ from PIL import Image
 from webmap.core.pictures import pictures
 from webmap.errors import ProtocolError
 from webmap.geometry import Affine
-from webmap.ros.protocol import Protocol
+from webmap.ros.rosbridge.protocol import Protocol
 from webmap.scope import Removal, current_scope, keep, no_scope
 
 

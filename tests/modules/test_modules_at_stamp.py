@@ -74,7 +74,7 @@ def near(points):
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.placing.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 
@@ -156,7 +156,7 @@ def test_of_a_robot_without_frames_a_clock_that_is_a_minute_off_is_said(
 
 def test_who_stands_and_says_nothing_more_is_no_trouble(link, scanner, robot):
     odometry(link, 100.0)
-    robot._poses.heard_at -= 90.0
+    robot.whereabouts.heard_at -= 90.0
     link.say("/scan", scan(WALL, 190.0))
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.0))
     assert robot.problems == {}

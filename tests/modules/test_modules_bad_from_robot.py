@@ -294,7 +294,7 @@ class Scene:
         at = robot.position
         return {
             "/odom": (at.x, at.y, robot.yaw),
-            "/scan": look(by["LaserScanner"]._dots),
+            "/scan": look(by["LaserScanner"].dots),
             "/map": look(self.grids[number].picture.element),
             "/amcl_pose": by["PoseWithCovariance"].ellipse._transform,
             "/plan": by["Path"].points,
@@ -441,7 +441,7 @@ def test_what_is_wrong_and_can_be_drawn_is_drawn_and_said_once(map, channel, nam
 
 def dots_of(scene: Scene) -> np.ndarray:
     (scanner,) = (m for m in scene.robots[0].modules if hasattr(m, "max_dots"))
-    return np.frombuffer(scanner._dots._dots.points, "<i2").reshape(-1, 2)
+    return np.frombuffer(scanner.dots._dots.points, "<i2").reshape(-1, 2)
 
 
 def test_braces_cost_next_to_no_time(map, channel):

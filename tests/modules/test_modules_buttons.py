@@ -12,7 +12,7 @@ import pytest
 from button_robot import robot_node
 
 from webmap import Bridge, Robot
-from webmap.core.button_spec import ButtonMistake, read_button
+from webmap.config.buttons import ButtonMistake, read_button
 from webmap.core.page import Page, PageEntry
 from webmap.errors import ConfigError
 from webmap.scene.events import Event
@@ -138,7 +138,7 @@ def test_a_topic_that_a_robot_is_moved_by_is_refused_whatever_it_is_called(robot
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Let a busy machine take its time to tell a type."""
-    monkeypatch.setattr("webmap.core.button_run.ROSAPI_PATIENCE", 20.0)
+    monkeypatch.setattr("webmap.ros.rosbridge.graph.BRIEF", 20.0)
 
 
 @pytest.fixture(scope="module")
@@ -370,9 +370,12 @@ def test_a_parameter_of_ros_2_is_set_by_its_node(sim, robot, result, state, word
     done, node = pressed(robot, button, sim["ros2"], services=services)
     assert (done.state, done.words) == (state, words)
     ((_, args),) = node.calls
-    assert args["parameters"] == [
-        {"name": "max_vel", "value": {"type": 3, "double_value": 0.4}}
-    ]
+    (parameter,) = args["parameters"]
+    assert parameter["name"] == "max_vel"
+    value = parameter["value"]
+    assert len(value) == 10, "the graph knows the type, and fills the other fields in"
+    said = {name: each for name, each in value.items() if each}
+    assert said == {"type": 3, "double_value": 0.4}
 
 
 def test_without_a_link_it_says_so(robot):

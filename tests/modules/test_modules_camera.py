@@ -13,8 +13,7 @@ from PIL import Image
 from webmap.core.pictures import pictures
 from webmap.errors import ConfigError, ProtocolError
 from webmap.modules.robot.camera import Camera, ShownAnyImageMsg, ShownImageMsg
-from webmap.ros.image_size import size_of
-from webmap.ros.messages_image import CompressedImageMsg, ImageMsg
+from webmap.ros.messages_image import CompressedImageMsg, ImageMsg, size_of
 
 TOPIC = "/camera/image_raw/compressed"
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from module_fakes import dots, header, pose, to_root
 
-from webmap.modules.robot.point_cloud import ShownCloudMsg
-from webmap.ros.events import Publish
+from webmap.modules.robot.point_cloud import PointCloud2Msg
+from webmap.ros.rosbridge.events import Publish
 
 FLOAT32, FLOAT64, UINT8 = 7, 8, 2
 
@@ -226,7 +226,7 @@ def test_a_large_cloud_is_thinned_evenly_where_it_is_decoded(
             "msg": {**cloud(points, rows=rows, row_pad=3), "height": rows},
         }
     )
-    whole = Publish("/points", text.encode()).decode(ShownCloudMsg)
+    whole = Publish("/points", text.encode()).decode(PointCloud2Msg)
     less = whole.digest()
     assert (less.height, less.width) == (1, 24)
     found = zip(*less.columns("x", "y"), strict=True)

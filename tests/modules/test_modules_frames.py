@@ -29,7 +29,7 @@ def tell(link, *transforms, static=False) -> None:
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.placing.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 

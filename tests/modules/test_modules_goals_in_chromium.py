@@ -149,20 +149,20 @@ def label(tab: Page):
 
 @pytest.mark.parametrize(
     ("name", "told"),
-    [("Old 0", r"Under way, [\d.]+ m to go"), ("New 0", r"m to go, about \d+ s")],
+    [("Old 0", r"Goal under way, [\d.]+ m to go"), ("New 0", r"m to go, about \d+ s")],
 )
 def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, told):
     send(tab, name)
-    expect(label(tab)).to_contain_text("Under way")
+    expect(label(tab)).to_contain_text("Goal under way")
     expect(label(tab)).to_contain_text(re.compile(told))
     expect(tab.locator(".webmap-goal-arrow.way")).to_have_count(1)
-    expect(label(tab)).to_contain_text("Reached", timeout=15_000)
+    expect(label(tab)).to_contain_text("Goal reached", timeout=15_000)
 
 
 @pytest.mark.parametrize(("name", "to"), [("Old 0", "Plain 1"), ("New 0", "New 1")])
 def test_a_goal_is_called_off_where_it_is_drawn(tab, name, to):
     send(tab, name, to)
-    expect(label(tab)).to_contain_text("Under way")
+    expect(label(tab)).to_contain_text("Goal under way")
     label(tab).get_by_role("button", name="Cancel the goal").click()
     expect(label(tab)).to_contain_text("Cancelled")
 
@@ -171,7 +171,7 @@ def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
     pick(tab, "New 0")
     tab.keyboard.press("g")
     press(tab, *OUTSIDE, drag=-30)
-    expect(label(tab)).to_have_text(re.compile("Failed, no path to the goal"))
+    expect(label(tab)).to_have_text(re.compile("Goal failed, no path to the goal"))
     expect(tab.locator(".webmap-goal-arrow.failed")).to_have_count(1)
     label(tab).get_by_role("button", name="Show this goal no more").click()
     expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
@@ -179,7 +179,7 @@ def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
 
 def test_stop_cancels_a_goal_and_says_so(tab):
     send(tab, "Old 0", "Plain 1")
-    expect(label(tab)).to_contain_text("Under way")
+    expect(label(tab)).to_contain_text("Goal under way")
     tab.get_by_role("button", name="Stop all").click()
     expect(label(tab)).to_contain_text("Cancelled, STOP")
     reset(tab)
@@ -207,7 +207,7 @@ def send_elsewhere(bridge: str) -> None:
 def test_a_plain_topic_says_that_it_says_nothing_and_is_drawn_once(tab, bridges):
     published = tab.locator(".posestamped.goal")
     send(tab, "Plain 1", "Old 0")
-    expect(label(tab)).to_have_text(re.compile("Sent, this robot does not say"))
+    expect(label(tab)).to_have_text(re.compile("Goal sent, this robot does not say"))
     expect(published).to_have_attribute("data-pose", re.compile(r"goal \d+$"))
     expect(published).to_be_hidden()
     label(tab).get_by_role("button", name="Cancel the goal").click()
@@ -280,7 +280,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     sure = told["pose"]["covariance"]
     assert (sure[0], sure[7], sure[35]) == (0.25, 0.25, 0.068)
     send(tab, "Old 0", "Plain 1")
-    expect(label(tab)).to_contain_text("Under way")
+    expect(label(tab)).to_contain_text("Goal under way")
     tab.keyboard.press("i")
     press(tab, *beside(tab, "Old 0", 5), drag=30)
     expect(word).to_have_text("Not sent: it follows a goal: cancel that first")

@@ -13,7 +13,7 @@ from webmap.core.layer import Layer
 from webmap.core.pictures import pictures
 from webmap.geometry import Affine
 from webmap.modules.map import occupancy_grid as room
-from webmap.server.published import Published
+from webmap.server.files import Published
 
 WHITE, BLACK, CLEAR = (255, 255, 255, 255), (0, 0, 0, 255), (0, 0, 0, 0)
 

@@ -24,7 +24,8 @@ def said(monkeypatch):
     """What modules send to their halves."""
     sent = []
     monkeypatch.setattr(
-        "webmap.core.half.BrowserHalf.send", lambda self, message: sent.append(message)
+        "webmap.core.world_view.BrowserHalf.send",
+        lambda self, message: sent.append(message),
     )
     return sent
 

@@ -12,12 +12,12 @@ from webmap.core.alignment import align_bridge
 from webmap.core.frames import _heard
 from webmap.errors import ProtocolError
 from webmap.geometry import Affine
-from webmap.modules.map import markers
+from webmap.modules.map.markers import layer as markers
 
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.placing.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 

@@ -285,8 +285,8 @@ def test_a_marker_whose_quaternion_nobody_set_is_drawn_unturned_which_is_logged_
 def test_markers_beyond_the_most_are_left_out_and_their_number_is_said(
     map, link, channel, monkeypatch
 ):
-    monkeypatch.setattr("webmap.modules.map.markers.MAX_MARKERS", 10)
-    monkeypatch.setattr("webmap.modules.map.markers.SETTLED", 0.01)
+    monkeypatch.setattr("webmap.modules.map.markers.layer.MAX_MARKERS", 10)
+    monkeypatch.setattr("webmap.modules.map.markers.layer.SETTLED", 0.01)
 
     async def until(check):
         async with asyncio.timeout(10):

@@ -16,22 +16,20 @@ from test_modules_ways import path
 from webmap import Bridge
 from webmap.core.layer import Layer
 from webmap.errors import ConfigError, ProtocolError
-from webmap.ros.events import Publish
+from webmap.modules.map.markers.messages import MarkerArrayMsg
+from webmap.modules.map.occupancy_grid import OccupancyGridUpdateMsg
+from webmap.modules.robot.diagnostics import DiagnosticArrayMsg
+from webmap.modules.robot.grid_cells import GridCellsMsg
+from webmap.modules.robot.nav_sat_fix import NavSatFixMsg
+from webmap.modules.robot.point_cloud import PointCloud2Msg
+from webmap.modules.robot.point_stamped import PointStampedMsg
+from webmap.modules.robot.polygon import PolygonStampedMsg
+from webmap.modules.robot.pose_array import ParticleCloudMsg, PoseArrayMsg
+from webmap.modules.robot.pose_with_covariance import DoubtfulPoseStampedMsg
+from webmap.modules.robot.range import RangeMsg
 from webmap.ros.messages import OccupancyGridMsg, PathMsg
-from webmap.ros.messages_cloud import PointCloud2Msg
-from webmap.ros.messages_diagnostics import DiagnosticArrayMsg
-from webmap.ros.messages_fix import NavSatFixMsg
-from webmap.ros.messages_grid import OccupancyGridUpdateMsg
-from webmap.ros.messages_marker import MarkerArrayMsg
-from webmap.ros.messages_points import GridCellsMsg, PointStampedMsg
-from webmap.ros.messages_poses import (
-    DoubtfulPoseStampedMsg,
-    ParticleCloudMsg,
-    PolygonStampedMsg,
-    PoseArrayMsg,
-    RangeMsg,
-)
 from webmap.ros.offload import values
+from webmap.ros.rosbridge.events import Publish
 from webmap.ros.worker import Request, answer, view_name
 
 MESSAGES = {
@@ -61,7 +59,9 @@ def test_a_large_message_is_the_same_by_way_of_the_worker(view):
     here = Publish("/t", text).decode(view)
     name = view_name(view)
     assert name is not None
-    *_, there = values(*answer(Request(len(text), "/t", name), text), view)
+    *_, there = values(
+        *answer(Request(len(text), "/t", view_name(Publish), name), text), view
+    )
     assert there == here
 
 

@@ -5,11 +5,12 @@ from module_fakes import header, pose
 
 from webmap import Map, Robot
 from webmap.core.layer import Layer
+from webmap.core.map_layer import ShownLayer
 from webmap.errors import ConfigError, ModuleNotFound
 
 
 def grids(map: Map) -> list:
-    return [m for m in map.modules if type(m).__name__ == "OccupancyGrid"]
+    return [m for m in map.modules if isinstance(m, ShownLayer)]
 
 
 def test_every_map_that_shows_the_robot_has_the_module_and_no_other(

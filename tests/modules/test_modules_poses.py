@@ -216,7 +216,7 @@ def test_a_polygon_of_no_points_draws_nothing_and_a_broken_one_changes_nothing(
 
 
 def test_a_frame_that_is_none_is_named(link, robot):
-    with pytest.raises(ValueError, match="'map' or 'robot', got 'odom'"):
+    with pytest.raises(ValueError, match='"map" or "robot", got \'odom\''):
         robot.add_module("Polygon", link, "/footprint", frame="odom")
     assert link.listeners.keys() == {"/odom"}
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from webmap import Robot
-from webmap.modules.robot.laser_scanner import scan_points
+from webmap.errors import ProtocolError
+from webmap.modules.robot.laser_scanner import check_rays, scan_points
 from webmap.ros.decoding import convert
 from webmap.ros.messages import BatteryStateMsg, LaserScanMsg
 from webmap.scope import Removal, keep
@@ -79,9 +80,10 @@ def test_a_scan_with_nothing_in_it_draws_nothing_or_all_that_is_finite(bad):
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf])
-def test_a_scan_without_an_angle_is_ignored(angle):
-    assert scan_points(scan([1.0], start=angle)) is None
-    assert scan_points(scan([1.0], step=angle)) is None
+def test_a_scan_without_an_angle_is_refused(angle):
+    for wrong in (scan([1.0], start=angle), scan([1.0], step=angle)):
+        with pytest.raises(ProtocolError, match=r"angle_\w+ must be finite radians"):
+            check_rays(wrong)
 
 
 def test_the_scanner_draws_one_path_of_class_dot_in_its_place_on_the_robot():
@@ -105,7 +107,7 @@ def test_the_scanner_draws_one_path_of_class_dot_in_its_place_on_the_robot():
 def test_a_scan_that_reaches_far_uses_a_coarser_unit():
     link, robot = Link(), Robot("Bob")
     scanner = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
-    scanner.on_scan(scan([80.0], high=100.0))
+    scanner.take(scan([80.0], high=100.0))
     (dot,) = scanner.svg.children
     x, _ = np.frombuffer(dot._dots.points, "<i2")
     assert x * dot._dots.unit == pytest.approx(80.0, abs=0.01)

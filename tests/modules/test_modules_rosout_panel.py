@@ -6,8 +6,8 @@ import msgspec
 import pytest
 from module_fakes import header
 
-from webmap.core.bridge_log import LONGEST, MOST, BridgeLog, log_of
 from webmap.errors import ConfigError
+from webmap.modules.map.rosout_panel import LONGEST, MOST, BridgeLog, log_of
 
 ROS1, ROS2 = {"info": 2, "error": 8}, {"info": 20, "error": 40}
 
@@ -43,7 +43,8 @@ class LogLink:
 def said(monkeypatch):
     sent = []
     monkeypatch.setattr(
-        "webmap.core.half.BrowserHalf.send", lambda self, message: sent.append(message)
+        "webmap.core.world_view.BrowserHalf.send",
+        lambda self, message: sent.append(message),
     )
     return sent
 

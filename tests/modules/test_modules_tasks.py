@@ -8,7 +8,7 @@ import pytest
 from module_fakes import Channel, Someone
 
 from webmap import Bridge, Map, Robot
-from webmap.console.tasks import LOOKS, GoalLine, figures
+from webmap.console.card_parts import GOALS, GoalLine, figures
 from webmap.core.page import Page, PageEntry
 from webmap.gate.messages import GoalReport
 
@@ -199,7 +199,7 @@ class TestRoutes:
 
 class TestOnTheCard:
     def test_every_state_has_words_a_shape_and_a_figure_only_on_the_way(self):
-        for state in LOOKS:
+        for state in GOALS:
             told = figures(goal(state, left=2.0))
             assert told == (
                 "2.0 m to go" if state in ("under way", "cancelling") else ""

@@ -4,12 +4,12 @@ import math
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import msgspec
 import pytest
 from fake_rosbridge import FakeRosbridge, bridged, until
 
+from captured_frames import CAPTURED
 from webmap.errors import (
     BridgeClosed,
     BridgeError,
@@ -18,12 +18,11 @@ from webmap.errors import (
     ProtocolError,
     ServiceError,
 )
-from webmap.ros import backoff, liveness
+from webmap.ros import backoff
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
+from webmap.ros.rosbridge import connection
 from webmap.scope import Scope
-
-CAPTURED = Path(__file__).parent / "captured"
 
 
 class Text(msgspec.Struct):
@@ -38,9 +37,9 @@ def run(scenario):
 def fast(monkeypatch):
     """Reconnect at once and call a link dead soon."""
     monkeypatch.setattr(backoff, "FIRST", 0.02)
-    monkeypatch.setattr(liveness.Liveness, "LIMIT", 0.3)
-    monkeypatch.setattr(liveness.Liveness, "PERIOD", 0.05)
-    monkeypatch.setattr(liveness.Liveness, "LATE", 0.3)
+    monkeypatch.setattr(connection.Liveness, "LIMIT", 0.3)
+    monkeypatch.setattr(connection.Liveness, "PERIOD", 0.05)
+    monkeypatch.setattr(connection.Liveness, "LATE", 0.3)
 
 
 def test_a_wrong_address_is_refused_at_once():
@@ -378,7 +377,7 @@ def test_what_was_wrong_on_a_link_is_taken_back_on_the_next(fast):
 
 
 def test_silence_that_was_explained_is_taken_back_by_what_comes(monkeypatch):
-    monkeypatch.setattr("webmap.ros.doubts.SILENCE", 0.02)
+    monkeypatch.setattr("webmap.ros.topic_faults.SILENCE", 0.02)
 
     async def scenario():
         got, shown = [], Shown()
@@ -395,7 +394,7 @@ def test_silence_that_was_explained_is_taken_back_by_what_comes(monkeypatch):
 
 
 def test_silence_under_a_wrong_type_is_explained(monkeypatch):
-    monkeypatch.setattr("webmap.ros.doubts.SILENCE", 0.02)
+    monkeypatch.setattr("webmap.ros.topic_faults.SILENCE", 0.02)
 
     async def scenario():
         errors = []
@@ -416,7 +415,7 @@ def test_two_types_for_one_topic_are_refused():
     with pytest.raises(ConfigError, match="std_msgs/Bool"):
         bridge.subscribe("/a", print, "std_msgs/Bool")
     with pytest.raises(ConfigError, match="raw"):
-        bridge.subscribe("/a", print, compression="cbor-raw")
+        bridge.subscribe("/a", print, encoding="raw")
 
 
 @pytest.mark.parametrize(
@@ -665,7 +664,7 @@ def test_a_silent_robot_over_a_live_link_is_not_dead(fast):
 
 
 def test_a_callback_that_blocks_does_not_make_the_link_look_dead(fast, monkeypatch):
-    monkeypatch.setattr("webmap.ros.connection.LOOK_PERIOD", 0.05)
+    monkeypatch.setattr("webmap.ros.rosbridge.connection.LOOK_PERIOD", 0.05)
 
     async def scenario():
         reasons, got = [], []
@@ -911,7 +910,7 @@ def test_a_thousand_listeners_leave_nothing_behind():
 
 def test_importing_the_bridge_loads_no_heavy_library():
     code = (
-        "import sys, webmap.ros.bridge, webmap.ros.messages, webmap.ros.views\n"
+        "import sys, webmap.ros.bridge, webmap.ros.messages, webmap.ros.messages\n"
         "heavy = {'numpy', 'websockets', 'cbor2', 'PIL', 'starlette', 'uvicorn'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )

@@ -7,18 +7,24 @@ import json
 import pytest
 from fake_rosbridge import bridged, until
 
-from webmap.ros import renewal
 from webmap.ros.bridge import Bridge
-from webmap.ros.large import MOST_LOST, PATIENCE, THROTTLE, InJson
-from webmap.ros.renewal import IN_CBOR, Silence
+from webmap.ros.rosbridge import wire_subscription
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
+from webmap.ros.rosbridge.wire_subscription import (
+    IN_CBOR,
+    MOST_LOST,
+    PATIENCE,
+    THROTTLE,
+    InJson,
+    Silence,
+)
 from webmap.scope import Scope
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import parse_quirks
-from webmap.sim.rosbridge.rosapi import Rosapi
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.server import RosbridgeServer
 
 MAP = "nav_msgs/OccupancyGrid"
 LIMIT = 5000
@@ -105,10 +111,10 @@ class TestSilence:
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(renewal, "PERIOD", 0.01)
-    monkeypatch.setattr(renewal, "FIRST", 0.02)
-    monkeypatch.setattr(renewal, "LONGEST", 0.05)
-    monkeypatch.setattr(renewal, "IN_CBOR", 0.2)
+    monkeypatch.setattr(wire_subscription, "PERIOD", 0.01)
+    monkeypatch.setattr(wire_subscription, "FIRST", 0.02)
+    monkeypatch.setattr(wire_subscription, "LONGEST", 0.05)
+    monkeypatch.setattr(wire_subscription, "IN_CBOR", 0.2)
 
 
 @contextlib.asynccontextmanager
@@ -228,7 +234,7 @@ def test_a_message_in_parts_is_known_as_one(quick):
 def test_a_bridge_may_be_busy_with_a_map_for_a_while_and_with_nothing_else(monkeypatch):
     async def scenario():
         async with bridged() as (server, bridge):
-            busy = bridge._lane._busy
+            busy = bridge._link.lane._busy
             bridge.subscribe("/text", print, "std_msgs/String")
             bridge.subscribe("/scan", print, "sensor_msgs/LaserScan")
             assert not busy()

@@ -11,19 +11,22 @@ import pytest
 from fake_rosbridge import bridged, until
 
 from webmap.ros import limits, worker
-from webmap.ros.events import Malformed, Publish
 from webmap.ros.limits import (
     GENERAL,
     LIMITS,
-    MAX_ITEMS,
-    MAX_OTHER,
     MAX_VALUES,
     TooLarge,
-    check_count,
     limit_of,
 )
 from webmap.ros.messages import TFMessage
-from webmap.ros.protocol import Protocol
+from webmap.ros.rosbridge.events import Malformed, Publish
+from webmap.ros.rosbridge.frame_limits import (
+    MAX_ITEMS,
+    MAX_NUMBERS,
+    MAX_OTHER,
+    check_count,
+)
+from webmap.ros.rosbridge.protocol import Protocol
 from webmap.scope import Scope
 
 MIB = 1 << 20
@@ -114,9 +117,10 @@ def test_items_of_cbor_are_counted_whatever_they_are():
     ids=["json", "cbor"],
 )
 def test_the_worker_builds_nothing_of_what_it_refuses(frame):
+    asked = worker.Request(len(frame), "/t", worker.view_name(Publish))
     tracemalloc.start()
     try:
-        reply, _ = worker.answer(worker.Request(len(frame), "/t"), frame)
+        reply, _ = worker.answer(asked, frame)
         _, most = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -137,7 +141,8 @@ def transforms(count):
 def test_a_list_that_nobody_can_use_as_a_whole_is_refused():
     frame = transforms(10_001)
     view = worker.view_name(TFMessage)
-    reply, _ = worker.answer(worker.Request(len(frame), "/t", view), frame)
+    asked = worker.Request(len(frame), "/t", worker.view_name(Publish), view)
+    reply, _ = worker.answer(asked, frame)
     assert reply.error.startswith("got a message with 10001 transforms; 10000 are")
 
 
@@ -154,10 +159,10 @@ def test_an_answer_of_very_many_values_is_refused():
     event = Protocol().receive(frame, 0.0)
     assert isinstance(event, Malformed)
     assert "objects and lists" in event.reason
-    slow = '{"op":"service_response","values":[NaN' + ",1" * limits.MAX_NUMBERS + "]}"
+    slow = '{"op":"service_response","values":[NaN' + ",1" * MAX_NUMBERS + "]}"
     assert "NaN" in Protocol().receive(slow, 0.0).reason
     quick = slow.replace("NaN", "1")
-    assert len(Protocol().receive(quick, 0.0).values) == limits.MAX_NUMBERS + 1
+    assert len(Protocol().receive(quick, 0.0).values) == MAX_NUMBERS + 1
 
 
 def test_a_message_in_fragments_may_be_as_large_as_one_in_one_piece():

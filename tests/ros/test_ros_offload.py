@@ -1,19 +1,18 @@
 import asyncio
 import os
 import signal
-from pathlib import Path
 
 import msgspec
 import pytest
 from fake_rosbridge import bridged, until
 
+from captured_frames import CAPTURED
 from webmap.errors import ProtocolError
 from webmap.ros import offload, worker
-from webmap.ros.events import Publish
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
 from webmap.ros.offload import Offload
+from webmap.ros.rosbridge.events import Publish
 
-CAPTURED = Path(__file__).parent / "captured"
 MAP = (CAPTURED / "ros2/publish_map.ros2.json").read_bytes()
 
 

@@ -10,12 +10,12 @@ import pytest
 from fake_rosbridge import until
 from test_ros_limits import publish, transforms
 
-from webmap.modules.map.markers import FramedMarkerArrayMsg
+from webmap.modules.map.markers.messages import MarkerArrayMsg
+from webmap.modules.robot.diagnostics import DiagnosticArrayMsg
 from webmap.ros import offload, worker
-from webmap.ros.events import Publish
 from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
-from webmap.ros.messages_diagnostics import DiagnosticArrayMsg
 from webmap.ros.offload import Offload
+from webmap.ros.rosbridge.events import Publish
 
 STEP = 0.1
 """Seconds of processor that no step may take: five times what any takes here."""
@@ -73,7 +73,7 @@ def markers(count):
 
 LONG = {
     TFMessage: ("transforms", "/t", transforms(9000)),
-    FramedMarkerArrayMsg: ("markers", "/markers", markers(8000)),
+    MarkerArrayMsg: ("markers", "/markers", markers(8000)),
     DiagnosticArrayMsg: ("status", "/diagnostics", statuses(1900)),
     PathMsg: ("poses", "/plan", poses(16000)),
 }
@@ -283,6 +283,8 @@ def test_a_message_that_takes_too_much_memory_is_an_error(monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr(Publish, "decode", decode)
-    reply, parts = worker.answer(worker.Request(2, "/t"), b"{}")
+    reply, parts = worker.answer(
+        worker.Request(2, "/t", worker.view_name(Publish)), b"{}"
+    )
     assert reply.error == "it takes too much memory to be decoded"
     assert not parts

@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from webmap.ros import ops
+from webmap.ros.rosbridge import ops
 
 
 def said(frame):

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from webmap.ros.connection import MOST_FRAGMENTS, Lane
+from webmap.ros.rosbridge.connection import MOST_FRAGMENTS, Lane
 from webmap.testing import Sentinel
 
 MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.pieces import PIECE, Pieces
-from webmap.ros.turns import turns
+from webmap.ros.rosbridge.pieces import PIECE, Pieces
+from webmap.ros.rosbridge.turns import turns
 
 
 def frame(length):

@@ -1,15 +1,15 @@
 import json
 import math
-from pathlib import Path
 
 import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from captured_frames import CAPTURED
 from webmap.errors import ProtocolError
 from webmap.ros import messages
-from webmap.ros.events import (
+from webmap.ros.rosbridge.events import (
     CallService,
     Malformed,
     Publish,
@@ -17,11 +17,9 @@ from webmap.ros.events import (
     Status,
     Unknown,
 )
-from webmap.ros.fragments import Fragments
-from webmap.ros.protocol import Protocol, topic_in_head
+from webmap.ros.rosbridge.protocol import Fragments, Protocol, topic_in_head
 from webmap.ros.views import ODOMETRY_VIEWS
 
-CAPTURED = Path(__file__).parent / "captured"
 SERVERS = ["ros1", "ros2", "rs"]
 VIEWS = (
     *ODOMETRY_VIEWS.values(),

@@ -6,8 +6,14 @@ from itertools import pairwise
 import pytest
 from fake_rosbridge import bridged, until
 
-from webmap.ros import renewal
-from webmap.ros.renewal import AGAIN, FIRST, LONGEST, UNANSWERED, Silence
+from webmap.ros.rosbridge import wire_subscription
+from webmap.ros.rosbridge.wire_subscription import (
+    AGAIN,
+    FIRST,
+    LONGEST,
+    UNANSWERED,
+    Silence,
+)
 
 TYPE = "nav_msgs/OccupancyGrid"
 
@@ -53,9 +59,9 @@ def test_where_nobody_can_tell_it_is_asked_for_now_and_then():
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(renewal, "PERIOD", 0.01)
-    monkeypatch.setattr(renewal, "FIRST", 0.02)
-    monkeypatch.setattr(renewal, "LONGEST", 0.05)
+    monkeypatch.setattr(wire_subscription, "PERIOD", 0.01)
+    monkeypatch.setattr(wire_subscription, "FIRST", 0.02)
+    monkeypatch.setattr(wire_subscription, "LONGEST", 0.05)
 
 
 def test_the_old_subscription_is_given_up_before_the_new_one_is_asked_for(quick):
@@ -84,7 +90,7 @@ def test_the_old_subscription_is_given_up_before_the_new_one_is_asked_for(quick)
 
 
 def test_a_bridge_without_rosapi_is_not_troubled(quick, monkeypatch):
-    monkeypatch.setattr(renewal, "AGAIN", 0.3)
+    monkeypatch.setattr(wire_subscription, "AGAIN", 0.3)
 
     async def scenario():
         errors = []

@@ -10,7 +10,7 @@ from fake_rosbridge import bridged, until
 from webmap.discovery import discover
 from webmap.errors import ProtocolError, ServiceError
 from webmap.ros.decoding import decode_json
-from webmap.ros.protocol import Protocol
+from webmap.ros.rosbridge.protocol import Protocol
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.ros.backoff import Backoff
-from webmap.ros.liveness import Liveness
-from webmap.ros.throttle import Throttle
+from webmap.ros.rosbridge.connection import Liveness
+from webmap.ros.subscriptions import Throttle
 
 
 def test_delays_grow_and_end_at_ten_seconds():

@@ -1,21 +1,21 @@
 import json
 import math
 from array import array
-from pathlib import Path
 
 import pytest
 
+from captured_frames import CAPTURED
 from webmap.errors import ConfigError, ProtocolError
 from webmap.ros import messages
-from webmap.ros.arrays import Floats, Int8s, typed_array
+from webmap.ros.arrays import Floats, Int8s
 from webmap.ros.decoding import convert
+from webmap.ros.rosbridge.cbor import typed_array
 from webmap.ros.views import (
     ODOMETRY_VIEWS,
     odometry_view,
     odometry_view_by_shape,
 )
 
-CAPTURED = Path(__file__).parent / "captured"
 PLACE = {
     "position": {"x": 1.0, "y": 2.0, "z": 0.0},
     "orientation": {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0},

@@ -9,15 +9,15 @@ import time
 
 import numpy as np
 
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim import run_simulator
 from webmap.sim.messages import Messages
 from webmap.sim.process import end_with_stdin
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import parse_quirks
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.server import RosbridgeServer
 
 ROBOTS = 10
 SIDE = 4000

@@ -7,7 +7,7 @@ import pytest
 from websockets.sync.client import connect
 
 from webmap.geometry import Twist
-from webmap.ros import ops
+from webmap.ros.rosbridge import ops
 from webmap.testing import Sentinel, WitnessRobot
 
 

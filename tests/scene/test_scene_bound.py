@@ -1,7 +1,9 @@
 import pytest
 
 from webmap.errors import SceneError
-from webmap.scene import Changed, Document, Fragment, html, svg
+from webmap.scene import html, svg
+from webmap.scene.bound import Document
+from webmap.scene.fragment import Changed, Fragment
 
 
 def test_the_same_id_gives_the_same_element():

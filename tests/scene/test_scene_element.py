@@ -6,7 +6,10 @@ import pytest
 
 from webmap.errors import SceneError
 from webmap.geometry import Affine
-from webmap.scene import Event, Fragment, Text, html, svg
+from webmap.scene import html, svg
+from webmap.scene.events import Event
+from webmap.scene.fragment import Fragment
+from webmap.scene.node import Text
 from webmap.scope import Scope, current_scope
 
 

@@ -1,7 +1,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.scene import Added, Changed, Fragment, Removed, Text, html, svg
+from webmap.scene import html, svg
+from webmap.scene.fragment import Added, Changed, Fragment, Removed
+from webmap.scene.node import Text
 
 
 def test_nothing_changed_since_now():

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.errors import SceneError
-from webmap.scene.values import format_number, format_value
+from webmap.scene.allowed import format_number, format_value
 
 
 @pytest.mark.parametrize(

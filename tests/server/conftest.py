@@ -12,8 +12,8 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     from starlette.testclient import TestClient
 
-from webmap.server.app import create_app
-from webmap.server.settings import Settings
+from webmap.server.access import Settings
+from webmap.server.app import WebApp
 
 HOST = "127.0.0.1:8000"
 
@@ -30,7 +30,7 @@ def rooms() -> SimpleNamespace:
 
 @pytest.fixture
 def app(rooms):
-    return create_app(rooms.site, rooms.model, rooms.gate, Settings(token=TOKEN))
+    return WebApp(rooms.site, rooms.model, rooms.gate, Settings(token=TOKEN))
 
 
 @pytest.fixture

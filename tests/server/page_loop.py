@@ -7,12 +7,11 @@ import threading
 import time
 from pathlib import Path
 
-from webmap.core.page import PageEntry
+from webmap.core.page import PageEntry, Viewer
 from webmap.core.runtime import Runtime
 from webmap.core.tasks import spawn
-from webmap.server.model import Model
-from webmap.server.published import Published
-from webmap.server.viewer import Viewer
+from webmap.server.files import Published
+from webmap.server.open_pages import OpenPages
 
 ANN = Viewer("v1", "Ann")
 HELLO = {
@@ -72,7 +71,7 @@ class Loop:
         self.thread.join(10)
 
 
-class Outbox:
+class PageSocket:
     def __init__(self) -> None:
         self.frames: list[bytes] = []
         self.reason: str | None = None
@@ -80,20 +79,20 @@ class Outbox:
     def offer(self, data: bytes) -> None:
         self.frames.append(data)
 
-    def close(self, reason: str) -> None:
+    def end(self, code: int, reason: str) -> None:
         self.reason = reason
 
 
 def make_model(loop, function, max_pages=1000):
     entry = PageEntry("/", function, None, Path(), "test")
-    return Model(loop.runtime, {"/": entry}, Published(), max_pages=max_pages)
+    return OpenPages(loop.runtime, {"/": entry}, Published(), max_pages=max_pages)
 
 
 def open_page(model, page_id="page0001", viewer=ANN):
-    outbox = Outbox()
-    handle = model.open_scene("/", page_id, viewer, outbox)
+    socket = PageSocket()
+    handle = model.open_scene("/", page_id, viewer, socket)
     handle.receive(json.dumps({**HELLO, "page": page_id}))
-    return handle, outbox
+    return handle, socket
 
 
 def wait_for(condition):

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import httpx
 
+from webmap.core.page import Viewer
 from webmap.server.app import WebApp
-from webmap.server.listening import listen
-from webmap.server.ports import DriveConnection, Outbox
-from webmap.server.runner import make_server
-from webmap.server.viewer import Viewer
+from webmap.server.page_socket import PageSocket
+from webmap.server.runner import listen, make_server
 
 TOKEN = "t0ken-" + "A" * 43
 
@@ -45,7 +44,7 @@ class FakeScene:
     path: str
     page_id: str
     viewer: Viewer
-    outbox: Outbox
+    socket: PageSocket
     received: list[str] = field(default_factory=list)
     times_closed: int = 0
 
@@ -59,13 +58,13 @@ class FakeScene:
 class FakeModel:
     def __init__(self) -> None:
         self.scenes: list[FakeScene] = []
-        self.drives: list[tuple[str, str, DriveConnection]] = []
+        self.drives: list[tuple[str, str, FakeDrive]] = []
         self.refusals: list[tuple[str, str]] = []
 
     def open_scene(
-        self, entry_path: str, page_id: str, viewer: Viewer, outbox: Outbox
+        self, entry_path: str, page_id: str, viewer: Viewer, socket: PageSocket
     ) -> FakeScene:
-        scene = FakeScene(entry_path, page_id, viewer, outbox)
+        scene = FakeScene(entry_path, page_id, viewer, socket)
         self.scenes.append(scene)
         return scene
 
@@ -102,6 +101,9 @@ class FakeDrive:
 class FakeGate:
     def __init__(self) -> None:
         self.connections: list[FakeDrive] = []
+
+    def __call__(self, *args) -> FakeDrive:
+        return self.connect(*args)
 
     def connect(self, name, role, send, close) -> FakeDrive:
         connection = FakeDrive(name, role, send, close)

@@ -6,12 +6,12 @@ from starlette.applications import Starlette
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
+from webmap.core.page import Viewer
 from webmap.core.pictures import pictures
-from webmap.server.app import create_app
+from webmap.server.access import Settings
+from webmap.server.app import WebApp
 from webmap.server.auth import Token
-from webmap.server.headers import CONTENT_SECURITY_POLICY
-from webmap.server.settings import Settings
-from webmap.server.viewer import Viewer
+from webmap.server.security import CONTENT_SECURITY_POLICY
 
 ORIGIN = {"origin": "http://127.0.0.1:8000"}
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -111,7 +111,7 @@ def test_a_failing_page_gets_the_headers_too(app, rooms, make_client):
         def pages(self):
             raise RuntimeError("broken")
 
-    app = create_app(Broken(), rooms.model, rooms.gate, Settings(token=TOKEN))
+    app = WebApp(Broken(), rooms.model, rooms.gate, Settings(token=TOKEN))
     client = make_client(app, raise_server_exceptions=False)
     client.cookies["webmap_8000"] = Token(TOKEN).issue()
     answer = client.get("/")
@@ -380,7 +380,7 @@ def test_a_host_application_can_tell_who_somebody_is(rooms, make_client, is_asyn
         return tell(scope)
 
     settings = Settings(authenticate=tell_later if is_async else tell)
-    app = create_app(rooms.site, rooms.model, rooms.gate, settings)
+    app = WebApp(rooms.site, rooms.model, rooms.gate, settings)
     client = make_client(app)
     assert client.get(f"/?token={settings.token}").status_code == 403
     headers = {"x-user": "ada"}
@@ -405,7 +405,7 @@ def test_the_lifespan_is_the_hosts_own(rooms, make_client):
         yield
         events.append("stop")
 
-    app = create_app(rooms.site, rooms.model, rooms.gate, lifespan=life)
+    app = WebApp(rooms.site, rooms.model, rooms.gate, lifespan=life)
     with make_client(app):
         assert events == ["start"]
     assert events == ["start", "stop"]
@@ -413,4 +413,4 @@ def test_the_lifespan_is_the_hosts_own(rooms, make_client):
 
 def test_a_weak_token_stops_the_start(rooms):
     with pytest.raises(ValueError, match="43"):
-        create_app(rooms.site, rooms.model, rooms.gate, Settings(token="weak"))
+        WebApp(rooms.site, rooms.model, rooms.gate, Settings(token="weak"))

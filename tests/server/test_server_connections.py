@@ -20,13 +20,11 @@ from server_fakes import (
 from websockets.asyncio.client import connect
 
 from webmap.server import connections
-from webmap.server.app import create_app
-from webmap.server.bounds import DRIVE
+from webmap.server.access import Settings
+from webmap.server.app import WebApp
 from webmap.server.connections import STRANGERS
-from webmap.server.hop import Hops
-from webmap.server.line import Line
-from webmap.server.queues import DriveQueue
-from webmap.server.settings import Settings
+from webmap.server.outbox import BatchedCallsByLoop, DriveQueue
+from webmap.server.page_socket import DRIVE, PageSocket
 
 SHORT_S = 0.5
 HEAD = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -47,7 +45,7 @@ def large(tmp_path):
 @pytest.fixture
 def server(gate, large):
     site = FakeSite(FakePage("/"), FakePage("/large", large, Path(large.parent)))
-    app = create_app(site, FakeModel(), gate, Settings(token=TOKEN))
+    app = WebApp(site, FakeModel(), gate, Settings(token=TOKEN))
     with running(app) as server:
         yield server
 
@@ -242,7 +240,9 @@ class GivenUp:
 
 def test_what_is_sent_to_a_page_that_has_gone_leaves_no_traceback(caplog):
     async def scenario():
-        line = Line(GivenUp(), "drive", Hops().here(), DRIVE, DriveQueue())
+        line = PageSocket(
+            GivenUp(), "drive", BatchedCallsByLoop().of_this_loop(), DRIVE, DriveQueue()
+        )
         line.offer("tick")
         async with asyncio.timeout(10):
             await line.run(print, print)

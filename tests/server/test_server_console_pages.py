@@ -5,15 +5,13 @@ import asyncio
 import pytest
 from page_loop import make_model, objects_left, open_page, wait_for
 
-from webmap import Bridge, Robot
-from webmap.console import RobotDescription
-from webmap.console.fleet import make_robot
+from webmap import Bridge, Robot, RobotConfig
+from webmap.console import make_robot
 from webmap.console.opened import Console
 from webmap.console.page import build as build_console
-from webmap.core.bridge_log import log_of
 from webmap.core.layer import Layer
-from webmap.modules.map.rosout_panel import RosoutPanel
-from webmap.server import page_host as host_module
+from webmap.modules.map.rosout_panel import RosoutPanel, log_of
+from webmap.server import open_pages as host_module
 
 
 @pytest.fixture
@@ -26,17 +24,20 @@ def robots(loop, bridge):
     def make():
         return [
             make_robot(
-                RobotDescription(
-                    name=name,
-                    bridge=bridge,
-                    odometry=f"/{name}/odom",
-                    twist=f"/{name}/cmd_vel",
-                    scan=f"/{name}/scan",
-                    battery=f"/{name}/battery",
-                    cameras=(f"/{name}/camera/compressed",),
-                    goal=f"/{name}/goal",
-                    initial_pose=f"/{name}/initialpose",
-                )
+                RobotConfig.from_dict(
+                    {
+                        "name": name,
+                        "bridge": bridge.url,
+                        "odometry": f"/{name}/odom",
+                        "twist": f"/{name}/cmd_vel",
+                        "scan": f"/{name}/scan",
+                        "battery": f"/{name}/battery",
+                        "cameras": f"/{name}/camera/compressed",
+                        "move": f"/{name}/goal",
+                        "initial_pose": f"/{name}/initialpose",
+                    }
+                ),
+                [bridge],
             )
             for name in ("Bob", "Ann", "Cid")
         ]

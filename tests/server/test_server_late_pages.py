@@ -8,7 +8,7 @@ from page_loop import make_model, open_page, wait_for
 
 import webmap
 from webmap.errors import ConfigError
-from webmap.server import page_host as host_module
+from webmap.server import open_pages as host_module
 
 
 def test_a_page_function_that_goes_on_for_ever_ends_with_its_page(loop, monkeypatch):

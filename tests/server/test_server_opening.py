@@ -12,7 +12,7 @@ import pytest
 from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 
 from webmap.server import application, opening
-from webmap.server.app import create_app
+from webmap.server.app import WebApp
 
 URL = "http://127.0.0.1:8000/"
 
@@ -85,7 +85,7 @@ def test_where_no_file_can_be_written_the_printed_address_remains(home, caplog):
 def test_run_prints_the_token_and_opens_an_address_that_works_once(
     browser, capsys, monkeypatch, make_client
 ):
-    app = create_app(FakeSite(FakePage("/")), FakeModel(), FakeGate())
+    app = WebApp(FakeSite(FakePage("/")), FakeModel(), FakeGate())
     monkeypatch.setattr(application, "_make_app", lambda *_, **__: app)
     monkeypatch.setattr(application, "runtime", FakeRuntime())
     monkeypatch.setattr(application, "has_run", False)

@@ -7,11 +7,11 @@ from page_loop import HELLO, make_model, objects_left, open_page, wait_for
 
 import webmap
 from webmap.core.layer import Layer
+from webmap.core.page import Viewer
 from webmap.modules.robot.laser_scanner import LaserScanner, SweepMsg
-from webmap.ros.events import Publish
+from webmap.ros.rosbridge.events import Publish
 from webmap.scope import Removal, keep
-from webmap.server import page_host as host_module
-from webmap.server.viewer import Viewer
+from webmap.server import open_pages as host_module
 from webmap.testing.witness import WitnessRobot
 
 
@@ -23,8 +23,8 @@ def test_the_page_function_knows_the_container_and_a_frame_comes(loop):
         seen.append((map.canvas_width, map.canvas_height, page.viewer.name))
 
     model = make_model(loop, build)
-    _, outbox = open_page(model)
-    wait_for(lambda: outbox.frames)
+    _, socket = open_page(model)
+    wait_for(lambda: socket.frames)
     assert seen == [(700, 500, "Ann")]
     loop.call(lambda: model.close() or True)
 
@@ -65,11 +65,11 @@ def test_an_exception_shows_on_that_page_and_the_others_go_on(loop):
 )
 def test_garbage_from_a_page_is_refused_and_the_page_goes_on(loop, garbage):
     model = make_model(loop, lambda page: None)
-    handle, outbox = open_page(model)
+    handle, socket = open_page(model)
     handle.receive(garbage)
     handle.receive(json.dumps(HELLO))
     loop.call(lambda: True)
-    assert outbox.reason is None
+    assert socket.reason is None
     loop.call(lambda: model.close() or True)
 
 
@@ -83,8 +83,8 @@ def test_the_map_is_kept_for_a_viewer_who_comes_back(loop):
     handle, _ = open_page(model)
     wait_for(lambda: made)
     handle.closed()
-    _, outbox = open_page(model)
-    wait_for(lambda: outbox.frames)
+    _, socket = open_page(model)
+    wait_for(lambda: socket.frames)
     assert len(made) == 1
     loop.call(lambda: model.close() or True)
 
@@ -171,9 +171,9 @@ def test_a_thousand_pages_opened_and_closed_leave_nothing_behind(loop, monkeypat
 
     def round_of(count):
         for number in range(count):
-            handle, outbox = open_page(model, f"page{number:04}")
+            handle, socket = open_page(model, f"page{number:04}")
             handle.closed()
-            del outbox
+            del socket
         loop.call(lambda: True)
         wait_for(lambda: not model._hosts)
 
@@ -202,14 +202,14 @@ def test_fifty_viewers_of_one_grid_cost_one_decode_and_one_encoding(loop):
 
     model = make_model(loop, build)
     pages = [open_page(model, f"page{number:04}") for number in range(50)]
-    wait_for(lambda: all(outbox.frames for _, outbox in pages))
-    for handle, outbox in pages:
-        count = len(outbox.frames)
+    wait_for(lambda: all(socket.frames for _, socket in pages))
+    for handle, socket in pages:
+        count = len(socket.frames)
         for frame in range(1, count + 1):
             handle.receive(json.dumps({"op": "seen", "frame": frame}))
     loop.call(lambda: True)
     assert len(link.listeners) == 1
-    said = [len(outbox.frames) for _, outbox in pages]
+    said = [len(socket.frames) for _, socket in pages]
     loop.call(lambda: link.listeners[0](7) or True)
 
     def news():
@@ -248,7 +248,7 @@ def counted(monkeypatch, owner, name):
 
 def test_fifty_viewers_of_one_scan_cost_one_decode_and_one_drawing(loop, monkeypatch):
     decoded = counted(monkeypatch, Publish, "_decode")
-    drawn = counted(monkeypatch, LaserScanner, "_draw")
+    drawn = counted(monkeypatch, LaserScanner, "draw")
     with WitnessRobot() as there:
         bridge, bob = webmap.Bridge(there.url), webmap.Robot("Bob")
         bob.add_module("LaserScanner", bridge, "/scan")
@@ -262,19 +262,19 @@ def test_fifty_viewers_of_one_scan_cost_one_decode_and_one_drawing(loop, monkeyp
 
         model = make_model(loop, build)
         pages = [open_page(model, f"page{number:04}") for number in range(50)]
-        wait_for(lambda: all(outbox.frames for _, outbox in pages))
-        for handle, outbox in pages:
-            for frame in range(1, len(outbox.frames) + 1):
+        wait_for(lambda: all(socket.frames for _, socket in pages))
+        for handle, socket in pages:
+            for frame in range(1, len(socket.frames) + 1):
                 handle.receive(json.dumps({"op": "seen", "frame": frame}))
         loop.call(lambda: bridge.start(loop.runtime._loop) or True)
         wait_for(subscribed)
-        said = [len(outbox.frames) for _, outbox in pages]
+        said = [len(socket.frames) for _, socket in pages]
         there.publish("/scan", SCAN)
         wait_for(lambda: drawn)
         wait_for(
             lambda: all(
-                len(outbox.frames) > count
-                for (_, outbox), count in zip(pages, said, strict=True)
+                len(socket.frames) > count
+                for (_, socket), count in zip(pages, said, strict=True)
             )
         )
         assert len(drawn) == 1

@@ -16,20 +16,19 @@ from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, sign_in
 from websockets.sync.client import connect
 
 from webmap.errors import ConfigError, WebMapError
-from webmap.server.app import create_app
-from webmap.server.listening import check_exposure, listen, url_of
-from webmap.server.runner import announce, serve
-from webmap.server.settings import Settings
+from webmap.server.access import Settings
+from webmap.server.app import WebApp
+from webmap.server.runner import announce, check_exposure, listen, serve, url_of
 
 PROGRAM = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
-from webmap.server.app import create_app
+from webmap.server.app import WebApp
 from webmap.server.runner import serve
-from webmap.server.settings import Settings
+from webmap.server.access import Settings
 
-app = create_app(
+app = WebApp(
     FakeSite(FakePage("/")), FakeModel(), FakeGate(), Settings(token=sys.argv[2])
 )
 serve(app, port=0)
@@ -82,7 +81,7 @@ def test_a_signal_ends_it_cleanly_and_soon_with_sockets_open(process, number):
 
 
 def app(settings=None, lifespan=None):
-    return create_app(
+    return WebApp(
         FakeSite(FakePage("/")),
         FakeModel(),
         FakeGate(),

@@ -11,9 +11,9 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Frame, Opcode
 
-from webmap.server.app import create_app
-from webmap.server.seats import REPLACED
-from webmap.server.settings import Settings
+from webmap.server.access import Settings
+from webmap.server.app import WebApp
+from webmap.server.page_socket import REPLACED
 
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
@@ -34,7 +34,7 @@ def module_rooms():
 @pytest.fixture(scope="module")
 def server(module_rooms):
     rooms = module_rooms
-    app = create_app(
+    app = WebApp(
         rooms.site, rooms.model, rooms.gate, Settings(token=TOKEN, max_pages=4)
     )
     with running(app) as server:
@@ -89,8 +89,8 @@ def test_a_scene_carries_both_ways_and_tells_the_model_once_that_it_closed(
             await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
             scene = rooms.model.scenes[0]
             await asyncio.to_thread(wait_for, lambda: scene.received)
-            await asyncio.to_thread(scene.outbox.offer, b"frame 1")
-            await asyncio.to_thread(scene.outbox.offer, b"frame 2")
+            await asyncio.to_thread(scene.socket.offer, b"frame 1")
+            await asyncio.to_thread(scene.socket.offer, b"frame 2")
             assert [await socket.recv(), await socket.recv()] == [
                 b"frame 1",
                 b"frame 2",
@@ -101,8 +101,8 @@ def test_a_scene_carries_both_ways_and_tells_the_model_once_that_it_closed(
     scene = rooms.model.scenes[0]
     assert (scene.path, scene.page_id, scene.received) == ("/lab", "p1", ["hello"])
     wait_for(lambda: scene.times_closed)
-    scene.outbox.offer(b"too late")
-    scene.outbox.close("too late")
+    scene.socket.offer(b"too late")
+    scene.socket.end(1011, "too late")
     assert scene.times_closed == 1
 
 
@@ -170,7 +170,7 @@ def test_the_model_can_end_a_scene_and_say_why(rooms, open_socket):
     async def scenario():
         async with open_socket("scene?id=p") as socket:
             await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
-            rooms.model.scenes[0].outbox.close("the page was closed " + "€" * 99)
+            rooms.model.scenes[0].socket.end(1011, "the page was closed " + "€" * 99)
             return await reason_of(socket)
 
     code, reason = asyncio.run(scenario())
@@ -374,7 +374,7 @@ def test_a_page_that_stops_reading_is_closed_and_holds_nothing(rooms, open_socke
             scene = rooms.model.scenes[0]
 
             def flood():
-                scene.outbox.offer(bytes(900_000))
+                scene.socket.offer(bytes(900_000))
                 return scene.times_closed
 
             await asyncio.to_thread(wait_for, flood, seconds=10)
@@ -394,7 +394,7 @@ def test_a_slow_scene_holds_no_tick_up(rooms, open_socket):
                 wait_for, lambda: rooms.model.scenes and rooms.gate.connections
             )
             for number in range(20):
-                rooms.model.scenes[0].outbox.offer(bytes(700_000))
+                rooms.model.scenes[0].socket.offer(bytes(700_000))
                 rooms.gate.connections[0].send(TICK % number)
                 async with asyncio.timeout(4):  # less than STALLED_S
                     assert await quick.recv() == TICK % number

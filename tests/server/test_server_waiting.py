@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.server.waiting import Waiting, origin_of
+from webmap.server.connections import Waiting, origin_of
 
 HERE = ""
 THERE, ELSEWHERE = "192.0.2.1", "192.0.2.2"

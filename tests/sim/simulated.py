@@ -10,16 +10,16 @@ import cbor2
 import numpy as np
 
 from webmap.geometry import Pose
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.session import Session
 from webmap.sim.maps import FREE, OCCUPIED, FloorPlan
 from webmap.sim.node import STEP, RobotsNode
 from webmap.sim.robot import BaseOptions, Robot
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import parse_quirks
-from webmap.sim.rosbridge.rosapi import Rosapi
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.session import Session
 from webmap.sim.scanner import ScannerOptions
 from webmap.sim.world import World, WorldOptions
 
@@ -154,10 +154,10 @@ class Client:
 
 
 @contextlib.contextmanager
-def running(*options, module="webmap.sim"):
+def running(*options, module="webmap.sim", cwd=None):
     """Run a server as a process of its own, and give its URL."""
     command = [sys.executable, "-m", module, *options]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=cwd)
     try:
         line = process.stdout.readline()
         prefix = "rosbridge is ready at "

@@ -12,14 +12,14 @@ import pytest
 from PIL import Image
 
 from webmap.geometry import Pose
-from webmap.sim.camera import HEIGHT, WIDTH, Camera
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder, Publication
+from webmap.ros.rosbridge.server.quirks import POLITE
+from webmap.ros.rosbridge.server.schema import Schema
 from webmap.sim.maps import FloorPlan
 from webmap.sim.messages import Messages
 from webmap.sim.obstacles import Obstacles
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder, Publication
-from webmap.sim.rosbridge.quirks import POLITE
-from webmap.sim.rosbridge.schema import Schema
+from webmap.sim.world import HEIGHT, WIDTH, Camera
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from simulated import Bench, room
 
 from webmap.geometry import Pose, Twist
 from webmap.sim.feeds.cloud import POINT, cloud_points
-from webmap.sim.feeds.costmap import Costs, distances
 from webmap.sim.feeds.localization import SURE, Belief
+from webmap.sim.feeds.navigation import Costs, distances
 from webmap.sim.maps import UNKNOWN
 from webmap.sim.navigator import Goal
 from webmap.sim.obstacles import Obstacles
@@ -65,6 +65,35 @@ def test_every_topic_has_a_type_of_its_dialect_and_speaks_when_heard(dialect):
         assert heard(bench, topic), topic
 
 
+def names_of(fields, message):
+    """The names of all fields, by the definition and as the message has them."""
+    known, said = [field.name for field in fields], list(message)
+    for field in fields:
+        if field.fields is not None:
+            value = message[field.name]
+            for each in value if field.is_array else [value]:
+                more, told = names_of(field.fields, each)
+                known, said = known + more, said + told
+    return known, said
+
+
+@DIALECTS
+def test_every_message_has_the_fields_of_its_definition_in_their_order(dialect):
+    bench = Bench(dialect, robots=2, tilted=True)
+    published = {}
+    for topic in [*bench.graph.topics]:
+        deliver = lambda each: published.setdefault(each.topic, each)  # noqa: E731
+        bench.graph.subscribe(object(), topic, deliver)
+    bench.world.send_goal(0, Goal(Pose(3.0, 1.5)))
+    bench.run(3)
+    assert len(published) > 30
+    for each in published.values():
+        fields = bench.graph.schema.fields(each.type)
+        known, said = names_of(fields, each.message)
+        assert said == known, each.topic
+        assert each.form("cbor-raw", bench.encoder)
+
+
 @DIALECTS
 def test_what_a_robot_steers_to_is_told_from_its_base_while_it_follows_a_path(dialect):
     bench = Bench(dialect, robots=1, plan=room(boxes=[(4.5, 0, 5.5, 4)]))
@@ -95,9 +124,9 @@ def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
 
 
 def test_without_extras_there_are_none(monkeypatch):
+    from webmap.ros.rosbridge.server.graph import Graph
+    from webmap.ros.rosbridge.server.quirks import parse_quirks
     from webmap.sim.node import RobotsNode
-    from webmap.sim.rosbridge.graph import Graph
-    from webmap.sim.rosbridge.quirks import parse_quirks
 
     bench = Bench()
     graph = Graph(bench.graph.schema)
@@ -341,7 +370,7 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
 
 def test_a_fix_is_where_the_robot_is_on_the_globe():
     from webmap.core.local_plane import LocalPlane
-    from webmap.sim.feeds.satellites import DATUM
+    from webmap.sim.feeds.localization import DATUM
 
     bench = Bench(robots=1)
     robot = bench.world.robots[0]

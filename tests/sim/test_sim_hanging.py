@@ -9,12 +9,12 @@ import pytest
 from simulated import Bench, room
 from websockets.asyncio.client import connect
 
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import parse_quirks
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.server import RosbridgeServer
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
 
 TYPE = "std_msgs/String"
 TOPIC = "/latched"

@@ -1,7 +1,7 @@
 from simulated import Bench
 
-from webmap.sim.rosbridge.encode import Publication
-from webmap.sim.rosbridge.outbox import Outbox
+from webmap.ros.rosbridge.server.encode import Publication
+from webmap.ros.rosbridge.server.operation import Outbox
 
 
 def publication(topic, number):

@@ -16,18 +16,18 @@ import pytest
 from simulated import room, running
 from websockets.asyncio.client import connect
 
+from captured_frames import PLAYER, frame_file, played
+from frame_player import load_recording
 from webmap.errors import ConfigError
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import POLITE, REAL, Quirks, parse_quirks
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim import run_simulator
-from webmap.sim.recording import load_recording
-from webmap.sim.rosbridge.dialect import Dialect
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.rosbridge.quirks import POLITE, REAL, Quirks, parse_quirks
-from webmap.sim.rosbridge.rosapi import Rosapi
-from webmap.sim.rosbridge.schema import Schema
-from webmap.sim.rosbridge.server import RosbridgeServer
 
-CAPTURED = Path(__file__).parent / "captured"
 REFERENCE = (Path(__file__).parents[2] / "docs/reference/cli.md").read_text()
 
 
@@ -219,22 +219,25 @@ def test_many_clients_come_and_go_and_leave_nothing():
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_the_player_sends_what_was_captured_byte_for_byte(dialect):
-    folder = CAPTURED / dialect
-
     async def scenario(url):
         async with connect(url, max_size=None) as client:
             await subscribe(client, "/robot_0/odom")
-            assert await client.recv() == (folder / "publish_odom.json").read_text()
+            assert (
+                await client.recv()
+                == frame_file(dialect, "publish_odom.json").read_text()
+            )
         async with connect(url, max_size=None) as client:
             await subscribe(client, "/map", compression="cbor")
-            assert await client.recv() == (folder / "cbor_map.bin").read_bytes()
+            assert (
+                await client.recv() == frame_file(dialect, "cbor_map.bin").read_bytes()
+            )
             # Latched: once, whatever else comes.
             await subscribe(client, "/robot_1/odom")
             second = json.loads(await client.recv())
             assert second["topic"] == "/robot_1/odom"
             assert second["msg"]["pose"]["pose"]["position"]["x"] > 5
 
-    with running(str(folder), module="webmap.sim.player") as url:
+    with running(*played(dialect), **PLAYER) as url:
         asyncio.run(scenario(url))
 
 
@@ -252,7 +255,7 @@ def test_the_player_answers_what_rosapi_was_asked():
             await client.send('{"op": "call_service", "service": "/no/such"}')
             assert json.loads(await client.recv())["result"] is False
 
-    with running(str(CAPTURED / "ros1"), module="webmap.sim.player") as url:
+    with running(*played("ros1"), **PLAYER) as url:
         asyncio.run(scenario(url))
 
 
@@ -260,14 +263,17 @@ def test_what_lies_beside_the_frames_is_passed_over(tmp_path):
     (tmp_path / "INDEX.json").write_text('[{"file": "x"}]')
     (tmp_path / "broken.json").write_text("")
     (tmp_path / "nothing_came.bin").write_bytes(b"")
-    text = (CAPTURED / "ros1" / "publish_odom.json").read_text()
+    text = frame_file("ros1", "publish_odom.json").read_text()
     (tmp_path / "publish_odom.json").write_text(text)
-    assert load_recording(tmp_path).texts == {"/robot_0/odom": text}
+    assert load_recording(sorted(tmp_path.iterdir())).texts == {"/robot_0/odom": text}
 
 
 def test_the_player_needs_frames(tmp_path):
+    nothing = tmp_path / "nothing_came.bin"
+    nothing.write_bytes(b"")
     done = subprocess.run(
-        [sys.executable, "-m", "webmap.sim.player", str(tmp_path)],
+        [sys.executable, "-m", PLAYER["module"], str(nothing)],
+        cwd=PLAYER["cwd"],
         capture_output=True,
         text=True,
         check=False,

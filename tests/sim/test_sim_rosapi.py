@@ -1,10 +1,9 @@
 import json
-from pathlib import Path
 
 import pytest
 from simulated import Bench
 
-CAPTURED = Path(__file__).parent / "captured"
+from captured_frames import frame_file
 
 
 @pytest.fixture
@@ -98,7 +97,7 @@ def test_nodes_and_what_they_have_are_listed(client):
 
 
 def test_message_details_are_those_of_the_real_one(client):
-    path = CAPTURED / "ros1" / "service_response_rosapi_message_details.json"
+    path = frame_file("ros1", "service_response_rosapi_message_details.json")
     real = json.loads(path.read_text())["values"]["typedefs"]
     made = values(client, "message_details", {"type": "nav_msgs/Odometry"})["typedefs"]
     by_type = {definition["type"]: definition for definition in made}

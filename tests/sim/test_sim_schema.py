@@ -3,9 +3,10 @@ import base64
 import numpy as np
 import pytest
 
-from webmap.sim.rosbridge.details import definition_text, type_definitions
-from webmap.sim.rosbridge.dialect import Dialect, canonical, resolve
-from webmap.sim.rosbridge.schema import MessageMismatch, Schema, UnknownType
+from webmap.ros.definitions import UnknownType
+from webmap.ros.rosbridge.server.dialect import Dialect, canonical, resolve
+from webmap.ros.rosbridge.server.rosapi import definition_text, type_definitions
+from webmap.ros.rosbridge.server.schema import MessageMismatch, Schema
 
 TWIST = "geometry_msgs/Twist"
 ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
@@ -42,6 +43,24 @@ def test_a_list_gives_the_fields_in_order(schema):
 def test_what_does_not_fit_is_refused(schema, value):
     with pytest.raises(MessageMismatch):
         schema.conform(TWIST, value)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ({"linear": {"q": 1}}, f"Message type {TWIST} does not have a field linear.q"),
+        (
+            {"linear": {"x": "fast"}},
+            f"{TWIST} message requires a number for field linear.x, "
+            "but got a <class 'str'>",
+        ),
+        (7, f"{TWIST} message requires a table of fields, but got a <class 'int'>"),
+    ],
+)
+def test_a_mismatch_is_said_in_the_words_of_rosbridge(schema, value, words):
+    with pytest.raises(MessageMismatch) as error:
+        schema.conform(TWIST, value)
+    assert str(error.value) == words
 
 
 def test_true_is_a_number_only_for_ros2():

@@ -2,12 +2,12 @@
 
 import json
 import math
-from pathlib import Path
 
 import pytest
 from simulated import Bench
 
-CAPTURED = Path(__file__).parent / "captured"
+from captured_frames import frame_file
+
 CMD = "/robot_0/cmd_vel"
 ODOM = "/robot_0/odom"
 TEXT = "std_msgs/String"
@@ -282,7 +282,7 @@ class TestServices:
             ("stop_trigger", "/robot_0/stop", {}),
             ("unknown_service", "/does/not/exist", {}),
         ):
-            path = CAPTURED / "ros1" / f"service_response_{name}.json"
+            path = frame_file("ros1", f"service_response_{name}.json")
             client.send(op="call_service", service=service, args=args, id="call:1")
             assert client.frames() == [path.read_text()]
 

@@ -20,11 +20,10 @@ from webmap.core.pictures import pictures
 from webmap.errors import ConfigError
 from webmap.lifecycle import Lifecycle
 from webmap.modules.robot import http_camera
-from webmap.ros.image_answer import Answer
+from webmap.ros.image_pull import Answer
 from webmap.sim import run_simulator
 from webmap.sim.web_video import WebVideoServer, server
-from webmap.sim.web_video.form import Form, NoPicture
-from webmap.sim.web_video.request import Refusal, Request, read_request
+from webmap.sim.web_video.request import Form, NoPicture, Refusal, Request, read_request
 
 TOPIC = "/robot_0/camera/image_raw"
 STREAM = f"/stream?topic={TOPIC}&type=mjpeg"

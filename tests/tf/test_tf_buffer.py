@@ -152,6 +152,31 @@ def test_ten_seconds_are_kept():
         buffer.lookup("odom", "base", 19.0)
 
 
+def test_what_is_found_is_of_the_time_or_else_the_newest(robot):
+    then, now = robot.find("map", "base_link", 11.0), robot.find("map", "base_link")
+    assert place(then.transform) == (101.0, 0.0)
+    assert (then.newest, then.on_time) == (11.8, True)
+    assert place(now.transform) == (101.8, 0.0)
+    assert (now.newest, now.on_time) == (11.8, False)
+    assert robot.find("map", "base_link", 12.5) == now
+    assert robot.find("laser", "base_link").newest is None
+    assert robot.find("map", "map") == (Transform(), None, False)
+    with pytest.raises(FrameMissing):
+        robot.find("map", "camera", 11.0)
+
+
+def test_a_way_that_was_looked_for_is_another_when_the_tree_changes(robot):
+    robot.add("world", "tag", at(1.0), 11.0)
+    with pytest.raises(NotConnected):
+        robot.lookup("map", "tag", 11.0)
+    assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
+    robot.add("map", "world", at(5.0), 11.0)
+    assert place(robot.lookup("map", "tag", 11.0)) == (6.0, 0.0)
+    robot.add("map", "base_link", at(7.0), 11.0)
+    assert place(robot.lookup("map", "base_link", 11.0)) == (7.0, 0.0)
+    assert place(robot.lookup("map", "laser", 11.0)) == (7.3, 0.0)
+
+
 def test_a_frame_that_changes_its_parent_is_noted(robot):
     robot.add("map", "base_link", at(7.0), 11.0)
     assert "was in 'odom' and is in 'map' now" in robot.notes[-1]

@@ -67,7 +67,7 @@ def odometry(x, y=0.0, yaw=0.0, *, stamp=10.0, frame="odom"):
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.core.pose_troubles.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.core.placing.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.core.frames.GRACE", 0.0)
 
 

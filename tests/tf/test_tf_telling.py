@@ -43,7 +43,7 @@ def test_a_listener_that_raises_keeps_no_other_from_hearing_and_is_logged_once(c
         link.say("/tf", moved(step, 10.0 + step))
         assert robot.position.x == step
     (said,) = caplog.records
-    assert said.getMessage() == "test: what goes by frames raised"
+    assert said.getMessage() == "test: a listener to frames raised"
     assert "this one cannot" in str(said.exc_info[1])
     held.remove()
     robot.destroy()

@@ -7,10 +7,9 @@ import pytest
 from test_tf_robot import Link, odometry, transform
 
 from webmap import Robot
-from webmap.core.frame_faults import FrameFaults
-from webmap.core.jumps import Jumps
-from webmap.core.odometry import PoseReading
-from webmap.core.pose_troubles import Lasting
+from webmap.core.frames import FrameFaults, lasting
+from webmap.core.placing import Lasting, PoseReading
+from webmap.core.pose_pipeline import Jumps
 from webmap.geometry import Quaternion, Vector3
 from webmap.tf import Buffer
 
@@ -266,11 +265,11 @@ def test_faults_with_the_robots_prefix_concern_it_though_nothing_connects_them()
 
 
 def test_trouble_that_comes_and_goes_is_never_said(clock):
-    lasting = Lasting()
+    waits = Lasting()
     for _ in range(10):
-        assert lasting.look("late") == ""
+        assert lasting(waits, "late") == ""
         clock.now += 0.6
-        assert lasting.look("") == ""
-    assert lasting.look("late") == ""
+        assert lasting(waits, "") == ""
+    assert lasting(waits, "late") == ""
     clock.now += 1.0
-    assert lasting.look("late") == "late"
+    assert lasting(waits, "late") == "late"

@@ -16,8 +16,8 @@ from webmap.cli.demo import simulator
 from webmap.cli.play import replay
 from webmap.gate.display.child import Child
 from webmap.gate.messages import Ready
-from webmap.ros.events import Publish
 from webmap.ros.offload import Offload
+from webmap.ros.rosbridge.events import Publish
 
 SOURCE = Path(webmap.__file__).parent
 
@@ -149,7 +149,7 @@ def test_a_replay_that_hangs_in_a_file_ends_when_its_parent_does():
 
 PARENT = """\
 import asyncio, time
-from webmap.ros.events import Publish
+from webmap.ros.rosbridge.events import Publish
 from webmap.ros.offload import Offload
 async def main():
     frame = b'{"op":"publish","topic":"/a","msg":{"data":"%s"}}' % (b"x" * (1 << 20))

@@ -36,6 +36,25 @@ def test_the_gate_loads_no_heavy_package(module: str) -> None:
     assert not loaded_by(f"import {module}") & HEAVY
 
 
+def test_what_moves_a_robot_is_configured_without_a_display() -> None:
+    loaded = modules_after("import webmap.config.motion")
+    rooms = {".".join(name.split(".")[:2]) for name in loaded} - {"webmap"}
+    ours = {name for name in rooms if name.startswith("webmap.")}
+    base = {"webmap.errors", "webmap.logs", "webmap.outside_text"}
+    assert ours <= base | {"webmap.config", "webmap.geometry", "webmap.ros"}
+    files = {name for name in loaded if name.startswith(("webmap.ros", "webmap.con"))}
+    assert files == {
+        "webmap.config",
+        "webmap.config.checks",
+        "webmap.config.motion",
+        "webmap.config.reading",
+        "webmap.ros",
+        "webmap.ros.names",
+    }
+    heavy = HEAVY | {"tomllib", "websockets"}
+    assert not {name.partition(".")[0] for name in loaded} & heavy
+
+
 def test_a_scan_costs_the_gate_cbor_and_nothing_else_that_is_heavy() -> None:
     loaded = loaded_by(
         "import webmap.gate.__main__, cbor2\n"

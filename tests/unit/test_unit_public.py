@@ -1,6 +1,8 @@
 """The public names, and the version that is said in several places."""
 
 import re
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
@@ -36,6 +38,12 @@ def test_every_place_says_the_same_version() -> None:
     newest = re.search(r"^## (\S+?),", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
     assert newest is not None
     assert {webmap.__version__, version("webmap"), newest[1]} == {project["version"]}
+
+
+def test_the_reference_of_layers_is_made_from_their_declarations() -> None:
+    tool = ROOT / "tools" / "make_layers_page.py"
+    done = subprocess.run([sys.executable, tool, "--check"], capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
 
 
 @pytest.mark.parametrize("command", ["demo", "play", "record", "run", "sim", "view"])

@@ -59,3 +59,45 @@ def test_no_file_names_a_path_of_a_machine() -> None:
 @pytest.mark.parametrize("parts", [("/home", "ann", "x"), ("cd /root", "a")])
 def test_a_path_of_a_machine_would_be_seen(parts: tuple[str, ...]) -> None:
     assert MACHINE_PATH.search("/".join(parts))
+
+
+# What only a rosbridge has: operations, encodings, fields, nodes and parameters.
+ROSBRIDGE_WORDS = re.compile(
+    r"rosapi|rosbridge_(?:suite|websocket|server|library)|max_message_size|cbor|"
+    r"fragment_size|throttle_rate|advertise_service|service_response|"
+    r"[\"'](?:subscribe|unsubscribe|advertise|unadvertise|publish|call_service)[\"']",
+    re.IGNORECASE,
+)
+ROSBRIDGE_ROOMS = (
+    "ros/rosbridge/",
+    "gate/",  # it has sockets of its own
+    "testing/",  # its peers are rosbridges
+)
+# People have to read of rosapi, since they have to start it; a replay starts it, too.
+ROSBRIDGE_TEXTS = {
+    "bags/replay.py": {"rosapi"},
+    "cli/doctor.py": {"rosapi"},
+    "cli/finding.py": {"rosapi"},
+    "cli/record.py": {"rosapi"},
+    "cli/recording_to.py": {"rosapi"},
+    "cli/topic_list.py": {"rosapi"},
+    "console/doctor.py": {"rosapi"},
+    "sim/process.py": {"rosapi"},
+}
+
+
+def test_rosbridge_is_spoken_in_one_room() -> None:
+    found = []
+    for path in SOURCES:
+        name = path.relative_to(ROOT / "src/webmap").as_posix()
+        if name.startswith(ROSBRIDGE_ROOMS):
+            continue
+        words = {word.lower() for word in ROSBRIDGE_WORDS.findall(path.read_text())}
+        found += [f"{name}: {w}" for w in words - ROSBRIDGE_TEXTS.get(name, set())]
+    assert not found, "speak of topics, messages and services; see webmap.ros.bridge"
+
+
+@pytest.mark.parametrize("text", ['"/rosapi/topics"', "'call_service'", "in CBOR"])
+def test_a_word_of_rosbridge_would_be_seen(text: str) -> None:
+    assert ROSBRIDGE_WORDS.search(text)
+    assert not ROSBRIDGE_WORDS.search("bridge.call_service(name)")

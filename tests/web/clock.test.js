@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { DisplayClock } from "../../src/webmap/web/clock.js";
+import { DisplayClock } from "../../src/webmap/web/ages.js";
 
 test("the clock is unknown until a frame came", () => {
   assert.equal(new DisplayClock().at(5), null);

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { DragEnd } from "../../src/webmap/web/drag_end.js";
+import { DragEnd } from "../../src/webmap/web/map.js";
 
 test("the click that ends a drag is swallowed, and the one after it is not", () => {
   const drag = new DragEnd();

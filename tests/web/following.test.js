@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { Following } from "../../src/webmap/web/following.js";
+import { Following } from "../../src/webmap/web/view.js";
 
 const at = (x, y) => ({ x, y });
 

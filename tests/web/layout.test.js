@@ -1,17 +1,25 @@
 import assert from "node:assert/strict";
 import { afterEach, beforeEach, describe, test } from "node:test";
-
-import { keepView, keptView } from "../../src/webmap/web/kept_views.js";
 import {
+  checkSize,
+  keepView,
+  keptView,
+  LayoutParts,
   LayoutRefused,
   MOST_BYTES,
-  checkSize,
+  placeOf,
   readLayout,
+  viewOf,
   writeLayout,
 } from "../../src/webmap/web/layout.js";
-import { LayoutParts } from "../../src/webmap/web/layout_parts.js";
-import { placeOf, viewOf } from "../../src/webmap/web/place.js";
-import { apply, initialView, rotate, scale, translate } from "../../src/webmap/web/view.js";
+import {
+  apply,
+  initialView,
+  rotate,
+  scale,
+  translate,
+} from "../../src/webmap/web/view.js";
+
 
 const VIEW = { x: 12.5, y: -3, pixels_per_metre: 40, turn_rad: 0.5 };
 const LAYOUT = {

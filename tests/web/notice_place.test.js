@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { GAP, freePlace, meets } from "../../src/webmap/web/notice_place.js";
+import { GAP, freePlace, meets } from "../../src/webmap/web/notices.js";
 
 /**
  * @param {number} left
@@ -17,7 +17,7 @@ const words = (width) => Math.ceil(700 / width) * 60;
 const DESKTOP = box(328, 72, 1280, 800);
 const PHONE = box(0, 52, 390, 726);
 
-/** @param {import("../../src/webmap/web/notice_place.js").Box[]} taken */
+/** @param {import("../../src/webmap/web/notices.js").Box[]} taken */
 function covered(area, taken) {
   const place = freePlace(area, taken, words);
   if (!place) return null;

@@ -1,15 +1,16 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-
-import { Operations, operated } from "../../src/webmap/web/operations.js";
 import {
   apply,
   fit,
   initialView,
+  operated,
+  Operations,
   rotate,
   scale,
   translate,
 } from "../../src/webmap/web/view.js";
+
 
 const SIZE = { width: 700, height: 500 };
 const VIEW = initialView(700, 500);

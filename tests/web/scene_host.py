@@ -14,9 +14,12 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from webmap.scene import Document, Fragment, svg
-from webmap.server.headers import CONTENT_SECURITY_POLICY
-from webmap.wire import Hello, SceneSession, read_hello
+from webmap.scene import svg
+from webmap.scene.bound import Document
+from webmap.scene.fragment import Fragment
+from webmap.server.security import CONTENT_SECURITY_POLICY
+from webmap.wire.messages import Hello, read_message
+from webmap.wire.session import SceneSession
 
 HERE = Path(__file__).parent
 WEB = HERE.parents[1] / "src" / "webmap" / "web"
@@ -172,7 +175,8 @@ class SceneHost:
         page_id = web_socket.query_params["id"]
         ticking: asyncio.Task[None] | None = None
         with contextlib.suppress(WebSocketDisconnect):
-            hello = read_hello(await web_socket.receive_text())
+            hello = read_message(await web_socket.receive_text())
+            assert isinstance(hello, Hello)
             shown = self.shown.get(page_id)
             if shown is None:
                 shown = self.shown[page_id] = Shown()

@@ -234,7 +234,7 @@ def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
     bench = open_bench("?holonomic")
     bench.select("r1")
     stick = bench.page.locator(".webmap-stick")
-    assert not stick.is_visible()
+    bench.until(lambda: not stick.is_visible())
     bench.page.get_by_role("button", name="Stick", exact=True).click()
     box = stick.bounding_box()
     bench.page.get_by_role("button", name="Sideways").click()

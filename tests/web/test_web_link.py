@@ -3,8 +3,9 @@
 import pytest
 from scene_host import wait
 
-from webmap.wire import SceneSession, Trouble, ViewReport
+from webmap.wire.messages import Trouble, ViewReport
 from webmap.wire.opcodes import VERSION
+from webmap.wire.session import SceneSession
 
 pytestmark = pytest.mark.browser
 

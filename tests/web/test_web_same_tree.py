@@ -14,8 +14,8 @@ from wire_picture import f32, histories, play
 
 from real_browser import watched_tab
 from webmap.geometry import Affine
-from webmap.scene import Text
-from webmap.wire import SceneSession
+from webmap.scene.node import Text
+from webmap.wire.session import SceneSession
 
 pytestmark = pytest.mark.browser
 

@@ -7,8 +7,9 @@ import pytest
 from scene_host import wait
 
 from webmap.geometry import Affine
-from webmap.scene import Fragment, html, svg
-from webmap.wire import ElementEvent, Trouble
+from webmap.scene import html, svg
+from webmap.scene.fragment import Fragment
+from webmap.wire.messages import ElementEvent, Trouble
 
 pytestmark = pytest.mark.browser
 

@@ -87,3 +87,50 @@ def test_stop_of_the_driven_robot_does_not_move(
     bench.until(lambda: bench.shown() == "late")
     boxes["late"] = stop.bounding_box()
     assert len({tuple(box.values()) for box in boxes.values()}) == 1, boxes
+
+
+WIDE_ROUTE = """async (width) => {
+  const { lay } = await import("/_webmap/modules/overlay.js");
+  const style = new CSSStyleSheet();
+  style.replaceSync("svg { height: auto } input, select { min-height: 10px }");
+  document.adoptedStyleSheets.push(style);
+  const link = document.createElement("link");
+  link.rel = "stylesheet";
+  link.href = "/_webmap/modules/route_tool.css";
+  const loaded = new Promise((resolve) => link.addEventListener("load", resolve));
+  document.head.append(link);
+  await loaded;
+  const map = document.querySelector("svg.webmap");
+  Object.assign(map.style, { width: `${width}px`, height: "500px" });
+  const route = document.createElement("details");
+  route.className = "webmap-panel webmap-route";
+  route.open = true;
+  const [summary, row, select, option] = ["summary", "p", "select", "option"].map(
+    (tag) => document.createElement(tag),
+  );
+  summary.textContent = "Route";
+  option.textContent = "a long name ".repeat(20);
+  select.append(option);
+  row.append(select);
+  route.append(summary, row);
+  lay(bench.maps[0], route, "top-left");
+  const drawing = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  drawing.classList.add("webmap-route-drawing");
+  map.parentElement.append(drawing);
+}"""
+
+
+@pytest.mark.parametrize("width", [320, 600])
+def test_an_open_route_stays_on_the_map_and_rules_of_the_page_do_not_shrink_tools(
+    open_bench: Callable[..., Bench], width: int
+) -> None:
+    bench = open_bench("?modules=stop")
+    bench.page.evaluate(WIDE_ROUTE, width)
+    map_box = bench.page.locator("svg.webmap").bounding_box()
+    panel = bench.page.locator(".webmap-route").bounding_box()
+    assert panel["x"] + panel["width"] <= map_box["x"] + map_box["width"] - 11
+    assert panel["width"] == pytest.approx(width - 24, abs=1)
+    assert bench.page.locator(".webmap-route select").bounding_box()["height"] >= 44
+    drawing = bench.page.locator(".webmap-route-drawing")
+    assert drawing.evaluate("e => getComputedStyle(e).pointerEvents") == "none"
+    assert drawing.bounding_box()["height"] > 300

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { REPORT_PERIOD, ViewReports } from "../../src/webmap/web/view_reports.js";
+import { REPORT_PERIOD, ViewReports } from "../../src/webmap/web/view.js";
 
 /**
  * @param {number} count

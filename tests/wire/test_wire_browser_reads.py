@@ -15,8 +15,10 @@ from hypothesis import strategies as st
 from wire_picture import histories, picture_of, play
 
 from webmap.geometry import Affine
-from webmap.scene import Document, Fragment, fragment, html, node, svg
-from webmap.wire import SceneSession
+from webmap.scene import fragment, html, node, svg
+from webmap.scene.bound import Document
+from webmap.scene.fragment import Fragment
+from webmap.wire.session import SceneSession
 
 HERE = Path(__file__).parent
 GOLDEN = HERE / "golden"

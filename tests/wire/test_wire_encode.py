@@ -5,8 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.geometry import Affine
-from webmap.scene import Document, Fragment, html, svg
+from webmap.scene import html, svg
 from webmap.scene.allowed import ATTRIBUTES
+from webmap.scene.bound import Document
+from webmap.scene.fragment import Fragment
 from webmap.wire.encode import _SLOTS, encode_changes, encode_snapshot, string, varint
 from webmap.wire.opcodes import TAGS, Op
 

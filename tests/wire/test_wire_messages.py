@@ -5,8 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.errors import WireError
-from webmap.wire import ElementEvent, Hello, SceneSession, ViewReport, read_hello
-from webmap.wire.messages import LONGEST, read_message
+from webmap.wire.messages import (
+    LONGEST,
+    ElementEvent,
+    Hello,
+    ViewReport,
+    read_message,
+)
+from webmap.wire.session import SceneSession
 
 HELLO = {
     "op": "hello",
@@ -25,15 +31,10 @@ def text(message, **changes):
 
 
 def test_a_hello_says_which_page_it_is():
-    hello = read_hello(text(HELLO))
+    hello = read_message(text(HELLO))
     assert isinstance(hello, Hello)
     assert hello.containers == {"map": (700, 500)}
     assert (hello.page, hello.url, hello.theme) == ("abcdefgh-1", "/lab?x=1", "dark")
-
-
-def test_what_is_not_hello_cannot_be_first():
-    with pytest.raises(WireError, match="hello first"):
-        read_hello('{"op":"seen","frame":1}')
 
 
 def test_an_event_has_what_the_hand_did():

@@ -3,10 +3,13 @@ import struct
 import pytest
 
 from webmap.errors import WireError
-from webmap.scene import Document, Fragment, html, svg
-from webmap.wire import ElementEvent, ModuleMessage, SceneSession, ViewReport
+from webmap.scene import html, svg
+from webmap.scene.bound import Document
+from webmap.scene.fragment import Fragment
+from webmap.wire.messages import ElementEvent, ModuleMessage, ViewReport
 from webmap.wire.opcodes import RESET, VERSION
-from webmap.wire.unsaid import Unsaid
+from webmap.wire.page_state import PendingRecords
+from webmap.wire.session import SceneSession
 
 HEADER = struct.Struct("<HBId")
 
@@ -206,7 +209,7 @@ def test_what_is_mounted_within_goes_along():
     session.unmount(outer)
     assert session.fragment(inner) is None
     assert not session._fragments
-    assert not session._canvases
+    assert not session._map_views
     assert not session._attached
     with pytest.raises(WireError, match="not on the page"):
         session.set_class(inner, "x", True)
@@ -265,7 +268,7 @@ def test_operations_of_a_page_that_looks_away_are_bounded():
     session.mount(Fragment(root), under=0)
     for _ in range(100_000):
         session.view(root.id, "translate", 1, 0)
-    canvas = session._canvases[root.id]
+    canvas = session._map_views[root.id]
     assert len(canvas._unreported) == canvas.UNREPORTED_KEPT
     assert len(session.frame(0.0)) < 100_000
 
@@ -313,7 +316,7 @@ def test_messages_for_a_page_that_looks_away_are_bounded():
     for number in range(5000):
         session.error(f"number {number}")
     frame = session.frame(0.0)
-    assert frame.count(b"number ") == Unsaid.MESSAGES_KEPT
+    assert frame.count(b"number ") == PendingRecords.MESSAGES_KEPT
     assert b"number 4999" in frame
 
 
@@ -338,7 +341,7 @@ def test_a_page_that_was_loaded_again_is_told_what_is_not_mended():
     session.restart()
     again = session.frame(0.0)
     told = [number for number in range(200) if b"number %d." % number in again]
-    assert len(told) == Unsaid.PROBLEMS_KEPT - 1
+    assert len(told) == PendingRecords.PROBLEMS_KEPT - 1
     assert told == list(range(100, 199))
 
 
@@ -370,7 +373,7 @@ def test_a_page_opened_a_thousand_times_leaves_nothing():
         next_frame(session)
         session.unmount(page)
         next_frame(session)
-    left = (session._mounts, session._fragments, session._canvases, session._attached)
+    left = (session._mounts, session._fragments, session._map_views, session._attached)
     assert left == ({}, {}, {}, {})
 
 

@@ -6,9 +6,11 @@ import struct
 from hypothesis import strategies as st
 
 from webmap.geometry import Affine
-from webmap.scene import Fragment, Text, html, svg
+from webmap.scene import html, svg
 from webmap.scene.bound import BoundElement
-from webmap.wire.mounts import flags
+from webmap.scene.fragment import Fragment
+from webmap.scene.node import Text
+from webmap.wire.page_state import flags
 
 
 def f32(value):

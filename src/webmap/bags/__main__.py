@@ -6,7 +6,7 @@ import logging
 import sys
 from pathlib import Path
 
-from webmap.bags.needed import need_rosbags
+from webmap.bags import need_rosbags
 from webmap.bags.player import Player
 from webmap.bags.recording import Recording
 from webmap.children import end_with_parent
@@ -14,10 +14,10 @@ from webmap.errors import ConfigError, WebMapError
 from webmap.logs import set_up_logging
 from webmap.not_listening import why_not_listening
 from webmap.outside_text import one_line
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.quirks import POLITE
+from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim.process import signals_set
-from webmap.sim.rosbridge.encode import Encoder
-from webmap.sim.rosbridge.quirks import POLITE
-from webmap.sim.rosbridge.server import RosbridgeServer
 
 log = logging.getLogger("webmap.bags")
 

@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from webmap.bags.latching import is_latched
-from webmap.bags.types import Way
+from webmap.bags.recording import is_latched
+from webmap.bags.types import TypeVersion
 from webmap.errors import ConfigError
-from webmap.sim.rosbridge.dialect import DialectName, canonical
+from webmap.ros.rosbridge.server.dialect import DialectName, canonical
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Qos
@@ -23,7 +23,7 @@ class BagFile(Protocol):
 
     path: Path
 
-    def add(self, topic: str, way: Way) -> Any:
+    def add(self, topic: str, version: TypeVersion) -> Any:
         """Begin a topic, and return what its messages are written to."""
 
     def write(self, channel: Any, time: int, data: bytes) -> None:
@@ -74,14 +74,14 @@ class Ros1Bag:
         self._writer = Writer(path)
         self._writer.open()
 
-    def add(self, topic: str, way: Way) -> Any:
+    def add(self, topic: str, version: TypeVersion) -> Any:
         """Begin a topic, and return what its messages are written to."""
         return self._writer.add_connection(
             topic,
-            way.type_name,
-            typestore=way.store,
+            version.type_name,
+            typestore=version.store,
             callerid="/webmap",
-            latching=int(is_latched(topic, canonical(way.type_name))),
+            latching=int(is_latched(topic, canonical(version.type_name))),
         )
 
     def write(self, channel: Any, time: int, data: bytes) -> None:
@@ -110,13 +110,13 @@ class Ros2Bag:
         )
         self._writer.open()
 
-    def add(self, topic: str, way: Way) -> Any:
+    def add(self, topic: str, version: TypeVersion) -> Any:
         """Begin a topic, and return what its messages are written to."""
-        latched = is_latched(topic, canonical(way.type_name))
+        latched = is_latched(topic, canonical(version.type_name))
         return self._writer.add_connection(
             topic,
-            way.type_name,
-            typestore=way.store,
+            version.type_name,
+            typestore=version.store,
             offered_qos_profiles=[_kept()] if latched else [],
         )
 

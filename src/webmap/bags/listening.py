@@ -6,13 +6,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from webmap.bags.incoming import Incoming
-from webmap.bags.recorder import Recorder
+from webmap.bags.recorder import Incoming, Recorder
 from webmap.bags.replay import STATUS
 from webmap.errors import BridgeError, ConfigError
 from webmap.ros.bridge import Bridge
-from webmap.ros.events import Publish
 from webmap.ros.names import is_type, normalise_topic
+from webmap.ros.received import ReceivedMessage
 
 LOOK = 2.0
 """Seconds between two looks which topics there are."""
@@ -24,7 +23,7 @@ OPEN_WITHIN = 5.0
 """Seconds after which it is said that the link is not open yet."""
 
 PICTURES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
-"""Types that are asked for in CBOR: encoding them as JSON takes a bridge too long."""
+"""Types that are asked for in binary: a bridge takes long to encode them as text."""
 
 QUEUE = 100
 """Messages of a topic that the bridge may hold back; each one counts."""
@@ -152,14 +151,14 @@ class Listening:
                 heard,
                 type_name,
                 queue_length=QUEUE,
-                compression="cbor" if is_type(type_name, *PICTURES) else None,
+                encoding="binary" if is_type(type_name, *PICTURES) else None,
             )
             subscription.undecoded = True
         except ConfigError as error:
             self._say(f"{topic} is left out: {error}")
         return True
 
-    def _heard(self, topic: str, message: Publish) -> None:
+    def _heard(self, topic: str, message: ReceivedMessage) -> None:
         if not self._stop.is_set():
             self._incoming.put(topic, message, time.time_ns())
 

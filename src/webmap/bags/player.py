@@ -6,9 +6,9 @@ import logging
 import time
 from collections.abc import Callable
 
-from webmap.bags.pace import SECOND, Pace
 from webmap.bags.recording import Recorded, Recording
 from webmap.bags.replay import Replay
+from webmap.bags.times import SECOND, Pace
 from webmap.errors import ConfigError
 
 log = logging.getLogger("webmap.bags")

@@ -1,21 +1,144 @@
 """A recording as it lies on the disk: its topics, and its messages in their order."""
 
+import keyword
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from webmap.bags.latching import is_latched, is_static
-from webmap.bags.reading import Messages
-from webmap.bags.shapes import shapes_of
+from webmap.bags.types import texts_of
 from webmap.errors import ConfigError
 from webmap.plain_files import refuse_special, resolved
-from webmap.sim.rosbridge.dialect import Dialect, DialectName, canonical, resolve
-from webmap.sim.rosbridge.schema import Schema, UnknownType
+from webmap.ros.definitions import OCTETS, TIMES, Definitions, Field, UnknownType
+from webmap.ros.rosbridge.server.dialect import Dialect, DialectName, canonical, resolve
+from webmap.ros.rosbridge.server.schema import DTYPES, Schema
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
+
+NAMES = ("map", "tf_static", "robot_description")
+"""What such topics are called, whatever a bag tells of them."""
+
+TYPES = ("nav_msgs/OccupancyGrid",)
+"""What is worth keeping of any topic: it is large, and seldom comes."""
+
+STATIC = "tf_static"
+
+
+def is_latched(topic: str, type_name: str) -> bool:
+    """Return whether the newest message of a topic is kept by its name or type.
+
+    Args:
+        topic: Its name.
+        type_name: Canonical, such as ``nav_msgs/OccupancyGrid``.
+
+    """
+    return topic.rpartition("/")[2] in NAMES or type_name in TYPES
+
+
+def is_static(topic: str) -> bool:
+    """Return whether a topic tells of frames that never move against each other."""
+    return topic.rpartition("/")[2] == STATIC
+
+
+class StaticFrames:
+    """All that was told of static frames, as one message.
+
+    Each node tells of its own, and a bag does not say which node said what; so the
+    newest message alone would leave the others' out.
+    """
+
+    def __init__(self) -> None:
+        self._frames: dict[str, Any] = {}
+
+    def with_all(self, message: dict[str, Any]) -> dict[str, Any]:
+        """Return a ``tf2_msgs/TFMessage`` with what was told before it."""
+        for transform in message["transforms"]:
+            self._frames[transform["child_frame_id"]] = transform
+        return {"transforms": list(self._frames.values())}
+
+
+Make = Callable[[Any], Any]
+
+
+class Messages:
+    """Makes messages, as the rosbridge server publishes them, of rosbags' objects.
+
+    Arrays stay arrays, and bytes become bytes; times are spelled as the dialect of the
+    schema has them.
+
+    Args:
+        schema: Knows the fields of the types.
+
+    """
+
+    def __init__(self, schema: Schema) -> None:
+        self._schema = schema
+        self._known: dict[str, Make] = {}
+
+    def message(self, type_name: str, value: object) -> dict[str, Any]:
+        """Return the message of an object.
+
+        Args:
+            type_name: Of the message, as the schema knows it.
+            value: What rosbags made of its bytes.
+
+        Raises:
+            UnknownType: If the schema does not know the type.
+
+        """
+        make = self._known.get(type_name)
+        if make is None:
+            # Worked out once a type, for messages of it come many times a second.
+            fields = self._schema.fields(type_name)
+            make = self._known[type_name] = self._record(fields)
+        made: dict[str, Any] = make(value)
+        return made
+
+    def _record(self, fields: Sequence[Field]) -> Make:
+        parts = [
+            (field.name, _attribute(field.name), self._field(field)) for field in fields
+        ]
+        return lambda value: {
+            name: make(getattr(value, inner)) for name, inner, make in parts
+        }
+
+    def _field(self, field: Field) -> Make:
+        if not field.is_array:
+            return self._single(field)
+        if field.type in OCTETS:
+            return bytes
+        numbers = field.type in DTYPES
+        if field.type == "bool" or (numbers and field.size is not None):
+            return _listed
+        if numbers:
+            return _same
+        single = self._single(field)
+        return lambda values: [single(value) for value in values]
+
+    def _single(self, field: Field) -> Make:
+        if field.fields is not None:
+            return self._record(field.fields)
+        if field.type in TIMES:
+            whole, rest = self._schema.dialect.time(0)
+            return lambda time: {whole: int(time.sec), rest: int(time.nanosec)}
+        return _same
+
+
+def _attribute(field: str) -> str:
+    """Return what rosbags calls a field: a word of Python gets a line behind it."""
+    return f"{field}_" if keyword.iskeyword(field) else field
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+def _listed(values: Any) -> list[Any]:
+    listed: list[Any] = values.tolist()
+    return listed
+
 
 SECOND = 1_000_000_000
 
@@ -182,17 +305,20 @@ class Recording:
         usable = []
         for connection in self._reader.connections:
             try:
-                shapes = shapes_of(self._reader.typestore, connection.msgtype)
-            except UnknownType as error:
-                self._leave_out(connection, str(error))
+                texts = texts_of(self._reader.typestore, connection.msgtype)
+                type_name = canonical(connection.msgtype)
+                Definitions(texts, ros2=self.dialect == "ros2").definition(type_name)
+            except ConfigError as error:
+                unknown = error.type if isinstance(error, UnknownType) else None
+                why = f"there is no definition of {unknown}" if unknown else str(error)
+                self._leave_out(connection, why)
                 continue
-            type_name = canonical(connection.msgtype)
             name = self._names[connection.topic] = resolve(connection.topic)
             known = self.topics.get(name)
             if known is not None and known.type != type_name:
                 self._leave_out(connection, f"it is a {known.type} too")
                 continue
-            self.schema.define(type_name, shapes)
+            self.schema.define(texts)
             latched = (known is not None and known.latched) or _said_latched(connection)
             latched = latched or is_latched(name, type_name)
             self.topics[name] = RecordedTopic(name, type_name, latched)

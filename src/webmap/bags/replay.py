@@ -4,20 +4,18 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from webmap.bags.latching import StaticFrames, is_static
-from webmap.bags.pace import Pace
-from webmap.bags.recording import Recorded, Recording
-from webmap.bags.stamps import Stamps
-from webmap.sim.rosbridge.graph import (
+from webmap.bags.recording import Recorded, Recording, StaticFrames, is_static
+from webmap.bags.times import Pace, Stamps
+from webmap.ros.rosbridge.server.graph import (
     BRIDGE_NODE,
     Deliver,
     Graph,
     GraphError,
     ServiceHandler,
 )
-from webmap.sim.rosbridge.quirks import POLITE
-from webmap.sim.rosbridge.rosapi import Rosapi
-from webmap.sim.rosbridge.schema import Schema
+from webmap.ros.rosbridge.server.quirks import POLITE
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
 
 NODE = "/recording"
 """The node that publishes what was recorded."""
@@ -33,7 +31,7 @@ REFUSED = "this is a recording: nothing is taken in"
 class ReplayGraph(Graph):
     """A ROS graph that takes nothing in once it is sealed.
 
-    Whoever connects may subscribe and ask rosapi; there is nobody who would obey.
+    Whoever connects may subscribe and ask questions; there is nobody who would obey.
     """
 
     def __init__(self, schema: Schema, *, clock: Callable[[], float]) -> None:

@@ -1,76 +1,89 @@
 """What rosbags knows of the types of a ROS, and messages as bytes by that."""
 
+import base64
+import binascii
+import math
 import struct
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from array import array
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, cast
 
-from webmap.bags.shapes import Shape, shapes_of
-from webmap.bags.writing import Misfit, Objects
+import numpy as np
+
 from webmap.errors import ConfigError
+from webmap.ros.conforming import Conformer, Misfit, check_size, wrong
+from webmap.ros.definitions import (
+    FLOATS,
+    INTEGERS,
+    SCALARS,
+    Definitions,
+    Field,
+    UnknownType,
+    shipped,
+)
 from webmap.ros.names import ros2_type
-from webmap.sim.rosbridge.dialect import DialectName, canonical
-from webmap.sim.rosbridge.schema import UnknownType
+from webmap.ros.rosbridge.server.dialect import DialectName, canonical
+from webmap.ros.rosbridge.server.encode import serialize
+from webmap.ros.rosbridge.server.schema import DTYPES
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
-
-MORE = {
-    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
-    "tf/msg/tfMessage": "geometry_msgs/TransformStamped[] transforms",
-    "map_msgs/msg/OccupancyGridUpdate": (
-        "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\n"
-        "int8[] data"
-    ),
-}
-"""Definitions that rosbags lacks, the same in ROS 1 and ROS 2."""
-
-MORE_ROS1 = {
-    "move_base_msgs/msg/MoveBaseGoal": "geometry_msgs/PoseStamped target_pose",
-    "move_base_msgs/msg/MoveBaseFeedback": "geometry_msgs/PoseStamped base_position",
-    "move_base_msgs/msg/MoveBaseResult": "",
-    "move_base_msgs/msg/MoveBaseActionGoal": (
-        "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\n"
-        "move_base_msgs/MoveBaseGoal goal"
-    ),
-    "move_base_msgs/msg/MoveBaseActionFeedback": (
-        "std_msgs/Header header\nactionlib_msgs/GoalStatus status\n"
-        "move_base_msgs/MoveBaseFeedback feedback"
-    ),
-    "move_base_msgs/msg/MoveBaseActionResult": (
-        "std_msgs/Header header\nactionlib_msgs/GoalStatus status\n"
-        "move_base_msgs/MoveBaseResult result"
-    ),
-}
-"""Goals of move_base and how they go."""
-
-MORE_ROS2 = {
-    "nav2_msgs/msg/Particle": "geometry_msgs/Pose pose\nfloat64 weight",
-    "nav2_msgs/msg/ParticleCloud": (
-        "std_msgs/Header header\nnav2_msgs/Particle[] particles"
-    ),
-    "nav2_msgs/action/NavigateToPose_Feedback": (
-        "geometry_msgs/PoseStamped current_pose\n"
-        "builtin_interfaces/Duration navigation_time\n"
-        "builtin_interfaces/Duration estimated_time_remaining\n"
-        "int16 number_of_recoveries\nfloat32 distance_remaining"
-    ),
-    "nav2_msgs/action/NavigateToPose_FeedbackMessage": (
-        "unique_identifier_msgs/UUID goal_id\n"
-        "nav2_msgs/action/NavigateToPose_Feedback feedback"
-    ),
-}
-"""Particles of Nav2's AMCL, and how goals of Nav2 go, from Humble on."""
-
-_UNFIT = (struct.error, ValueError, TypeError, AssertionError, OverflowError)
-"""What rosbags raises where a value does not fit its type."""
 
 ROS1 = ("ROS1_NOETIC",)
 ROS2 = ("ROS2_KILTED", "ROS2_JAZZY", "ROS2_IRON", "ROS2_HUMBLE", "ROS2_FOXY")
 """Releases whose types are known, in the order in which they are tried."""
 
+_ARRAY, _SEQUENCE = 3, 4
+"""rosbags' kinds of fields that are arrays."""
 
-class Way:
-    """One way to make bytes of the messages of a type: as one release has it.
+_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
+_FILLER = "structure_needs_at_least_one_member"
+"""What a type without fields has in ROS 2, where nobody looks."""
+
+
+def texts_of(store: "Typestore", type_name: str) -> dict[str, str]:
+    """Return the definitions of a type and of all types in it, as texts by name.
+
+    Args:
+        store: What rosbags knows of types.
+        type_name: As rosbags has it: ``nav_msgs/msg/Odometry``.
+
+    Raises:
+        UnknownType: If the store does not know the type or one in it, or a field is
+            of a kind that messages over rosbridge do not have.
+
+    """
+    found: dict[str, str] = {}
+    waiting = [type_name]
+    while waiting:
+        name = waiting.pop()
+        if canonical(name) in found:
+            continue
+        if name not in store.fielddefs:
+            raise UnknownType(name)
+        lines = []
+        for field, (kind, inner) in store.fielddefs[name][1]:
+            count = ""
+            if int(kind) in (_ARRAY, _SEQUENCE):
+                (_, inner), size = cast("Any", inner)
+                most = f"[<={size}]" if size else "[]"
+                count = f"[{size}]" if int(kind) == _ARRAY else most
+            if isinstance(inner, str):
+                part = canonical(inner)
+                waiting += [inner] if inner not in _TIMES else []
+            else:
+                scalar, longest = cast("Any", inner)
+                if scalar not in SCALARS:
+                    raise UnknownType(scalar)
+                part = f"{scalar}<={longest}" if longest else scalar
+            if field != _FILLER:
+                lines.append(f"{part}{count} {field}")
+        found[canonical(name)] = "\n".join(lines)
+    return found
+
+
+class TypeVersion:
+    """A message type as one release of ROS has it, and the bytes of its messages.
 
     Args:
         store: What rosbags knows of the types of that release.
@@ -78,19 +91,19 @@ class Way:
         dialect: Whose bytes they are.
 
     Raises:
-        UnknownType: If that release has no such type.
+        ConfigError: If that release has no such type, or it makes no sense.
 
     """
 
     def __init__(
         self, store: "Typestore", type_name: str, dialect: DialectName
     ) -> None:
-        shapes: dict[str, Shape] = shapes_of(store, type_name)
         self.store = store
         self.type_name = type_name
-        self._objects = Objects(store.types, shapes)
-        ros1 = dialect == "ros1"
-        self._serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
+        self._ros2 = dialect == "ros2"
+        known = Definitions(texts_of(store, type_name), ros2=self._ros2)
+        self._fields = known.definition(canonical(type_name)).fields
+        self._conformer = _FromRobot(ros2=self._ros2)
 
     def bytes_of(self, message: object) -> bytes:
         """Return a message as ROS itself puts it on its wire.
@@ -99,11 +112,11 @@ class Way:
             Misfit: If the message does not fit the type as this release has it.
 
         """
-        made = self._objects.object(canonical(self.type_name), message)
+        whole = self._conformer.message(self._fields, message)
         try:
-            return bytes(self._serialize(made, self.type_name))
-        except _UNFIT as error:
-            raise Misfit(str(error) or "it cannot be written") from None
+            return serialize(self._fields, whole, ros2=self._ros2)
+        except (struct.error, UnicodeError) as error:
+            raise Misfit(str(error)) from None
 
 
 class Types:
@@ -116,10 +129,13 @@ class Types:
 
     def __init__(self, dialect: DialectName) -> None:
         self.dialect: DialectName = dialect
+        self._shipped = shipped(ros2=dialect == "ros2")
         self._stores: dict[str, Typestore] = {}
 
-    def ways(self, type_name: str) -> Iterator[Way]:
-        """Give the ways to write messages of a type; none if nobody knows it.
+    def versions(self, type_name: str) -> Iterator[TypeVersion]:
+        """Give a message type as each release has it, the newest first.
+
+        Nothing is given for a type that neither rosbags nor WebMap knows.
 
         Args:
             type_name: In the spelling of either ROS.
@@ -133,8 +149,8 @@ class Types:
             name = name.replace("/msg/", "/action/")
         for release in ROS1 if self.dialect == "ros1" else ROS2:
             try:
-                yield Way(self._store(release), name, self.dialect)
-            except UnknownType:
+                yield TypeVersion(self._store(release), name, self.dialect)
+            except ConfigError:
                 continue
 
     def _store(self, release: str) -> "Typestore":
@@ -142,9 +158,92 @@ class Types:
 
         if release not in self._stores:
             store = get_typestore(Stores[release])
-            more = MORE_ROS1 if self.dialect == "ros1" else MORE_ROS2
-            for name, text in {**MORE, **more}.items():
-                if name not in store.fielddefs:
-                    store.register(get_types_from_msg(text, name))
+            for name in self._shipped:
+                spelled = ros2_type(name)
+                if name.endswith("_FeedbackMessage"):
+                    spelled = spelled.replace("/msg/", "/action/")
+                if spelled not in store.fielddefs:
+                    text = self._shipped.text(name)
+                    store.register(get_types_from_msg(text, spelled))
             self._stores[release] = store
         return self._stores[release]
+
+
+class _FromRobot(Conformer):
+    """Takes whole messages, in every form in which a rosbridge sends them.
+
+    In JSON a ``null`` stands for a float that is not finite; it becomes NaN. Bytes come
+    as they are, as a list, or as text in base64.
+    """
+
+    def absent(self, field: Field, made: dict[str, Any]) -> None:
+        raise Misfit("it is missing")
+
+    def array(self, field: Field, value: Any) -> Any:
+        if field.type not in DTYPES and field.type != "bool":
+            return super().array(field, value)
+        octets = isinstance(value, str | bytes)
+        if octets:
+            value = np.frombuffer(_octets(value), np.uint8)
+        elif not isinstance(value, list | array | np.ndarray):
+            raise wrong(value, "numbers")
+        check_size(field, value)
+        dtype = np.dtype(DTYPES.get(field.type, "?"))
+        try:
+            with np.errstate(invalid="ignore"):
+                numbers = np.ascontiguousarray(value, dtype)  # of None it makes NaN
+        except (TypeError, ValueError, OverflowError) as error:
+            raise Misfit(str(error)) from None
+        if dtype.kind in "iu" and not octets:
+            same = value == numbers.tolist() if isinstance(value, list) else None
+            if not (np.array_equal(value, numbers) if same is None else same):
+                raise wrong(value, f"whole numbers of the kind {field.type}")
+        return numbers.reshape(-1)
+
+    def number(self, field: Field, value: Any) -> float:
+        if value is None:
+            return math.nan
+        if not isinstance(value, int | float):
+            raise wrong(value, "a number")
+        if FLOATS[field.type] < abs(value) < math.inf:
+            raise wrong(value, f"a number that a {field.type} can hold")
+        return float(value)
+
+    def whole(self, field: Field, value: Any) -> int:
+        if isinstance(value, str | bytes):  # in ROS 2 a number of one byte comes so
+            one = isinstance(value, str) and len(value) == 1
+            octets = b"" if one else _octets(value)
+            value = ord(value) if one else int.from_bytes(octets, "little")
+        low, high = INTEGERS[field.type]
+        fits = isinstance(value, int | float) and math.isfinite(value)
+        if not fits or int(value) != value or not low <= value <= high:
+            raise wrong(value, f"a whole number from {low} to {high}")
+        return int(value)
+
+    def text(self, field: Field, value: Any) -> str:
+        if not isinstance(value, str):
+            raise wrong(value, "a text")
+        return value
+
+    def truth(self, value: Any) -> bool:
+        if not isinstance(value, bool | int):
+            raise wrong(value, "true or false")
+        return bool(value)
+
+    def time(self, field: Field, value: Any) -> dict[str, int]:
+        if not isinstance(value, Mapping):
+            raise wrong(value, "a time")
+        whole = value.get("sec", value.get("secs"))
+        rest = value.get("nanosec", value.get("nsecs"))
+        if not (isinstance(whole, int) and isinstance(rest, int)):
+            raise wrong(value, "seconds and nanoseconds")
+        return self.spelled(whole, rest)
+
+
+def _octets(value: str | bytes) -> bytes:
+    if isinstance(value, bytes):
+        return value
+    try:
+        return base64.b64decode(value, validate=True)
+    except binascii.Error as error:
+        raise Misfit(f"no base64: {error}") from None

@@ -17,7 +17,7 @@ def check(file: Path) -> None:
     No robot is reached. Every mistake is named with its line; the exit code is 2 if
     there is one.
     """
-    from webmap.cli.fleet.show import prepare
+    from webmap.cli.fleet import prepare
 
     ready = prepare(file)
     robots, bridges = len(ready.robots), len(ready.bridges)

@@ -10,8 +10,7 @@ import click
 
 from webmap.children import GRACE
 from webmap.cli.beside import beside
-from webmap.cli.options import PORT, web_options
-from webmap.cli.sim_options import simulator_options
+from webmap.cli.options import PORT, simulator_options, web_options
 from webmap.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -85,39 +84,43 @@ def demo_robot(bridge: "Bridge", index: int, dialect: str = "ros1") -> "Robot":
         dialect: Which ROS the simulator plays, ``"ros1"`` or ``"ros2"``.
 
     """
-    from webmap.console import RobotDescription
-    from webmap.console.fleet import make_robot
+    import webmap
+    from webmap.console import make_robot
 
     topics = f"/robot_{index}"
-    if dialect == "ros2":
-        goal, cancel = f"{topics}/goal_pose", ""
-        action = (f"{topics}/navigate_to_pose", "nav2_msgs/action/NavigateToPose")
-    else:
-        goal = f"{topics}/move_base_simple/goal"
-        cancel = f"{topics}/move_base/cancel"
-        action = (f"{topics}/move_base", "move_base_msgs/MoveBaseAction")
-    robot = make_robot(
-        RobotDescription(
-            name=f"Robot {index}",
-            bridge=bridge,
-            odometry=f"{topics}/odom",
-            twist=f"{topics}/cmd_vel",
-            scan=f"{topics}/base_scan",
-            battery=f"{topics}/battery_state",
-            cameras=(f"{topics}/camera/image_raw/compressed",),
-            goal=goal,
-            cancel=cancel,
-            action=action,
-            initial_pose=f"{topics}/initialpose",
-            stops_within=0.25,
-        )
-    )
-    robot.add_module("Path", bridge, f"{topics}/plan")
-    robot.add_module("Trail", length=10.0)
+    move = {
+        "topic": f"{topics}/goal_pose",
+        "action": f"{topics}/navigate_to_pose",
+        "action_type": "nav2_msgs/action/NavigateToPose",
+    }
+    if dialect != "ros2":
+        move = {
+            "topic": f"{topics}/move_base_simple/goal",
+            "cancel_topic": f"{topics}/move_base/cancel",
+            "action": f"{topics}/move_base",
+            "action_type": "move_base_msgs/MoveBaseAction",
+        }
+    link = {"bridge": bridge.url}
     lookahead = {"name": "lookahead", "frame": "robot", "age_limit": 2.0}
-    robot.add_module("PointStamped", bridge, f"{topics}/lookahead_point", **lookahead)
-    robot.add_module("Diagnostics", bridge, namespace=topics)
-    return robot
+    point = f"{topics}/lookahead_point"
+    config = {
+        "name": f"Robot {index}",
+        "bridge": bridge.url,
+        "odometry": f"{topics}/odom",
+        "twist": {"topic": f"{topics}/cmd_vel", "stops_within": 0.25},
+        "scan": f"{topics}/base_scan",
+        "battery": f"{topics}/battery_state",
+        "cameras": f"{topics}/camera/image_raw/compressed",
+        "move": move,
+        "initial_pose": f"{topics}/initialpose",
+        "modules": [
+            {"name": "Path", "args": [link, f"{topics}/plan"]},
+            {"name": "Trail", "options": {"length": 10.0}},
+            {"name": "PointStamped", "args": [link, point], "options": lookahead},
+            {"name": "Diagnostics", "args": [link], "options": {"namespace": topics}},
+        ],
+    }
+    return make_robot(webmap.RobotConfig.from_dict(config), [bridge])
 
 
 def _give_up(status: int) -> NoReturn:

@@ -6,20 +6,14 @@ import sys
 import click
 
 from webmap.cli.echo import echo
-from webmap.cli.options import Finite, verbose_option
+from webmap.cli.options import verbose_option, wait_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
 @click.command(short_help="Print the robots behind a bridge, their topics, and why.")
 @click.argument("url", nargs=-1, required=True)
 @click.option("--toml", is_flag=True, help="Print a fleet file, to be kept.")
-@click.option(
-    "--wait",
-    type=Finite(0.0),
-    default=5.0,
-    show_default=True,
-    help="Seconds to wait for a rosbridge that cannot be reached.",
-)
+@wait_option
 @topics_option
 @verbose_option
 def discover(

@@ -6,7 +6,7 @@ import sys
 import click
 
 from webmap.cli.echo import echo
-from webmap.cli.options import Finite, verbose_option
+from webmap.cli.options import Finite, verbose_option, wait_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
 
@@ -34,13 +34,7 @@ from webmap.cli.topic_list import one_bridge, topics_option
     show_default=True,
     help="How long to listen to odometry and scans.",
 )
-@click.option(
-    "--wait",
-    type=Finite(0.0),
-    default=5.0,
-    show_default=True,
-    help="Seconds to wait for a rosbridge that cannot be reached.",
-)
+@wait_option
 @click.option(
     "--ask-parameters",
     is_flag=True,

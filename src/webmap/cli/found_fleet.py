@@ -5,17 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from webmap.cli.described import describe, overrules
-from webmap.cli.draw_layer import meant, shared_map
 from webmap.cli.echo import echo
 from webmap.cli.finding import Found, find
-from webmap.cli.names import set_twice
+from webmap.cli.looking import LookingForLayers, LookingForRobots, on_page
 from webmap.cli.overruling import TOLD, Overruling
-from webmap.cli.told import offer
-from webmap.console import RobotDescription
+from webmap.cli.shown import ShownRobot, ShownRobots
+from webmap.cli.told import Candidate, offer, set_twice
+from webmap.config.checks import same_name
 from webmap.discovery import FoundRobot
-from webmap.discovery.layers import FoundLayer
-from webmap.discovery.naming import free_name, same_name
+from webmap.discovery.naming import free_name
 from webmap.discovery.rules import VELOCITY
 from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
 from webmap.errors import BridgeClosed
@@ -31,79 +29,81 @@ if TYPE_CHECKING:
 class FoundFleet:
     """The robots that were found, and what is known when it is looked again."""
 
-    told: list[RobotDescription]
+    told: list[Candidate]
     """Robots that were told by hand; the console has them already."""
 
-    stops_within: float | None = None
-    robots: list[tuple[FoundRobot, RobotDescription]] = field(default_factory=list)
-    """Robots that were found, and the same as the console takes them."""
+    robots: list[Candidate] = field(default_factory=list)
+    """Robots that were found."""
 
     behind: "dict[Bridge, Found]" = field(default_factory=dict)
     """What was found behind each bridge, before anybody said anything."""
 
     overruling: Overruling = field(default_factory=Overruling)
-    """What was said of robots better than it was guessed."""
+    """What was said of robots."""
 
     def table(self, *, grid: bool, as_told: bool) -> str:
         """Return what the page would use and draw, and why, for people.
 
         Args:
             grid: Whether the robots' own maps are shown under them.
-            as_told: Whether of robots that were told no more is drawn than that.
+            as_told: Whether only the given topics of robots given by hand are drawn.
 
         """
         lines: list[str] = []
         taken: set[tuple[Bridge, str]] = set()
-        for about in self.told:
-            lines += ["", f"{about.name} (told with --robot)", *_told_table(about)]
-            found = self.behind.get(about.bridge)
+        for bridge, told in self.told:
+            lines += ["", f"{told.name} (told with --robot)", *_told_table(told)]
+            found = self.behind.get(bridge)
             if found is None or as_told:
                 continue
-            there = offer(about, found.topics, found.findings)
-            if (about.bridge, there.namespace) not in taken:  # it is drawn once
-                taken.add((about.bridge, there.namespace))
-                layers = _on_page(there.layers, grid)
-                lines += drawn_table(there.namespace, layers, there.left_out)
-        for robot, about in self.robots:
-            lines += ["", f"behind {about.bridge.url}:", *robot_table(robot)]
-            findings = self.behind[about.bridge].findings
+            there = offer(told, found.topics, found.findings)
+            if (bridge, there.namespace) not in taken:  # it is drawn once
+                taken.add((bridge, there.namespace))
+                lines += drawn_table(there.namespace, on_page(there.layers, grid))
+        for bridge, robot in self.robots:
+            lines += ["", f"behind {bridge.url}:", *robot_table(robot)]
+            findings = self.behind[bridge].findings
             space = robot.namespace
             guessed = next(r for r in findings.robots if r.namespace == space)
-            fixed = self.overruling.fixed(about.bridge.url, guessed)
-            layers = _on_page(meant(findings.layers[space], guessed, fixed), grid)
-            lines += drawn_table(space, layers, findings.left_out[space])
+            layers = self.overruling.layers(bridge.url, findings, guessed)
+            lines += drawn_table(space, on_page(layers, grid))
         if self.robots:
             lines += ["", OVERRULE]
         return "\n".join(map(escaped, lines)).lstrip("\n") or "No robot is known."
 
-    def show(self, console: "Console", *, grid: bool) -> None:
-        """Show what was found and what comes later.
+    def show(
+        self,
+        console: "Console",
+        *,
+        grid: bool = True,
+        as_told: bool = False,
+        topics: Mapping[str, str] | None = None,
+    ) -> None:
+        """Show what was found, what comes later, and all that can be drawn of it.
 
         Args:
-            console: The console, which has been opened.
-            grid: Whether the robots' own map is shown under them.
+            console: The console, which has been opened with the robots that were told.
+            grid: Whether the robots' own maps are shown under them.
+            as_told: Whether only the given topics of robots given by hand are drawn.
+            topics: Types by topic, where a bridge cannot be asked for them.
 
         """
-        from webmap.cli.latecomers import LateRobots, LookingForRobots, greet
-
-        late = LateRobots(console)
-        for robot, about in self.robots:
-            if grid:
-                late.show_grid(about.bridge, shared_map(robot))
-            late.add(robot, about)
-        names = [about.name for about in self.told]
-        names += [robot.name for robot, _ in self.robots]
-        came = greet(
-            late,
-            names,
-            self.stops_within,
-            grid=grid,
-            overruling=self.overruling,
-            told=self.told,
-        )
-        for bridge, found in self.behind.items():
-            robots = found.findings.robots
-            _services.append(LookingForRobots(bridge, robots, came))
+        shown = ShownRobots(console, self.overruling, told=self.told, grid=grid)
+        for robot in self.robots:
+            shown.add(robot)
+        for bridge, one in self.behind.items():
+            robots = one.findings.robots
+            _services.append(LookingForRobots(bridge, robots, shown.came))
+        config = self.overruling.config
+        told = [
+            ShownRobot(bridge, found, made, config(bridge.url, found))
+            for (bridge, found), made in zip(self.told, console.told, strict=True)
+            if not as_told
+        ]
+        bridges = dict.fromkeys([*self.behind, *(robot.bridge for robot in told)])
+        for bridge in bridges:
+            looking = LookingForLayers(bridge, shown, told=told, topics=topics)
+            _services.append(looking)
 
 
 _services: list[object] = []
@@ -112,10 +112,9 @@ _services: list[object] = []
 
 def find_fleet(
     bridges: Sequence["Bridge"],
-    told: Sequence[RobotDescription],
+    told: Sequence[Candidate],
     *,
     wait: float,
-    stops_within: float | None,
     topics: Mapping[str, str] | None = None,
     overruling: Overruling | None = None,
 ) -> FoundFleet:
@@ -125,9 +124,8 @@ def find_fleet(
         bridges: The bridges.
         told: Robots that were told by hand; each takes the place of one found.
         wait: How long to wait for a bridge that cannot be reached, in seconds.
-        stops_within: Seconds within which every base stops by itself, if known.
         topics: Types by topic, where the bridge cannot be asked for them.
-        overruling: What was said of robots better than it is guessed.
+        overruling: What was said of robots.
 
     Raises:
         ConfigError: If something was said of a robot that there is not, or a person
@@ -140,33 +138,32 @@ def find_fleet(
     )
     names = [robot.name for one in found for robot in one.findings.robots]
     missing = any(isinstance(one.trouble, BridgeClosed) for one in found)
-    names += [robot.name for robot in told]
+    names += [robot.found.name for robot in told]
     for sentence in overruling.check(names, all_known=not missing):
         echo(sentence, err=True)
-    fleet = FoundFleet([*overruling.tell(told)], stops_within, overruling=overruling)
+    fleet = FoundFleet([], overruling=overruling)
     behind = {bridge: one.topics for bridge, one in zip(bridges, found, strict=True)}
-    fleet.told = [_typed(robot, behind[robot.bridge]) for robot in fleet.told]
-    taken = {same_name(other.name) for other in fleet.told}
+    for bridge, robot in overruling.tell(told):
+        fleet.told.append(Candidate(bridge, _typed(robot, behind[bridge])))
+    taken = {same_name(other.found.name) for other in fleet.told}
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             echo(one.why, err=True)
         for robot in overruling.findings(bridge.url, one.findings).robots:
-            about = describe(robot, bridge, stops_within=stops_within)
-            about = _typed(about, one.topics)
-            if any(overrules(other, about) for other in fleet.told):
+            robot = _typed(robot, one.topics)
+            if any(o.is_also(Candidate(bridge, robot)) for o in fleet.told):
                 continue
             if same_name(robot.name) in taken and overruling.names(robot.name):
                 raise set_twice(robot.name)
             robot = replace(robot, name=free_name(robot.name, taken))
-            about = replace(about, name=robot.name)
             echo(f"Found {in_one_line(robot)}", err=True)
-            fleet.robots.append((robot, about))
+            fleet.robots.append(Candidate(bridge, robot))
         fleet.behind[bridge] = one
     return fleet
 
 
 def told_fleet(
-    bridges: Sequence["Bridge"], told: Sequence[RobotDescription], *, wait: float
+    bridges: Sequence["Bridge"], told: Sequence[Candidate], *, wait: float
 ) -> FoundFleet:
     """Return robots that were told, with what is behind their bridges besides.
 
@@ -189,26 +186,23 @@ def told_fleet(
     return FoundFleet([*told], behind=dict(zip(bridges, found, strict=True)))
 
 
-def _typed(about: RobotDescription, topics: Mapping[str, str]) -> RobotDescription:
+def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:
     """Return a robot with the type of its velocity, if the topics behind it tell it."""
-    if about.twist_type or not is_topic(about.twist):
-        return about
-    type = topics.get(normalise_topic(about.twist), "").strip()
-    return replace(about, twist_type=type) if is_type(type, *VELOCITY) else about
+    velocity = robot.first("velocity")
+    if velocity is None or velocity.type or not is_topic(velocity.topic):
+        return robot
+    type = topics.get(normalise_topic(velocity.topic), "").strip()
+    if not is_type(type, *VELOCITY):
+        return robot
+    others = robot.guesses["velocity"][1:]
+    typed = (replace(velocity, type=type), *others)
+    return replace(robot, guesses={**robot.guesses, "velocity": typed})
 
 
-def _told_table(about: RobotDescription) -> list[str]:
-    """Return what was said of a robot, one role a line."""
-    lines = []
-    for role, name in TOLD.items():
-        said = getattr(about, name)
-        topics = [said] if isinstance(said, str) else said
-        if role == "velocity" and said and about.twist_type:
-            topics = [f"{said}  {about.twist_type}"]
-        lines += [f"  {role:<11} {topic}" for topic in topics if topic]
-    return lines
-
-
-def _on_page(layers: Sequence[FoundLayer], grid: bool) -> list[FoundLayer]:
-    """Return the layers without maps, where a floor plan is in their place."""
-    return [layer for layer in layers if grid or layer.kind not in ("map", "grid")]
+def _told_table(robot: FoundRobot) -> list[str]:
+    """Return what was said of a robot, one topic a line."""
+    said = [(role, guess) for role in TOLD for guess in robot.guesses.get(role, ())]
+    return [
+        f"  {role:<11} {guess.topic}{f'  {guess.type}' if guess.type else ''}"
+        for role, guess in said
+    ]

@@ -1,8 +1,8 @@
 """The robots that ``webmap doctor`` looks at, where somebody configured them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import click
 
@@ -10,9 +10,6 @@ from webmap.discovery import Findings
 from webmap.discovery.doctor import MeantRobot
 from webmap.discovery.found import ROLES, FoundRobot, Role
 from webmap.ros.names import normalise_url
-
-if TYPE_CHECKING:
-    from webmap.console import RobotDescription
 
 Meant: TypeAlias = Callable[[Findings], Sequence[MeantRobot]]
 """From what was found behind a bridge to the robots as they were configured."""
@@ -62,14 +59,14 @@ def _always(robots: Sequence[MeantRobot]) -> Meant:
 
 
 def _of_file(file: Path) -> list[tuple[str, Meant]]:
-    from webmap.cli.fleet.show import prepare
+    from webmap.cli.fleet import prepare
     from webmap.console.in_use import Made, in_use
 
     ready = prepare(file)
     maps: list[Made] = []
-    for grid in ready.fleet.maps:
-        where = (ready.bridges[grid["bridge"]], grid["topic"])
-        maps.append(("OccupancyGrid", where, {"palette": grid.get("palette")}))
+    for grid in ready.fleet.map:
+        where = (ready.bridges[grid.bridge], grid.topic)
+        maps.append(("OccupancyGrid", where, {"palette": grid.palette}))
     return [
         (bridge.url, _always(in_use(ready.robots, bridge, maps)))
         for bridge in ready.bridges.values()
@@ -82,10 +79,10 @@ def _said(url: str, robots: Sequence[str], settings: Sequence[str]) -> Meant:
     from webmap.cli.told import told_robots
 
     overruling = Overruling([parse_setting(text) for text in settings])
-    told = told_robots(robots, [webmap.Bridge(url)], None)
+    told = told_robots(robots, [webmap.Bridge(url)])
     if told:
-        overruling.check([about.name for about in told], all_known=True)
-        return _always([_of_told(about) for about in overruling.tell(told)])
+        overruling.check([robot.found.name for robot in told], all_known=True)
+        return _always([_of_told(robot) for _, robot in overruling.tell(told)])
 
     def overruled(found: Findings) -> Sequence[MeantRobot]:
         overruling.check([robot.name for robot in found.robots], all_known=True)
@@ -96,28 +93,27 @@ def _said(url: str, robots: Sequence[str], settings: Sequence[str]) -> Meant:
     return overruled
 
 
-def _of_told(about: "RobotDescription") -> MeantRobot:
+def _of_told(robot: FoundRobot) -> MeantRobot:
     """Return a robot of ``--robot``; what else it has is as it was found."""
     from webmap.cli.overruling import TOLD
 
-    topics: dict[Role, tuple[tuple[str, str], ...]] = {"pose": ()}
-    for role in ROLES:
-        said = getattr(about, TOLD[role]) if role in TOLD else None
-        if said is not None:
-            names = (said,) if isinstance(said, str) else said
-            topics[role] = tuple((name, "") for name in names if name)
-    if about.twist and about.twist_type:
-        topics["velocity"] = ((about.twist, about.twist_type),)
-    if not about.odometry:
-        topics["tf"] = ()  # it is drawn by frames only where odometry says which
-    return MeantRobot(about.name, topics)
+    roles: list[Role] = ["pose", *TOLD]
+    if not robot.topic("odometry"):
+        roles.append("tf")  # it is drawn by frames only where odometry says which
+    return MeantRobot(robot.name, _topics(robot, roles))
 
 
 def _of_found(robot: FoundRobot, there: FoundRobot) -> MeantRobot:
     """Return what was said better of a robot that was found."""
-    topics: dict[Role, tuple[tuple[str, str], ...]] = {
-        role: tuple((each.topic, each.type) for each in robot.guesses.get(role, ()))
-        for role in ROLES
-        if robot.guesses.get(role) != there.guesses.get(role)
-    }
+    roles = [r for r in ROLES if robot.guesses.get(r) != there.guesses.get(r)]
+    topics = _topics(robot, roles)
     return MeantRobot(robot.name, topics, robot.base_frame, found_as=there.name)
+
+
+def _topics(
+    robot: FoundRobot, roles: Iterable[Role]
+) -> dict[Role, tuple[tuple[str, str], ...]]:
+    return {
+        role: tuple((each.topic, each.type) for each in robot.guesses.get(role, ()))
+        for role in roles
+    }

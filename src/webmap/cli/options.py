@@ -27,6 +27,16 @@ class Finite(click.FloatRange):
         return number
 
 
+wait_option = click.option(
+    "--wait",
+    type=Finite(0.0),
+    default=5.0,
+    show_default=True,
+    help="Seconds to wait for a rosbridge that cannot be reached.",
+)
+"""How long a command waits for a rosbridge."""
+
+
 def web_options(command: F) -> F:
     """Add where the web interface listens, and what opens it."""
     for option in (
@@ -70,3 +80,36 @@ verbose_option = click.option(
     callback=_set_up_log,
     help="Log more, to standard error.",
 )
+
+
+def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
+    """Return what adds how many robots there are, where they start, and which ROS.
+
+    Args:
+        robots: What is said of ``--robots``, which is None if it was not said.
+        dialect: What is said of ``--dialect``.
+
+    """
+
+    def add(command: F) -> F:
+        for option in (
+            click.option(
+                "--dialect",
+                type=click.Choice(["ros1", "ros2"]),
+                default="ros1",
+                show_default=True,
+                help=dialect,
+            ),
+            click.option(
+                "--seed",
+                type=int,
+                default=1,
+                show_default=True,
+                help="Where they start.",
+            ),
+            click.option("--robots", "-n", type=click.IntRange(1, 500), help=robots),
+        ):
+            command = option(command)
+        return command
+
+    return add

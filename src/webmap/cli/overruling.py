@@ -1,14 +1,17 @@
-"""What a person says better than discovery guessed, one topic at a time."""
+"""Settings of a person that replace guesses of discovery, one topic at a time."""
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from webmap.cli.names import check_name, set_twice
-from webmap.console import RobotDescription
+import msgspec
+
+from webmap.cli.told import Candidate, check_name, set_twice
+from webmap.config.checks import same_name
+from webmap.config.robot import RobotConfig, named_cameras
 from webmap.discovery.found import ACTIONS, ROLES, Findings, FoundRobot, Guess, Role
-from webmap.discovery.naming import same_name
+from webmap.discovery.layers import Layers, is_own, role_of
+from webmap.discovery.robots import host_name
 from webmap.discovery.rules import VELOCITY
 from webmap.errors import ConfigError
 from webmap.ros.names import is_topic, is_type
@@ -26,17 +29,23 @@ WORDS = ("name", "base", "velocity_type")
 """What is said of a robot besides its topics: its name, the frame of its base, and the
 type of what drives it."""
 
-TOLD = {
-    "odometry": "odometry",
-    "velocity": "twist",
-    "scan": "scan",
-    "battery": "battery",
-    "goal": "goal",
-    "cancel": "cancel",
-    "initialpose": "initial_pose",
-    "camera": "cameras",
-}
-"""Roles that a robot of ``--robot`` can have, and what its description calls them."""
+TOLD: tuple[Role, ...] = (
+    "odometry",
+    "velocity",
+    "scan",
+    "battery",
+    "goal",
+    "cancel",
+    "initialpose",
+    "camera",
+)
+"""Roles that a robot of ``--robot`` can have."""
+
+MOTION: tuple[Role, ...] = ("velocity", "goal", "action", "cancel", "initialpose")
+"""Roles by which a robot is told something."""
+
+MOST_CAMERAS = 4
+"""Cameras of one robot that are shown; they are only asked while somebody looks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,33 +110,58 @@ def parse_setting(text: str) -> Setting:
 
 
 class Overruling:
-    """The settings of a command line, and the robots that they are about.
+    """What a command line says of robots, and the robots that it is about.
 
     Args:
-        settings: What was said, in the order in which it was.
+        settings: What was said of one robot each, in the order in which it was.
+        stops_within: Seconds within which every base stops by itself, if known.
 
     """
 
-    def __init__(self, settings: Sequence[Setting] = ()) -> None:
+    def __init__(
+        self, settings: Sequence[Setting] = (), stops_within: float | None = None
+    ) -> None:
         self._settings = tuple(settings)
+        self._stops_within = stops_within
         self._robots: dict[tuple[str, str], str] = {}
 
-    def tell(self, robots: Sequence[RobotDescription]) -> list[RobotDescription]:
+    def config(self, url: str, robot: FoundRobot) -> RobotConfig:
+        """Return a robot as it is shown.
+
+        Args:
+            url: The bridge that it is behind.
+            robot: The robot, with what was said of it.
+
+        """
+        config = robot.config(url)
+        cameras = named_cameras(config.cameras[:MOST_CAMERAS])
+        twist = config.motion.twist
+        if twist is not None:
+            known = msgspec.structs.replace(twist, stops_within=self._stops_within)
+            config = config.with_part("twist", known)
+        return config.with_part("cameras", cameras)
+
+    def tell(self, robots: Sequence[Candidate]) -> list[Candidate]:
         """Return robots of ``--robot`` with what else was said of them.
 
         Raises:
             ConfigError: If such a robot cannot have what was said.
 
         """
-        told: list[RobotDescription] = []
+        told: list[Candidate] = []
         for robot in robots:
-            changes: dict[str, Any] = {}
-            for setting in self._of(robot.name):
-                changes.update(_described(setting))
-            named = replace(robot, **changes)
-            if any(same_name(named.name) == same_name(one.name) for one in told):
+            settings = self._of(robot.found.name)
+            for setting in settings:
+                if setting.key not in (*TOLD, "name", "velocity_type"):
+                    raise ConfigError(
+                        f"--set {setting.text!r}: a robot of --robot has no "
+                        f"{setting.key}; leave --robot out, so that it is found, or "
+                        "write a fleet file"
+                    )
+            named = _overruled(robot.found, settings, None)
+            if any(same_name(named.name) == same_name(o.found.name) for o in told):
                 raise set_twice(named.name)
-            told.append(named)
+            told.append(Candidate(robot.bridge, named))
         return told
 
     def apply(
@@ -144,42 +178,34 @@ class Overruling:
         place = (url, robot.namespace)
         known = self._robots.get(place, robot.name)
         settings = self._of(known)
-        if not settings:
-            return robot
-        self._robots[place] = known
-        guesses = dict(robot.guesses)
-        dialect = dialect or _dialect(robot)
-        for setting in settings:
-            if setting.key == "name":
-                robot = replace(robot, name=setting.values[0])
-                continue
-            if setting.key == "base":
-                robot = replace(robot, base_frame=setting.values[0])
-                continue
-            if setting.key == "velocity_type":
-                continue
-            role = _role(setting)
-            said = _guesses(role, setting.values, guesses.get(role, ()), dialect)
-            if said:
-                guesses[role] = said
-            else:
-                guesses.pop(role, None)
-            if role == "odometry":
-                # No other source of its place is meant then.
-                guesses.pop("pose", None)
-        for setting in settings:
-            # Of the topic that is used in the end, whatever was said first.
-            if setting.key == "velocity_type" and guesses.get("velocity"):
-                first, *others = guesses["velocity"]
-                rule = f"{first.rule}, its type {RULE}"
-                typed = replace(first, type=setting.values[0], rule=rule)
-                guesses["velocity"] = (typed, *others)
-        return replace(robot, guesses=guesses)
+        if settings:
+            self._robots[place] = known
+        return _overruled(robot, settings, dialect)
 
     def fixed(self, url: str, robot: FoundRobot) -> frozenset[str]:
         """Return the roles of a robot that no topic that comes later may have."""
         known = self._robots.get((url, robot.namespace), robot.name)
         return frozenset(setting.key for setting in self._of(known))
+
+    def layers(self, url: str, findings: Findings, robot: FoundRobot) -> Layers:
+        """Return the layers of a robot, without topics that --set gave another role.
+
+        Args:
+            url: The bridge that it is behind.
+            findings: What was found there.
+            robot: As it was found, before anybody said anything.
+
+        """
+        fixed = self.fixed(url, robot)
+        overruled = {
+            (role, guess.topic)
+            for role, guesses in robot.guesses.items()
+            if role in fixed
+            for guess in guesses
+        }
+        drawn, others = findings.layers[robot.namespace]
+        kept = [each for each in drawn if (role_of(each), each.topic) not in overruled]
+        return Layers(tuple(kept), others)
 
     def names(self, name: str) -> bool:
         """Tell whether a person said that a robot is called so."""
@@ -228,8 +254,81 @@ class Overruling:
         return [setting for setting in self._settings if setting.robot == name]
 
 
-def _role(setting: Setting) -> Role:
-    return next(role for role in ROLES if role == setting.key)
+class Watched(Overruling):
+    """Has no settings, so that every robot stays as discovery found it.
+
+    Args:
+        name: What a robot is called that has no name of its own.
+
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name = name
+
+    def apply(
+        self, url: str, robot: FoundRobot, dialect: str | None = None
+    ) -> FoundRobot:
+        """Return a robot that was found without all that would move it.
+
+        Args:
+            url: The bridge that it is behind.
+            robot: As it was found.
+            dialect: That of the bridge.
+
+        """
+        guesses = {
+            role: found for role, found in robot.guesses.items() if role not in MOTION
+        }
+        name = self._name if robot.name == host_name(url) else robot.name
+        return replace(robot, guesses=guesses, name=name)
+
+    def fixed(self, url: str, robot: FoundRobot) -> frozenset[str]:
+        """Return the roles that no topic that comes later may have."""
+        return frozenset(MOTION)
+
+
+def shared_map(found: FoundRobot) -> str:
+    """Return the map that robots share, or that --set names; empty if there is none.
+
+    It is shown before anything else of the robot. A map of its own comes with it.
+    """
+    guess = found.first("map")
+    if guess is None:
+        return ""
+    named = guess.topic.rpartition("/")[2].endswith("map")
+    shared = named and not is_own(guess.topic, found.namespace)
+    return guess.topic if shared or guess.rule == RULE else ""
+
+
+def _overruled(
+    robot: FoundRobot, settings: Sequence[Setting], dialect: str | None
+) -> FoundRobot:
+    """Return a robot with what was said of it."""
+    guesses = dict(robot.guesses)
+    dialect = dialect or _dialect(robot)
+    for setting in settings:
+        if setting.key == "name":
+            robot = replace(robot, name=setting.values[0])
+        elif setting.key == "base":
+            robot = replace(robot, base_frame=setting.values[0])
+        elif setting.key != "velocity_type":
+            role = next(role for role in ROLES if role == setting.key)
+            said = _guesses(role, setting.values, guesses.get(role, ()), dialect)
+            guesses.pop(role, None)
+            if said:
+                guesses[role] = said
+            if role == "odometry":
+                # No other source of its place is meant then.
+                guesses.pop("pose", None)
+    for setting in settings:
+        # Of the topic that is used in the end, whatever was said first.
+        if setting.key == "velocity_type" and guesses.get("velocity"):
+            first, *others = guesses["velocity"]
+            rule = f"{first.rule}, its type {RULE}".removeprefix(", ")
+            typed = replace(first, type=setting.values[0], rule=rule)
+            guesses["velocity"] = (typed, *others)
+    return replace(robot, guesses=guesses)
 
 
 def _dialect(robot: FoundRobot) -> str:
@@ -253,18 +352,3 @@ def _guesses(
     if role == "tf":
         topics = [topic.removesuffix("/tf") + "/tf" for topic in topics]
     return tuple(Guess(topic, types.get(topic, ""), RULE) for topic in topics)
-
-
-def _described(setting: Setting) -> Mapping[str, Any]:
-    if setting.key == "name":
-        return {"name": setting.values[0]}
-    if setting.key == "velocity_type":
-        return {"twist_type": setting.values[0]}
-    if setting.key not in TOLD:
-        raise ConfigError(
-            f"--set {setting.text!r}: a robot of --robot has no {setting.key}; leave "
-            "--robot out, so that it is found, or write a fleet file"
-        )
-    if setting.key == "camera":
-        return {"cameras": setting.values}
-    return {TOLD[setting.key]: setting.values[0] if setting.values else ""}

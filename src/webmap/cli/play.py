@@ -1,16 +1,26 @@
 """``webmap play FILE``: a recording on the map."""
 
 import contextlib
+import math
 import os
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+import msgspec
 
 from webmap.cli.beside import beside
 from webmap.cli.echo import echo
 from webmap.cli.options import PORT, Finite, web_options
 from webmap.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Map
+
+POSITION = re.compile(r".*: (\d+\.\d) of ")
+"""Where in the recording the replay is, in seconds."""
 
 
 @click.command(short_help="Show a recording: a bag of ROS 1 or ROS 2.")
@@ -61,13 +71,11 @@ def play(
     """
     import webmap
     from webmap import console
-    from webmap.bags.needed import need_rosbags
+    from webmap.bags import need_rosbags
     from webmap.bags.recording import recording_name
     from webmap.bags.replay import STATUS
     from webmap.cli.found_fleet import find_fleet
-    from webmap.cli.found_layers import draw_layers
-    from webmap.cli.recording_line import RecordingLine
-    from webmap.cli.watched import Watched
+    from webmap.cli.overruling import Watched
 
     need_rosbags()
     name = recording_name(files)
@@ -77,13 +85,10 @@ def play(
         bridge = webmap.Bridge(url, name=f"recording {name}")
         bridge.replays = True
         watched = Watched(Path(name).stem)
-        fleet = find_fleet(
-            [bridge], [], wait=5.0, stops_within=None, overruling=watched
-        )
+        fleet = find_fleet([bridge], [], wait=5.0, overruling=watched)
         title = f"Recording {name}"
         opened = console.open_console([bridge], [], title=title, place=title)
-        fleet.show(opened, grid=True)
-        draw_layers([bridge], opened.robots, watched, console=opened)
+        fleet.show(opened)
         opened.add_module(RecordingLine, bridge, STATUS, once(begin_anew))
         webmap.run(
             host=host,
@@ -125,3 +130,38 @@ def once(call: Callable[[], None]) -> Callable[[], None]:
     """Return what calls something the first time that it is called."""
     left = [call]
     return lambda: left.pop()() if left else None
+
+
+class _String(msgspec.Struct):
+    data: str
+
+
+class RecordingLine:
+    """Says beside the product's name what is played, and where in it; a map module.
+
+    Args:
+        map: The map.
+        bridge: The bridge to the replay.
+        topic: Where the replay says it, in words.
+        opened: Called when a page is there.
+
+    """
+
+    def __init__(
+        self, map: "Map", bridge: "Bridge", topic: str, opened: Callable[[], object]
+    ) -> None:
+        self._map = map
+        self._at = math.inf  # it begins anew when the first page opens
+        self._title = map.page.element("title")
+        bridge.subscribe(topic, self._show, "std_msgs/String", decode=_String)
+        opened()
+
+    def _show(self, message: _String) -> None:
+        self._title.text = message.data
+        found = POSITION.match(message.data)
+        if found is None:
+            return
+        before, self._at = self._at, float(found[1])
+        if self._at < before:  # a new round: robots are where they were at its begin
+            for robot in self._map.robots:
+                robot.expect_jump()

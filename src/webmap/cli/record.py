@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from webmap.cli.options import Finite, verbose_option
+from webmap.cli.options import Finite, verbose_option, wait_option
 from webmap.cli.topic_list import topics_option
 from webmap.errors import ConfigError
 
@@ -38,13 +38,7 @@ from webmap.errors import ConfigError
     type=Finite(0.0, min_open=True),
     help="End after so many seconds; without it Ctrl+C ends it.",
 )
-@click.option(
-    "--wait",
-    type=Finite(0.0),
-    default=5.0,
-    show_default=True,
-    help="Seconds to wait for a rosbridge that cannot be reached.",
-)
+@wait_option
 @topics_option
 @verbose_option
 def record(
@@ -68,7 +62,7 @@ def record(
     """
     import asyncio
 
-    from webmap.bags.needed import need_rosbags
+    from webmap.bags import need_rosbags
     from webmap.cli.recording_to import record_to, told_types
     from webmap.ros.names import normalise_topic, normalise_url
 

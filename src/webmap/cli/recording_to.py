@@ -17,8 +17,8 @@ from webmap.discovery.asking import ask_topics
 from webmap.errors import BridgeError, ConfigError, ServiceError
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import split_type
+from webmap.ros.rosbridge.server.dialect import DialectName
 from webmap.sim.process import signals_set
-from webmap.sim.rosbridge.dialect import DialectName
 
 EVERY = 10.0
 """Seconds between two words of how it goes where they cannot replace each other."""

@@ -9,8 +9,7 @@ import click
 
 from webmap.children import end_with_parent
 from webmap.cli.echo import echo
-from webmap.cli.options import PORT, Finite, verbose_option
-from webmap.cli.sim_options import simulator_options
+from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 
 
 @click.command()

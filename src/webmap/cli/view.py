@@ -100,47 +100,35 @@ def view(
     import webmap
     from webmap import console
     from webmap.cli.found_fleet import FoundFleet, find_fleet, told_fleet
-    from webmap.cli.found_layers import draw_layers
     from webmap.cli.overruling import Overruling, parse_setting
     from webmap.cli.told import told_robots
 
     one_bridge(url, topics)
-    overruling = Overruling([parse_setting(text) for text in settings])
+    overruling = Overruling([parse_setting(text) for text in settings], stops_within)
     bridges = [webmap.Bridge(text) for text in url]
-    told = told_robots(robots, bridges, stops_within)
+    told = told_robots(robots, bridges)
     plan = Path(floor) if floor else None
-    fleet = None
     if discover or topics is not None or not told:
         fleet = find_fleet(
             bridges,
             told,
             wait=wait,
-            stops_within=stops_within,
             topics=topics,
             overruling=overruling,
         )
-        told = fleet.told
     else:
-        overruling.check([robot.name for robot in told], all_known=True)
+        overruling.check([robot.found.name for robot in told], all_known=True)
         told = overruling.tell(told)
+        if show and not as_told:
+            fleet = told_fleet(bridges, told, wait=wait)
+        else:
+            fleet = FoundFleet(told, overruling=overruling)
     if show:
-        if fleet is None:
-            looked = FoundFleet(told)
-            fleet = looked if as_told else told_fleet(bridges, told, wait=wait)
         echo(fleet.table(grid=plan is None, as_told=as_told), lines=True)
         return
-    opened = console.open_console(bridges, told, floor=plan)
-    if fleet is not None:
-        fleet.show(opened, grid=plan is None)
-    if fleet is not None or not as_told:
-        draw_layers(
-            bridges,
-            opened.robots,
-            overruling,
-            console=opened if plan is None else None,
-            told=() if as_told else list(zip(told, opened.told, strict=True)),
-            topics=topics,
-        )
+    configs = [overruling.config(bridge.url, robot) for bridge, robot in fleet.told]
+    opened = console.open_console(bridges, configs, floor=plan)
+    fleet.show(opened, grid=plan is None, as_told=as_told, topics=topics)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

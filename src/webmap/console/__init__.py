@@ -3,9 +3,8 @@
 It is built with WebMap's public API alone, so it is also the longest example of it.
 """
 
-from webmap.console.fleet import RobotDescription, parse_robot
+from webmap.console.fleet import make_robot
 from webmap.console.opened import Console
 from webmap.console.page import open_console
-from webmap.console.shapes import Picture
 
-__all__ = ["Console", "Picture", "RobotDescription", "open_console", "parse_robot"]
+__all__ = ["Console", "make_robot", "open_console"]

@@ -1,22 +1,16 @@
-import { NewestPicture } from "./camera_picture.js";
-import { FOUND, keep, listenToDrags, nextCorner, readKept, roomFor } from "./camera_place.js";
-import { CameraView } from "./camera_view.js";
-import { closeSheet } from "./sheet.js";
+import {
+  CameraView,
+  FOUND,
+  keep,
+  listenToDrags,
+  nextCorner,
+  readKept,
+  roomFor,
+} from "./camera_view.js";
+import { closeSheet } from "./dom.js";
 
-/** @typedef {import('./camera_place.js').Dock} Dock */
-
-/**
- * @typedef {object} MapCanvas
- * @property {SVGSVGElement} svg
- * @property {number | null} clock
- * @property {{add: (name: "camera", part: {
- *   read: () => Place, write: (place: Place) => void, reset: () => void,
- * }) => () => void}} layout
- * @property {{
- *   robots: ReadonlyMap<string, {mine: boolean}>,
- *   goBy: (robot: string, age: () => number) => () => void,
- * }} drive
- */
+/** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('./camera_view.js').Dock} Dock */
 
 /** @typedef {{dock: Dock, x: number, y: number}} Place */
 /** @typedef {{id: number, name: string}} Camera */
@@ -66,7 +60,7 @@ class CameraPanel {
       dock: (dock) => this._dock(dock),
       close: () => this._close(),
     });
-    this._picture = new NewestPicture(load, (image) => this._view.show(image));
+    this._picture = new NewestPicture(loadImage, (image) => this._view.show(image));
     this._ending = new AbortController();
     const { signal } = this._ending;
     document.addEventListener("visibilitychange", () => this._watch(), { signal });
@@ -262,7 +256,7 @@ function addressOf(url) {
  * @param {string} url
  * @returns {Promise<HTMLImageElement>}
  */
-async function load(url) {
+async function loadImage(url) {
   const image = new Image();
   image.src = url;
   await image.decode();
@@ -275,3 +269,89 @@ function cardButton(id) {
   return button instanceof HTMLElement ? button : null;
 }
 
+/** Milliseconds after which a load that never ends holds up the next no more. */
+const PATIENCE = 2000;
+
+/**
+ * The newest picture of one camera: one is loaded at a time, what comes meanwhile is
+ * left out but for the newest, and what is shown knows its age.
+ *
+ * Times are in milliseconds of the page's own clock.
+ *
+ * @template T
+ */
+export class NewestPicture {
+  /**
+   * @param {(url: string) => Promise<T>} load Loads a picture whole.
+   * @param {(picture: T) => void} show
+   * @param {() => number} now
+   */
+  constructor(load, show, now = () => performance.now()) {
+    this._load = load;
+    this._show = show;
+    this._now = now;
+    this._since = now();
+    /** @type {number | null} When the picture was taken that is shown. */
+    this._taken = null;
+    /** @type {{url: string, taken: number} | null} */
+    this._next = null;
+    /** Loads of another camera, and those that were given up, count no more. */
+    this._number = 0;
+    this._busySince = -Infinity;
+  }
+
+  /** Another camera was chosen: there is no picture of it yet. */
+  restart() {
+    this._number++;
+    this._busySince = -Infinity;
+    this._next = null;
+    this._taken = null;
+    this._since = this._now();
+  }
+
+  /** Whether a picture is shown. */
+  get shown() {
+    return this._taken !== null;
+  }
+
+  /**
+   * How old the picture is that is shown; without one, for how long it was waited for.
+   */
+  get age() {
+    return Math.max(0, this._now() - (this._taken ?? this._since));
+  }
+
+  /**
+   * A picture can be had.
+   *
+   * @param {string} url
+   * @param {number} age How old it is already.
+   */
+  offer(url, age) {
+    this._next = { url, taken: this._now() - Math.max(0, age) };
+    if (this._now() - this._busySince >= PATIENCE) this._begin();
+  }
+
+  _begin() {
+    const next = this._next;
+    if (next === null) return;
+    this._next = null;
+    this._busySince = this._now();
+    const number = ++this._number;
+    this._load(next.url)
+      .then(
+        (picture) => {
+          if (number !== this._number) return;
+          this._taken = next.taken;
+          this._show(picture);
+        },
+        // It was withdrawn for a newer one, which is on its way.
+        () => {},
+      )
+      .finally(() => {
+        if (number !== this._number) return;
+        this._busySince = -Infinity;
+        this._begin();
+      });
+  }
+}

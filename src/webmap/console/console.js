@@ -1,49 +1,16 @@
 import { listenToActions } from "./card_actions.js";
-import { showConnection } from "./connection.js";
-import { listenToHelp } from "./help.js";
-import { listenToList } from "./into_view.js";
-import { spreadNames } from "./names.js";
-import { listenToSearch } from "./search.js";
-import { listenToSheet, nameSheet } from "./sheet.js";
-import { keepSizes, listenToTools } from "./view_tools.js";
+import { byId, listenToSheet, nameSheet, say, typing } from "./dom.js";
+import { keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
  * What of the console acts in the browser itself, because it must be quick, or work
  * while the display cannot be reached: the state of the connection, who "you" are, the
  * buttons of the view and of the card, the search, the sheet on a phone, help.
- *
- * @typedef {{a: number, b: number, c: number, d: number, e: number, f: number}} Matrix
- *
- * @typedef {object} Report
- * @property {string} robot
- * @property {boolean} mine
- * @property {{state: string, text: string} | null} [test] The newest stop test.
- *
- * @typedef {object} Drive
- * @property {string} state
- * @property {ReadonlyMap<string, Report>} robots
- * @property {(kind: string, fn: () => void) => () => void} on
- * @property {(robot: string) => void} cancel
- * @property {(robot: string) => void} release
- * @property {(robot: string) => void} stopTest
- * @property {() => void} doubt
- *
- * @typedef {object} MapCanvas
- * @property {SVGSVGElement} svg
- * @property {SVGGElement} world
- * @property {Matrix} view
- * @property {number} width
- * @property {number} height
- * @property {string | null} selected
- * @property {number} following
- * @property {(id: number) => void} follow
- * @property {Drive} drive
- * @property {(view: Matrix, options?: {user?: boolean}) => void} setView
- * @property {(fn: () => void) => () => void} onView
- * @property {(fn: () => void) => () => void} onSelect
- *
- * @typedef {{title: string, bounds: [number, number, number, number] | null}} Options
  */
+
+/** @typedef {import('../web/drive.js').Drive} Drive */
+/** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {{title: string, bounds: [number, number, number, number] | null}} Options */
 
 /**
  * @param {MapCanvas} map
@@ -72,4 +39,224 @@ export default function attach(map, options, send) {
       for (const off of offs) off();
     },
   };
+}
+
+/**
+ * Show whether commands would arrive, and which robots are "yours". How long they take
+ * depends on the robot, too, so the driving panel has that figure.
+ *
+ * @param {Drive} drive
+ */
+function showConnection(drive) {
+  const link = byId("link");
+  const show = () => {
+    link.dataset.link = drive.state;
+  };
+  const mark = () => {
+    for (const element of document.querySelectorAll("[data-robot]")) {
+      if (!(element instanceof HTMLElement)) continue;
+      const mine = drive.robots.get(element.dataset.robot ?? "")?.mine ?? false;
+      if (mine !== "mine" in element.dataset) toggle(element, "mine", mine);
+    }
+  };
+  const look = () => {
+    show();
+    mark();
+    count();
+  };
+  look();
+  const timer = setInterval(look, 500);
+  const offs = [drive.on("state", show), drive.on("robot", mark)];
+  return () => {
+    clearInterval(timer);
+    for (const off of offs) off();
+  };
+}
+
+/** Say how many robots there are, and of how many the data is old. */
+function count() {
+  const rows = document.querySelectorAll("#robots > .row").length;
+  const old = document.querySelectorAll("#robots > .row .age.stale").length;
+  const robots = rows === 1 ? "1 robot" : `${rows} robots`;
+  say(byId("robots-count"), old > 0 ? `${robots}, ${old} with old data` : robots);
+}
+
+/**
+ * @param {HTMLElement} element
+ * @param {string} name
+ * @param {boolean} on
+ */
+function toggle(element, name, on) {
+  if (on) element.dataset[name] = "";
+  else delete element.dataset[name];
+}
+
+/** Milliseconds between two looks at which names there is room for. */
+const PERIOD = 300;
+
+/** How large a name is on the screen, in pixels: about so much a letter, and a line. */
+const LETTER = 8;
+const LINE = 18;
+
+/** With more robots in sight than this only the selected one has its name. */
+const MOST = 150;
+
+/**
+ * A name on the screen: its middle and its size, in pixels.
+ *
+ * @typedef {object} Name
+ * @property {number} x
+ * @property {number} y
+ * @property {number} width
+ * @property {boolean} first Whether it comes before the others.
+ */
+
+/**
+ * Return which names can be shown without covering one another.
+ *
+ * @param {Name[]} names
+ * @returns {boolean[]} For each, whether there is room for it.
+ */
+export function roomFor(names) {
+  const order = names.map((_, index) => index);
+  order.sort((a, b) => Number(names[b].first) - Number(names[a].first) || a - b);
+  const shown = names.map(() => false);
+  /** @type {Name[]} */
+  const placed = [];
+  for (const index of order) {
+    const name = names[index];
+    const free = placed.every(
+      (other) =>
+        Math.abs(other.y - name.y) >= LINE ||
+        Math.abs(other.x - name.x) >= (other.width + name.width) / 2,
+    );
+    if (!free && !name.first) continue;
+    shown[index] = true;
+    placed.push(name);
+  }
+  return shown;
+}
+
+/**
+ * Keep the robots' names on the map from covering one another.
+ *
+ * @param {MapCanvas} map
+ * @returns {() => void} Ends it.
+ */
+function spreadNames(map) {
+  const spread = () => {
+    const robots = [...map.world.querySelectorAll(".robot:not(.unplaced)")];
+    const names = robots.map((robot) => nameOf(map, robot));
+    const shown =
+      robots.length > MOST ? names.map(({ first }) => first) : roomFor(names);
+    robots.forEach((robot, index) => {
+      if (robot.classList.contains("nameless") !== shown[index]) return;
+      robot.classList.toggle("nameless", !shown[index]);
+    });
+  };
+  const timer = setInterval(spread, PERIOD);
+  const off = map.onSelect(spread);
+  spread();
+  return () => {
+    clearInterval(timer);
+    off();
+  };
+}
+
+/**
+ * @param {MapCanvas} map
+ * @param {Element} robot
+ * @returns {Name}
+ */
+function nameOf({ view, selected }, robot) {
+  const list = robot instanceof SVGGraphicsElement ? robot.transform.baseVal : null;
+  const { e: x, f: y } = list?.numberOfItems ? list.getItem(0).matrix : { e: 0, f: 0 };
+  return {
+    x: view.a * x + view.c * y + view.e,
+    y: view.b * x + view.d * y + view.f,
+    width: (robot.getAttribute("data-name")?.length ?? 0) * LETTER,
+    first: robot.getAttribute("data-robot") === selected,
+  };
+}
+
+/**
+ * Hide the robots whose name does not have what was typed in it. Enter selects the only
+ * one that is left.
+ *
+ * @param {AbortSignal} signal
+ */
+function listenToSearch(signal) {
+  const input = /** @type {HTMLInputElement} */ (byId("search"));
+  const filter = () => {
+    const wanted = input.value.trim().toLowerCase();
+    for (const row of document.querySelectorAll("#robots > .row")) {
+      const name = row.querySelector(".name")?.textContent?.toLowerCase() ?? "";
+      row.classList.toggle("filtered", !name.includes(wanted));
+    }
+    const none = wanted !== "" && hits().length === 0;
+    say(byId("not-found"), none ? `No robot has “${input.value.trim()}” in its name.` : "");
+  };
+  input.addEventListener("input", filter, { signal });
+  const newcomers = new MutationObserver(filter);
+  newcomers.observe(byId("robots"), { childList: true });
+  signal.addEventListener("abort", () => newcomers.disconnect());
+  const choose = (/** @type {KeyboardEvent} */ event) => {
+    const [only, ...more] = event.key === "Enter" ? hits() : [];
+    if (only && more.length === 0) only.click();
+  };
+  input.addEventListener("keydown", choose, { signal });
+  const key = (/** @type {KeyboardEvent} */ event) => {
+    if (event.key !== "/" || event.ctrlKey || event.metaKey || typing(event)) return;
+    event.preventDefault();
+    input.focus();
+  };
+  document.addEventListener("keydown", key, { signal });
+}
+
+/** @returns {HTMLElement[]} What selects the robots that are listed. */
+function hits() {
+  return [...document.querySelectorAll("#robots > .row:not(.filtered) [aria-pressed]")].filter(
+    (button) => button instanceof HTMLElement,
+  );
+}
+
+/**
+ * Help lies beside STOP and is no modal dialog: that would take STOP's clicks. While it
+ * is open no input moves a robot (`data-hands-off`), as it covers what the operator would
+ * have to see. Esc closes it, unless this page drives: then Esc is STOP.
+ *
+ * @param {Drive} drive
+ * @param {AbortSignal} signal
+ */
+function listenToHelp(drive, signal) {
+  const help = /** @type {HTMLDialogElement} */ (byId("help"));
+  const turn = () => {
+    if (help.open) help.close();
+    else {
+      drive.doubt();
+      help.show();
+      byId("help-open").setAttribute("aria-expanded", "true");
+    }
+  };
+  const closed = () => {
+    byId("help-open").setAttribute("aria-expanded", "false");
+    byId("help-open").focus();
+  };
+  help.addEventListener("close", closed, { signal });
+  byId("help-open").addEventListener("click", turn, { signal });
+  byId("help-close").addEventListener("click", turn, { signal });
+  const outside = (/** @type {PointerEvent} */ { target }) => {
+    const map = target instanceof Element && target.closest("svg.webmap");
+    if (help.open && map) turn();
+  };
+  document.addEventListener("pointerdown", outside, { signal });
+  const key = (/** @type {KeyboardEvent} */ event) => {
+    if (event.key !== "?" || typing(event)) return;
+    event.preventDefault();
+    turn();
+  };
+  document.addEventListener("keydown", key, { signal });
+  return drive.on("stop", () => {
+    if (help.open) turn();
+  });
 }

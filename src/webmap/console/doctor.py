@@ -1,21 +1,24 @@
 """The readiness check on the page: a button for each bridge, and what it finds."""
 
+import asyncio
 import itertools
+import logging
 import math
 import time
-from collections.abc import Iterator, Sequence
+import weakref
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from webmap import html, svg
-from webmap.console.checkup import Checkup, checkup_of
 from webmap.console.in_use import in_use
-from webmap.console.robot_card import icon
-from webmap.console.try_call import TryCall
+from webmap.console.words import icon
+from webmap.discovery.doctor import Finding, MeantRobot, Observed, judge
+from webmap.discovery.doctor.measure import TRYING, observe, tried
+from webmap.discovery.doctor.verdict import report as report_text
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Map
-    from webmap.discovery.doctor import Finding
 
 WORDS = {"wrong": "Wrong", "warning": "Warning", "note": "Note", "good": "Good"}
 
@@ -186,3 +189,193 @@ def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
         said.append(html.p(text=advice, class_="advice"))
     item = html.li(shape.set("aria-hidden", "true"), said, class_="finding")
     return item.set("data-level", level)
+
+
+log = logging.getLogger("webmap.console")
+
+SECONDS = 3.0
+"""How long topics are listened to."""
+
+PLURAL = {"wrong": "wrong", "warning": "warnings", "note": "notes", "good": "good"}
+
+Observe = Callable[..., Awaitable[Observed]]
+
+
+class Checkup:
+    """The readiness check of one bridge, and what it found last.
+
+    However many viewers ask, there is one at a time, with one socket for listening;
+    the bridge's own links are not touched.
+
+    Args:
+        url: The bridge's address.
+        observe: Looks at a bridge.
+        tried: Takes what was seen, tries a call that hangs, and adds what that tells.
+
+    """
+
+    def __init__(
+        self, url: str, observe: Observe = observe, tried: Observe = tried
+    ) -> None:
+        self.url = url
+        self.version = 0
+        """A number that grows whenever there is something new to show."""
+        self.doing = ""
+        """What is being done, in a sentence; empty if nothing is."""
+        self.findings: Sequence[Finding] = ()
+        """What was found last: the bridge first, then each robot, worst first."""
+        self.ended: float | None = None
+        """When topics were listened to last, on the monotonic clock; None if never."""
+        self._observe = observe
+        self._tried = tried
+        self._seen: Observed | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether somebody's check is under way."""
+        return self._task is not None and not self._task.done()
+
+    @property
+    def can_try(self) -> bool:
+        """Whether a call that hangs can be tried: the bridge was there at the check."""
+        seen = self._seen
+        return seen is not None and not seen.trouble and not self.is_running
+
+    @property
+    def summary(self) -> str:
+        """How many findings of each level there are, in words."""
+        numbers = {level: 0 for level in PLURAL}
+        for finding in self.findings:
+            numbers[finding.level] += 1
+        said = [
+            f"{number} {level if number == 1 else PLURAL[level]}"
+            for level, number in numbers.items()
+            if number
+        ]
+        free = not numbers["wrong"] and not numbers["warning"]
+        return ("Nothing is in the way: " if free else "") + ", ".join(said)
+
+    @property
+    def text(self) -> str:
+        """All findings as plain text."""
+        return report_text(self.url, self.findings)
+
+    def start(self, robots: Sequence[MeantRobot] = ()) -> None:
+        """Look at the bridge, unless somebody has that done already.
+
+        Args:
+            robots: The robots that the page has of it, with the topics in use; those
+                that are found are looked at if there are none.
+
+        """
+        if not self.is_running:
+            self._begin(self._look(robots))
+
+    def try_call(self) -> None:
+        """Try what a call that hangs holds up; the rest of the report stays.
+
+        Nothing is tried while something is done, or if the bridge was away.
+        """
+        if self._seen is not None and self.can_try:
+            self._begin(self._try(self._seen))
+
+    def _begin(self, work: Coroutine[None, None, Observed]) -> None:
+        self._say("Beginning.")
+        self._task = asyncio.get_running_loop().create_task(self._run(work))
+
+    async def _look(self, robots: Sequence[MeantRobot]) -> Observed:
+        try:
+            return await self._observe(
+                self.url, seconds=SECONDS, meant=lambda _: robots, progress=self._say
+            )
+        finally:
+            self.ended = time.monotonic()
+
+    async def _try(self, seen: Observed) -> Observed:
+        self._say(TRYING)
+        return await self._tried(seen)
+
+    async def _run(self, work: Coroutine[None, None, Observed]) -> None:
+        try:
+            self._seen = await work
+            self.findings = judge(self._seen)
+        except Exception as error:
+            log.exception("the readiness check of %s failed", self.url)
+            words = f"The check itself failed: {error!r}."
+            advice = f"Run webmap doctor {self.url} in a terminal, and look at the log."
+            self._seen = None
+            self.findings = [Finding("wrong", "bridge", words, advice)]
+        self._say("")
+
+    def _say(self, doing: str) -> None:
+        self.doing = doing
+        self.version += 1
+
+
+_checkups: "weakref.WeakKeyDictionary[Bridge, Checkup]" = weakref.WeakKeyDictionary()
+
+
+def checkup_of(bridge: "Bridge") -> Checkup:
+    """Return the check of a bridge, which all viewers share."""
+    found = _checkups.get(bridge)
+    if found is None:
+        found = _checkups[bridge] = Checkup(bridge.url)
+    return found
+
+
+MAY_TRY = ("operator", "admin")
+"""Roles of viewers who may try a call."""
+
+TRY_WORDS = (
+    "Does a service that hangs hold up what comes after it on a socket? To find out, "
+    "WebMap offers a service of its own to the ROS system for a moment, under a name "
+    "that nobody else has. It calls that over a link of its own, leaves it unanswered "
+    "for a second, and asks rosapi for the time meanwhile.",
+    "No node of a robot is called, and velocity goes over other links. At the worst "
+    "the bridge keeps everybody waiting for that second: try it while nobody drives.",
+)
+
+
+class TryCall:
+    """A button and the question that it asks, on one page.
+
+    Args:
+        checkup: What tries it, and has the report.
+        role: What the viewer may do.
+
+    """
+
+    def __init__(self, checkup: "Checkup", role: str) -> None:
+        self._checkup = checkup
+        self._may = role in MAY_TRY
+        self.button: Element = html.button("Try a call", type="button", class_="button")
+        self.button.set(hidden=not self._may)
+        self.button.on("click", lambda event: self._ask(True))
+        self._yes = html.button("Try it", type="button", class_="button")
+        self._yes.on("click", lambda event: self._agreed())
+        no = html.button("Not now", type="button", class_="button")
+        no.on("click", lambda event: self._ask(False))
+        self.question: Element = html.div(
+            *(html.p(text=text) for text in TRY_WORDS),
+            html.div(self._yes, no, class_="doctor-answers"),
+            class_="doctor-question",
+            role="group",
+            hidden=True,
+        )
+        self.question.set("aria-label", "Try a call that hangs")
+        self.poll()
+
+    def poll(self) -> None:
+        """Look whether it can be tried now."""
+        for button in (self.button, self._yes):
+            button.set(disabled=not self._checkup.can_try)
+
+    def _ask(self, asked: bool) -> None:
+        self.question.set(hidden=not (asked and self._may))
+
+    def _agreed(self) -> None:
+        self._ask(False)
+        # Whoever may only look has no say, whatever their page sends.
+        if self._may:
+            self._checkup.try_call()

@@ -1,147 +1,122 @@
-"""What the console shows: robots, told by their topics."""
+"""What the console shows of a robot: all that is configured, its picture, its name.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+``map.css`` has the colours.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import webmap
-from webmap.console.shapes import NameLabel, Picture, picture_model, robot_model
-from webmap.errors import ConfigError
+from webmap import geometry, svg
 
 if TYPE_CHECKING:
-    from webmap import Bridge, Robot
-
-FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobotDescription:
-    """A robot and its topics; what it does not have is empty."""
-
-    name: str
-    bridge: "Bridge"
-    odometry: str = ""
-    twist: str = ""
-    twist_type: str = ""
-    """``geometry_msgs`` Twist or TwistStamped in either dialect; empty if the bridge is
-    to be asked for it."""
-    scan: str = ""
-    battery: str = ""
-    cameras: tuple[str, ...] = ()
-    """Topics of ``sensor_msgs/CompressedImage`` or ``Image``."""
-    goal: str = ""
-    """A topic of ``geometry_msgs/PoseStamped`` that sends it somewhere."""
-    cancel: str = ""
-    """A topic of ``actionlib_msgs/GoalID`` that calls goals off."""
-    action: tuple[str, str] | None = None
-    """The action that sends it somewhere and says how that goes: its name and its
-    type, ``nav2_msgs/action/NavigateToPose`` or ``move_base_msgs/MoveBaseAction``."""
-    initial_pose: str = ""
-    """A topic of ``geometry_msgs/PoseWithCovarianceStamped`` that tells it where it
-    is."""
-    goal_frame: str = "map"
-    """The frame of its map, in which goals and its place are told."""
-    stops_within: float | None = None
-    """Seconds within which the base stops by itself when velocity ceases, if known."""
-    picture: Picture | None = None
-    """How it looks from above, if not like all others."""
+    from webmap import Bridge, Element, Robot, RobotConfig
+    from webmap.config.robot import PictureConfig
 
 
-def parse_robot(
-    text: str, bridges: Sequence["Bridge"], *, stops_within: float | None = None
-) -> RobotDescription:
-    """Read a robot as a person writes it on the command line.
+def make_robot(
+    config: "RobotConfig",
+    bridges: "Mapping[str, Bridge] | Iterable[Bridge]",
+    picture: str = "",
+) -> "Robot":
+    """Return a robot, with what the console shows of it.
 
     Args:
-        text: ``NAME:ODOM:CMD_VEL:SCAN``; topics may be empty, and empty ones at the
-            end left out. ``2@`` before the name says that the robot is behind the
-            second bridge.
-        bridges: The bridges there are.
-        stops_within: Seconds within which the base stops by itself, if known.
+        config: The robot.
+        bridges: Its bridges, by the names that the configuration has for them, or in
+            any order if it has their addresses.
+        picture: The URL that pages load its picture from, if it has one.
 
     Raises:
-        ConfigError: If the text is not of that form, or there is no such bridge.
+        ConfigError: If something in it cannot be meant; every mistake is named.
 
     """
-    number, _, rest = (
-        text.rpartition("@")
-        if "@" in text.partition(":")[0]
-        else (
-            "1",
-            "",
-            text,
-        )
-    )
-    if not (number.isascii() and number.isdigit() and 0 < int(number) <= len(bridges)):
-        raise ConfigError(
-            f"robot {text!r}: {number!r} is no bridge's number; there are "
-            f"{len(bridges)}, counted from 1"
-        )
-    name, *topics = (part.strip() for part in rest.split(":"))
-    if not name or len(topics) > 3 or not any(topics):
-        raise ConfigError(f"robot {text!r} is not of the form {FORM}")
-    odometry, twist, scan = [*topics, "", "", ""][:3]
-    return RobotDescription(
-        name=name,
-        bridge=bridges[int(number) - 1],
-        odometry=odometry,
-        twist=twist,
-        scan=scan,
-        stops_within=stops_within,
-    )
-
-
-def set_goals(
-    robot: "Robot",
-    bridge: "Bridge",
-    goal: str,
-    cancel: str,
-    action: tuple[str, str] | None,
-    *,
-    frame: str = "map",
-) -> None:
-    """Say where a robot's goals go, if they go anywhere."""
-    if goal or action:
-        chosen = (
-            {} if action is None else {"action": action[0], "action_type": action[1]}
-        )
-        robot.set_move_topic(
-            bridge, goal, frame=frame, cancel_topic=cancel or None, **chosen
-        )
-
-
-def make_robot(about: RobotDescription) -> "Robot":
-    """Return the robot of a description, with what the console shows of it."""
-    bridge = about.bridge
-    picture = about.picture
-    model = robot_model() if picture is None else picture_model(picture)
-    robot = webmap.Robot(about.name, model)
-    if picture is not None:  # the name lies below it
-        robot.svg.set_style("--reach", picture.reach)
-    if about.odometry:
-        robot.set_odometry_topic(bridge, about.odometry)
-    if about.twist:
-        robot.set_twist_topic(
-            bridge,
-            about.twist,
-            type=about.twist_type or None,
-            stops_within=about.stops_within,
-        )
-    set_goals(
-        robot, bridge, about.goal, about.cancel, about.action, frame=about.goal_frame
-    )
-    if about.initial_pose:
-        frame = about.goal_frame
-        robot.set_initial_pose_topic(bridge, about.initial_pose, frame=frame)
-    if about.scan:
-        scanner = robot.add_module(
-            "LaserScanner", bridge, about.scan, max_dots=None, throttle=100
-        )
-        robot.svg.insert(1, scanner.svg)  # after the title, under the body
-    if about.battery:
-        robot.add_module("Battery", bridge, about.battery)
-    for number, topic in enumerate(about.cameras, 1):
-        name = "Camera" if len(about.cameras) == 1 else f"Camera {number}"
-        robot.add_module("Camera", bridge, topic, name)
+    if not isinstance(bridges, Mapping):
+        bridges = {bridge.url: bridge for bridge in bridges}
+    pictured = config.picture if picture else None
+    model = None if config.model is not None else robot_model()
+    if pictured is not None:
+        model = picture_model(pictured, picture)
+    robot = webmap.Robot.from_config(config, bridges, model=model)
+    if pictured is not None:  # the name lies below it
+        robot.svg.set_style("--reach", picture_reach(pictured))
     robot.add_module(NameLabel)
     return robot
+
+
+BODY = (
+    "M0.08 -0.19H-0.14A0.08 0.08 0 0 0 -0.22 -0.11V0.11A0.08 0.08 0 0 0 -0.14 0.19"
+    "H0.08C0.18 0.19 0.25 0.08 0.25 0C0.25 -0.08 0.18 -0.19 0.08 -0.19Z"
+)
+HEADING = "M0.19 0L-0.08 0.13L-0.03 0L-0.08 -0.13Z"
+HATCH = (
+    "M-0.22 0.02L0 0.19M-0.22 -0.12L0.14 0.17M-0.12 -0.19L0.22 0.08"
+    "M0.04 -0.19L0.25 -0.02"
+)
+
+
+def robot_model() -> "Element":
+    """Return a rounded body of half a metre with an arrow that says where it looks."""
+    return svg.g(
+        svg.circle(r=0.35, class_="hit"),
+        svg.g(
+            svg.circle(r=0.37, class_="ring"),
+            svg.path(d=BODY, class_="body"),
+            svg.path(d=HATCH, class_="hatch"),
+            svg.path(d=HEADING, class_="heading"),
+            class_="model",
+        ),
+    )
+
+
+def picture_reach(picture: "PictureConfig") -> float:
+    """Return how far from the base a picture reaches at the most, in metres."""
+    half = math.hypot(picture.width, picture.height) / 2
+    return half + math.hypot(picture.x, picture.y)
+
+
+def picture_model(picture: "PictureConfig", href: str) -> "Element":
+    """Return a model that is a picture, with the same marks as any other robot.
+
+    Args:
+        picture: Where it is on the robot.
+        href: The URL that pages load it from.
+
+    """
+    width, height = picture.width, picture.height
+    placed = geometry.Affine.translation(picture.x, picture.y)
+    placed @= geometry.Affine.rotation(math.radians(picture.angle))
+    image = svg.image(class_="picture", href=href, preserveAspectRatio="none")
+    image.set_matrix(placed @ geometry.Affine(1, 0, 0, -1, 0, 0))
+    # What is drawn over the usual body while its data is old lies over the picture.
+    hatch = svg.path(d=HATCH, class_="hatch")
+    hatch.set_matrix(placed @ geometry.Affine(width / 0.47, 0, 0, height / 0.38, 0, 0))
+    reach = svg.rect(class_="reach", fill="transparent")
+    reach.set_matrix(placed)
+    for box in (image, reach):
+        box.set(x=-width / 2, y=-height / 2, width=width, height=height)
+    around = math.hypot(width, height) / 2 + 0.02
+    ring = svg.circle(r=around, cx=picture.x, cy=picture.y, class_="ring")
+    model = svg.g(ring, image, hatch, class_="model pictured")
+    model.set_style("--length", max(width, height))
+    return svg.g(svg.circle(r=0.35, class_="hit"), reach, model)
+
+
+class NameLabel:
+    """The robot's name below it, upright wherever it looks; a module of robots."""
+
+    def __init__(self, robot: "Robot") -> None:
+        self.robot = robot
+        self.svg = svg.g(svg.text(text=robot.name, class_="label"), class_="upright")
+        # Over the body, and under what other modules draw.
+        robot.svg.insert(list(robot.svg.children).index(robot.model) + 1, self.svg)
+        self.on_odometry_update()
+
+    def destroy(self) -> None:
+        """Take the name away."""
+        self.svg.remove()
+
+    def on_odometry_update(self) -> None:
+        """Turn against the robot, so that the name stays upright."""
+        self.svg.set_pose(0.0, 0.0, -self.robot.yaw)

@@ -46,7 +46,8 @@ def in_use(
 def _in_use(
     robot: "Robot", bridge: "Bridge", maps: Iterable[Made]
 ) -> MeantRobot | None:
-    feed, twist, goals = robot.feed, robot.motion.twist_topic, robot.motion.move_topic
+    feed, motion = robot.feed, robot.motion
+    twist, goals = motion.config.twist, motion.config.move
     frames = robot.tf
     topics: Topics = {"odometry": (), "pose": (), "velocity": (), "action": ()}
     elsewhere: set[Role] = set()
@@ -54,11 +55,11 @@ def _in_use(
         topics["odometry"] = ((feed.topic, feed.type or ""),)
     elif feed is not None:
         elsewhere.add("odometry")
-    if twist is not None and twist.bridge is bridge:
+    if twist is not None and motion.bridge("twist") is bridge:
         topics["velocity"] = ((twist.topic, twist.type or ""),)
     elif twist is not None:
         elsewhere.add("velocity")
-    if goals is not None and goals.bridge is bridge and goals.action:
+    if goals is not None and motion.bridge("move") is bridge and goals.action:
         kind = goals.action_type.rpartition("/")[2]
         tails = [tail for tail, type in ACTIONS.items() if type.endswith(f"/{kind}")]
         topics["action"] = tuple((goals.action + tail, "") for tail in tails)

@@ -113,6 +113,23 @@ class Console:
         for page in list(self._pages):
             _add_module(name, args, options, page)
 
+    def add_module_once(self, name: Factory, /, *args: Any, **options: Any) -> bool:
+        """Give the map of every page a module, unless that was done already.
+
+        Args:
+            name: The module's name, or what makes it.
+            *args: What its constructor gets after the map.
+            **options: Its arguments by name.
+
+        Returns:
+            Whether the module is new.
+
+        """
+        new = (name, args, options) not in self._more
+        if new:
+            self.add_module(name, *args, **options)
+        return new
+
     def set_module(self, name: str, /, **options: Any) -> None:
         """Give the map of every page to come a module, or that module more options.
 

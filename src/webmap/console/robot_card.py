@@ -1,15 +1,13 @@
 """The card of the selected robot: where it is, how it moves, what can be done."""
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from webmap import html, svg
+from webmap import html
 from webmap.console.cameras import CameraViews
-from webmap.console.own_stop import OwnStop
+from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
 from webmap.console.robot_list import AGE_LIMIT, StateShape
-from webmap.console.speeds import SpeedTable
-from webmap.console.tasks import GoalLine
-from webmap.console.words import UNKNOWN, heading, look_of, number, sentence
+from webmap.console.words import UNKNOWN, heading, icon, look_of, number, sentence
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,31 +43,15 @@ TEST_WORDS = (
 """What the button of the stop test says; console.js says which, in ``data-test``."""
 
 
-class Goals(Protocol):
-    """What the card asks of the module that sends robots somewhere."""
-
-    def aim(self) -> None:
-        """Let the viewer's next press on the map be the goal."""
-
-    def forget(self, robot: "Robot") -> None:
-        """Take a goal's arrow away."""
-
-
-class Poses(Protocol):
-    """What the card asks of the module that tells robots where they are."""
-
-    def aim(self) -> None:
-        """Let the viewer's next press on the map say where the robot is."""
-
-
 class RobotCard:
     """Shows the robot that is selected on a map; a module of maps.
 
     Args:
         map: The map.
         element: The page's element to fill; it is hidden while nothing is selected.
-        goals: What sends robots somewhere.
-        poses: What tells robots where they are.
+        aim_goal: Lets the viewer's next press on the map be the goal.
+        forget_goal: Takes the arrow of a robot's goal away.
+        aim_pose: Lets the viewer's next press on the map be the robot's pose.
         most: What this page drives a robot at, in m/s and rad/s.
         remove: Takes a robot that is gone off all pages.
 
@@ -79,16 +61,19 @@ class RobotCard:
         self,
         map: "Map",
         element: "Element",
-        goals: Goals,
-        poses: Poses,
+        *,
+        aim_goal: "Callable[[], object]",
+        forget_goal: "Callable[[Robot], object]",
+        aim_pose: "Callable[[], object]",
         most: tuple[float, float],
         remove: "Callable[[Robot], object]",
     ) -> None:
         self.map = map
         self._remove = remove
         self.element = element
-        self._goals = goals
-        self._poses = poses
+        self._aim_goal = aim_goal
+        self._take_arrow = forget_goal
+        self._aim_pose = aim_pose
         self._robot: Robot | None = None
         self._feed: Feed | None = None
         self._shape = StateShape()
@@ -216,8 +201,8 @@ class RobotCard:
         )
         state.set("role", "status")
         buttons = self._buttons = {about[0]: action(*about) for about in ACTIONS}
-        buttons["send"].on("click", lambda event: self._goals.aim())
-        buttons["locate"].on("click", lambda event: self._poses.aim())
+        buttons["send"].on("click", lambda event: self._aim_goal())
+        buttons["locate"].on("click", lambda event: self._aim_pose())
         buttons["cancel"].on("click", lambda event: self._forget_goal())
         buttons["remove"].on("click", lambda event: self._remove_robot())
         buttons["remove"].set(
@@ -245,7 +230,7 @@ class RobotCard:
 
     def _forget_goal(self) -> None:
         if self._robot is not None:
-            self._goals.forget(self._robot)
+            self._take_arrow(self._robot)
 
 
 class Feed:
@@ -266,11 +251,6 @@ class Feed:
     def on_battery_update(self, battery: object) -> None:
         """Show the battery."""
         self._card.show_battery(battery)
-
-
-def icon(symbol: str) -> "Element":
-    """Return a symbol of console.html as a picture that says nothing by itself."""
-    return svg.svg(svg.use(href=f"#{symbol}"), class_="icon").set("aria-hidden", "true")
 
 
 def fact(name: str, value: "Element", unit: str) -> "Element":
@@ -294,3 +274,42 @@ def stop_test() -> "Element":
     )
     element.set("title", "Creeps, sends nothing any more, and sees when it stands")
     return element.set("data-act", "stop-test").set("data-test", "take")
+
+
+class RobotButtons:
+    """Shows the buttons of the robot that is selected; a module of maps.
+
+    Args:
+        map: The map.
+        card: The page's element to append to.
+
+    """
+
+    def __init__(self, map: "Map", card: "Element") -> None:
+        self.map = map
+        self.element: Element = html.section(class_="card-buttons")
+        self.element.set("aria-label", "Buttons")
+        card.append(self.element)
+        self._shown: list[Any] = []
+        self.on_select()
+
+    def destroy(self) -> None:
+        """Take the buttons away."""
+        self._let_go()
+        self.element.remove()
+
+    def on_select(self) -> None:
+        """Show the buttons of the robot that is selected now."""
+        self._let_go()
+        robot = self.map.selected
+        modules = [] if robot is None else robot.modules
+        self._shown = [
+            module.show_buttons_in(self.element)
+            for module in modules
+            if hasattr(module, "show_buttons_in")
+        ]
+
+    def _let_go(self) -> None:
+        for shown in self._shown:
+            shown.remove()
+        self._shown = []

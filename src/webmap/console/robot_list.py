@@ -1,17 +1,47 @@
 """The list of robots: who each is, how old its pose, its battery, who drives."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
-from webmap.console.battery import BatteryMark, Charge
-from webmap.console.words import look_of
+from webmap.console.words import battery_tone, look_of
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
 
+FULL = 18.0
+"""The width of the picture's charge when the battery is full."""
+
 AGE_LIMIT = 1.0
 """Seconds after which a pose looks old."""
+
+
+class BatteryMark:
+    """A battery that is as full as the robot's, with the percentage beside it."""
+
+    def __init__(self) -> None:
+        self._fill = svg.rect(x=2.5, y=2.5, width=0, height=8, rx=1, class_="charge")
+        self._text = html.span()
+        picture = svg.svg(
+            svg.rect(x=0.75, y=0.75, width=21.5, height=11.5, rx=2.5),
+            self._fill,
+            svg.rect(x=23.5, y=4, width=2, height=5, rx=1, class_="pole"),
+            viewBox="0 0 26 13",
+        )
+        picture.set("aria-hidden", "true")
+        name = html.span(text="battery ", class_="unseen")
+        self.element = html.span(
+            picture, name, self._text, class_="battery", hidden=True
+        )
+
+    def show(self, charge: float | None) -> None:
+        """Show a charge from 0 to 1; nothing is shown of one that is not known."""
+        self.element.set(hidden=charge is None)
+        if charge is None:
+            return
+        self._fill.set(width=round(FULL * charge, 1))
+        self._text.text = f"{round(100 * charge)} %"
+        self.element.set("data-tone", battery_tone(charge) or None)
 
 
 class RobotList:
@@ -101,7 +131,7 @@ class Row:
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
         for module in robot.modules:
             if hasattr(module, "charge"):
-                self._battery.show(module)
+                self._battery.show(module.charge)
 
     def destroy(self) -> None:
         """Take the line away."""
@@ -116,9 +146,9 @@ class Row:
         self.element.set("data-tone", tone or None)
         self.element.set("data-state", state.name)
 
-    def on_battery_update(self, battery: Charge) -> None:
+    def on_battery_update(self, battery: Any) -> None:
         """Show the charge."""
-        self._battery.show(battery)
+        self._battery.show(battery.charge)
 
     def show_selected(self, selected: bool) -> None:
         """Mark the line if its robot is selected."""

@@ -1,18 +1,19 @@
-"""How a robot's state looks, and how numbers and sentences are written."""
+"""How states, numbers and sentences are written, and which symbols they have."""
 
 import math
 import re
 from typing import TYPE_CHECKING
 
+from webmap import svg
+
 if TYPE_CHECKING:
-    from webmap import Robot
+    from webmap import Element, Robot
 
 UNKNOWN = "\N{EN DASH}"
 """What stands where a number would."""
 
 LOW, EMPTY = 0.2, 0.1
 """Charges below which a battery is low, and as good as empty."""
-
 
 NAME = re.compile(r"[\d/_:.]")
 """What is in a URL, a topic or the name of a robot, and in no plain word."""
@@ -40,6 +41,11 @@ LOOKS = {
     "free": ("state-free", ""),
 }
 """For each state of a robot a symbol of console.html, and a tone."""
+
+
+def icon(symbol: str) -> "Element":
+    """Return a symbol of console.html as a picture that says nothing by itself."""
+    return svg.svg(svg.use(href=f"#{symbol}"), class_="icon").set("aria-hidden", "true")
 
 
 def look_of(robot: "Robot") -> tuple[str, str]:

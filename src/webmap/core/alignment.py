@@ -16,7 +16,7 @@ FARTHEST = 1e6
 """Metres; no map lies farther off."""
 
 HERE = Pose()
-"""The alignment of who shares the common map."""
+"""The alignment of everything on the common map."""
 
 
 def alignment(x: float, y: float, angle: float) -> Pose:
@@ -68,7 +68,7 @@ class Alignments:
         ] = weakref.WeakKeyDictionary()
 
     def of(self, bridge: Bridge | None) -> Pose:
-        """Return where the map of what is behind a bridge lies."""
+        """Return where the map of the robots behind a bridge lies."""
         return HERE if bridge is None else self._poses.get(bridge, HERE)
 
     def stated(self, bridge: Bridge) -> Pose | None:
@@ -82,7 +82,7 @@ class Alignments:
         return self._marks[bridge]
 
     def set(self, bridge: Bridge, pose: Pose) -> None:
-        """Say where the map of what is behind a bridge lies."""
+        """Say where the map of the robots behind a bridge lies."""
         self._poses[bridge] = pose
         for listener in tuple(self._listeners.get(bridge, {}).values()):
             listener()

@@ -1,60 +1,60 @@
-"""Whether what a robot is told is of the kinds that the method's signature names.
-
-A number in quotes or an address where the bridge should be is refused in the call
-that says it, in the words in which a module's arguments are.
-"""
+"""Methods whose arguments are one part of a robot's configuration."""
 
 import functools
-from collections.abc import Callable, Collection
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+import inspect
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from webmap.core.module_arguments import WrongArguments, check_arguments
 
-
-class Named(Protocol):
-    """Whose method is called: a robot."""
-
-    name: str
-
+if TYPE_CHECKING:
+    from webmap.core.driven import Driven
 
 P = ParamSpec("P")
-R = TypeVar("R")
-N = TypeVar("N", bound=Named)
-Method = Callable[Concatenate[N, P], R]
+D = TypeVar("D", bound="Driven")
+Method = Callable[Concatenate[D, P], None]
 
 
-def checks_kinds(
-    *, but: Collection[str] = ()
-) -> Callable[[Method[N, P, R]], Method[N, P, R]]:
-    """Have a method refuse arguments that are not of the kinds it names; a decorator.
+def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
+    """Have a method set a part of the configuration; a decorator.
+
+    The method has a signature and a docstring and no code: ``configure`` gets what it
+    is called with, by the names of its parameters. An argument that it does not have
+    and a bridge that is none are refused here, all else where the part is read.
 
     Args:
-        but: Parameters whose values the method looks at itself, in better words.
+        key: The part.
 
     """
 
-    def decorate(method: Method[N, P, R]) -> Method[N, P, R]:
-        @functools.wraps(method)
-        def checked(owner: N, /, *args: P.args, **kwargs: P.kwargs) -> R:
-            _check(owner, method, args, kwargs, but)
-            return method(owner, *args, **kwargs)
+    def decorate(method: Method[D, P]) -> Method[D, P]:
+        signature = inspect.signature(method)
 
-        return checked
+        @functools.wraps(method)
+        def setter(owner: D, /, *args: P.args, **kwargs: P.kwargs) -> None:
+            _check(owner, method, args, kwargs)
+            given = signature.bind(owner, *args, **kwargs)
+            given.apply_defaults()
+            _, *values = given.arguments.items()
+            part = dict(values)
+            bridge = part.pop("bridge", None)
+            owner.configure(key, part, bridge)
+
+        return setter
 
     return decorate
 
 
 def _check(
-    owner: Named,
+    owner: "Driven",
     method: Callable[..., object],
     args: tuple[Any, ...],
     kwargs: dict[str, Any],
-    but: Collection[str],
 ) -> None:
     try:
         check_arguments(method, args, kwargs)
     except WrongArguments as error:
-        wrong = [each for each in error.wrong if each.name not in but]
+        wrong = [each for each in error.wrong if each.name in ("", "bridge")]
         if wrong:
             called = f"robot {owner.name!r}: {method.__name__}"
             raise WrongArguments(called, wrong) from None

@@ -1,28 +1,19 @@
 """What a robot can be told to do: its verbs of motion, all of which the gate obeys."""
 
 import asyncio
-import math
-import reprlib
 import time
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import Any, Literal
 
-from webmap.core.call_arguments import checks_kinds
+from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
+from webmap.config.robot import LINKED, MOTION
+from webmap.core.call_arguments import sets_part
 from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
-from webmap.core.goal_topics import (
-    COVARIANCE,
-    NAVIGATE_TO_POSE,
-    InitialPoseTopic,
-    MoveTopic,
-)
 from webmap.core.motion import MotionRoad
 from webmap.core.registry import Namespace
-from webmap.core.twist_topic import TwistTopic
 from webmap.errors import ConfigError, MotionError
-from webmap.gate.messages import AssistSpec, RobotReport
-from webmap.gate.rules.assist import polygon_around
+from webmap.gate.messages import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.geometry import Quaternion, Twist
 from webmap.ros.bridge import Bridge
@@ -58,7 +49,7 @@ class Driven(Extendable):
 
     # Where velocity and goals go.
 
-    @checks_kinds(but=["stop_hooks"])
+    @sets_part("twist")
     def set_twist_topic(
         self,
         bridge: Bridge,
@@ -84,7 +75,7 @@ class Driven(Extendable):
         Args:
             bridge: The link to the robot's ROS system.
             topic: The topic, of ``geometry_msgs`` Twist or TwistStamped.
-            type: The message type; asked of rosapi, or Twist, if not given.
+            type: The message type; asked of the bridge, or Twist, if not given.
             stops_within: The time in seconds within which the base stops by itself
                 when velocity ceases. Without it nobody knows whether the robot stops
                 when WebMap cannot tell it to, and it is driven at no more than
@@ -110,29 +101,40 @@ class Driven(Extendable):
                 cannot be meant.
 
         """
-        with no_scope():
-            self.motion.set_twist(
-                TwistTopic(
-                    bridge,
-                    topic,
-                    type,
-                    stops_within,
-                    v_max,
-                    w_max,
-                    a_max,
-                    holonomic,
-                    stop_hooks,
-                    z_max,
-                    rx_max,
-                    ry_max,
-                )
+
+    def configure(
+        self,
+        key: str,
+        values: Mapping[str, Any] | None,
+        bridge: Bridge | None = None,
+    ) -> None:
+        """Set or clear one part of the robot's configuration.
+
+        Args:
+            key: Its name in a fleet file, such as ``"twist"``.
+            values: What it says there; None clears it.
+            bridge: The link that it goes over, if it goes over one of its own.
+
+        Raises:
+            ConfigError: If something in it cannot be meant; every mistake is named.
+
+        """
+        what = f"robot {self.name!r}"
+        if key not in MOTION:
+            raise ConfigError(
+                f'{what}: there is no key "{key}" here; there are {", ".join(MOTION)}'
             )
-        self._show_base(holonomic=holonomic)
+        if key in LINKED and values is not None and bridge is None:
+            raise ConfigError(f"{what}: {key}: a bridge is missing")
+        with no_scope():
+            self.motion.set(key, values, bridge)
+        twist = self.motion.config.twist
+        self._show_base(holonomic=twist is not None and twist.holonomic)
 
     def _show_base(self, *, holonomic: bool) -> None:
         """Let pages know what the base can."""
 
-    @checks_kinds(but=["footprint"])
+    @sets_part("scan_assist")
     def set_scan_assist(
         self,
         topic: str,
@@ -175,29 +177,16 @@ class Driven(Extendable):
             ConfigError: If something of that cannot be meant.
 
         """
-        self.motion.set_assist(
-            AssistSpec(
-                topic=topic,
-                footprint=_corners(self.name, footprint),
-                sensor=(x, y, math.radians(angle)),
-                upside_down=upside_down,
-                frame=frame.removeprefix("/"),
-                stop_distance=stop_distance,
-                brake=brake,
-                blind=blind,
-                creep=creep,
-            )
-        )
 
     def clear_scan_assist(self) -> None:
         """Let the robot be driven as before; nothing happens if nothing was set."""
-        self.motion.set_assist(None)
+        self.configure("scan_assist", None)
 
     def unadvertise_twist_topic(self) -> None:
         """Give up the twist topic; does nothing if there is none."""
-        self.motion.set_twist(None)
+        self.configure("twist", None)
 
-    @checks_kinds()
+    @sets_part("move")
     def set_move_topic(
         self,
         bridge: Bridge,
@@ -230,20 +219,8 @@ class Driven(Extendable):
                 cannot be meant.
 
         """
-        with no_scope():
-            self.motion.set_move(
-                MoveTopic(
-                    bridge,
-                    topic,
-                    frame,
-                    cancel_topic,
-                    on_operator_loss,
-                    action,
-                    action_type,
-                )
-            )
 
-    @checks_kinds(but=["covariance"])
+    @sets_part("initial_pose")
     def set_initial_pose_topic(
         self,
         bridge: Bridge,
@@ -267,12 +244,10 @@ class Driven(Extendable):
                 to another bridge.
 
         """
-        with no_scope():
-            self.motion.set_pose(InitialPoseTopic.of(bridge, topic, covariance, frame))
 
     def unadvertise_move_topic(self) -> None:
         """Give up the move topic; does nothing if there is none."""
-        self.motion.set_move(None)
+        self.configure("move", None)
 
     # What a program says.
 
@@ -320,7 +295,7 @@ class Driven(Extendable):
         report = self.report
         if report is None or report.epoch != epoch:
             return "the gate has not said that it can"
-        if self.motion.twist_topic is None:  # it takes goals alone
+        if self.motion.config.twist is None:  # it takes goals alone
             return None if report.armable else report.reason
         return report.reason
 
@@ -445,24 +420,3 @@ class Driven(Extendable):
 
         """
         self.notify_modules(f"on_send_{kind}", message)
-
-
-def _corners(
-    name: str, footprint: Sequence[tuple[float, float]] | float
-) -> tuple[tuple[float, float], ...]:
-    """Return the corners of a footprint, which may be given as a radius."""
-    if isinstance(footprint, float | Real):  # numpy's numbers are Real
-        radius = float(footprint)
-        if isinstance(footprint, bool) or not 0 < radius < math.inf:
-            raise ConfigError(
-                f"robot {name!r}: the footprint for scan assist is a radius above 0 in "
-                f"metres, got {footprint!r}"
-            )
-        return polygon_around(radius)
-    try:
-        return tuple((float(x), float(y)) for x, y in footprint)
-    except (TypeError, ValueError):
-        raise ConfigError(
-            f"robot {name!r}: the footprint for scan assist is a radius or corners "
-            f"(x, y) in metres, got {reprlib.repr(footprint)}"
-        ) from None

@@ -76,6 +76,12 @@ class Extendable:
         made = (self._made.get(id(module)) for module in self.modules)
         return [arguments for arguments in made if arguments is not None]
 
+    def arguments_of(
+        self, module: Any
+    ) -> tuple[str, tuple[Any, ...], dict[str, Any]] | None:
+        """Return name and arguments of a module; None if it was not added by name."""
+        return self._made.get(id(module))
+
     def remove_module(self, module: Any) -> None:
         """Remove a module: call its ``destroy()`` and release what it made.
 

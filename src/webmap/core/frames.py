@@ -5,9 +5,10 @@ import logging
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
-from webmap.core.frame_faults import FrameFaults
+from webmap.core.placing import Lasting
 from webmap.errors import ProtocolError
 from webmap.geometry import Quaternion, Vector3
 from webmap.ros.bridge import Bridge
@@ -24,14 +25,90 @@ QUEUE = 100
 """Messages that a bridge may hold back: many nodes share the topic, and each counts."""
 
 GRACE = 3.0
-"""Seconds since the link first opened in which nobody misses a frame: who tells of it
-is still being found, and static ones come late."""
+"""Seconds since the link first opened in which no frame is called missing: publishers
+are still being discovered, and static frames come late."""
 
 PERIOD = 0.05
-"""Least seconds between two times that listeners are told: of all that is heard
-meanwhile they are told once, however many nodes share the topic."""
+"""Least seconds between two calls of the listeners: what comes meanwhile is one call,
+however many nodes share the topic."""
+
+STANDS = 10.0
+"""Seconds for which a fault is shown, after it was seen last."""
+
+MOST = 50
+"""Frames whose faults are kept."""
 
 _heard: dict[tuple[Bridge, str], "Frames"] = {}
+
+
+@dataclass(slots=True)
+class _Fault:
+    frames: tuple[str, str]
+    words: str
+    seen: float
+
+
+class FrameFaults:
+    """The faults of transforms, until they have not been seen for a while.
+
+    Args:
+        buffer: The frames; a fault concerns the robots whose frames descend from it.
+
+    """
+
+    def __init__(self, buffer: Buffer) -> None:
+        self._buffer = buffer
+        self._faults: dict[str, _Fault] = {}
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return bool(self._faults)
+
+    def note(self, parent: str, child: str, words: str, now: float) -> bool:
+        """Note that a transform had a fault.
+
+        Args:
+            parent: The frame that its numbers are in.
+            child: The frame that is placed.
+            words: What was wrong, in a sentence.
+            now: The time, in seconds of any clock that only goes forward.
+
+        Returns:
+            Whether it is new; a fault of every message is new once.
+
+        """
+        known = self._faults.get(child)
+        if known is not None:
+            known.seen = now
+            return False
+        if len(self._faults) >= MOST:
+            return False
+        self._faults[child] = _Fault((parent, child), words, now)
+        return True
+
+    def of(self, base: str, now: float) -> str | None:
+        """Return what is wrong with the frames that a robot is placed by, if anything.
+
+        Args:
+            base: The robot's own frame. Its ancestors concern it, and frames with the
+                same prefix.
+            now: As in :meth:`note`.
+
+        """
+        if not self._faults:
+            return None
+        for child in [c for c, f in self._faults.items() if now > f.seen + STANDS]:
+            del self._faults[child]
+        space = base.rpartition("/")[0]
+        chain = set(self._buffer.chain(base))
+        words = [
+            fault.words
+            for fault in self._faults.values()
+            if chain.intersection(fault.frames)
+            or (space and any(name.startswith(f"{space}/") for name in fault.frames))
+        ]
+        return words[0] if words else None
 
 
 class Frames:
@@ -50,7 +127,8 @@ class Frames:
         self.faults = FrameFaults(self.buffer)
         """What was wrong with transforms of late."""
         self.heard_at = time.monotonic()
-        """When the first came of what is told now, by :func:`time.monotonic`."""
+        """When the first transform came for which the listeners are called now, in
+        seconds of :func:`time.monotonic`."""
         self._untold_since: float | None = None
         self._told_at = -math.inf
         self._listeners: dict[int, Callable[[], object]] = {}
@@ -75,7 +153,7 @@ class Frames:
     def join(self, listener: Callable[[], object]) -> Removal:
         """Call ``listener`` when frames have moved, until the removal.
 
-        That is at once, or with all that moves within :data:`PERIOD` of the last time.
+        That is at once, or :data:`PERIOD` after the last call.
         """
         key = id(listener)
         self._listeners[key] = listener
@@ -97,7 +175,7 @@ class Frames:
         """Call all listeners once more, also if nothing is heard until then.
 
         Args:
-            after: Seconds from now; who wakes them sooner does it for all.
+            after: Seconds from now; of several wishes the earliest counts.
 
         """
         if self._loop is None:
@@ -148,7 +226,7 @@ class Frames:
         if raised not in self._raised:
             self._raised.add(raised)
             log.error(
-                "%s: what goes by frames raised", self.bridge.name, exc_info=error
+                "%s: a listener to frames raised", self.bridge.name, exc_info=error
             )
 
     def _end(self) -> None:
@@ -191,9 +269,30 @@ class Frames:
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
-    """Return the frames of a ROS system; those who ask alike get the same."""
+    """Return the frames of a ROS system; they are shared by all callers."""
     space = "/" + namespace.strip("/") if namespace.strip("/") else ""
     key = (bridge, space)
     if key not in _heard:
         _heard[key] = Frames(bridge, space)
     return _heard[key]
+
+
+def lasting(waits: Lasting, trouble: str, frames: Frames | None = None) -> str:
+    """Return trouble once it has lasted, and nothing before.
+
+    Args:
+        waits: What is known of it so far.
+        trouble: Which kind there is now; empty if there is none.
+        frames: Those it is about, if it is about frames. Nothing is returned while they
+            may still be coming, and their listeners are called when it is due.
+
+    """
+    now = time.monotonic()
+    due = waits.due(trouble, now, -math.inf if frames is None else frames.complete_from)
+    if due is None:
+        return ""
+    if now >= due:
+        return trouble
+    if frames is not None:
+        frames.wake(due - now)
+    return ""

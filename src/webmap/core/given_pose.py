@@ -1,6 +1,11 @@
-"""What a program may give as a position or an orientation: anything of that shape."""
+"""Poses that a program or a page gives."""
 
-from typing import Protocol
+import sys
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+    from webmap.core.robot import Robot
 
 
 class Position(Protocol):
@@ -33,3 +38,31 @@ class Orientation(Protocol):
     @property
     def w(self) -> float:
         """The real component."""
+
+
+def robot_and_pose(
+    map: "Map", given: Any
+) -> "tuple[Robot, float, float, float] | None":
+    """Return which robot of a map a page means, and x, y and yaw.
+
+    Args:
+        map: The map that the page shows.
+        given: A table with ``robot``, its id, ``x`` and ``y`` in metres and ``yaw`` in
+            radians; what comes from a page may be anything else.
+
+    Returns:
+        None if the map has no such robot, or a number is missing.
+
+    """
+    if not isinstance(given, dict):
+        return None
+    robot = map.find_robot(given.get("robot"))
+    x, y, yaw = (given.get(name) for name in ("x", "y", "yaw"))
+    if robot is None or not (_finite(x) and _finite(y) and _finite(yaw)):
+        return None
+    return robot, x, y, yaw
+
+
+def _finite(value: object) -> TypeGuard[float]:
+    # A whole number may have more digits than any float has.
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

@@ -110,14 +110,10 @@ def _costmap_colour(value: int) -> Colour:
     return (red, 0, 255 - red, 255)
 
 
-def _raw_colour(value: int) -> Colour:
-    return (255 - value, 255 - value, 255 - value, 255)
-
-
 # By the value of a cell as a byte: -1, which is unknown, is 255.
 PALETTES: dict[str, list[Colour]] = {
     "map": [_map_colour(value) for value in range(256)],
     "costmap": [_costmap_colour(value) for value in range(256)],
-    "raw": [_raw_colour(value) for value in range(256)],
+    "raw": [(255 - value, 255 - value, 255 - value, 255) for value in range(256)],
 }
 """The colours of each palette, as RViz has them where it has any."""

@@ -1,6 +1,5 @@
 """Places with a name, and where they are kept."""
 
-import difflib
 import json
 import math
 import re
@@ -10,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from webmap.config.checks import did_you_mean
 from webmap.errors import ConfigError
 from webmap.identifiers import generate_id
 from webmap.plain_files import LARGEST_STATE, read_file, write_file
@@ -215,8 +215,7 @@ def _label(data: Any, of: str) -> Label:
         raise _Misplaced((), of, "expected a table with name, x and y")
     for key in data:
         if key not in _KEYS:
-            near = difflib.get_close_matches(str(key), _KEYS, n=1)
-            hint = f'; did you mean "{near[0]}"?' if near else ""
+            hint = did_you_mean(key, _KEYS)
             raise wrong(key, f"no such key{hint}; there are {', '.join(_KEYS)}")
     name = data.get("name")
     if not isinstance(name, str) or not name.strip() or len(name) > MAX_NAME:

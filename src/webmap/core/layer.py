@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Hashable
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from webmap.core.problems import Problems
 from webmap.scene import svg
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from webmap.core.map import Map
 
 log = logging.getLogger("webmap.layer")
-
-L = TypeVar("L", bound="Layer")
 
 
 class Layer:
@@ -34,7 +32,7 @@ class Layer:
         self.fragment = Fragment(self.svg)
         self.users = 0
         self.scope = Scope(type(self).__name__, self._failed, self.clear_problem)
-        self._told: Problems[Map] = Problems(log)
+        self._told = Problems(log)
         self.maps = self._told.maps
         """Those that hear what fails: see :meth:`show_on`."""
         self.problems: dict[object, str] = self._told.standing
@@ -42,7 +40,7 @@ class Layer:
         self._key: Hashable = None
 
     @classmethod
-    def shared(cls: type[L], *args: Any, **options: Any) -> L:
+    def shared(cls, *args: Any, **options: Any) -> Self:
         """Return the layer of this class for these arguments, with one user more.
 
         Args:
@@ -53,7 +51,7 @@ class Layer:
         key = (cls, args, tuple(sorted(options.items())))
         layer = cls._shared.get(key)
         if layer is None:
-            layer = cls(*args, **options)
+            layer = cls._made(*args, **options)
             layer._key = key
             try:
                 with no_scope(), layer.scope.active():
@@ -65,6 +63,10 @@ class Layer:
         layer.users += 1
         assert isinstance(layer, cls)
         return layer
+
+    @classmethod
+    def _made(cls, *args: Any, **options: Any) -> Self:
+        return cls(*args, **options)
 
     def start(self) -> None:
         """Subscribe to what the layer shows; called once, in the layer's scope."""

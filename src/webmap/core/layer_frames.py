@@ -3,14 +3,16 @@
 from typing import TYPE_CHECKING
 
 from webmap.core.alignment import alignments
-from webmap.core.frames import Frames, frames_of
+from webmap.core.frames import Frames, frames_of, lasting
 from webmap.core.layer import Layer
-from webmap.core.pose_troubles import Lasting
+from webmap.core.placed import put
+from webmap.core.placing import Lasting
+from webmap.core.pose_source import affine
 from webmap.core.sighting import newest_or_at
-from webmap.geometry import Pose
+from webmap.geometry import Affine, Pose
 from webmap.ros.bridge import Bridge
 from webmap.scope import keep
-from webmap.tf import Transform
+from webmap.tf import Transform, TransformError
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -91,8 +93,8 @@ class LayerFrames:
         return newest_or_at(buffer, target, source, stamp)
 
     def _say(self, words: str) -> None:
-        """Say what is wrong with the frames, once it has lasted; or take it back."""
-        if self._lasting.look("lost" if words else "", self._frames):
+        """Show what is wrong with the frames once it has lasted, or clear it."""
+        if lasting(self._lasting, "lost" if words else "", self._frames):
             self._layer.set_problem(self, words)
         elif not words:
             self._layer.clear_problem(self)
@@ -118,3 +120,43 @@ class LayerFrames:
 def not_known(frame: str, why: object) -> str:
     """Return a sentence on a frame that is somewhere and nobody tells where."""
     return f"it is not known where {frame!r} is on the map: {why}"
+
+
+class Anchored(LayerFrames):
+    """Keeps a whole layer where the frames of a ROS system have its data."""
+
+    def _begin(self) -> None:
+        self._frame: str | None = None
+        self._offset = Affine()
+
+    def stand_in(self, frame_id: str, stamp: float) -> None:
+        """Take the layer's coordinates to be in a frame, as it was at a time.
+
+        Afterwards the layer moves as the frame does.
+
+        Args:
+            frame_id: The frame of a message; empty if it does not say.
+            stamp: In seconds of the robot's clock; 0 if not said.
+
+        """
+        source = self._source(frame_id)
+        if source is not None:
+            self._frame = source
+            self._place(source, stamp)
+
+    def _news(self) -> None:
+        if self._frame is not None:
+            self._place(self._frame, 0.0)
+
+    def _place(self, source: str, stamp: float) -> None:
+        try:
+            found, _ = self._look(source, stamp)
+        except TransformError as error:
+            self._say(not_known(source, error))
+            return
+        self._offset = found.from_above
+        self._align(self.alignment)
+        self._say("")
+
+    def _align(self, aligned: Pose) -> None:
+        put(self._layer.svg, affine(aligned) @ self._offset)

@@ -1,25 +1,38 @@
 """The road of one robot's commands to the gate, and the gate's word of it."""
 
 import logging
+import math
 import time
 import zlib
 from collections import Counter
+from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from webmap.core.goal_topics import InitialPoseTopic, MoveTopic
+import msgspec
+
+from webmap.config.checks import Mistakes
+from webmap.config.motion import (
+    TWIST_TYPES,
+    InitialPoseConfig,
+    MotionConfig,
+    MoveConfig,
+    ScanAssistConfig,
+    TwistConfig,
+)
+from webmap.config.reading import Config, read_part
 from webmap.core.tasks import spawn
-from webmap.core.twist_topic import TWIST_TYPES, TwistTopic, check_twist_type
 from webmap.core.type_asking import TypeAsking
-from webmap.errors import ConfigError, MotionError
-from webmap.gate.hookspecs import checked_hooks
+from webmap.errors import MotionError
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
 from webmap.geometry import Pose, Twist
 from webmap.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
+from webmap.ros.moving import STOP
+from webmap.ros.names import is_type
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import GateClient
@@ -27,10 +40,27 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.robot")
 
 ASK_WRITERS = 10.0
-"""Seconds between two questions to rosapi who publishes velocities to a robot."""
+"""Seconds between two questions to a bridge who publishes velocities to a robot."""
 
-BRIDGES = ("rosbridge", "webmap")
-"""What is in the names of nodes that publish for their clients, this one too."""
+PARTS: dict[str, type[Config]] = {
+    "twist": TwistConfig,
+    "move": MoveConfig,
+    "initial_pose": InitialPoseConfig,
+    "scan_assist": ScanAssistConfig,
+}
+"""The parts of a robot's motion."""
+
+WRITING = ("twist", "move", "initial_pose")
+"""Those for which the gate writes; the first that a robot has names its bridge."""
+
+OF_BASE = sorted(
+    set(TwistConfig.__struct_fields__)
+    & set(RobotSpec.__struct_fields__) - {"stop_hooks"}
+)
+"""What the gate knows of a base by the names that the configuration has."""
+
+Links: TypeAlias = dict[str, Bridge | None]
+"""The bridge of each part."""
 
 _used: Counter[str] = Counter()
 
@@ -61,92 +91,64 @@ class MotionRoad:
         """The robot's own frame; the gate hears of a change."""
         self._name = name
         self._complain = complain
-        self._twist: TwistTopic | None = None
-        self._move: MoveTopic | None = None
-        self._pose: InitialPoseTopic | None = None
+        self.config = MotionConfig()
+        """What moves the robot; :meth:`set` changes it."""
+        self._bridges: Links = {}
         self._odometry: tuple[Bridge, str, str | None] | None = None
-        self._assist: AssistSpec | None = None
         self._own_map = Pose()
         self._asking: TypeAsking | None = None
         self._ask_writers_at = 0.0
         roads.add(self)
 
     @property
-    def twist_topic(self) -> TwistTopic | None:
-        """Where velocity goes, if that is set."""
-        return self._twist
-
-    @property
     def axes(self) -> Axes:
         """The axes out of the plane that the robot moves along, and how fast."""
-        return PLANE if self._twist is None else self._twist.axes
+        twist = self.config.twist
+        if twist is None:
+            return PLANE
+        return Axes(twist.z_max or 0.0, twist.rx_max or 0.0, twist.ry_max or 0.0)
 
-    @property
-    def pose_topic(self) -> InitialPoseTopic | None:
-        """Where the robot is told where it is, if that is set."""
-        return self._pose
+    def set(
+        self, key: str, values: Mapping[str, Any] | None, bridge: Bridge | None = None
+    ) -> None:
+        """Set or clear one part of the configuration.
 
-    @property
-    def move_topic(self) -> MoveTopic | None:
-        """Where goals go, if that is set."""
-        return self._move
-
-    def set_twist(self, twist: TwistTopic | None) -> None:
-        """Set or clear where velocity goes.
+        Args:
+            key: The part, a field of ``MotionConfig``.
+            values: What it says, as plain values; None clears it. What is empty where
+                that is the default counts as left out.
+            bridge: The bridge that it goes over, if it goes over one.
 
         Raises:
-            ConfigError: If the type is none that carries a velocity, or a number or a
-                stop hook cannot be meant.
+            ConfigError: If something in it cannot be meant; every mistake is named.
 
         """
-        if twist is not None:
-            if twist.type is not None:
-                check_twist_type(twist.topic, twist.type)
-            hooks = checked_hooks(self._name, twist.stop_hooks, twist.topic)
-            twist = replace(twist, stop_hooks=hooks)
-            self._check(twist, self._move, self._pose)
-            for topic, carried in twist.writes().items():
-                twist.bridge.protect(topic, carried)
+        part = None
+        if values is not None:
+            url = "" if bridge is None else bridge.url
+            part = read_part(PARTS[key], key, values, f"robot {self._name!r}", url)
+        config = msgspec.structs.replace(self.config, **{key: part})
+        bridges = {**self._bridges, key: bridge}
+        if part is not None:
+            self._check(config, bridges)
+        if part is not None and bridge is not None:
+            for topic, carried in _written(part).items():
+                bridge.protect(topic, carried)
+        self.config, self._bridges = config, bridges
+        if key == "twist":
+            self._ask_type(config.twist, bridge)
+        self.declare()
+
+    def _ask_type(self, twist: TwistConfig | None, bridge: Bridge | None) -> None:
         if self._asking is not None:
             self._asking.remove()
             self._asking = None
-        self._twist = twist
-        if twist is not None and twist.type is None:
-            self._asking = TypeAsking(twist.bridge, twist.topic, self._take_type)
-        self.declare()
+        if twist is not None and twist.type is None and bridge is not None:
+            self._asking = TypeAsking(bridge, twist.topic, self._take_type)
 
-    @property
-    def assist(self) -> AssistSpec | None:
-        """How the robot is slowed down before what its scanner sees, if that is set."""
-        return self._assist
-
-    def set_move(self, move: MoveTopic | None) -> None:
-        """Set or clear where goals go.
-
-        Raises:
-            ConfigError: If the initial pose goes to another bridge, or something in it
-                cannot be meant.
-
-        """
-        if move is not None:
-            self._check(self._twist, move, self._pose)
-            move.protect()
-        self._move = move
-        self.declare()
-
-    def set_pose(self, pose: InitialPoseTopic | None) -> None:
-        """Set or clear where the robot is told where it is.
-
-        Raises:
-            ConfigError: If its goals go to another bridge.
-
-        """
-        if pose is not None:
-            self._check(self._twist, self._move, pose)
-            for topic, carried in pose.writes().items():
-                pose.bridge.protect(topic, carried)
-        self._pose = pose
-        self.declare()
+    def bridge(self, key: str) -> Bridge | None:
+        """Return the bridge that a part of the configuration goes over, if any."""
+        return self._bridges.get(key)
 
     def set_odometry(self, bridge: Bridge, topic: str, type: str | None) -> None:
         """Tell where the gate can see for itself how the robot moves.
@@ -160,16 +162,6 @@ class MotionRoad:
         if self._odometry != (bridge, topic, type):
             self._odometry = (bridge, topic, type)
             self.declare()
-
-    def set_assist(self, assist: AssistSpec | None) -> None:
-        """Set how the robot is slowed down before what its scanner sees.
-
-        Raises:
-            ConfigError: If something in it cannot be meant.
-
-        """
-        self._assist = assist and checked_assist(self._name, assist)
-        self.declare()
 
     def set_alignment(self, own_map: Pose) -> None:
         """Tell where the robot's own map lies on the common one: goals need it."""
@@ -203,58 +195,65 @@ class MotionRoad:
 
     def spec(self) -> RobotSpec | None:
         """Return what the gate needs to know, or None if nothing moves the robot."""
-        return self._spec(self._twist, self._move, self._pose)
+        return self._spec(self.config, self._bridges)
 
-    def _check(
-        self,
-        twist: TwistTopic | None,
-        move: MoveTopic | None,
-        pose: InitialPoseTopic | None,
-    ) -> None:
+    def _check(self, config: MotionConfig, bridges: "Links") -> None:
         """Refuse what the gate would refuse, before any of it is kept.
 
-        Who says it hears of it there, and not whoever starts the gate.
+        The error is raised where the part is set, not where the gate is started.
         """
-        spec = self._spec(twist, move, pose)
+        mistakes = Mistakes()
+        config.check((), mistakes)
+        mistakes.refuse(f"robot {self._name!r}")
+        if config.scan_assist is not None:
+            checked_assist(self._name, _assist(config.scan_assist))
+        spec = self._spec(config, bridges)
         if spec is not None:
             checked(spec)
 
-    def _spec(
-        self,
-        twist: TwistTopic | None,
-        move: MoveTopic | None,
-        pose: InitialPoseTopic | None,
-    ) -> RobotSpec | None:
-        link = twist or move or pose
+    def _spec(self, config: MotionConfig, bridges: "Links") -> RobotSpec | None:
+        twist, move, pose = config.twist, config.move, config.initial_pose
+        first = next((key for key in WRITING if getattr(config, key) is not None), None)
+        link = None if first is None else bridges[first]
         if link is None:
             return None
-        goals = {
-            **(pose.fields(move) if pose else {}),
-            **(move.fields() if move else {}),
-        }
+        driven: dict[str, Any] = {}
+        if twist is not None:
+            driven = {name: getattr(twist, name) for name in OF_BASE}
+            driven["stop_hooks"] = tuple(map(msgspec.to_builtins, twist.stop_hooks))
+            driven["twist_topic"] = twist.topic
+            if config.scan_assist is not None:
+                driven["assist"] = _assist(config.scan_assist)
+        goals: dict[str, Any] = {}
+        if move is not None:
+            goals = {
+                "goal_topic": move.topic or None,
+                "goal_type": _goal_type(move, "PoseStamped"),
+                "cancel_topic": move.cancel_topic,
+                "action": move.action,
+                "action_type": move.action_type,
+                "on_operator_loss": move.on_operator_loss,
+            }
+        if pose is not None:
+            goals["pose_topic"] = pose.topic
+            goals["pose_covariance"] = pose.covariance
+            goals["pose_type"] = _goal_type(move, "PoseWithCovarianceStamped")
+        told = move or pose
+        if told is not None:
+            goals |= {"goal_url": told.bridge, "goal_frame": told.frame}
         odometry = self._odometry
         return RobotSpec(
             id=self.id,
             name=self._name,
-            bridge_url=link.bridge.url,
-            twist_topic=twist.topic if twist else None,
+            bridge_url=link.url,
             twist_type=(twist.type if twist else None) or TWIST_TYPES[0],
             base_frame=self.base_frame,
             twist_type_assumed=twist is not None and twist.type is None,
-            stops_within=twist.stops_within if twist else None,
-            v_max=twist.v_max if twist else None,
-            w_max=twist.w_max if twist else None,
-            z_max=twist.z_max if twist else None,
-            rx_max=twist.rx_max if twist else None,
-            ry_max=twist.ry_max if twist else None,
-            a_max=twist.a_max if twist else None,
-            holonomic=twist.holonomic if twist else False,
-            assist=self._assist if twist else None,
-            stop_hooks=tuple(map(dict, twist.stop_hooks)) if twist else (),
             odometry_url=odometry[0].url if odometry else None,
             odometry_topic=odometry[1] if odometry else None,
             odometry_type=odometry[2] if odometry else None,
             own_map=(self._own_map.x, self._own_map.y, self._own_map.yaw),
+            **driven,
             **goals,
         )
 
@@ -266,17 +265,17 @@ class MotionRoad:
 
         """
         written: dict[str, str] = {}
-        for way in (self._pose, self._move, self._twist):
-            if way is not None and way.bridge.url == url:
-                written.update(way.writes())
+        for key in reversed(WRITING):
+            part, bridge = getattr(self.config, key), self._bridges.get(key)
+            if part is not None and bridge is not None and bridge.url == url:
+                written.update(_written(part))
         return written
 
     def close(self) -> None:
         """Let the gate forget the robot; it stops if it was driven."""
         # All at once: without velocity it would be another machine, for its goals.
-        self._move = self._pose = self._odometry = None
-        self.set_twist(None)
-        self.declare()
+        self.config, self._odometry = MotionConfig(), None
+        self.set("twist", None)
         roads.discard(self)
 
     def take(self) -> "Future[int]":
@@ -328,17 +327,17 @@ class MotionRoad:
 
     def heed(self, report: RobotReport) -> None:
         """Ask who else publishes velocities to the robot, while somebody does."""
-        twist, now = self._twist, time.monotonic()
+        twist, now = self.config.twist, time.monotonic()
         if report.other_writer is None or twist is None:
             self._ask_writers_at = now
         elif now >= self._ask_writers_at:
             self._ask_writers_at = now + ASK_WRITERS
             spawn(self._ask_writers(twist))
 
-    async def _ask_writers(self, twist: TwistTopic) -> None:
-        nodes = await twist.bridge.publishers(twist.topic)
-        if nodes is not None and self.gate is not None and self._twist is twist:
-            others = [n for n in nodes if not any(part in n for part in BRIDGES)]
+    async def _ask_writers(self, twist: TwistConfig) -> None:
+        bridge = self._bridges.get("twist")
+        others = None if bridge is None else await bridge.other_publishers(twist.topic)
+        if others is not None and self.gate is not None and self.config.twist is twist:
             self.gate.name_writers(self.id, tuple(others))
 
     def _gate(self) -> "GateClient":
@@ -346,24 +345,69 @@ class MotionRoad:
             raise MotionError(
                 f"robot {self._name!r} cannot be moved before webmap.start()"
             )
-        if self.spec() is None:
+        if not any(getattr(self.config, key) for key in WRITING):
             raise MotionError(
                 f"robot {self._name!r} has no twist topic and no move topic"
             )
         return self.gate
 
     def _take_type(self, found: str) -> None:
-        twist = self._twist
+        twist = self.config.twist
         if twist is None or twist.type == found:
             return
-        try:
-            check_twist_type(twist.topic, found)
-        except ConfigError as error:
-            self._complain(str(error))
-            self.set_twist(None)
+        if not is_type(found, *TWIST_TYPES):
+            self._complain(
+                f"topic {twist.topic!r} has type {found}; velocity goes to "
+                f"{TWIST_TYPES[0]} or {TWIST_TYPES[1]}"
+            )
+            self.set("twist", None)
             return
-        self._twist = replace(twist, type=found)
+        typed = msgspec.structs.replace(twist, type=found)
+        self.config = msgspec.structs.replace(self.config, twist=typed)
         self.declare()
+
+
+def _written(part: object) -> dict[str, str]:
+    """Return what the gate alone writes for a part: topics, and what each carries."""
+    match part:
+        case TwistConfig():
+            hooks = {hook.topic: STOP for hook in part.stop_hooks if hook.topic}
+            return {**hooks, part.topic: "a velocity"}
+        case MoveConfig():
+            action = part.action
+            names = (
+                (part.topic, "a goal"),
+                (part.cancel_topic, "the end of a goal"),
+                (action and f"{action}/goal", "a goal"),
+                (action and f"{action}/cancel", "the end of a goal"),
+            )
+            return {name: carried for name, carried in names if name}
+        case InitialPoseConfig():
+            return {part.topic: "an initial pose"}
+    return {}
+
+
+def _goal_type(move: MoveConfig | None, name: str) -> str:
+    """Return a type of ``geometry_msgs`` as the dialect of the action has it."""
+    ros2 = move is not None and move.action and "/action/" in move.action_type
+    return f"geometry_msgs/msg/{name}" if ros2 else f"geometry_msgs/{name}"
+
+
+def _assist(config: ScanAssistConfig) -> AssistSpec:
+    """Return scan assist as the gate takes it: a radius becomes corners."""
+    size = config.footprint
+    corners = polygon_around(size) if isinstance(size, float) else tuple(size)
+    return AssistSpec(
+        topic=config.topic,
+        footprint=corners,
+        sensor=(config.x, config.y, math.radians(config.angle)),
+        upside_down=config.upside_down,
+        frame=config.frame,
+        stop_distance=config.stop_distance,
+        brake=config.brake,
+        blind=config.blind,
+        creep=config.creep,
+    )
 
 
 roads: set[MotionRoad] = set()

@@ -1,17 +1,14 @@
-"""How a robot hears where it is: one topic, its type found out when not said."""
+"""The topic with a robot's poses, whose type is found out if it is not given."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
-from webmap.core.tasks import spawn
+from webmap.core.placing import PoseReading
 from webmap.core.type_asking import TypeAsking
 from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry import Quaternion, Twist, Vector3
-from webmap.geometry.reach import FARTHEST
+from webmap.geometry import FARTHEST
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
-from webmap.ros.messages import OdometryMsg
 from webmap.ros.views import (
     ODOMETRY_VIEWS,
     OdometryView,
@@ -20,47 +17,10 @@ from webmap.ros.views import (
 )
 from webmap.scope import Removable, Scope, no_scope
 
+ODOMETRY = "nav_msgs/Odometry"
+"""The type of poses that has a velocity too."""
+
 _NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
-
-
-@dataclass(frozen=True, slots=True)
-class PoseReading:
-    """What one message says of a robot's pose, and of its motion if it does."""
-
-    position: Vector3
-    orientation: Quaternion
-    twist: Twist | None = None
-    frame_id: str = ""
-    """The frame of the pose; empty if the message does not say."""
-
-    stamp: float = 0.0
-    """When it was measured, in seconds of the robot's clock; 0 if not said."""
-
-    @classmethod
-    def of(cls, message: OdometryView) -> "PoseReading":
-        """Take the pose out of a decoded message."""
-        place = message.place
-        return cls(
-            place.position.vector,
-            place.orientation.quaternion,
-            message.velocity if isinstance(message, OdometryMsg) else None,
-            message.frame_id,
-            message.stamp,
-        )
-
-    @property
-    def is_usable(self) -> bool:
-        """Whether it is somewhere that can be drawn, and the orientation is one."""
-        p, q = self.position, self.orientation
-        numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-        return all(abs(number) < FARTHEST for number in numbers) and q.norm > 1e-6
-
-
-class PoseListener(Protocol):
-    """Who is told the poses."""
-
-    def __call__(self, reading: PoseReading) -> None:
-        """Take the newest pose."""
 
 
 class OdometryFeed:
@@ -70,14 +30,14 @@ class OdometryFeed:
         bridge: The link to the ROS system that has the topic.
         topic: The topic.
         throttle: The least time between two messages, in milliseconds.
-        type: The message type; asked of rosapi, or told from the first message's
-            shape, if not given.
+        type: The message type; if not given, the bridge is asked, and the shape of the
+            first message is looked at.
         listener: Called with each pose, in the model's thread.
+        typed: Called with the type when it is known, which may be at once; "" for one
+            that has no pose.
         complain: Called with a sentence for people when the topic cannot be used,
             and with None when it can be used again.
-        typed: Called with the type when it is known, which may be at once; "" is one
-            that tells no pose.
-        scope: Is told of messages that cannot be decoded.
+        report: Called with a sentence about what failed and is over.
 
     Raises:
         ConfigError: If ``type`` is given and has no pose in it.
@@ -90,54 +50,52 @@ class OdometryFeed:
         topic: str,
         throttle: int,
         type: str | None,
-        listener: PoseListener,
-        complain: Callable[[str | None], None],
+        *,
+        listener: Callable[[PoseReading], None],
         typed: Callable[[str], None],
-        scope: Scope,
+        complain: Callable[[str | None], None],
+        report: Callable[[str], None],
     ) -> None:
         self.bridge = bridge
         self.topic = topic
         self.throttle = throttle
         self.type: str | None = None
         self._listener = listener
-        self._complain = complain
         self._typed = typed
-        self._scope = scope
-        self._opening: Removable | None = None
+        self._tell_complaint = complain
+        self._complaint: str | None = None
+        self._report = report
+        self._scope = Scope(
+            f"poses of {topic}", self._failed, lambda _: self._complain(None)
+        )
         self._subscription: Removable | None = None
         self._asking: Removable | None = None
         if type is None:
-            self._opening = bridge.on_open(self._on_open)
-            return
-        self._subscribe(odometry_view(type))
+            self._asking = TypeAsking(bridge, topic, self._told, self._listen_untyped)
+        else:
+            self._subscribe(odometry_view(type))
 
     def remove(self) -> None:
         """Unsubscribe; the second call does nothing."""
-        for thing in (self._opening, self._subscription, self._asking):
+        for thing in (self._subscription, self._asking):
             if thing is not None:
                 thing.remove()
-        self._opening = self._subscription = self._asking = None
+        self._subscription = self._asking = None
 
-    def _on_open(self) -> None:
+    def _listen_untyped(self) -> None:
+        """Find the type by the shape of the first message: the bridge may not know it.
+
+        The bridge is asked all the same, since the first message may come only when the
+        robot moves.
+        """
         if self._subscription is None:
-            spawn(self._find_out())
-
-    async def _find_out(self) -> None:
-        found = await self.bridge.topic_type(self.topic)
-        if self._subscription is not None or self._opening is None:
-            return
-        if found is None:
             with self._scope.active():
                 self._subscription = self.bridge.subscribe(
                     self.topic, self._on_first, throttle=self.throttle
                 )
-            # Who has the topic may start later, and may say nothing before it moves.
-            self._asking = TypeAsking(self.bridge, self.topic, self._told)
-            return
-        self._told(found)
 
     def _told(self, type: str) -> None:
-        """Take the type that rosapi tells."""
+        """Take the type that the bridge returns."""
         if self.type is not None:
             return
         try:
@@ -169,9 +127,7 @@ class OdometryFeed:
         self._hear(first)
 
     def _subscribe(self, view: type[OdometryView]) -> None:
-        self.type = next(
-            name for name, known in ODOMETRY_VIEWS.items() if known is view
-        )
+        self.type = _NAMES[view]
         self._typed(self.type)
         with self._scope.active():
             self._subscription = self.bridge.subscribe(
@@ -184,12 +140,25 @@ class OdometryFeed:
         except ProtocolError as error:
             self._complain(f"topic {self.topic!r}: {error}")
             return
-        if reading.is_usable:
-            self._complain(None)
-            with no_scope():  # what others make of it is not this topic's
-                self._listener(reading)
-        else:
+        if not reading.is_usable:
             self._complain(
                 f"topic {self.topic!r}: a pose with NaN, infinity, a number beyond "
                 f"{FARTHEST:g} or a quaternion of zeros was ignored"
             )
+            return
+        if self._complaint is not None:
+            self._complain(None)
+        with no_scope():  # what others make of it is not this topic's
+            self._listener(reading)
+
+    def _failed(self, text: str, about: object) -> None:
+        """Pass on what the bridge reports; what is about nothing is over."""
+        if about is None:
+            self._report(text)
+        else:
+            self._complain(text)
+
+    def _complain(self, text: str | None) -> None:
+        if text != self._complaint:
+            self._complaint = text
+            self._tell_complaint(text)

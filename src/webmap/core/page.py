@@ -9,24 +9,78 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.hand_speeds import HandSpeeds
-from webmap.core.page_ports import PageChannel, Publisher, Viewer
+from webmap.core.pictures import Publisher
 from webmap.core.tasks import begin
 from webmap.core.view import initial_view
 from webmap.errors import ConfigError
+from webmap.gate.messages import Role
 from webmap.plain_files import resolved
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.events import Event, Handler, Listener
 from webmap.scene.fragment import Fragment
 from webmap.scope import Removal, Scope, current_scope
+from webmap.wire.session import SceneSession
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 log = logging.getLogger("webmap.page")
 
+
+class HandSpeeds:
+    """The most that each module of a page asks for, and the module the hands are at."""
+
+    def __init__(self) -> None:
+        self._most: dict[int, tuple[float, float]] = {}
+        self._driving: int | None = None
+
+    @property
+    def in_force(self) -> tuple[float, float]:
+        """What holds now, in m/s and rad/s.
+
+        That of the module that the hands are at; the least of all while they are at
+        none; zero if there is no module that drives.
+        """
+        if not self._most:
+            return (0.0, 0.0)
+        if self._driving in self._most:
+            return self._most[self._driving]
+        linear, angular = zip(*self._most.values(), strict=True)
+        return (min(linear), min(angular))
+
+    def set(self, module: object, speed: float, rotation_speed: float) -> None:
+        """Note that a module drives, and how fast at the most."""
+        self._most[id(module)] = (speed, rotation_speed)
+
+    def drive(self, module: object, on: bool) -> None:
+        """Note that the hands are at a module, or left it."""
+        if on:
+            self._driving = id(module)
+        elif self._driving == id(module):
+            self._driving = None
+
+    def clear(self, module: object) -> None:
+        """Note that a module drives no more."""
+        self._most.pop(id(module), None)
+        self.drive(module, False)
+
+
 PageFunction = Callable[["Page"], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Viewer:
+    """One browser that has signed in; all its pages and tabs are one viewer."""
+
+    id: str
+    """Opaque, the same for as long as the browser stays signed in."""
+
+    name: str
+    """What other people read when this viewer drives."""
+
+    role: Role = "operator"
+    """What the viewer may do: look, drive, or administer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +157,7 @@ class Page:
     def __init__(
         self,
         entry: PageEntry,
-        channel: PageChannel,
+        channel: SceneSession,
         viewer: Viewer,
         publisher: Publisher,
         sizes: Mapping[str, tuple[float, float]],

@@ -8,7 +8,7 @@ import threading
 import time
 from collections import deque
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from webmap.geometry import Affine
 from webmap.scene import svg
@@ -36,6 +36,19 @@ def pixels_across(file: Path) -> int | None:
             return image.width
     except (OSError, ValueError, Image.DecompressionBombError):
         return None
+
+
+class Publisher(Protocol):
+    """Gives files URLs that a page can load; the server implements it."""
+
+    def publish_file(self, path: Path) -> str:
+        """Let pages load an ES module or a style sheet; return its URL."""
+
+    def publish_image(self, image: Path) -> str:
+        """Let pages load an image; return the URL of this version of it."""
+
+    def withdraw_image(self, url: str) -> None:
+        """Undo one :meth:`publish_image`."""
 
 
 class Published(NamedTuple):

@@ -1,17 +1,17 @@
 """Where a robot's module draws: on the robot, or in the world under it."""
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from webmap.core.frames import frames_of
-from webmap.core.pose_troubles import Lasting
+from webmap.core.frames import lasting
+from webmap.core.placing import Lasting
+from webmap.core.pose_source import affine
 from webmap.core.sighting import Sighting, Sightings
-from webmap.core.whereabouts import affine
-from webmap.errors import ConfigError, ProtocolError
+from webmap.errors import ConfigError
 from webmap.geometry import Affine, Pose, Vector3
-from webmap.geometry.reach import FARTHEST
 from webmap.scene import svg
 from webmap.scene.element import Child, Element
 from webmap.scope import Removal, keep
@@ -20,6 +20,8 @@ from webmap.tf.transform import alike
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+
+log = logging.getLogger("webmap.modules")
 
 FRAMES = ("map", "robot")
 
@@ -43,8 +45,8 @@ class Placed:
 
     A group in the map's frame lies under the robot's model.
 
-    The group itself only ever turns in the plane: what is tilted, upside down or on its
-    side is drawn as it looks from above, by who gives a function for that.
+    The group itself only turns in the plane. For data that is tilted, upside down or on
+    its side, pass a function to :meth:`stand_in` that draws it as seen from above.
 
     Args:
         robot: The robot.
@@ -79,7 +81,9 @@ class Placed:
         self.frame = frame
         self._class = class_
         mount = Pose(x, y, math.radians(angle))
-        self._sightings = Sightings(robot, frame, mount if mount != Pose() else None)
+        self._sightings = Sightings(
+            robot.whereabouts, frame, mount if mount != Pose() else None
+        )
         self._seen: tuple[str, float] | None = None
         self._draw: Draw | None = None
         self._drawn: Transform | None = None
@@ -88,6 +92,7 @@ class Placed:
         robot's; or to the common map if no message was ever taken."""
         self._on_robot = frame == "robot"
         self._settled = True
+        self._upright: dict[Element, tuple[float, float]] = {}
         self._trouble = ""
         self._lasting = Lasting()
         self.svg = svg.g(*children, class_=class_, pointer_events="none")
@@ -102,13 +107,14 @@ class Placed:
     def stand_in(self, frame_id: str, stamp: float, draw: Draw | None = None) -> None:
         """Take coordinates to be in the frame that a message names, as it was then.
 
-        Where that frame was at the stamp is told by the frames that the robot was given
-        with ``set_tf``, and else by its poses. If the newest of them is older than the
-        stamp, the group is put where they would go on to, and set right when they come.
+        The frames that the robot was given with ``set_tf`` say where that frame was at
+        the stamp, or the robot's poses if there are none. If the newest of them is
+        older than the stamp, the motion is extrapolated, and corrected when newer ones
+        come.
 
-        A robot without frames is taken to carry its sensors where their modules were
-        told, or at its own origin. A frame that nobody tells of is taken to be where it
-        was last, or the robot's own or the map's, and that is said.
+        Without frames, a sensor is where the options of its module place it, or at the
+        robot's origin. If a frame is unknown, its last place is used, or the robot's
+        frame or the map's, and the robot shows a problem.
 
         Args:
             frame_id: The frame of the message; empty if it does not say.
@@ -118,9 +124,14 @@ class Placed:
                 group has to lie in the plane of the frame.
 
         """
+        before = (self._seen, self._draw, self._drawn)
         self._seen = (frame_id, stamp)
         self._draw, self._drawn = draw, None
-        self._settle()
+        try:
+            self._settle()
+        except BaseException:
+            self._seen, self._draw, self._drawn = before
+            raise
 
     def moved_within(self, frame_id: str, stamp: float, seconds: float) -> Pose:
         """Return where a sensor gets in a time, in its own plane as it was before.
@@ -140,29 +151,47 @@ class Placed:
             return Pose()
         return (then.offset.inverse @ later.offset).planar
 
-    def follow(self) -> None:
-        """Stay in place on the map while the robot goes along."""
+    def keep_upright(self, element: Element, x: float, y: float) -> None:
+        """Keep an element of the group from turning with it.
+
+        Args:
+            element: Its y then points down and its units are centimetres.
+            x: Where it is from the group's origin, in metres along the map's x.
+            y: In metres along the map's y.
+
+        """
+        self._upright[element] = (x, y)
         self._put()
 
     def _news(self) -> None:
-        if not self._settled:
+        if self._settled:
+            if not self._on_robot or self._upright:
+                self._put()
+            return
+        try:
             self._settle()
-        else:
-            self._put()
+        except Exception as error:  # others hear of the news too
+            self._settled = True
+            self._trouble = "failed"  # so that the next drawing that works clears it
+            log.exception("%s: drawing failed", self._class)
+            words = f"drawing failed: {type(error).__name__}: {error}"
+            self.robot.set_problem(self, f"{self._class}: {words}")
 
     def _settle(self) -> None:
         """Find out where the group is, as well as it can be known by now."""
         if self._seen is None:
             return
         found = self._sightings.look(*self._seen)
-        self._on_robot, self._settled = found.on_robot, found.settled
         if self._draw is None:
-            self._offset = found.offset.from_above
+            offset = found.offset.from_above
         else:
             pose, tilt = found.offset.heading_and_tilt
             lift = Vector3(0.0, 0.0, tilt.translation.z - found.ground)
             self._tilt(self._draw, replace(tilt, translation=lift))
-            self._offset = affine(pose)
+            offset = affine(pose)
+        # Only now, since drawing may fail: what was drawn before then stays in place.
+        self._offset, self._on_robot = offset, found.on_robot
+        self._settled = found.settled
         self._say(found)
         self._put()
 
@@ -178,15 +207,16 @@ class Placed:
             at = self.robot.position
             own = affine(Pose(at.x, at.y, self.robot.yaw))
             if self._seen is not None:
-                place = self.robot.whereabouts.placing @ place
+                place = self.robot.whereabouts.common_from_own @ place
             place = own.inverse @ place
         put(self.svg, place)
+        for element, (x, y) in self._upright.items():
+            turn = Affine.rotation(-self.robot.yaw - math.atan2(place.b, place.a))
+            element.set_matrix(turn @ Affine(0.01, 0, 0, -0.01, x, y))
 
     def _say(self, found: Sighting) -> None:
-        """Say what is wrong with the place, once; take it back when that is mended."""
-        tf = self.robot.tf if found.trouble else None
-        frames = None if tf is None else frames_of(tf["bridge"], tf["namespace"])
-        trouble = self._lasting.look(found.trouble, frames)
+        """Show what is wrong with the place once; clear it when that is over."""
+        trouble = lasting(self._lasting, found.trouble, self.robot.whereabouts.frames)
         if trouble == self._trouble:
             return
         self._trouble = trouble
@@ -207,55 +237,3 @@ def put(element: Element, place: Affine) -> None:
         element.set_pose(place.e, place.f, math.atan2(place.b, place.a))
     else:
         element.set_matrix(place)
-
-
-def rounded(value: float) -> float:
-    """Return metres to the millimetre, which is short on the wire."""
-    return round(value, 3) + 0.0
-
-
-def check_finite(points: list[tuple[float, float]], what: str) -> None:
-    """Let points pass that can be drawn.
-
-    Raises:
-        ProtocolError: If one is not finite, or farther away than anything can be; it
-            is named by its number.
-
-    """
-    for number, (x, y) in enumerate(points):
-        if not (math.isfinite(x) and math.isfinite(y)):
-            raise ProtocolError(
-                f"{what} must be of finite numbers, got ({x}, {y}) as point {number} "
-                f"of {len(points)}"
-            )
-        if max(abs(x), abs(y)) > FARTHEST:
-            raise ProtocolError(
-                f"{what} must be within {FARTHEST:g} m of the origin, got ({x:g}, "
-                f"{y:g}) as point {number} of {len(points)}"
-            )
-
-
-def thinned(count: int, most: int) -> range | list[int]:
-    """Return which of ``count`` things to keep: evenly chosen, and the last one."""
-    if count <= most:
-        return range(count)
-    step = count / most
-    return [*(int(i * step) for i in range(most - 1)), count - 1]
-
-
-def sector(radius: float, half: float) -> str | None:
-    """Return the path of a sector about x; None if it has no size.
-
-    Args:
-        radius: Metres.
-        half: Half its angle, in radians; all round from pi on.
-
-    """
-    if radius <= 0 or half < 1e-4:
-        return None
-    half = min(half, math.pi - 1e-3)
-    x, y = radius * math.cos(half), radius * math.sin(half)
-    large = int(half > math.pi / 2)
-    return (
-        f"M0 0L{x:.4f} {-y:.4f}A{radius:.4f} {radius:.4f} 0 {large} 1 {x:.4f} {y:.4f}z"
-    )

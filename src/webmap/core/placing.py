@@ -1,47 +1,113 @@
-"""Where a robot is in the frame of the map, from its odometry and the frames."""
+"""Readings of a robot's pose, and how frames take them to the robot's map."""
 
 import math
-from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
-from webmap.core.odometry import PoseReading
-from webmap.tf import Buffer, NotKnownThen, Transform, TransformError
+from webmap.geometry import FARTHEST, Quaternion, Twist, Vector3
+from webmap.ros.messages import OdometryMsg
+from webmap.tf import Transform, TransformError
+
+if TYPE_CHECKING:
+    from webmap.core.frames import Frames
+    from webmap.ros.views import OdometryView
 
 OTHER_CLOCK = 60.0
 """Seconds between two stamps of one moment beyond which they are by different clocks;
 what is less may be a recording that was put together."""
 
 LATE = 2.0
-"""Seconds for which nothing new is told of a way before that is said."""
+"""Seconds without news of a frame after which that is a problem."""
 
 CLOCKS = "clocks"
-"""The kind of trouble that poses and frames have other clocks."""
+"""The kind of problem that poses and frames have different clocks."""
+
+
+PATIENCE = 1.0
+"""Seconds for which something is wrong before that is shown: when a link opens, frames
+come one after another, and that is no trouble."""
+
+
+class PoseReading(NamedTuple):
+    """The pose of a robot in one message, and its velocity if the message has one."""
+
+    position: Vector3
+    orientation: Quaternion
+    twist: Twist | None = None
+    frame_id: str = ""
+    """The frame of the pose; empty if the message names none."""
+
+    stamp: float = 0.0
+    """When it was measured, in seconds of the robot's clock; 0 if not known."""
+
+    @classmethod
+    def of(cls, message: "OdometryView") -> "PoseReading":
+        """Take the pose out of a decoded message."""
+        place = message.place
+        p, q = place.position, place.orientation
+        return cls(
+            Vector3(p.x, p.y, p.z),
+            Quaternion(q.x, q.y, q.z, q.w),
+            message.velocity if isinstance(message, OdometryMsg) else None,
+            message.frame_id,
+            message.stamp,
+        )
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether it is somewhere that can be drawn, and the orientation is one."""
+        p, q = self.position, self.orientation
+        # Comparisons with NaN are false.
+        return (
+            abs(p.x) < FARTHEST
+            and abs(p.y) < FARTHEST
+            and abs(p.z) < FARTHEST
+            and q.norm > 1e-6
+            and max(abs(q.x), abs(q.y), abs(q.z), abs(q.w)) < FARTHEST
+        )
+
+    @property
+    def transform(self) -> Transform:
+        """The pose as what takes coordinates of the robot to those of its frame."""
+        return Transform(self.position, self.orientation)
+
+    def moved(self, by: Transform, frame_id: str) -> "PoseReading":
+        """Return the pose in another frame, where ``by`` has the frame of the pose."""
+        placed = by @ self.transform
+        return PoseReading(
+            placed.translation, placed.rotation, self.twist, frame_id, self.stamp
+        )
 
 
 class Placing:
-    """Takes poses of a robot to the frame of the map.
+    """Takes poses of a robot to the frame of its map.
 
     Args:
-        buffer: What is known of the frames.
-        map_frame: The frame that robots are drawn in.
+        frames: What is known of the frames.
+        map_frame: The frame that the robot is drawn in.
         base_frame: The robot's own frame.
-        namespace: Of the topics that the frames come from.
+        quiet: Whether poses that cannot be taken there are no problem to be shown.
 
     """
 
     def __init__(
-        self, buffer: Buffer, map_frame: str, base_frame: str, namespace: str = ""
+        self, frames: "Frames", map_frame: str, base_frame: str, *, quiet: bool = False
     ) -> None:
-        self.map_frame = buffer.name(map_frame, namespace)
-        self.base_frame = buffer.name(base_frame, namespace)
-        self._buffer = buffer
-        self._namespace = namespace
+        self.buffer = frames.buffer
+        self._namespace = frames.namespace
+        self.map_frame = self.name(map_frame)
+        self.base_frame = self.name(base_frame)
+        self.quiet = quiet
+        self.kind = ""
+        """The kind of problem that there is with the frames; empty if there is none."""
+        self.problem = ""
+        """The problem, in a sentence."""
         self._known: dict[str, Transform] = {}
         self._newest = -math.inf
         self._news: dict[str, tuple[float, float]] = {}
-        self.problem: str | None = None
-        """What is wrong with the frames that the robot is drawn by, in a sentence."""
-        self.kind = ""
-        """Which kind of trouble that is; the words of one kind may differ."""
+
+    def name(self, frame: str) -> str:
+        """Return the whole name of a frame as the robot names it."""
+        return self.buffer.name(frame, self._namespace)
 
     def of_reading(self, reading: PoseReading, now: float) -> PoseReading:
         """Return a pose in the frame of the map.
@@ -55,70 +121,55 @@ class Placing:
             now: When it came, in seconds of any clock that only goes forward.
 
         """
-        frame = self._buffer.name(reading.frame_id, self._namespace)
+        frame = self.name(reading.frame_id)
         if not frame or frame == self.map_frame:
-            self._mended()
-            return replace(reading, frame_id=frame)
+            self.kind = ""
+            return reading._replace(frame_id=frame)
         try:
-            map_from_frame = self._lookup(frame, reading.stamp)
-            self._known[frame] = map_from_frame
-            self._look_whether_it_stopped(frame, now)
-            self._look_at_clocks(frame, reading.stamp)
+            found = self.buffer.find(self.map_frame, frame, reading.stamp)
         except TransformError as error:
             self._wrong(error, f"it is drawn where {frame!r} has it: {error}")
             if frame not in self._known:
-                return replace(reading, frame_id=frame)
-            map_from_frame = self._known[frame]
-        placed = map_from_frame @ Transform(reading.position, reading.orientation)
-        return replace(
-            reading,
-            position=placed.translation,
-            orientation=placed.rotation,
-            frame_id=self.map_frame,
-        )
+                return reading._replace(frame_id=frame)
+        else:
+            self._known[frame] = found.transform
+            self._look_whether_it_stopped(frame, found.newest, now)
+            self._look_at_clocks(frame, found.newest, reading.stamp)
+        return reading.moved(self._known[frame], self.map_frame)
 
     def of_base(self, now: float) -> PoseReading | None:
-        """Return where the frames have the base; None if they say nothing new of it.
+        """Return where the frames have the base; None if there is no news of it.
 
         Args:
             now: The time, in seconds of any clock that only goes forward.
 
         """
+        base = self.base_frame
         try:
-            newest = self._buffer.newest(self.map_frame, self.base_frame) or 0.0
-            self._look_whether_it_stopped(self.base_frame, now)
+            newest = self.buffer.newest(self.map_frame, base)
+            self._look_whether_it_stopped(base, newest, now)
+            newest = newest or 0.0
             if newest == self._newest:
                 return None
-            placed = self._buffer.lookup(self.map_frame, self.base_frame)
-            self._newest = newest
+            placed = self.buffer.lookup(self.map_frame, base)
         except TransformError as error:
             self._wrong(error, f"its place is not known: {error}")
             return None
+        self._newest = newest
         return PoseReading(
-            placed.translation,
-            placed.rotation,
-            frame_id=self.map_frame,
-            stamp=newest,
+            placed.translation, placed.rotation, None, self.map_frame, newest
         )
 
-    def _lookup(self, frame: str, stamp: float) -> Transform:
-        if stamp:
-            try:
-                return self._buffer.lookup(self.map_frame, frame, stamp)
-            except NotKnownThen:
-                pass
-        return self._buffer.lookup(self.map_frame, frame)
-
-    def _look_whether_it_stopped(self, frame: str, now: float) -> None:
-        """Say so if nothing new comes of a way; what is static need not."""
-        newest = self._buffer.newest(self.map_frame, frame)
-        said, heard = self._news.get(frame, (None, now))
-        if newest is None or newest != said:
+    def _look_whether_it_stopped(
+        self, frame: str, newest: float | None, now: float
+    ) -> None:
+        """Note a problem if there is no news of a frame; what is static needs none."""
+        before, heard = self._news.get(frame, (None, now))
+        if newest is None or newest != before:
             heard = now
             self._news[frame] = (newest or 0.0, now)
-        if now <= heard + LATE:
-            self._mended()
-        else:
+        self.kind = ""
+        if now > heard + LATE:
             self.kind = "late"
             self.problem = (
                 f"nothing new of {self.map_frame!r} -> {frame!r} was told for more "
@@ -126,9 +177,8 @@ class Placing:
                 f"it still run?"
             )
 
-    def _look_at_clocks(self, frame: str, stamp: float) -> None:
-        """Say so if a pose and the frames cannot be by one clock."""
-        newest = self._buffer.newest(self.map_frame, frame)
+    def _look_at_clocks(self, frame: str, newest: float | None, stamp: float) -> None:
+        """Note a problem if a pose and the frames cannot be by one clock."""
         if self.kind or not stamp or newest is None:
             return
         apart = stamp - newest
@@ -144,5 +194,25 @@ class Placing:
     def _wrong(self, error: TransformError, words: str) -> None:
         self.kind, self.problem = type(error).__name__, words
 
-    def _mended(self) -> None:
-        self.kind, self.problem = "", None
+
+class Lasting:
+    """Finds out when trouble has lasted for a while."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def due(self, trouble: str, now: float, earliest: float) -> float | None:
+        """Return when trouble is to be shown; None if there is none.
+
+        Args:
+            trouble: Which kind there is now; empty if there is none.
+            now: The time, in seconds of any clock that only goes forward.
+            earliest: When it is to be shown at the earliest.
+
+        """
+        if not trouble:
+            self._since = None
+            return None
+        if self._since is None:
+            self._since = now
+        return max(self._since + PATIENCE, earliest)

@@ -1,108 +1,97 @@
-"""Where the poses of a robot come from: a topic, the frames, or one by the other."""
+"""Hears where a robot is, by a topic and by frames, and has its poses shown.
 
+What follows from a message is decided in :mod:`webmap.core.pose_pipeline`; here are the
+subscriptions, the clock and the alignment.
+"""
+
+import math
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
+from webmap.core.alignment import HERE, alignments
 from webmap.core.frames import Frames, frames_of
-from webmap.core.motion import MotionRoad
-from webmap.core.odometry import OdometryFeed, PoseReading
-from webmap.core.placing import Placing
-from webmap.core.pose_troubles import PoseTroubles
-from webmap.core.refusals import Owner
+from webmap.core.odometry import ODOMETRY, OdometryFeed
+from webmap.core.placing import Placing, PoseReading
+from webmap.core.pose_pipeline import PosePipeline, Problem, Step
 from webmap.core.silence import SilenceWatch
-from webmap.core.whereabouts import Whereabouts
-from webmap.geometry import Pose
+from webmap.geometry import Affine, Pose
 from webmap.ros.bridge import Bridge
-from webmap.scope import Removal, Scope, no_scope
+from webmap.scope import Removal, no_scope
 
-ODOMETRY = "nav_msgs/Odometry"
-"""The type of poses that tells velocity too."""
-
-
-class PoseOwner(Owner, Protocol):
-    """Who is told what is wrong with its poses: a robot."""
-
-    name: str
-
-    def report_error(self, text: str) -> None:
-        """Show people what failed and is over."""
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
 
 
 class PoseSource:
-    """Takes a robot's poses from where they come to the common map.
+    """Brings a robot's poses from where they come to the common map.
 
     Args:
-        owner: The robot, which is told what is wrong with its poses.
-        motion: Its road to the gate, which looks at the odometry for itself.
-        heard: Called whenever a pose came in, and before it is shown.
-        show: Called with each pose, on the common map.
+        robot: The robot, which shows its poses and what is wrong with them.
 
     """
 
-    def __init__(
-        self,
-        owner: PoseOwner,
-        motion: MotionRoad,
-        heard: Callable[[], object],
-        show: Callable[[PoseReading], object],
-    ) -> None:
-        self.whereabouts = Whereabouts()
-        self.stamp: float | None = None
-        """When the newest was sent, in seconds of :func:`time.monotonic`."""
-        self.heard_at: float | None = None
-        """When the newest came in, by the same clock."""
-        self.expected_at: float | None = None
-        """When the newest pose came that would also come from a robot at rest."""
+    def __init__(self, robot: "Robot") -> None:
+        self.pipeline = PosePipeline()
         self.feed: OdometryFeed | None = None
         """The topic, if there is one."""
-        self._owner = owner
-        self._motion = motion
-        self._heard = heard
-        self._show = show
-        self._frames: Frames | None = None
-        self._placing: Placing | None = None
-        self._quiet = False
+        self.frames: Frames | None = None
+        """What poses are placed by; None to take them as they come."""
+        self.bridge: Bridge | None = None
+        """The link that poses come over."""
+        self.own_alignment: Pose | None = None
+        """The robot's own alignment; None if it goes with its bridge."""
+        self.alignment = HERE
+        """Where the robot's own map lies on the common one."""
+        self.common_from_own = Affine()
+        """What takes points of the robot's own map to the common one."""
+        self.heard_at: float | None = None
+        """When the newest pose came in, in seconds of :func:`time.monotonic`."""
+        self.expected_at: float | None = None
+        """When the newest pose came that would also come from a robot at rest."""
+        self._robot = robot
+        self._silence = SilenceWatch(robot)
+        self._problems: Mapping[str, Problem] = {}
         self._hears_frames = Removal(lambda: None)
-        self._troubles = PoseTroubles(owner)
-        self._silence = SilenceWatch(owner)
+        self._hears_alignment = Removal(lambda: None)
+        self._listeners: dict[int, Callable[[], object]] = {}
+
+    # Where poses come from.
 
     def follow(
         self, bridge: Bridge, topic: str, throttle: int, type: str | None
     ) -> None:
         """Take poses from a topic; see :meth:`Robot.set_odometry_topic`."""
         self.unfollow()
-        say = self._on_feed_problem
-
-        def typed(type: str | None) -> None:
-            # From the first word on: who drives a robot by odometry that never came
-            # drives blind. Poses without a velocity show no motion in any case.
-            if type in (None, ODOMETRY):
-                self._motion.set_odometry(bridge, topic, type)
-            else:
-                self._motion.clear_odometry()
-
+        typed = partial(self._on_type, bridge, topic)
         if type is None:
-            typed(None)  # else the feed says it at once
-        scope = Scope(f"poses of {topic}", self._failed, lambda _: say(None))
+            typed(None)  # else the feed calls it at once
         try:
             with no_scope():
                 self.feed = OdometryFeed(
-                    bridge, topic, throttle, type, self._on_pose, say, typed, scope
+                    bridge,
+                    topic,
+                    throttle,
+                    type,
+                    listener=self._on_reading,
+                    typed=typed,
+                    complain=self._on_complaint,
+                    report=self._robot.report_error,
                 )
         except BaseException:
-            self._motion.clear_odometry()
+            self._robot.motion.clear_odometry()
             raise
-        self._find_bridge()
+        self._restart()
 
     def unfollow(self) -> None:
-        """Take poses from no topic; does nothing if it is so."""
+        """Stop taking poses from a topic; does nothing if there is none."""
         if self.feed is not None:
             self.feed.remove()
             self.feed = None
-            self._owner.clear_problem("odometry")
-            self._motion.clear_odometry()
-            self._find_bridge()
+            self._robot.clear_problem("odometry")
+            self._robot.motion.clear_odometry()
+            self._restart()
 
     def place(
         self,
@@ -114,119 +103,173 @@ class PoseSource:
     ) -> None:
         """Take poses to the frame of the map; see :meth:`Robot.set_tf`."""
         self.unplace()
-        frames = frames_of(bridge, namespace)
-        self._frames = frames
-        self._placing = Placing(frames.buffer, map_frame, base_frame, frames.namespace)
-        self._motion.base_frame = self._placing.base_frame
-        self._quiet = quiet
+        frames = self.frames = frames_of(bridge, namespace)
+        placing = Placing(frames, map_frame, base_frame, quiet=quiet)
+        self.pipeline.placing = placing
+        self._robot.motion.base_frame = placing.base_frame
         self._hears_frames = frames.join(self._on_frames)
-        self._find_bridge()
+        self._restart()
 
     def unplace(self) -> None:
-        """Take poses as they come; does nothing if it is so."""
+        """Stop placing poses by frames; does nothing if there are none."""
         self._hears_frames.remove()
-        self._frames = self._placing = None
-        self._find_bridge()
+        self.frames = self.pipeline.placing = None
+        self._restart()
 
     @property
     def tf(self) -> Mapping[str, Any] | None:
         """The arguments of :meth:`Robot.set_tf`, None if it is not set."""
-        if self._frames is None or self._placing is None:
+        frames, placing = self.frames, self.pipeline.placing
+        if frames is None or placing is None:
             return None
         return {
-            "bridge": self._frames.bridge,
-            "map_frame": self._placing.map_frame,
-            "base_frame": self._placing.base_frame,
-            "namespace": self._frames.namespace,
-            "quiet": self._quiet,
+            "bridge": frames.bridge,
+            "map_frame": placing.map_frame,
+            "base_frame": placing.base_frame,
+            "namespace": frames.namespace,
+            "quiet": placing.quiet,
         }
-
-    def align(self, pose: Pose | None) -> None:
-        """Lay the robot's own map somewhere; with None it goes with its bridge."""
-        self.whereabouts.align(pose)
-        self._on_alignment()
 
     def end(self) -> None:
         """Hear of no pose any more."""
         self.unfollow()
         self.unplace()
 
-    def _on_pose(self, reading: PoseReading) -> None:
+    # Where the robot's own map lies.
+
+    @property
+    def newest(self) -> PoseReading | None:
+        """The newest pose, in the robot's own map."""
+        return self.pipeline.newest
+
+    def come(self, *, within: float) -> bool:
+        """Return whether a pose came in the last seconds, however old it was then."""
+        heard = self.heard_at
+        return heard is not None and time.monotonic() - heard <= within
+
+    def align(self, pose: Pose | None) -> None:
+        """Lay the robot's own map somewhere; with None it goes with its bridge."""
+        self.own_alignment = pose
+        self._on_alignment()
+
+    # Who draws by it.
+
+    def join(self, listener: Callable[[], object]) -> Removal:
+        """Call ``listener`` whenever there is news, until the removal.
+
+        That is of the pose, of the frames or of the alignment.
+        """
+        key = id(listener)
+        self._listeners[key] = listener
+        return Removal(lambda: self._listeners.pop(key, None))
+
+    def _tell(self) -> None:
+        for listener in tuple(self._listeners.values()):
+            listener()
+
+    # What comes.
+
+    def _on_type(self, bridge: Bridge, topic: str, type: str | None) -> None:
+        """Let the gate look at the odometry itself, unless it has no velocity.
+
+        The gate looks also while the type is not known: whoever drives a robot whose
+        odometry never came drives blind.
+        """
+        if type in (None, ODOMETRY):
+            self._robot.motion.set_odometry(bridge, topic, type)
+        else:
+            self._robot.motion.clear_odometry()
+
+    def _on_complaint(self, text: str | None) -> None:
+        if text is None:
+            self._robot.clear_problem("odometry")
+        else:
+            self._robot.set_problem("odometry", text)
+
+    def _on_reading(self, reading: PoseReading) -> None:
+        """Take a pose from the topic."""
         feed = self.feed
-        now = self._hear(0.0 if feed is None else feed.bridge.lag)
-        if feed is not None and feed.type == ODOMETRY:
-            # Other poses may come only while the robot moves.
+        if feed is None:
+            return
+        self.heard_at = now = time.monotonic()
+        if feed.type == ODOMETRY:  # other poses may come only while the robot moves
             self.expected_at = now
-            self._silence.hear(feed.bridge, feed.topic, feed.throttle / 1000)
-        if self._placing is not None:
-            reading = self._placing.of_reading(reading, now)
-        self._take(reading)
-        self._tell_trouble()
+            self._silence.hear(now)
+        self._show(self.pipeline.step(reading, self.frames, now), now - feed.bridge.lag)
 
     def _on_frames(self) -> None:
-        """Look where the frames have the base, if no topic says where it is."""
-        placing, frames = self._placing, self._frames
-        if self.feed is None and placing and frames:
-            reading = placing.of_base(time.monotonic())
-            if reading is not None:
-                # It may have waited to be told with others.
-                now = self._hear(frames.bridge.lag, frames.heard_at)
-                if reading.stamp:  # else it is fixed to the map, and told once
-                    self.expected_at = now
-                    self._silence.hear(frames.bridge, f"{frames.namespace}/tf")
-                self._take(reading)
-        self._tell_trouble()
-        self.whereabouts.tell()
+        """Take the pose of the base from the frames, if there is no topic."""
+        frames, now = self.frames, time.monotonic()
+        if frames is None:
+            return
+        step = self.pipeline.step(None, frames, now)
+        if step.pose is not None:
+            # It may have waited for the next call of listeners.
+            self.heard_at = came = frames.heard_at
+            if step.pose.stamp:  # else it is fixed to the map, and comes once
+                self.expected_at = came
+                self._silence.hear(now)
+            self._show(step, came - frames.bridge.lag)
+        else:
+            self._show_problems(step)
+            self._tell()
 
     def _on_alignment(self) -> None:
-        """Go where a new alignment has the robot, and all that it knows."""
-        if self.whereabouts.newest is not None:
-            self._show(self.whereabouts.on_map(self.whereabouts.newest))
-        self._motion.set_alignment(self.whereabouts.alignment)
-        self.whereabouts.tell()
+        """Move the robot, and what is drawn by its pose, to a new alignment."""
+        own, pipeline = self.own_alignment, self.pipeline
+        self.alignment = alignments.of(self.bridge) if own is None else own
+        self.common_from_own = affine(self.alignment)
+        pipeline.alignment = self.alignment
+        if pipeline.newest is not None:
+            self._robot.show_pose(pipeline.on_map(pipeline.newest))
+        self._robot.motion.set_alignment(self.alignment)
+        self._tell()
 
-    def _on_feed_problem(self, text: str | None) -> None:
-        if text is None:
-            self._owner.clear_problem("odometry")
-        else:
-            self._owner.set_problem("odometry", text)
+    # What is shown.
 
-    def _failed(self, text: str, about: object) -> None:
-        if about is None:
-            self._owner.report_error(text)
-        else:
-            self._on_feed_problem(text)
+    def _show(self, step: Step, stamp: float) -> None:
+        assert step.pose is not None  # callers have one
+        self._robot.show_pose(step.pose, stamp)
+        self._tell()
+        if step.problems is self.pipeline.problems:  # else a listener ended this source
+            self._show_problems(step)
 
-    def _find_bridge(self) -> None:
-        """Note where poses come from now: the alignment of that bridge holds."""
-        self.whereabouts.forget()
-        self._troubles.forget()
-        self._silence.forget()
+    def _show_problems(self, step: Step) -> None:
+        if step.look_again is not None and self.frames is not None:
+            self.frames.wake(step.look_again - time.monotonic())
+        if step.problems is not self._problems:
+            self._change_problems(step.problems)
+
+    def _change_problems(self, problems: Mapping[str, Problem]) -> None:
+        before, self._problems = self._problems, problems
+        for about in ("tf", "frames", "jumps"):
+            old, new = before.get(about), problems.get(about)
+            if old is not None and (new is None or new.kind != old.kind):
+                self._robot.clear_problem(about)
+            if new is not None and new != old:
+                self._robot.set_problem(about, new.text)
+
+    def _restart(self) -> None:
+        """Forget the poses so far: those to come are from another source."""
+        feed, frames = self.feed, self.frames
+        bridge, topic, period = None, "", None
+        if feed is not None:
+            bridge, topic, period = feed.bridge, feed.topic, feed.throttle / 1000
+        elif frames is not None:
+            bridge, topic = frames.bridge, f"{frames.namespace}/tf"
+        self.pipeline.restart(period)
+        self._change_problems({})
+        self._silence.restart(bridge, topic, period or 0.0)
         self.expected_at = None
-        source = self._frames if self.feed is None else self.feed
-        bridge = None if source is None else source.bridge
-        if bridge is not self.whereabouts.bridge:
-            self.whereabouts.come_from(bridge, self._on_alignment)
+        if bridge is not self.bridge:
+            self._hears_alignment.remove()
+            self.bridge = bridge
+            if bridge is not None:
+                self._hears_alignment = alignments.on_change(bridge, self._on_alignment)
             self._on_alignment()
 
-    def _tell_trouble(self) -> None:
-        """Say what is wrong with the frames or the poses; take back what is mended."""
-        self._troubles.look(
-            self._placing, self._frames, self.whereabouts.jumps, quiet=self._quiet
-        )
 
-    def _hear(self, lag: float, came: float | None = None) -> float:
-        """Note that a pose came, and return when; that is now if it is not said."""
-        self.heard_at = came = time.monotonic() if came is None else came
-        self.stamp = came - lag
-        self._heard()
-        return came
-
-    def _take(self, reading: PoseReading) -> None:
-        """Take the newest pose, in the robot's own map."""
-        period = 0.0 if self.feed is None else self.feed.throttle / 1000
-        # Of poses by frames alone the frames say it themselves when time leaps.
-        timed = self.feed is not None
-        self.whereabouts.jumps.look(reading, time.monotonic(), timed=timed)
-        self._show(self.whereabouts.take(reading, period))
-        self.whereabouts.tell()
+def affine(pose: Pose) -> Affine:
+    """Return what takes coordinates of a pose's own frame to the outer one."""
+    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+    return Affine(cos, sin, -sin, cos, pose.x, pose.y)

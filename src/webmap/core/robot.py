@@ -7,18 +7,21 @@ import time
 import weakref
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
+from webmap.config.reading import read_part
+from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
 from webmap.core.alignment import alignment
-from webmap.core.call_arguments import checks_kinds
+from webmap.core.call_arguments import sets_part
 from webmap.core.driven import Driven
-from webmap.core.model_images import ModelImages
-from webmap.core.odometry import OdometryFeed, PoseReading
+from webmap.core.odometry import OdometryFeed
+from webmap.core.placing import PoseReading
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
-from webmap.core.robot_model import checked_model
-from webmap.core.robot_state import RobotState, since_when, state_of
+from webmap.core.robot_model import ModelImages, checked_model
+from webmap.core.robot_state import Facts, RobotState, since_when, state_of
+from webmap.errors import ConfigError
 from webmap.gate.messages import RobotReport
 from webmap.geometry import Quaternion, Twist, Vector3
 from webmap.ros.bridge import Bridge
@@ -72,7 +75,7 @@ class Robot(Driven):
         super().__init__(name, namespace)
         self.base_link = self.motion.base_frame = base_link
         self.model = model
-        self._told: Problems[Map] = Problems(log, lambda text: f"{self.name}: {text}")
+        self._told = Problems(log, lambda text: f"{self.name}: {text}")
         self.maps = self._told.maps
         self.problems: dict[object, str] = self._told.standing
         """What fails for now, in sentences, by what they are about."""
@@ -83,8 +86,10 @@ class Robot(Driven):
         self.valid = False
         self._state_shown = ""
         self._state_timer: asyncio.TimerHandle | None = None
-        self._poses = PoseSource(self, self.motion, self._on_heard, self._show)
-        self.whereabouts = self._poses.whereabouts
+        self.pose_stamp: float | None = None
+        """When the newest pose was sent, in seconds of ``time.monotonic()``; None
+        before there was one."""
+        self.whereabouts = PoseSource(self)
         """Where it is and was, on its own map and on the common one."""
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
         self.svg.set("data-name", self.name)
@@ -106,12 +111,23 @@ class Robot(Driven):
 
         Its element in the scene has the state's name as ``data-state``.
         """
-        return state_of(self)
+        feed, ended = self.feed, self.goal_ended_at
+        return state_of(
+            Facts(
+                self.report,
+                None if feed is None else feed.bridge,
+                0.0 if feed is None else feed.throttle / 1000,
+                self.silent_for,
+                self.pose_age,
+                self.motion.axes.seen(self.measured_twist),
+                None if ended is None else time.monotonic() - ended,
+            )
+        )
 
     @property
     def feed(self) -> OdometryFeed | None:
         """Where the poses come from, if that is set."""
-        return self._poses.feed
+        return self.whereabouts.feed
 
     @property
     def yaw(self) -> float:
@@ -122,15 +138,6 @@ class Robot(Driven):
     def angle(self) -> float:
         """The heading, in degrees, counter-clockwise from x."""
         return math.degrees(self.yaw)
-
-    @property
-    def pose_stamp(self) -> float | None:
-        """When the newest pose came in, on the monotonic clock; None before that."""
-        return self._poses.stamp
-
-    @pose_stamp.setter
-    def pose_stamp(self, stamp: float | None) -> None:
-        self._poses.stamp = stamp
 
     @property
     def pose_age(self) -> float | None:
@@ -144,13 +151,12 @@ class Robot(Driven):
 
         None if none has come: a pose of AMCL, for example, comes only after motion.
         """
-        heard = self._poses.expected_at
+        heard = self.whereabouts.expected_at
         return None if heard is None else time.monotonic() - heard
 
     def hears_poses(self, within: float) -> bool:
         """Return whether a pose came in the last seconds, however old it was then."""
-        heard = self._poses.heard_at
-        return heard is not None and time.monotonic() - heard <= within
+        return self.whereabouts.come(within=within)
 
     def destroy(self) -> None:
         """Stop all communication, remove the modules, leave every map."""
@@ -162,13 +168,13 @@ class Robot(Driven):
         for map in tuple(self.maps):
             map.remove_robot(self)
         self.remove_modules()
-        self._poses.end()
+        self.whereabouts.end()
         self.motion.close()
         robots.pop(self.id, None)
 
     # Where it is.
 
-    @checks_kinds()
+    @sets_part("odometry")
     def set_odometry_topic(
         self,
         bridge: Bridge,
@@ -181,8 +187,8 @@ class Robot(Driven):
 
         The topic may carry ``geometry_msgs`` Pose, PoseStamped,
         PoseWithCovarianceStamped or Pose2D, or ``nav_msgs/Odometry``. If ``type`` is
-        not given, rosapi is asked, and where there is no rosapi the shape of the first
-        message tells. The bridge need not be open yet.
+        not given, the bridge is asked, and where it does not know, the shape of the
+        first message tells. The bridge need not be open yet.
 
         Args:
             bridge: The link to the ROS system that has the topic.
@@ -194,13 +200,12 @@ class Robot(Driven):
             ConfigError: If ``type`` has no pose, or something else cannot be meant.
 
         """
-        self._poses.follow(bridge, topic, int(throttle), type)
 
     def unsubscribe_odometry_topic(self) -> None:
         """Stop following poses; does nothing if there is no topic."""
-        self._poses.unfollow()
+        self.whereabouts.unfollow()
 
-    @checks_kinds()
+    @sets_part("tf")
     def set_tf(
         self,
         bridge: Bridge,
@@ -230,17 +235,42 @@ class Robot(Driven):
             ConfigError: If something of that cannot be meant.
 
         """
-        base_frame = base_frame or self.base_link
-        self._poses.place(bridge, map_frame, base_frame, namespace, quiet)
+
+    def configure(
+        self,
+        key: str,
+        values: Mapping[str, Any] | None,
+        bridge: Bridge | None = None,
+    ) -> None:
+        """Set or clear one part of the robot's configuration; see :class:`Driven`."""
+        what = f"robot {self.name!r}"
+        if key in ("odometry", "tf") and values is not None and bridge is None:
+            raise ConfigError(f"{what}: {key}: a bridge is missing")
+        match key:
+            case "odometry" if values is None:
+                self.whereabouts.unfollow()
+            case "tf" if values is None:
+                self.whereabouts.unplace()
+            case "odometry" if values is not None and bridge is not None:
+                pose = read_part(OdometryConfig, key, values, what)
+                self.whereabouts.follow(bridge, pose.topic, pose.throttle, pose.type)
+            case "tf" if values is not None and bridge is not None:
+                tf = read_part(TfConfig, key, values, what)
+                base = tf.base_frame or self.base_link
+                self.whereabouts.place(
+                    bridge, tf.map_frame, base, tf.namespace, tf.quiet
+                )
+            case _:
+                super().configure(key, values, bridge)
 
     def unset_tf(self) -> None:
-        """Draw the robot where its odometry has it; does nothing if it is so."""
-        self._poses.unplace()
+        """Stop drawing the robot by frames; does nothing if it has none."""
+        self.whereabouts.unplace()
 
     @property
     def tf(self) -> Mapping[str, Any] | None:
         """The arguments of :meth:`set_tf`, None if it is not set."""
-        return self._poses.tf
+        return self.whereabouts.tf
 
     def set_alignment(self, x: float, y: float, angle: float) -> None:
         """Lay the robot's own map onto the common one: its poses, data and goals.
@@ -254,18 +284,41 @@ class Robot(Driven):
             ConfigError: If a number makes no sense.
 
         """
-        self._poses.align(alignment(x, y, angle))
+        self.whereabouts.align(alignment(x, y, angle))
 
     def unset_alignment(self) -> None:
         """Let the robot lie where its bridge's alignment has it."""
-        self._poses.align(None)
+        self.whereabouts.align(None)
 
     # Plain data.
 
     @classmethod
+    def from_config(
+        cls,
+        config: RobotConfig,
+        bridges: Mapping[str, Bridge] | None = None,
+        *,
+        model: Element | None = None,
+    ) -> Self:
+        """Make a robot with its topics and modules.
+
+        Args:
+            config: What it is and has.
+            bridges: Bridges by name or address, to be shared; others are made.
+            model: How it looks, if not as the configuration says.
+
+        Raises:
+            ConfigError: If something cannot be meant; every mistake is named.
+
+        """
+        from webmap.core.configure import robot_of
+
+        return robot_of(cls, config, bridges, model)
+
+    @classmethod
     def from_dict(
         cls, data: Mapping[str, Any], bridges: Mapping[str, Bridge] | None = None
-    ) -> "Robot":
+    ) -> Self:
         """Make a robot with its topics and modules from plain data.
 
         Args:
@@ -273,12 +326,16 @@ class Robot(Driven):
             bridges: Bridges by name or URL, to be shared; others are made.
 
         Raises:
-            ConfigError: If a key or a value is not understood; it is named.
+            ConfigError: If a key or a value is not understood; every mistake is named.
 
         """
-        from webmap.core.plain import robot_from_dict
+        return cls.from_config(RobotConfig.from_dict(data), bridges)
 
-        return robot_from_dict(cls, data, bridges)
+    def to_config(self) -> RobotConfig:
+        """Return what the robot is and has: its topics and its named modules."""
+        from webmap.core.configure import config_of
+
+        return config_of(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the robot, its topics and its named modules as plain data.
@@ -290,11 +347,11 @@ class Robot(Driven):
             ConfigError: If a module was given what no such file can hold.
 
         """
-        from webmap.core.plain import robot_to_dict
+        from webmap.core.configure import robot_to_dict
 
         return robot_to_dict(self)
 
-    # What others tell it.
+    # What is shown of it.
 
     def report_error(self, text: str) -> None:
         """Log a failure and show it on every page that has the robot."""
@@ -311,7 +368,7 @@ class Robot(Driven):
         self._told.set(about, text)
 
     def clear_problem(self, about: object) -> None:
-        """Note that what was said of ``about`` is true no more."""
+        """Take back the problem of ``about``; does nothing if there is none."""
         self._told.clear(about)
 
     def on_map(self, map: "Map", shown: bool) -> None:
@@ -343,12 +400,7 @@ class Robot(Driven):
 
         A jump of its poses within the next seconds is then no problem.
         """
-        self.whereabouts.jumps.expect(time.monotonic())
-
-    def _on_heard(self) -> None:
-        self.svg.set_age(self.pose_age or 0.0, limit=POSE_LIMIT)
-        if self._state_timer is None:
-            self._watch_state()
+        self.whereabouts.pipeline.jumps.expect(time.monotonic())
 
     def _watch_state(self) -> None:
         """Show the state now and then: no message comes when a robot is gone."""
@@ -362,21 +414,33 @@ class Robot(Driven):
         if name != self._state_shown:
             self._state_shown = name
             self.svg.set("data-state", name)
-            self.svg.set("data-since", since_when(self) if name == "gone" else None)
+            since = since_when(self.silent_for) if name == "gone" else None
+            self.svg.set("data-since", since)
 
-    def _show(self, reading: PoseReading) -> None:
-        """Draw the robot at a pose on the common map, if that is news."""
-        changed = (
-            reading.position != self.position
-            or reading.orientation != self.orientation
-            or reading.twist != self.measured_twist
-            or not self.valid
-        )
-        if not changed:
+    def show_pose(self, pose: PoseReading, stamp: float | None = None) -> None:
+        """Draw the robot at a pose on the common map, and fire ``on_odometry_update``.
+
+        Args:
+            pose: The pose; nothing fires if it is the same as before.
+            stamp: When it was sent, in seconds of :func:`time.monotonic`; None if the
+                robot's map was moved and the robot was not heard.
+
+        """
+        if stamp is not None:
+            self.pose_stamp = stamp
+            self.svg.set_age(time.monotonic() - stamp, limit=POSE_LIMIT)
+            if self._state_timer is None:
+                self._watch_state()
+        if (
+            self.valid
+            and pose.position == self.position
+            and pose.orientation == self.orientation
+            and pose.twist == self.measured_twist
+        ):
             return
-        self.position, self.orientation = reading.position, reading.orientation
-        self.measured_twist = reading.twist
-        self.svg.set_pose(self.position.x, self.position.y, self.yaw)
+        self.position, self.orientation = pose.position, pose.orientation
+        self.measured_twist = pose.twist
+        self.svg.set_pose(pose.position.x, pose.position.y, pose.orientation.yaw)
         if not self.valid:
             self.valid = True
             self.svg.classes.remove("unplaced")

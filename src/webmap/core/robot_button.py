@@ -1,16 +1,18 @@
 """One button of a robot: what it does, and how far that is, for everybody who looks."""
 
+import json
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from webmap.core.button_run import NotDone, run
-from webmap.core.button_spec import ButtonSpec
-from webmap.ros.asked_definitions import ask_definitions, lookup_in
+from webmap.config.buttons import ButtonSpec, motion_of, value_kind
+from webmap.core.motion import roads
+from webmap.errors import MotionRefused, ServiceError, WebMapError
 from webmap.ros.bridge import Bridge
-from webmap.ros.form_fields import Field, fields_of
-from webmap.ros.message_forms import checked
+from webmap.ros.definitions import Field
+from webmap.ros.message_forms import checked, fields_of
+from webmap.ros.names import same_type
 from webmap.scope import Removable, Removal, keep
 
 if TYPE_CHECKING:
@@ -22,6 +24,9 @@ State = Literal["idle", "running", "done", "failed"]
 
 PROGRAM = "this program"
 """Who presses, where nobody's hand does."""
+
+MAX_WORDS = 300
+"""Characters of what is said of a result."""
 
 
 class RobotButton:
@@ -131,8 +136,8 @@ class RobotButton:
         """
         assert self.spec.type is not None, "a form has a type"
         kind = "srv" if self.spec.kind == "service" else "msg"
-        texts = await ask_definitions(self._bridge, self.spec.type, kind)
-        self._fields = fields_of(self.spec.type, lookup_in(texts))
+        known = await self._bridge.definitions(self.spec.type, kind)
+        self._fields = fields_of(self.spec.type, known)
 
     def _configured(self) -> Any:
         if self.spec.kind == "parameter":
@@ -166,3 +171,158 @@ def _field_of_value(value: Any) -> Field:
         if isinstance(value, cls):
             return Field("value", type)
     raise AssertionError("a form of a parameter has one value")
+
+
+class NotDone(WebMapError):
+    """A button did not do what it is there for; the text says why, to people."""
+
+
+def declared_motion(spec: ButtonSpec, url: str) -> str | None:
+    """Return why a button may not act, by what robots were declared to be moved by.
+
+    Args:
+        spec: What it would do.
+        url: The address of its bridge.
+
+    """
+    if spec.kind == "parameter":
+        return None
+    for road in list(roads):
+        carried = road.writes(url).get(spec.name)
+        if carried is not None:
+            return (
+                f"{spec.name} carries {carried}, and a button may not write that: "
+                "the gate does"
+            )
+    return None
+
+
+async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
+    """Do what a button does.
+
+    Args:
+        bridge: The link.
+        spec: What it does.
+        values: The fields to send, or the parameter's value.
+
+    Returns:
+        What came of it, in words.
+
+    Raises:
+        NotDone: If it failed, was refused, or nobody answered in time.
+
+    """
+    try:
+        await _refuse_motion(bridge, spec)
+        if spec.kind == "service":
+            return await _call(bridge, spec, values)
+        if spec.kind == "topic":
+            bridge.publish(spec.name, values, spec.type)
+            return "Published"
+        if spec.node is None:
+            return await _set_ros1(bridge, spec, values)
+        return await _set_ros2(bridge, spec, values)
+    except NotDone:
+        raise
+    except MotionRefused as error:
+        raise NotDone(f"refused: {error}") from None
+    except (WebMapError, ValueError, TypeError) as error:
+        raise NotDone(shortened(str(error))) from None
+
+
+async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
+    """Look again, now that robots are declared and the robot tells its types.
+
+    Raises:
+        MotionRefused: If it would move a robot.
+        NotDone: If the robot has another type than was said.
+
+    """
+    found = await _type_on_robot(bridge, spec)
+    for type in (spec.type, found):
+        why = motion_of(spec.kind, spec.name, type)
+        if why is not None:
+            raise MotionRefused(why)
+    why = declared_motion(spec, bridge.url)
+    if why is not None:
+        raise MotionRefused(why)
+    if found and spec.type and not same_type(found, spec.type):
+        raise NotDone(f"{spec.name} is of type {found}, not of {spec.type}")
+
+
+async def _type_on_robot(bridge: Bridge, spec: ButtonSpec) -> str | None:
+    if spec.kind == "topic":
+        return await bridge.topic_type(spec.name)
+    if spec.kind == "parameter":
+        return None
+    return await bridge.service_type(spec.name)
+
+
+async def _call(bridge: Bridge, spec: ButtonSpec, values: Mapping[str, Any]) -> str:
+    answer = await bridge.call_service(
+        spec.name, values, type=spec.type, timeout=spec.timeout
+    )
+    return answered(answer)
+
+
+async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
+    name = spec.name
+    now = await bridge.set_parameter(name, value, timeout=spec.timeout)
+    if now != value:
+        raise NotDone(
+            f"{name} was to be {shown(value)}, and the robot says {shown(now)}"
+        )
+    return f"{name} is {shown(value)}"
+
+
+async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
+    number, field = value_kind(value)
+    parameter = {"name": spec.name, "value": {"type": number, field: value}}
+    answer = await bridge.call_service(
+        f"{spec.node}/set_parameters",
+        {"parameters": [parameter]},
+        type="rcl_interfaces/srv/SetParameters",
+        timeout=spec.timeout,
+    )
+    results = answer.get("results") if isinstance(answer, Mapping) else None
+    first = results[0] if isinstance(results, list) and results else None
+    if not isinstance(first, Mapping) or "successful" not in first:
+        raise ServiceError(f"{spec.node}/set_parameters answered nothing to the point")
+    if first["successful"] is not True:
+        reason = str(first.get("reason") or "no reason was given")
+        raise NotDone(shortened(f"{spec.node} refused: {reason}"))
+    return f"{spec.name} is {shown(value)}"
+
+
+def answered(answer: Any) -> str:
+    """Return in words what a service answered.
+
+    Raises:
+        NotDone: If it says ``success: false``.
+
+    """
+    if not isinstance(answer, Mapping):
+        return "Done"
+    said = str(answer.get("message") or answer.get("status_message") or "")
+    if answer.get("success") is False:
+        raise NotDone(shortened(said or "the robot says that it did not succeed"))
+    if said:
+        return shortened(f"Done: {said}")
+    rest = {name: value for name, value in answer.items() if name != "success"}
+    words = ", ".join(f"{name} {shown(value)}" for name, value in rest.items() if value)
+    return shortened(f"Done: {words}") if words else "Done"
+
+
+def shown(value: Any) -> str:
+    """Return a value as people read it."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, str):
+        return value
+    return json.dumps(value, ensure_ascii=False, default=str)
+
+
+def shortened(text: str) -> str:
+    """Return a text without what no screen shows, at most so long."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return plain if len(plain) <= MAX_WORDS else f"{plain[: MAX_WORDS - 3]}..."

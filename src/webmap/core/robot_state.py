@@ -1,16 +1,15 @@
 """What a robot is doing, in the words that every page has for it."""
 
-import time
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from webmap.core.silence import PERIODS
+from webmap.gate.messages import RobotReport
 from webmap.gate.rules.goals import BRAKES, OVER
 from webmap.gate.rules.obedience import MOVES, TURNS
 from webmap.gate.rules.standstill import moves
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
+from webmap.geometry import Twist
+from webmap.ros.bridge import Bridge
 
 WORDS = {
     "no_bridge": "No bridge",
@@ -64,7 +63,33 @@ class RobotState(NamedTuple):
     """The words for the page that holds the robot."""
 
 
-def state_of(robot: "Robot") -> RobotState:
+class Facts(NamedTuple):
+    """What the state of a robot follows from."""
+
+    report: RobotReport | None
+    """The newest report of the gate; None if the gate does not know the robot."""
+
+    bridge: Bridge | None
+    """The link of the topic with poses; None if there is no such topic."""
+
+    period: float
+    """The least seconds between two poses of that topic."""
+
+    silent_for: float | None
+    """Seconds since the newest pose from a source that also sends while the robot is at
+    rest; None if there was none."""
+
+    pose_age: float | None
+    """Seconds since the newest pose was sent; None if there was none."""
+
+    twist: Twist | None
+    """The velocity of that pose, in the axes that the robot moves along."""
+
+    goal_over_for: float | None
+    """Seconds since the newest goal ended; None if none has."""
+
+
+def state_of(facts: Facts) -> RobotState:
     """Return what a robot is doing.
 
     The gate decides what it knows. The display adds what only the display knows: the
@@ -72,60 +97,61 @@ def state_of(robot: "Robot") -> RobotState:
     old is left out: the page sees that by itself, also when it cannot reach this
     process.
     """
-    report = robot.report
-    if report is None:
-        return _state(_seen(robot) or "watched", robot)
-    name: str = report.doing
+    if facts.report is None:
+        return _state(_seen(facts) or "watched", facts)
+    name: str = facts.report.doing
     if name in QUIET:
-        name = _seen(robot, may_move=name != "down") or name
-    return _state(name, robot)
+        name = _seen(facts, may_move=name != "down") or name
+    return _state(name, facts)
 
 
-def since_when(robot: "Robot") -> str:
-    """Return when the newest pose came, by the clock of this computer."""
-    silent = timedelta(seconds=robot.silent_for or 0.0)
-    return f"{datetime.now() - silent:%H:%M}"
+def since_when(silent_for: float | None) -> str:
+    """Return when a robot fell silent, by the clock of this computer.
+
+    Args:
+        silent_for: Seconds since then; None for now.
+
+    """
+    return f"{datetime.now() - timedelta(seconds=silent_for or 0.0):%H:%M}"
 
 
-def _seen(robot: "Robot", *, may_move: bool = False) -> str | None:
+def _seen(facts: Facts, *, may_move: bool = False) -> str | None:
     """Return what the display knows of a robot that nobody drives."""
-    bridge = robot.feed.bridge if robot.feed is not None else None
+    bridge, report = facts.bridge, facts.report
     if bridge is not None and bridge.state != "open":
         return "no_bridge" if bridge.lost else "connecting"
-    if _is_gone(robot):
+    if _is_gone(facts):
         return "gone"
-    report = robot.report
     if not may_move or report is None or report.measured is not None:
         return None  # the gate looks at the same odometry
-    if not _moves(robot):
+    if not _moves(facts):
         return None
     if report.goal is not None and report.goal.state not in OVER:
         return "navigating"
-    ended = robot.goal_ended_at
-    brakes = ended is not None and time.monotonic() - ended < BRAKES
-    return "settling" if brakes else "moving"
+    over = facts.goal_over_for
+    return "settling" if over is not None and over < BRAKES else "moving"
 
 
-def _state(name: str, robot: "Robot") -> RobotState:
-    holder = robot.report.holder if robot.report is not None else None
+def _state(name: str, facts: Facts) -> RobotState:
+    holder = facts.report.holder if facts.report is not None else None
     who = holder.name or holder.connection if holder is not None else "Somebody"
-    text = WORDS[name].format(who=who, since=since_when(robot))
+    text = WORDS[name].format(who=who, since=since_when(facts.silent_for))
     return RobotState(name, text, WORDS.get(f"{name}_by_you", text))
 
 
-def _is_gone(robot: "Robot") -> bool:
+def _is_gone(facts: Facts) -> bool:
     """Return whether poses that should come have not come for long."""
-    silent, feed = robot.silent_for, robot.feed
+    silent = facts.silent_for
     if silent is None or silent <= GONE:
         return False
-    if feed is None:
+    if facts.bridge is None:
         return True
-    return silent > PERIODS * feed.throttle / 1000 and not feed.bridge.replays
+    return silent > PERIODS * facts.period and not facts.bridge.replays
 
 
-def _moves(robot: "Robot") -> bool:
+def _moves(facts: Facts) -> bool:
     """Return whether fresh odometry shows a robot in motion."""
-    if robot.pose_age is None or robot.pose_age > FRESH:
+    age, twist = facts.pose_age, facts.twist
+    if age is None or age > FRESH or twist is None:
         return False
-    twist = robot.motion.axes.seen(robot.measured_twist)
-    return twist is not None and moves(twist, MOVES, TURNS)
+    return moves(twist, MOVES, TURNS)

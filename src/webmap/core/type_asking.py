@@ -16,28 +16,34 @@ FEW = 5
 
 SHARE = 10
 """By what the time that an answer took is multiplied to the shortest pause after it,
-so that a rosapi that hangs is asked rarely."""
+so that a bridge that hangs is asked rarely."""
 
 
 class TypeAsking:
     """Asks for the type of a topic whenever the link opens, and on while it is unknown.
 
-    The node that has the topic may start after the link is open, and rosapi after
-    rosbridge.
+    The node that has the topic may start after the link is open, and so may the one
+    that answers the question.
 
     Args:
         bridge: The link.
         topic: The topic.
         found: Called with each type that was told, in the bridge's dialect.
+        unknown: Called each time that nobody knows it, if given.
 
     """
 
     def __init__(
-        self, bridge: Bridge, topic: str, found: Callable[[str], object]
+        self,
+        bridge: Bridge,
+        topic: str,
+        found: Callable[[str], object],
+        unknown: Callable[[], object] | None = None,
     ) -> None:
         self._bridge = bridge
         self._topic = topic
         self._found = found
+        self._unknown = unknown
         self._known = False
         self._over = False
         self._turn = 0
@@ -70,7 +76,10 @@ class TypeAsking:
         if type is not None:
             self._known = True
             self._found(type)
-        elif not self._known:  # what was told before the link was lost still holds
+            return
+        if self._unknown is not None:
+            self._unknown()
+        if not self._known:  # what was told before the link was lost still holds
             took = time.monotonic() - began
             pause = max(SOON if number <= FEW else LATER, SHARE * took)
             # No task waits meanwhile: nothing is left over when the process ends.

@@ -1,11 +1,12 @@
 """A view of the world on a page: what a map is before there is a robot on it."""
 
+import itertools
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from webmap.core.extendable import Extendable
-from webmap.core.half import BrowserHalf
 from webmap.core.page import Page, page_of
 from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
@@ -19,6 +20,46 @@ from webmap.scene.fragment import Fragment
 from webmap.scope import Removal, keep
 
 log = logging.getLogger("webmap.map")
+
+_numbers = itertools.count(1)
+
+
+class BrowserHalf:
+    """An ES module in one viewer's page that belongs to one module of one map."""
+
+    def __init__(
+        self,
+        page: Page,
+        map_element: int,
+        module: Any,
+        script: str | Path,
+        options: dict[str, Any],
+        style: str | Path | None,
+        ended: Callable[[int], object],
+    ) -> None:
+        self.instance = next(_numbers)
+        self.module = module
+        self._channel = page.channel
+        self._ended: Callable[[int], object] | None = ended
+        self._channel.attach(
+            map_element,
+            self.instance,
+            page.asset(script),
+            options,
+            None if style is None else page.asset(style),
+        )
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send a message to the half; nothing happens once it has ended."""
+        if self._ended is not None:
+            self._channel.send(self.instance, message)
+
+    def remove(self) -> None:
+        """End the half; the second call does nothing."""
+        ended, self._ended = self._ended, None
+        if ended is not None:
+            ended(self.instance)
+            self._channel.detach(self.instance)
 
 
 class World(Element):

@@ -3,23 +3,40 @@
 from collections.abc import Sequence
 from typing import Any
 
-import msgspec
-
-from webmap.discovery.drawing import Drawing, drawing
+from webmap.config.checks import Way
+from webmap.config.fleet import BridgeConfig, FleetConfig, MapConfig, dump
+from webmap.config.robot import ModuleConfig, RobotConfig
 from webmap.discovery.found import Findings, FoundRobot
-from webmap.discovery.layers import FoundLayer
-from webmap.outside_text import escaped
+from webmap.discovery.layers import TRAIL, Layers, drawing, topic_of, with_layers
 
 HEAD = """\
 # A fleet file: webmap check FILE reads it, webmap run FILE shows it.
 # The words after each topic say why it was chosen; a wrong one is yours to change.
 """
 
-UNSURE = """\
-# Say within how many seconds the base stops by itself when velocity ceases, if you
-# know it: without it the robot is driven at 0.3 m/s and 0.6 rad/s at the most.
-# twist.stops_within = 0.25
-"""
+UNSURE = (
+    "Say within how many seconds the base stops by itself when velocity ceases, if you",
+    "know it: without it the robot is driven at 0.3 m/s and 0.6 rad/s at the most.",
+    "twist.stops_within = 0.25",
+)
+
+REMARKED = {
+    "odometry": ("odometry",),
+    "velocity": ("twist", "topic"),
+    "battery": ("battery",),
+    "action": ("move", "action"),
+    "goal": ("move", "topic"),
+    "cancel": ("move", "cancel_topic"),
+}
+"""Roles whose rule is written behind their topic, and the key of the topic."""
+
+
+class Remarks:
+    """What is said of a fleet file's values besides them."""
+
+    def __init__(self) -> None:
+        self.behind: dict[Way, str] = {}
+        self.below: dict[Way, Sequence[str]] = {}
 
 
 def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
@@ -30,168 +47,113 @@ def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
             of all robots differ, as :func:`unique_names` makes them.
 
     """
-    parts = ["[bridges]"]
-    parts += [f"{_key(name)} = {_text(url)}" for name, url, _ in found]
-    parts += _maps(found)
+    remarks = Remarks()
+    maps: list[MapConfig] = []
+    modules: list[ModuleConfig] = []
+    robots: list[dict[str, Any]] = []
     for bridge, _, findings in found:
+        _add_shared(bridge, findings, maps, modules, remarks)
         for robot in findings.robots:
-            parts += ["", *_robot(robot, bridge, findings)]
-    # Comments hold names of topics, too; a line break in one would begin a table.
-    return "\n".join([HEAD, *map(escaped, parts)]) + "\n"
+            way = ("robots", len(robots))
+            robots.append(_robot(robot, bridge, findings, way, remarks))
+    bridges = {name: BridgeConfig(url=url) for name, url, _ in found}
+    data = FleetConfig(bridges=bridges, map=maps, modules=modules).to_dict()
+    data["bridges"] = {name: url for name, url, _ in found}
+    data["robots"] = robots
+    return dump(data, remarks=remarks.behind, below=remarks.below, head=HEAD)
 
 
-def _robot(robot: FoundRobot, bridge: str, findings: Findings) -> list[str]:
-    lines = [
-        "[[robots]]",
-        f"name = {_text(robot.name)}",
-        f"bridge = {_text(bridge)}",
-    ]
-    where = robot.first("odometry") or robot.first("pose")
-    if where is not None:
-        lines.append(
-            f"odometry = {{ topic = {_text(where.topic)}, type = {_text(where.type)} }}"
-            f" # {where.rule}"
-        )
-    if robot.tf_namespace is not None:
-        lines += _frames(robot)
-    lines += _scans(robot, findings)
-    battery = robot.first("battery")
-    if battery is not None:
-        lines.append(f"battery = {_text(battery.topic)} # {battery.rule}")
-    cameras = robot.guesses.get("camera", ())
-    if cameras:
-        rows = [f"  {_text(guess.topic)}, # {guess.rule}" for guess in cameras]
-        lines += ["cameras = [", *rows, "]"]
-    lines += _motion(robot)
-    lines += _modules(robot, bridge, findings)
-    lines += [
-        f"# not drawn, since there are enough of its kind: {layer.topic}"
-        for layer in findings.left_out.get(robot.namespace, ())
-    ]
-    return lines + [f"# {note}" for note in robot.notes]
+def _add_shared(
+    bridge: str,
+    findings: Findings,
+    maps: list[MapConfig],
+    modules: list[ModuleConfig],
+    remarks: Remarks,
+) -> None:
+    """Add what robots share, each once for its bridge: maps, and modules of the map."""
+    taken: set[str] = set()
+    for robot in findings.robots:
+        for layer in findings.layers.get(robot.namespace, Layers()).drawn:
+            drawn = drawing(layer, robot.namespace, None)
+            if not drawn.shared or layer.topic in taken:
+                continue
+            taken.add(layer.topic)
+            if drawn.module == "OccupancyGrid":
+                remarks.behind["map", len(maps), "topic"] = layer.rule
+                grid = MapConfig(bridge=bridge, topic=layer.topic, **drawn.options)
+                maps.append(grid)
+            else:
+                remarks.behind["modules", len(modules), "name"] = layer.rule
+                args = [{"bridge": bridge}, layer.topic]
+                options = dict(drawn.options)
+                modules.append(
+                    ModuleConfig(name=drawn.module, args=args, options=options)
+                )
 
 
-def _frames(robot: FoundRobot) -> list[str]:
-    options = robot.tf_options
-    if robot.tf_alone:
-        lines = ["tf.quiet = false # drawn where its frames have it"]
-    else:
-        frame = robot.map_frame
-        lines = [f"tf.quiet = true # drawn in the frame {frame}, if frames lead there"]
-    return lines + [
-        f"tf.{key} = {_text(options[key])}"
-        for key in ("namespace", "base_frame", "map_frame")
-        if options.get(key)
-    ]
-
-
-def _maps(found: Sequence[tuple[str, str, Findings]]) -> list[str]:
-    """Return the maps that robots share, each once for its bridge."""
-    lines: list[str] = []
-    for bridge, _, findings in found:
-        named: dict[str, FoundLayer] = {}
-        for robot in findings.robots:
-            for layer in findings.layers.get(robot.namespace, ()):
-                if drawing(layer, robot.namespace, None).shared:
-                    named.setdefault(layer.topic, layer)
-        for topic, layer in named.items():
-            lines += [
-                "",
-                "[[map]]",
-                f"bridge = {_text(bridge)}",
-                f"topic = {_text(topic)} # {layer.rule}",
-            ]
-            if layer.kind == "grid":
-                lines.append('palette = "costmap"')
-    return lines
-
-
-def _scans(robot: FoundRobot, findings: Findings) -> list[str]:
-    """Return the scans that are drawn: the best, and what else there is."""
-    layers = findings.layers.get(robot.namespace, ())
-    best = robot.first("scan")
-    topics = {} if best is None else {best.topic: best.rule}
-    for layer in layers:
-        if layer.kind == "scan":
-            topics.setdefault(layer.topic, layer.rule)
-    if not topics:
-        return []
-    listed = ", ".join(_text(topic) for topic in topics)
-    return [f"scan = [{listed}] # {'; '.join(topics.values())}"]
-
-
-def _modules(robot: FoundRobot, bridge: str, findings: Findings) -> list[str]:
-    """Return what is shown of a robot besides, as ``webmap view`` does."""
-    frames = None
-    if robot.tf_namespace is not None:
-        frames = {"map_frame": "map", **robot.tf_options}
-    link = f"{{ bridge = {_text(bridge)} }}"
-    where = robot.topic("odometry") or robot.topic("pose")
-    plan = robot.first("plan")
-    lines = ['  { name = "Trail", options = { length = 10.0 } },']
-    if plan is not None:
-        path = FoundLayer("path", plan.topic, plan.type, plan.rule)
-        lines.append(_module(drawing(path, "", None), path, link))
-    for layer in findings.layers.get(robot.namespace, ()):
-        drawn = drawing(layer, robot.namespace, frames)
-        if drawn.shared or layer.kind == "scan":
-            continue
-        if layer.topic not in (where, robot.topic("plan")):
-            lines.append(_module(drawn, layer, link))
-    return ["modules = [", *lines, "]"]
-
-
-def _module(drawn: Drawing, layer: FoundLayer, link: str) -> str:
-    name = "OnMaps" if drawn.of_maps else drawn.module
-    of = f"{_text(drawn.module)}, " if drawn.of_maps else ""
-    # What is empty is so unless it is said.
-    said = {key: value for key, value in drawn.options.items() if value != ""}
-    options = ", ".join(f"{key} = {_value(value)}" for key, value in said.items())
-    behind = f", options = {{ {options} }}" if options else ""
-    args = f"[{of}{link}, {_text(layer.topic)}]"
-    return f'  {{ name = "{name}", args = {args}{behind} }}, # {layer.rule}'
-
-
-def _motion(robot: FoundRobot) -> list[str]:
-    lines = []
-    velocity, goal = robot.first("velocity"), robot.first("goal")
-    if velocity is not None:
-        lines += [
-            f"twist.topic = {_text(velocity.topic)} # {velocity.rule}",
-            f"twist.type = {_text(velocity.type)}",
-            *UNSURE.splitlines(),
-        ]
-    if robot.action is not None and (guess := robot.first("action")) is not None:
-        name, type = robot.action
-        lines.append(f"move.action = {_text(name)} # {guess.rule}")
-        lines.append(f"move.action_type = {_text(type)}")
-    if goal is not None:
-        lines.append(f"move.topic = {_text(goal.topic)} # {goal.rule}")
-        cancel = robot.first("cancel")
-        if cancel is not None:
-            lines.append(f"move.cancel_topic = {_text(cancel.topic)} # {cancel.rule}")
-    if (goal is not None or robot.action is not None) and robot.map_frame != "map":
-        lines.append(f"move.frame = {_text(robot.map_frame)}")
+def _robot(
+    robot: FoundRobot, bridge: str, findings: Findings, way: Way, remarks: Remarks
+) -> dict[str, Any]:
+    """Return a robot as plain data, and note why each of its topics was chosen."""
+    config = robot.config(bridge)
+    behind = remarks.behind
+    for role in ("pose", *REMARKED):
+        key = REMARKED.get(role, ("odometry",))
+        guess = robot.first(role)  # type: ignore[arg-type]
+        if guess is not None:
+            behind[(*way, *key)] = guess.rule
+    for index, guess in enumerate(robot.guesses.get("camera", ())):
+        behind[(*way, "cameras", index)] = guess.rule
     pose = robot.first("initialpose")
-    moves = goal is not None or robot.action is not None
-    if pose is not None and (moves or robot.map_frame == "map"):
-        lines.append(f"initial_pose = {_text(pose.topic)} # {pose.rule}")
-    elif pose is not None:
-        lines.append(f"initial_pose.topic = {_text(pose.topic)} # {pose.rule}")
-        lines.append(f"initial_pose.frame = {_text(robot.map_frame)}")
-    return lines
+    if pose is not None and config.motion.initial_pose is not None:
+        framed = ("topic",) if config.motion.initial_pose.frame != "map" else ()
+        behind[(*way, "initial_pose", *framed)] = pose.rule
+    if config.motion.twist is not None:
+        remarks.below[(*way, "twist")] = UNSURE
+    behind[(*way, "tf", "quiet")] = (
+        "drawn where its frames have it"
+        if robot.tf_alone
+        else f"drawn in the frame {robot.map_frame}, if frames lead there"
+    )
+    config = _with_layers(config, robot, findings, way, remarks)
+    left_out = findings.layers.get(robot.namespace, Layers()).left_out
+    remarks.below[way] = (
+        *(
+            f"not drawn, since there are enough of its kind: {o.topic}"
+            for o in left_out
+        ),
+        *robot.notes,
+    )
+    data = config.to_dict()
+    # Of these a person sees what is chosen, also where that is what goes unsaid.
+    if "tf" in data:
+        data["tf"] = {"quiet": not robot.tf_alone, **data["tf"]}
+    if robot.action is not None:
+        name, type = robot.action
+        data["move"] = {**data["move"], "action": name, "action_type": type}
+        first = {key: data["move"].pop(key) for key in ("action", "action_type")}
+        data["move"] = {**first, **data["move"]}
+    return data
 
 
-def _value(value: Any) -> str:
-    return _text(value) if isinstance(value, str) else str(value).lower()
-
-
-def _text(value: str) -> str:
-    # A JSON text is a TOML text too, but for the characters that are not printable.
-    text = msgspec.json.encode(value).decode()
-    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
-
-
-def _key(name: str) -> str:
-    plain = name.replace("-", "").replace("_", "")
-    return name if plain.isascii() and plain.isalnum() else _text(name)
+def _with_layers(
+    config: RobotConfig,
+    robot: FoundRobot,
+    findings: Findings,
+    way: Way,
+    remarks: Remarks,
+) -> RobotConfig:
+    """Return a robot with all that ``webmap view`` draws of it."""
+    layers = findings.layers.get(robot.namespace, Layers()).drawn
+    config = config.with_part("modules", [TRAIL, *config.modules])
+    config = with_layers(config, layers, robot.namespace)
+    rules = {layer.topic: layer.rule for layer in layers}
+    best = [guess for guess in (robot.first("scan"), robot.first("plan")) if guess]
+    rules |= {guess.topic: guess.rule for guess in best}
+    if config.scan:
+        remarks.behind[(*way, "scan")] = "; ".join(rules[scan] for scan in config.scan)
+    for index, module in enumerate(config.modules):
+        rule = rules.get(topic_of(module))
+        if rule:
+            remarks.behind[(*way, "modules", index)] = rule
+    return config

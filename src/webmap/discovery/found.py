@@ -2,12 +2,25 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
+from webmap.config.motion import (
+    InitialPoseConfig,
+    MotionConfig,
+    MoveConfig,
+    TwistConfig,
+)
+from webmap.config.robot import (
+    CameraConfig,
+    ModuleConfig,
+    OdometryConfig,
+    RobotConfig,
+    TfConfig,
+)
 from webmap.discovery.tf_robots import MAP, WORLD
 
 if TYPE_CHECKING:
-    from webmap.discovery.layers import FoundLayer
+    from webmap.discovery.layers import Layers
 
 Role: TypeAlias = Literal[
     "odometry",
@@ -28,23 +41,7 @@ Role: TypeAlias = Literal[
 ]
 """What a topic is to a robot."""
 
-ROLES: tuple[Role, ...] = (
-    "odometry",
-    "pose",
-    "velocity",
-    "scan",
-    "battery",
-    "plan",
-    "goal",
-    "action",
-    "cancel",
-    "initialpose",
-    "map",
-    "costmap",
-    "camera",
-    "cloud",
-    "tf",
-)
+ROLES: tuple[Role, ...] = get_args(Role)
 """Every role, in the order in which they are shown."""
 
 
@@ -129,23 +126,69 @@ class FoundRobot:
         )
 
     @property
-    def tf_options(self) -> dict[str, Any]:
-        """The options of ``Robot.set_tf``; of use if there are frames at all."""
-        options: dict[str, Any] = {"namespace": self.tf_namespace or ""}
-        # Many robots have odometry, frames and no map: that is no mistake.
-        options["quiet"] = not self.tf_alone
-        if self.base_frame:
-            options["base_frame"] = self.base_frame
-        if self.tf_alone and self.root_frame:
-            options["map_frame"] = self.root_frame
-        elif self.map_frame != MAP:
-            options["map_frame"] = self.map_frame
-        return options
+    def tf(self) -> TfConfig | None:
+        """The frames that it is drawn by; None if there are none."""
+        if self.tf_namespace is None:
+            return None
+        return TfConfig(
+            namespace=self.tf_namespace,
+            # Many robots have odometry, frames and no map: that is no mistake.
+            quiet=not self.tf_alone,
+            base_frame=self.base_frame or None,
+            map_frame=(self.tf_alone and self.root_frame) or self.map_frame,
+        )
 
     @property
     def map_frame(self) -> str:
         """The frame of the map that it moves in, as its frames have it."""
         return self.root_frame if WORLD.match(self.root_frame) else MAP
+
+    def config(self, bridge: str) -> RobotConfig:
+        """Return the robot as its best topics configure it.
+
+        Args:
+            bridge: The name or the address of the bridge that it is behind.
+
+        """
+        scan, plan = self.topic("scan"), self.topic("plan")
+        drawn = ModuleConfig(name="Path", args=[{"bridge": bridge}, plan])
+        cameras = self.guesses.get("camera", ())
+        return RobotConfig(
+            name=self.name,
+            bridge=bridge,
+            odometry=self._odometry(),
+            tf=self.tf,
+            motion=self._motion(),
+            scan=[scan] if scan else [],
+            battery=self.topic("battery"),
+            cameras=[CameraConfig(topic=guess.topic) for guess in cameras],
+            modules=[drawn] if plan else [],
+        )
+
+    def _odometry(self) -> OdometryConfig | None:
+        where = self.first("odometry") or self.first("pose")
+        if where is None:
+            return None
+        return OdometryConfig(topic=where.topic, type=where.type or None)
+
+    def _motion(self) -> MotionConfig:
+        frame, action = self.map_frame, self.action
+        velocity, pose = self.first("velocity"), self.topic("initialpose")
+        twist = move = place = None
+        if velocity is not None:
+            twist = TwistConfig(topic=velocity.topic, type=velocity.type or None)
+        if self.topic("goal") or action is not None:
+            chosen = {} if action is None else {"action_type": action[1]}
+            move = MoveConfig(
+                topic=self.topic("goal"),
+                action=None if action is None else action[0],
+                cancel_topic=self.topic("cancel") or None,
+                frame=frame,
+                **chosen,
+            )
+        if pose:
+            place = InitialPoseConfig(topic=pose, frame=frame)
+        return MotionConfig(twist=twist, move=move, initial_pose=place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,8 +202,5 @@ class Findings:
     notes: tuple[str, ...] = ()
     """What holds for all of it, in sentences."""
 
-    layers: "Mapping[str, tuple[FoundLayer, ...]]" = field(default_factory=dict)
-    """What is drawn of each robot, by its namespace."""
-
-    left_out: "Mapping[str, tuple[FoundLayer, ...]]" = field(default_factory=dict)
-    """What could be drawn of each robot too, but for its number."""
+    layers: "Mapping[str, Layers]" = field(default_factory=dict)
+    """What is drawn of each robot, and what is left out, by its namespace."""

@@ -1,30 +1,31 @@
-"""Listening to frames for a moment, before anything else is there."""
+"""Listening to frames for a moment: before a robot is shown, and now and then after."""
 
 import asyncio
-import contextlib
-import time
-from collections.abc import Iterable, Mapping
+import weakref
+from collections.abc import Mapping
+from functools import partial
 
 from webmap.discovery.tf_robots import Trees
-from webmap.errors import ProtocolError
-from webmap.ros import ops
-from webmap.ros.events import Publish
-from webmap.ros.limits import MAX_FRAME
+from webmap.errors import BridgeClosed
+from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic
-from webmap.ros.protocol import Protocol
+from webmap.scope import no_scope
 
 SECONDS = 0.8
-"""How long is listened: who moves tells of its frames ten times a second."""
+"""How long it listens: a robot that moves sends its frames ten times a second."""
 
 QUEUE = 100
 """Messages that the bridge may hold back; each one counts."""
 
 MOST_TOPICS = 100
 
+TYPE = "tf2_msgs/TFMessage"
+_TYPES = (TYPE, "tf2_msgs/msg/TFMessage")
+
 
 def frame_topics(topics: Mapping[str, str]) -> list[str]:
-    """Return the topics that tell of frames, with the static ones of each."""
+    """Return the topics with frames, with the static ones of each namespace."""
     spaces = [
         name.removesuffix("/tf")
         for name, type in sorted(topics.items())
@@ -33,62 +34,84 @@ def frame_topics(topics: Mapping[str, str]) -> list[str]:
     return [f"{space}/{name}" for space in spaces for name in ("tf_static", "tf")]
 
 
+class LateFrames:
+    """Listens to frames for a moment now and then, and keeps what it heard.
+
+    So a robot of which there is nothing but ``/tf`` is found when it comes, at a
+    fraction of what it would cost to listen all the time.
+
+    Args:
+        bridge: The link that the frames come over; what others hear of it is shared.
+
+    """
+
+    def __init__(self, bridge: Bridge) -> None:
+        self._bridge = bridge
+        self.trees = Trees()
+
+    async def listen(
+        self, topics: Mapping[str, str], *, seconds: float = SECONDS
+    ) -> Trees:
+        """Listen for a moment, and return all that was heard up to now.
+
+        Args:
+            topics: Types by topic, as the bridge lists them.
+            seconds: How long to listen.
+
+        """
+        wanted = frame_topics(topics)[:MOST_TOPICS]
+        if not wanted:
+            return self.trees
+        with no_scope():
+            heard = [
+                self._bridge.subscribe(
+                    topic,
+                    partial(self._hear, topic.rpartition("/")[0]),
+                    TYPE,
+                    decode=TFMessage,
+                    queue_length=QUEUE,
+                )
+                for topic in wanted
+            ]
+        try:
+            await asyncio.sleep(seconds)
+        finally:
+            for subscription in heard:
+                subscription.remove()
+        return self.trees
+
+    def _hear(self, namespace: str, message: TFMessage) -> None:
+        for each in message.transforms:
+            self.trees.take(namespace, each.frame_id, each.child_frame_id)
+
+
+_late: weakref.WeakKeyDictionary[Bridge, LateFrames] = weakref.WeakKeyDictionary()
+
+
+def late_frames(bridge: Bridge) -> LateFrames:
+    """Return what listens to the frames of a bridge; the same for all who ask."""
+    if bridge not in _late:
+        _late[bridge] = LateFrames(bridge)
+    return _late[bridge]
+
+
 async def hear_frames(
     url: str, topics: Mapping[str, str], *, seconds: float = SECONDS
 ) -> Trees:
-    """Return the frames that are told of behind a bridge; none if it is silent.
+    """Return the frames behind a bridge; none if it is silent.
 
     Args:
         url: The bridge's address.
-        topics: Types by topic, as rosapi tells them.
+        topics: Types by topic, as the bridge lists them.
         seconds: How long to listen.
 
     """
-    trees = Trees()
-    wanted = frame_topics(topics)[:MOST_TOPICS]
-    if not wanted:
-        return trees
-    # The bridge was there a moment ago; if it is not, whoever connects will say it.
-    with contextlib.suppress(OSError, TimeoutError):
-        await _listen(url, wanted, seconds, trees)
-    return trees
-
-
-async def _listen(url: str, topics: Iterable[str], seconds: float, into: Trees) -> None:
-    from websockets.asyncio.client import connect
-    from websockets.exceptions import WebSocketException
-
-    protocol = Protocol()
-    try:
-        async with connect(
-            url,
-            max_size=MAX_FRAME,
-            open_timeout=5.0,
-            close_timeout=0.5,
-            compression=None,
-            proxy=None,
-        ) as socket:
-            for topic in topics:
-                request = ops.subscribe(topic, id=topic, queue_length=QUEUE)
-                await socket.send(request.decode())
-            async with asyncio.timeout(seconds):
-                while True:
-                    frame = await socket.recv(decode=False)
-                    event = protocol.receive(frame, time.monotonic())
-                    if isinstance(event, Publish):
-                        _take(event, into)
-    except WebSocketException as error:
-        raise OSError(str(error)) from None
-
-
-def _take(event: Publish, into: Trees) -> None:
-    namespace = event.topic.rpartition("/")[0]
-    try:
-        message = event.decode(TFMessage)
-    except ProtocolError:
-        return  # what nobody can read tells of no robot
-    for each in message.transforms:
-        into.take(namespace, each.frame_id, each.child_frame_id)
-
-
-_TYPES = ("tf2_msgs/TFMessage", "tf2_msgs/msg/TFMessage")
+    if not frame_topics(topics):
+        return Trees()
+    async with TemporaryBridge(url) as bridge:
+        try:
+            await bridge.open()
+        except BridgeClosed:
+            # It was there a moment ago; who connects next reports that it is away.
+            return Trees()
+        return await LateFrames(bridge).listen(topics, seconds=seconds)

@@ -1,71 +1,36 @@
 """Which topics can be drawn on a map besides what a robot is driven by.
 
-Rules are looked at in order, and the first that fits a topic counts. A robot gets so
-many topics of a kind at the most, the best first, since each costs its link something.
+Layers declare which topics they draw. The first kind that fits a topic counts. A robot
+gets so many topics of a kind at the most, the best first, since each costs its link
+something.
 """
 
+import inspect
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeAlias
 
+import msgspec
+
+from webmap.config.robot import ModuleConfig, RobotConfig, is_link
+from webmap.core.declaration import Declaration, FoundTopic, TopicKind, declarations
 from webmap.discovery.grouping import inside, nearest
 from webmap.errors import ConfigError
-from webmap.ros.names import is_topic, split_type
+from webmap.ros.names import is_topic, normalise_topic, split_type
 
-Kind: TypeAlias = Literal[
-    "map",
-    "grid",
-    "costmap",
-    "global costmap",
-    "scan",
-    "cloud",
-    "local plan",
-    "path",
-    "particles",
-    "poses",
-    "doubt",
-    "footprint",
-    "polygon",
-    "goal",
-    "pose",
-    "lookahead",
-    "point",
-    "cells",
-    "range",
-    "markers",
-    "fix",
-    "health",
-]
-"""What is drawn of a topic."""
-
-SHARED: tuple[Kind, ...] = ("map", "grid", "health")
-"""What every robot has of a topic that is in nobody's namespace."""
-
-
-@dataclass(frozen=True, slots=True)
-class LayerRule:
-    """One rule."""
-
-    kind: Kind
-    types: tuple[str, ...]
-    """Names of types without a dialect."""
-
-    name: str
-    """A pattern that is found in the topic's name."""
-
-    most: int
-    """How many topics of this kind a robot gets."""
-
-    words: str
-    """Why such a topic is drawn so, for people."""
+TRAIL = ModuleConfig(name="Trail", options={"length": 10.0})
+"""Where a robot was, which is drawn of every robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundLayer:
     """A topic that can be drawn."""
 
-    kind: Kind
+    kind: str
+    """What the layer calls such a topic."""
+
     topic: str
     type: str
     """The type as the bridge spells it."""
@@ -74,106 +39,23 @@ class FoundLayer:
     """The rule, in words."""
 
 
-GRID = ("nav_msgs/OccupancyGrid",)
-SCAN = ("sensor_msgs/LaserScan",)
-CLOUD = ("sensor_msgs/PointCloud2",)
-PATH = ("nav_msgs/Path",)
-ARRAY = ("geometry_msgs/PoseArray",)
-PARTICLES = ("nav2_msgs/ParticleCloud",)
-DOUBT = ("geometry_msgs/PoseWithCovarianceStamped",)
-POLYGON = ("geometry_msgs/PolygonStamped",)
-POSE = ("geometry_msgs/PoseStamped",)
-POINT = ("geometry_msgs/PointStamped",)
-CELLS = ("nav_msgs/GridCells",)
-MARKERS = ("visualization_msgs/MarkerArray",)
-MARKER = ("visualization_msgs/Marker",)
-FIX = ("sensor_msgs/NavSatFix",)
-GPS_FIX = ("gps_msgs/GPSFix", "gps_common/GPSFix")
-HEALTH = ("diagnostic_msgs/DiagnosticArray",)
+class Layers(NamedTuple):
+    """What can be drawn of one robot, the best first."""
 
-RULES: tuple[LayerRule, ...] = (
-    LayerRule("costmap", GRID, r"local_costmap/costmap\Z", 1, "a local costmap"),
-    LayerRule(
-        "global costmap", GRID, r"global_costmap/costmap\Z", 1, "a global costmap"
-    ),
-    LayerRule("costmap", GRID, r"costmap/costmap\Z", 1, "a costmap"),
-    LayerRule("costmap", GRID, r"costmap", 1, "named a costmap"),
-    LayerRule("map", GRID, r"/map\Z", 4, "the usual name"),
-    LayerRule("map", GRID, r"map[^/]*\Z", 4, "named a map"),
-    LayerRule("grid", GRID, r"", 2, "its type alone"),
-    LayerRule("scan", SCAN, r"/(?:base_)?scan\Z", 6, "the usual name"),
-    LayerRule("scan", SCAN, r"", 6, "its type alone"),
-    LayerRule("cloud", CLOUD, r"points|cloud", 2, "named points or a cloud"),
-    LayerRule("cloud", CLOUD, r"", 2, "its type alone"),
-    LayerRule("local plan", PATH, r"/local_plan\Z", 1, "the usual name"),
-    LayerRule("path", PATH, r"/plan\Z", 6, "the usual name"),
-    LayerRule("path", PATH, r"plan|path|trajectory", 6, "named a way to go"),
-    LayerRule("path", PATH, r"", 6, "its type alone"),
-    LayerRule("particles", PARTICLES, r"", 1, "its type alone"),
-    LayerRule("particles", ARRAY, r"particle_?cloud\Z", 1, "the usual name"),
-    LayerRule("poses", ARRAY, r"", 3, "its type alone"),
-    LayerRule(
-        "doubt",
-        DOUBT,
-        r"/(?:amcl_pose|localization_pose|pose)\Z",
-        2,
-        "a localiser's pose",
-    ),
-    LayerRule(
-        "doubt",
-        DOUBT,
-        r"\A(?!.*initial_?pose\Z)",
-        2,
-        "its type alone, unless it is where an initial pose is told",
-    ),
-    LayerRule(
-        "footprint",
-        POLYGON,
-        r"local_costmap/(?:published_)?footprint\Z",
-        1,
-        "of a local costmap",
-    ),
-    LayerRule("footprint", POLYGON, r"footprint[^/]*\Z", 1, "named a footprint"),
-    LayerRule("polygon", POLYGON, r"", 3, "its type alone"),
-    LayerRule("goal", POSE, r"/current_goal\Z", 1, "where move_base says that it goes"),
-    LayerRule("goal", POSE, r"/goal_pose\Z", 1, "where RViz sends Nav2"),
-    LayerRule(
-        "goal", POSE, r"/move_base_simple/goal\Z", 1, "where RViz sends move_base"
-    ),
-    LayerRule("pose", POSE, r"", 3, "its type alone"),
-    LayerRule(
-        "lookahead", POINT, r"/lookahead_point\Z", 1, "what a controller steers to"
-    ),
-    LayerRule("point", POINT, r"", 3, "its type alone"),
-    LayerRule(
-        "cells", CELLS, r"local_costmap/(?!unknown_space\Z)", 3, "of a local costmap"
-    ),
-    LayerRule(
-        "cells",
-        CELLS,
-        r"\A(?!.*unknown_space\Z)",
-        3,
-        "its type alone, unless it is all that nobody knows",
-    ),
-    LayerRule("range", ("sensor_msgs/Range",), r"", 8, "its type alone"),
-    LayerRule("markers", MARKERS, r"", 3, "its type alone"),
-    LayerRule("markers", MARKER, r"", 3, "its type alone"),
-    LayerRule("fix", FIX, r"/fix\Z", 1, "the usual name"),
-    LayerRule("fix", FIX, r"", 1, "its type alone"),
-    LayerRule("fix", GPS_FIX, r"", 1, "its type alone"),
-    LayerRule("health", HEALTH, r"/diagnostics\Z", 1, "the usual name"),
-    LayerRule("health", HEALTH, r"/diagnostics_agg\Z", 1, "what an aggregator says"),
-)
+    drawn: tuple[FoundLayer, ...] = ()
+    left_out: tuple[FoundLayer, ...] = ()
+    """What could be drawn too, but for its number."""
 
 
-Order: TypeAlias = tuple[int, bool, str]
+Place: TypeAlias = tuple[float, int, int, int]
+"""The rank of a layer, and the numbers of its kind, of the kind's type and pattern."""
+
+Order: TypeAlias = tuple[Place, bool, str]
 """The place of a rule, whether the topic is no robot's own, and the topic."""
 
 
-def find_layers(
-    topics: Mapping[str, str], robots: Iterable[str]
-) -> dict[str, list[FoundLayer]]:
-    """Return what is drawn of each robot.
+def find_layers(topics: Mapping[str, str], robots: Iterable[str]) -> dict[str, Layers]:
+    """Return what is drawn of each robot, and what is left out.
 
     Args:
         topics: Types by topic, in either dialect.
@@ -181,71 +63,194 @@ def find_layers(
             for a robot without one.
 
     """
-    return {space: drawn for space, (drawn, _) in _sorted(topics, robots).items()}
-
-
-def left_out(
-    topics: Mapping[str, str], robots: Iterable[str]
-) -> dict[str, list[FoundLayer]]:
-    """Return what could be drawn of each robot, but for its number.
-
-    Args:
-        topics: Types by topic, in either dialect.
-        robots: The namespaces of the robots behind the bridge.
-
-    """
-    return {space: others for space, (_, others) in _sorted(topics, robots).items()}
-
-
-def is_own(topic: str, namespace: str) -> bool:
-    """Tell whether a map is a robot's own, and not the one that all of them share."""
-    return namespace != "" and inside(topic, namespace)
-
-
-def _sorted(
-    topics: Mapping[str, str], robots: Iterable[str]
-) -> dict[str, tuple[list[FoundLayer], list[FoundLayer]]]:
+    layers = declarations()
+    kinds = _kinds(layers)
+    layers = _foreign_first(layers)
     matched: dict[str, list[tuple[Order, FoundLayer]]] = {space: [] for space in robots}
     for topic, type in topics.items():
-        found = _match(topic, type)
+        found = _match(topic, type, layers)
         if found is None:
             continue
         place, layer = found
-        for space in _owners(topic, layer.kind, matched):
+        for space in _owners(topic, kinds[layer.kind][1], matched):
             order = (place, not is_own(topic, space), topic)
             matched[space].append((order, layer))
-    return {space: _best(layers) for space, layers in matched.items()}
+    return {space: _best(found, kinds) for space, found in matched.items()}
 
 
-def _match(topic: str, type: str) -> tuple[int, FoundLayer] | None:
+def drawn_otherwise(topics: Mapping[str, str]) -> set[str]:
+    """Return the topics that layers draw which do not come with WebMap."""
+    layers = _foreign_first(declarations())
+    found = ((topic, _match(topic, type, layers)) for topic, type in topics.items())
+    kinds = _kinds(layers)
+    return {
+        topic
+        for topic, match in found
+        if match is not None and not kinds[match[1].kind][0].built_in
+    }
+
+
+def is_own(topic: str, namespace: str) -> bool:
+    """Return whether a topic is a robot's own, and not one that robots may share."""
+    return namespace != "" and inside(topic, namespace)
+
+
+def role_of(layer: FoundLayer) -> str:
+    """Return which role a topic may have that is drawn so; empty if none."""
+    return declared_kind(layer.kind)[1].role
+
+
+def declared_kind(name: str) -> tuple[Declaration, TopicKind]:
+    """Return a kind of topics and the layer that draws them.
+
+    Raises:
+        ConfigError: If no layer has a kind of that name.
+
+    """
+    known = _kinds(declarations())
+    if name not in known:
+        raise ConfigError(f"no layer draws {name!r}; there are {', '.join(known)}")
+    return known[name]
+
+
+def _kinds(layers: Iterable[Declaration]) -> dict[str, tuple[Declaration, TopicKind]]:
+    return {kind.name: (each, kind) for each in layers for kind in each.kinds}
+
+
+def _foreign_first(layers: Iterable[Declaration]) -> list[Declaration]:
+    """Return layers that do not come with WebMap before the others.
+
+    They may draw some topics of a type better.
+    """
+    return sorted(layers, key=lambda each: each.built_in)
+
+
+def _match(
+    topic: str, type: str, layers: Iterable[Declaration]
+) -> tuple[Place, FoundLayer] | None:
     if not is_topic(topic):
         return None
     try:
         plain = str(split_type(type.strip()))
     except ConfigError:
         return None
-    for place, rule in enumerate(RULES):
-        if plain in rule.types and re.search(rule.name, topic):
-            return place, FoundLayer(rule.kind, topic, type.strip(), rule.words)
+    for declared in layers:
+        for number, kind in enumerate(declared.kinds):
+            if plain not in kind.types:
+                continue
+            for rule, (pattern, words) in enumerate(kind.names.items()):
+                if re.search(pattern, topic):
+                    place = (declared.rank, number, kind.types.index(plain), rule)
+                    return place, FoundLayer(kind.name, topic, type.strip(), words)
     return None
 
 
-def _owners(topic: str, kind: Kind, spaces: Mapping[str, object]) -> list[str]:
+def _owners(topic: str, kind: TopicKind, spaces: Mapping[str, object]) -> list[str]:
     """Return whose a topic is: the innermost robot's, or the only one's."""
     owner = nearest(topic, spaces)
     if owner is not None:
         return [owner]
-    if kind in SHARED or len(spaces) == 1:
+    if kind.shared or len(spaces) == 1:
         return list(spaces)
     return []
 
 
 def _best(
     found: list[tuple[Order, FoundLayer]],
-) -> tuple[list[FoundLayer], list[FoundLayer]]:
+    kinds: Mapping[str, tuple[Declaration, TopicKind]],
+) -> Layers:
     best: list[FoundLayer] = []
     others: list[FoundLayer] = []
-    for (place, _, _), layer in sorted(found, key=lambda each: each[0]):
+    for _, layer in sorted(found, key=lambda each: each[0]):
         count = sum(other.kind == layer.kind for other in best)
-        (best if count < RULES[place].most else others).append(layer)
-    return best, others
+        most = kinds[layer.kind][1].most
+        (best if count < most else others).append(layer)
+    return Layers(tuple(best), tuple(others))
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A module that draws one topic of a robot."""
+
+    module: str
+    """Its name; it takes a bridge and the topic first."""
+
+    options: dict[str, Any] = field(default_factory=dict)
+    of_maps: bool = False
+    """Whether it is a module of maps, which a robot brings along by ``OnMaps``."""
+
+    shared: bool = False
+    """Whether it is nobody's own, and lies on the map once for all robots."""
+
+
+def drawing(
+    layer: FoundLayer,
+    namespace: str,
+    frames: Mapping[str, Any] | None,
+    number: int = 1,
+) -> Drawing:
+    """Return what draws a layer of a robot.
+
+    Args:
+        layer: The layer.
+        namespace: The robot's: ``/robot_0``, or empty.
+        frames: ``map_frame`` and ``namespace`` of the robot's frames; None if it has
+            none.
+        number: Which of the robot's layers of this class it is, from 1.
+
+    """
+    declared, kind = declared_kind(layer.kind)
+    own = is_own(layer.topic, namespace)
+    found = FoundTopic(kind, layer.topic, layer.type, own, namespace, frames, number)
+    options = declared.options_for(found)
+    shared = declared.of_maps and kind.shared and not own
+    return Drawing(declared.name, options, declared.of_maps and not shared, shared)
+
+
+def topic_of(module: ModuleConfig) -> str:
+    """Return the topic that a module draws; empty if it draws none."""
+    for link, topic in pairwise(module.args):
+        if is_link(link) and isinstance(topic, str):
+            return topic
+    return ""
+
+
+def with_layers(
+    config: RobotConfig, layers: Iterable[FoundLayer], namespace: str
+) -> RobotConfig:
+    """Return a robot with more of its topics drawn, each once.
+
+    What robots share is left out.
+
+    Args:
+        config: The robot.
+        layers: What is drawn of it.
+        namespace: The robot's: ``/robot_0``, or empty.
+
+    """
+    frames = None if config.tf is None else msgspec.structs.asdict(config.tf)
+    scans, modules = list(config.scan), list(config.modules)
+    taken = {topic_of(layer.module) for layer in config.layers()}
+    if config.odometry is not None:
+        taken.add(normalise_topic(config.odometry.topic))
+    for layer in layers:
+        name = declared_kind(layer.kind)[0].name
+        number = 1 + sum(module.name == name for module in modules)
+        drawn = drawing(layer, namespace, frames, number)
+        if drawn.shared or layer.topic in taken:
+            continue
+        taken.add(layer.topic)
+        if drawn.module == "LaserScanner":
+            scans.append(layer.topic)
+            continue
+        args = [{"bridge": config.bridge}, layer.topic]
+        takes = inspect.signature(declared_kind(layer.kind)[0].layer).parameters
+        options = {
+            key: value
+            for key, value in drawn.options.items()
+            if value != "" or takes[key].default != ""
+        }
+        if drawn.of_maps:
+            name, args = "OnMaps", [name, *args]
+        modules.append(ModuleConfig(name=name, args=args, options=options))
+    return msgspec.structs.replace(config, scan=scans, modules=modules)

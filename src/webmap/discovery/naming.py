@@ -1,24 +1,11 @@
 """Names of robots behind several bridges, so that no two are the same."""
 
-import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
+from webmap.config.checks import same_name
 from webmap.discovery.found import Findings
-
-LONGEST = 100
-"""Characters of a name that still fits into a list."""
-
-
-def is_name(text: str) -> bool:
-    """Return whether a text can stand in a list of robots: one line, not too long."""
-    return text.strip() != "" and text.isprintable() and len(text) <= LONGEST
-
-
-def same_name(name: str) -> str:
-    """Return what two names have in common that people would take for one."""
-    return unicodedata.normalize("NFKC", name).casefold().strip()
 
 
 def unique_names(

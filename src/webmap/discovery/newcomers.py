@@ -11,7 +11,7 @@ class News:
     """A robot that is new, or one that has more than before."""
 
     robot: FoundRobot
-    """All that is known of it now."""
+    """All that is known of it now: what is in use stays, what is new comes besides."""
 
     roles: tuple[Role, ...] = ()
     """What it has more than before; empty for a robot that is new."""
@@ -44,21 +44,31 @@ class Newcomers:
         news = []
         for robot in findings.robots:
             known = self._known.get(robot.namespace)
-            roles = () if known is None else _more(robot, known)
+            whole = robot if known is None else _merged(robot, known)
+            roles = () if known is None else _more(whole, known)
             moved = known is not None and leads_further(robot, known)
             if known is not None and not roles and not moved:
                 continue
             if before.get(robot.namespace) != robot:
                 self._seen[robot.namespace] = robot
                 continue
-            if known is not None and not moved:
-                robot = with_frames_of(robot, known)
-            guesses = {**robot.guesses, **(known.guesses if known else {})}
-            if "camera" in guesses:
-                guesses["camera"] = _all_cameras(robot, known)
-            self._known[robot.namespace] = replace(robot, guesses=guesses)
-            news.append(News(robot, roles, moved))
+            self._known[robot.namespace] = whole
+            news.append(News(whole, roles, moved))
         return news
+
+
+def _merged(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
+    """Return a robot with what is known of it, and with what is new besides."""
+    guesses = {**robot.guesses, **known.guesses}
+    if "camera" in guesses:
+        guesses["camera"] = _all_cameras(robot, known)
+    # A pose may be silent while the robot stands; what else tells its place is not.
+    framed = known.tf_namespace is not None and known.base_frame != ""
+    if "pose" not in known.guesses and (known.topic("odometry") or framed):
+        guesses.pop("pose", None)
+    if not leads_further(robot, known):
+        robot = with_frames_of(robot, known)
+    return replace(robot, guesses=guesses)
 
 
 def leads_further(robot: FoundRobot, known: FoundRobot) -> bool:
@@ -88,14 +98,14 @@ def with_frames_of(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
 
 def _more(robot: FoundRobot, known: FoundRobot) -> tuple[Role, ...]:
     new = {role for role in robot.guesses if role not in known.guesses}
-    if len(_all_cameras(robot, known)) > len(known.guesses.get("camera", ())):
+    if len(robot.guesses.get("camera", ())) > len(known.guesses.get("camera", ())):
         new.add("camera")
     return tuple(role for role in ROLES if role in new)
 
 
-def _all_cameras(robot: FoundRobot, known: FoundRobot | None) -> tuple[Guess, ...]:
+def _all_cameras(robot: FoundRobot, known: FoundRobot) -> tuple[Guess, ...]:
     """Return the cameras that are known, and then those that are new."""
-    before = () if known is None else known.guesses.get("camera", ())
+    before = known.guesses.get("camera", ())
     topics = {guess.topic for guess in before}
     more = robot.guesses.get("camera", ())
     return (*before, *(guess for guess in more if guess.topic not in topics))

@@ -9,13 +9,16 @@ from urllib.parse import urlsplit
 
 from webmap.discovery.found import Findings, FoundRobot, Guess, Role
 from webmap.discovery.grouping import inside, nearest, robot_namespaces
-from webmap.discovery.layers import find_layers, left_out
+from webmap.discovery.layers import drawn_otherwise, find_layers
 from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
 from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import is_topic, is_type
 
 SHARED: tuple[Role, ...] = ("map", "tf")
 """Roles that a topic without a namespace has for every robot."""
+
+DRAWN_ONLY: tuple[Role, ...] = ("scan", "plan", "map", "costmap", "cloud")
+"""Roles of topics that are drawn and nothing else, so that a layer may take them."""
 
 DIRECTION = (
     "A list of topics does not say who publishes and who subscribes: a topic may be "
@@ -37,7 +40,15 @@ def discover(
     """
     topics = {name: type.strip() for name, type in topics.items() if is_topic(name)}
     found = (match(name, type) for name, type in sorted(topics.items()))
-    matches = _packed([each for each in found if each is not None])
+    others = drawn_otherwise(topics)
+    matches = _packed(
+        [
+            each
+            for each in found
+            if each is not None
+            and not (each.role in DRAWN_ONLY and each.topic in others)
+        ]
+    )
     spaces = robot_namespaces(matches)
     bases, alone = owners(trees.bases() if trees else (), spaces)
     bases |= {base.space: base for base in alone}
@@ -51,8 +62,7 @@ def discover(
         robots,
         _dialect(topics.values()),
         _notes(topics, robots),
-        {space: tuple(drawn) for space, drawn in find_layers(topics, spaces).items()},
-        {space: tuple(more) for space, more in left_out(topics, spaces).items()},
+        find_layers(topics, spaces),
     )
 
 

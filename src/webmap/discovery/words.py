@@ -1,10 +1,7 @@
 """What was found, as a table for a terminal."""
 
-from collections.abc import Sequence
-
-from webmap.discovery.drawing import drawing
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
-from webmap.discovery.layers import FoundLayer
+from webmap.discovery.layers import Layers, drawing
 from webmap.outside_text import escaped
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
@@ -86,25 +83,20 @@ def robot_table(robot: FoundRobot) -> list[str]:
 
 def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
     """Return what is drawn of a robot that was found."""
-    space = robot.namespace
-    others = findings.left_out.get(space, ())
-    return drawn_table(space, findings.layers.get(space, ()), others)
+    return drawn_table(robot.namespace, findings.layers.get(robot.namespace, Layers()))
 
 
-def drawn_table(
-    namespace: str, drawn: Sequence[FoundLayer], others: Sequence[FoundLayer]
-) -> list[str]:
+def drawn_table(namespace: str, layers: Layers) -> list[str]:
     """Return what is drawn of a robot, one topic a line, by which module and rule.
 
     Args:
         namespace: The robot's.
-        drawn: What is drawn.
-        others: What could be drawn too, but for its number.
+        layers: What is drawn of it, and what is left out.
 
     """
     rows = [
         (layer.topic, drawing(layer, namespace, None).module, layer.rule)
-        for layer in drawn
+        for layer in layers.drawn
     ]
     if not rows:
         return []
@@ -114,8 +106,8 @@ def drawn_table(
         f"    {topic:<{widths[0]}}  {module:<{widths[1]}}  {rule}"
         for topic, module, rule in rows
     ]
-    if others:
-        listed = ", ".join(layer.topic for layer in others)
+    if layers.left_out:
+        listed = ", ".join(layer.topic for layer in layers.left_out)
         lines.append(f"  not drawn, since there are enough of their kind: {listed}")
     return lines
 

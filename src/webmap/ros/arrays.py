@@ -1,11 +1,10 @@
 """Arrays of numbers in messages, kept as bytes until somebody asks for numpy.
 
-JSON brings lists with ``null`` for what is not a number, CBOR brings typed arrays
-(RFC 8746). Both become one compact value that costs 4 bytes or 1 byte a number and
-needs no numpy to be made, moved between processes or thrown away.
+JSON brings lists with ``null`` for what is not a number, a binary encoding brings typed
+arrays. Both become one compact value that costs 4 bytes or 1 byte a number and needs no
+numpy to be made, moved between processes or thrown away.
 """
 
-import sys
 from array import array
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
@@ -122,35 +121,3 @@ def dec_hook(wanted: type, value: object) -> object:
     if isinstance(wanted, type) and issubclass(wanted, Numbers):
         return wanted.from_wire(value)
     raise NotImplementedError(f"a message cannot hold a {wanted!r}")
-
-
-def enc_hook(value: object) -> object:
-    """Encode the fields that msgspec does not know; see its ``enc_hook``."""
-    if isinstance(value, Numbers):
-        return bytes(value)
-    if isinstance(value, array):
-        return value.tolist()
-    raise NotImplementedError(f"cannot encode a {type(value).__name__}")
-
-
-# RFC 8746: tag -> type code, little-endian. Half and quadruple floats have none.
-_LITTLE = {64: "B", 68: "B", 69: "H", 70: "I", 71: "Q"}
-_LITTLE |= {72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d"}
-_BIG = {65: "H", 66: "I", 67: "Q", 73: "h", 74: "i", 75: "q", 81: "f", 82: "d"}
-TYPED_ARRAY_TAGS = frozenset(_LITTLE) | frozenset(_BIG)
-
-
-def typed_array(tag: int, value: object) -> "array[Any]":
-    """Return the numbers of a CBOR typed array.
-
-    Raises:
-        ValueError: If the value is not a whole number of such numbers.
-
-    """
-    if not isinstance(value, bytes):
-        raise ValueError(f"typed array {tag} holds {type(value).__name__}, not bytes")
-    numbers: array[Any] = array(_LITTLE.get(tag) or _BIG[tag])
-    numbers.frombytes(value)
-    if (sys.byteorder == "big") != (tag in _BIG):
-        numbers.byteswap()
-    return numbers

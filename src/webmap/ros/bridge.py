@@ -1,48 +1,36 @@
-"""The link to one ROS system, shared by everything in the process that needs it."""
+"""The link to one ROS system, shared by everything in the process that needs it.
+
+What is said here holds for any kind of link: topics, messages, services and who may
+publish what. How it goes over the wire is known to the link behind it alone.
+"""
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 
-from webmap.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.errors import BridgeClosed, BridgeError
 from webmap.lifecycle import lifecycle
-from webmap.outside_text import one_line
 from webmap.ros.callbacks import Callback, Callbacks
-from webmap.ros.calls import Calls
-from webmap.ros.connection import Lane, State
-from webmap.ros.doubts import Doubts
-from webmap.ros.events import CallService, Event, Malformed, Publish, Status
+from webmap.ros.definitions import Definitions
 from webmap.ros.fan_out import FanOut
-from webmap.ros.graph import Graph
-from webmap.ros.link_trouble import LinkTrouble
-from webmap.ros.names import normalise_topic, normalise_url, split_type
-from webmap.ros.ops import service_response
-from webmap.ros.protocol import Protocol
-from webmap.ros.publications import Publications, written_behind
-from webmap.ros.renewal import Renewals
-from webmap.ros.subscriptions import Subscription, Topic
-from webmap.ros.wish import Wish, checked
-from webmap.scope import Removal, keep
+from webmap.ros.moving import written_behind
+from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
+from webmap.ros.received import BridgeStats, LinkState, ReceivedMessage
+from webmap.ros.rosbridge.link import RosbridgeLink
+from webmap.ros.subscriptions import (
+    Encoding,
+    Subscription,
+    SubscriptionOptions,
+    Topic,
+    checked,
+)
+from webmap.ros.topic_faults import TopicFaults
+from webmap.scope import Removal, keep, no_scope
 
 log = logging.getLogger("webmap.ros")
-
-
-@dataclass(slots=True)
-class BridgeStats:
-    """What came on the data lane, since the bridge was made."""
-
-    frames: int = 0
-    bytes: int = 0
-    malformed: int = 0
-    """Frames that were not rosbridge."""
-
-    links: int = 0
-    """How often the link was opened."""
 
 
 class Bridge:
@@ -70,23 +58,26 @@ class Bridge:
         self.name = name or self.url
         self.replays = False
         """Whether a recording is played behind it, whose robots may pause and end."""
-        self.stats = BridgeStats()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._lane: Lane | None = None
         self._topics: dict[str, Topic] = {}
-        self._publications = Publications(written_behind(self.url))
-        self._calls = Calls(self.url)
-        self._graph = Graph(self.call_service)
+        self._written = written_behind(self.url)
         self._fan_out = FanOut()
-        self._doubts = Doubts(self.name, self._graph, self._report)
-        self._renewals = Renewals(self._graph.published, self._topics.values)
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
-        self._protocol = Protocol()
-        self._trouble = LinkTrouble(self.name, self._report)
-        self._over: str | None = None
-        """Why nothing comes any more, once what made this bridge has ended."""
+        self._link = RosbridgeLink(
+            self.url,
+            self.name,
+            opened=self._opened,
+            closed=self._closed,
+            received=self._received,
+            report=self._report,
+        )
+        self._graph = self._link.graph
+        self._faults = TopicFaults(self.name, self._graph.topic_type, self._report)
+        self._enlist()
+
+    def _enlist(self) -> None:
         lifecycle.add(self)
         keep(Removal(self._end))
 
@@ -94,14 +85,19 @@ class Bridge:
         return f"<Bridge {self.url} {self.state}>"
 
     @property
-    def state(self) -> State:
+    def state(self) -> LinkState:
         """``new``, ``connecting``, ``open``, or ``closed`` after :meth:`stop`."""
-        return self._lane.state if self._lane is not None else "new"
+        return self._link.lane.state
+
+    @property
+    def stats(self) -> BridgeStats:
+        """What came over the link, since the bridge was made."""
+        return self._link.stats
 
     @property
     def trouble(self) -> str | None:
         """Why the link is not open: how the last attempt failed or the link ended."""
-        return self._trouble.why
+        return self._link.trouble
 
     @property
     def lost(self) -> bool:
@@ -113,7 +109,7 @@ class Bridge:
     @property
     def last_heard(self) -> float | None:
         """When the last bytes came from the bridge, on the monotonic clock."""
-        return self._lane.last_heard if self._lane is not None else None
+        return self._link.lane.last_heard
 
     @property
     def lag(self) -> float:
@@ -123,7 +119,7 @@ class Bridge:
         that it has sent before; a link that becomes slow is seen within a second.
         What a robot's own nodes keep back is not in it.
         """
-        return self._lane.lag if self._lane is not None else 0.0
+        return self._link.lane.lag
 
     def on_open(self, fn: Callable[[], Any]) -> Removal:
         """Call ``fn`` whenever the link opens; soon, if it is open already.
@@ -132,7 +128,7 @@ class Bridge:
             BridgeClosed: If the page or the module that made this bridge has ended.
 
         """
-        self._refuse_if_over()
+        self._link.refuse_if_over()
         callback, removal = self._on_open.add(fn)
         if self.state == "open" and self._loop is not None:
             self._loop.call_soon(callback)
@@ -154,7 +150,7 @@ class Bridge:
         *,
         throttle: int = 0,
         decode: type[msgspec.Struct] | None = None,
-        compression: str | None = None,
+        encoding: Encoding | None = None,
         queue_length: int = 1,
     ) -> Subscription:
         """Hear the messages of a topic; also of one that does not exist yet.
@@ -172,9 +168,11 @@ class Bridge:
                 message. The bridge is never asked for less than 1 ms between two, and
                 then keeps the messages of a burst.
             decode: A type with the fields that are wanted; None for a plain dict.
-            compression: ``none``, ``png``, ``cbor`` or ``cbor-raw``; None lets
-                what may be large (scans, grids, clouds, paths, arrays of poses,
-                markers) come in CBOR and the rest in JSON.
+            encoding: ``binary`` for a binary encoding, which keeps infinities and
+                costs a bridge less for large messages; ``text``; or ``raw`` for a
+                mapping with the bytes that ROS itself sends. None lets what may be
+                large (scans, grids, clouds, paths, arrays of poses, markers) come in
+                a binary encoding and the rest as text.
             queue_length: Messages that the bridge may hold back; it is asked for
                 at least 1.
 
@@ -187,23 +185,23 @@ class Bridge:
             BridgeClosed: If the page or the module that made this bridge has ended.
 
         """
-        self._refuse_if_over()
+        self._link.refuse_if_over()
         name = normalise_topic(topic)
-        checked(callback, throttle, queue_length, decode)
+        wanted = SubscriptionOptions(type, throttle, queue_length, encoding)
+        options = checked(wanted, callback, decode)
         if type is not None:
             split_type(type)
-        wish = Wish(type, throttle, queue_length, compression)
-        book = self._topics.get(name) or self._new_topic(name)
-        book.check(wish)
+        entry = self._topics.get(name) or self._new_topic(name)
+        entry.check(options)
         called = Callback(callback, f"{self.name}: {name}", self._report)
-        listener = Subscription(book, called, wish, decode)
+        listener = Subscription(entry, called, options, decode)
         if listener.removed:  # its scope has ended already
             return listener
-        self._topics[name] = book
-        late, is_first = book.replay, not book.listeners
-        book.add(listener)
+        self._topics[name] = entry
+        late, is_first = entry.replay, not entry.listeners
+        entry.add(listener)
         if is_first and self.state == "open":
-            self._doubts.watch(book)
+            self._faults.watch(entry)
         elif late is not None:
             self._fan_out.give_soon(late, listener)
         return listener
@@ -227,21 +225,19 @@ class Bridge:
 
         """
         name = normalise_topic(topic)
-        book = self._topics.get(name)
-        known = self._graph.known(name) or (book.message_type if book else None)
-        frames = self._publications.frames(name, message, type, known)
-        try:
-            for frame in frames:
-                self._lane_or_raise().send(frame)
-        except BridgeClosed:
-            if len(frames) > 1:
-                self._publications.forget(name)
-            raise
+        entry, before = self._topics.get(name), self._link.published_type(name)
+        known = self._graph.known(name) or (entry.message_type if entry else None)
+        wanted = type or before or known
+        self._written.refuse_message(name, wanted, known)
+        if wanted is None:
+            raise BridgeError(f"{name}: say the message type the first time")
+        if before is not None and not same_type(before, wanted):
+            raise BridgeError(f"{name} is advertised as {before}, not as {wanted}")
+        self._link.publish(name, wanted, message)
 
     def unadvertise(self, topic: str) -> None:
         """Publish no more on ``topic``; nothing happens if nobody did."""
-        for frame in self._publications.forget(topic):
-            self._send(frame)
+        self._link.unadvertise(normalise_topic(topic))
 
     def protect(self, topic: str, carries: str = "a goal") -> None:
         """Refuse to publish on ``topic`` from now on: the gate writes it.
@@ -254,8 +250,9 @@ class Bridge:
             carries: What it carries, for whoever is refused.
 
         """
-        for frame in self._publications.protect(topic, carries):
-            self._send(frame)
+        name = normalise_topic(topic)
+        self._written.declare(name, carries)
+        self._link.unadvertise(name)
 
     async def call_service(
         self,
@@ -282,155 +279,182 @@ class Bridge:
             MotionRefused: If the service would send a robot somewhere.
 
         """
-        self._publications.refuse_goal_service(service)
-        self._refuse_if_over()
-        return await self._calls.call(normalise_topic(service), args, type, timeout)
-
-    async def topic_type(self, topic: str) -> str | None:
-        """Return the type of a topic as rosapi knows it, in the bridge's dialect.
-
-        None if nobody knows the topic, the bridge has no rosapi, or it does not
-        answer.
-        """
-        return await self._graph.topic_type(normalise_topic(topic))
-
-    async def publishers(self, topic: str) -> list[str] | None:
-        """Return the nodes that publish a topic, as rosapi knows them.
-
-        None if the bridge has no rosapi, or it does not answer.
-        """
-        return await self._graph.publishers(normalise_topic(topic))
+        name = normalise_topic(service)
+        self._written.refuse_service(name)
+        return await self._link.call_service(name, args, type=type, timeout=timeout)
 
     async def topics(self) -> dict[str, str]:
         """Return the type of every topic.
 
         Raises:
-            ServiceError: If the bridge has no rosapi, or it does not answer.
+            ServiceError: If the bridge does not list its topics.
             BridgeClosed: If the link cannot be opened.
 
         """
         return await self._graph.topics()
 
+    async def topic_type(self, topic: str) -> str | None:
+        """Return the type of a topic in the bridge's dialect.
+
+        None if nobody knows the topic, or the bridge does not answer.
+        """
+        return await self._graph.topic_type(normalise_topic(topic))
+
+    async def service_type(self, service: str) -> str | None:
+        """Return the type of a service in the bridge's dialect.
+
+        None if nobody knows the service, or the bridge does not answer.
+        """
+        return await self._graph.service_type(normalise_topic(service))
+
+    async def publishers(self, topic: str) -> list[str] | None:
+        """Return the nodes that publish a topic; None if the bridge does not answer."""
+        return await self._graph.nodes("publishers", normalise_topic(topic))
+
+    async def other_publishers(self, topic: str) -> list[str] | None:
+        """Return the publishers without those that publish for clients of a bridge.
+
+        WebMap itself is such a client. None as for :meth:`publishers`.
+        """
+        return await self._graph.other_publishers(normalise_topic(topic))
+
+    async def subscribers(self, topic: str) -> list[str] | None:
+        """Return the nodes that subscribe to a topic; None as for publishers."""
+        return await self._graph.nodes("subscribers", normalise_topic(topic))
+
+    async def definitions(self, type: str, kind: str = "msg") -> Definitions:
+        """Return the definitions of a type and of all its parts, and the shipped ones.
+
+        Args:
+            type: The type.
+            kind: ``"msg"``, or ``"srv"`` for the request of a service.
+
+        Raises:
+            ServiceError: If the bridge does not say them, or cannot be asked safely.
+            BridgeClosed: If the link cannot be opened.
+
+        """
+        return await self._link.definitions(type, kind)
+
+    async def time(self) -> float | None:
+        """Return the time of the ROS system in seconds since 1970.
+
+        That of a simulator may begin at zero. None if the bridge does not answer.
+        """
+        return await self._graph.time()
+
+    async def set_parameter(
+        self, name: str, value: Any, *, timeout: float = 5.0
+    ) -> Any:
+        """Set a parameter of ROS 1; return the value that it has then.
+
+        Parameters of ROS 2 belong to nodes, which have services for them.
+
+        Raises:
+            ServiceError: If the bridge does not answer in time.
+            BridgeClosed: If the link cannot be opened.
+
+        """
+        return await self._graph.set_parameter(name, value, timeout)
+
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Open the link, and keep it open; called when WebMap starts."""
-        if self._over or (self._lane is not None and self._lane.state != "closed"):
-            return
-        self._loop = loop
-        self._fan_out.begin(loop)
-        self._lane = Lane(
-            self.url,
-            opened=self._opened,
-            received=self._received,
-            closed=self._link_lost,
-            failed=self._trouble.not_opened,
-            busy=lambda: any(t.awaits_large for t in self._topics.values()),
-        )
-        self._lane.start(loop)
+        if self._link.over is None:
+            self._loop = loop
+            self._fan_out.begin(loop)
+            self._link.lane.start(loop)
+
+    async def stop(self) -> None:
+        """Close every link; listeners stay, for another :meth:`start`."""
+        await self._link.stop()
+        await self._fan_out.stop()
+        await self._faults.stop()
+        if self._link.over is not None and self._topics:  # others listen to it still
+            log.warning(
+                "%s: nothing more of %s", self._link.over, ", ".join(self._topics)
+            )
+            for topic in tuple(self._topics.values()):
+                topic.over(BridgeClosed(self._link.over))
 
     def _end(self) -> None:
         """End for good: what made this bridge has ended."""
-        self._over = (
+        self._link.over = (
             f"the link to {self.url} has ended with the page or the module that made "
             "it: a bridge that others use, too, is made outside of both"
         )
         lifecycle.end_service(self)
 
-    def _refuse_if_over(self) -> None:
-        if self._over is not None:
-            raise BridgeClosed(self._over)
-
-    async def stop(self) -> None:
-        """Close every link; listeners stay, for another :meth:`start`."""
-        if self._lane is not None:
-            await self._lane.stop()
-        await self._calls.stop()
-        await self._fan_out.stop()
-        await self._doubts.stop()
-        await self._renewals.stop()
-        if self._over is not None and self._topics:  # others listen, who outlive it
-            log.warning("%s: nothing more of %s", self._over, ", ".join(self._topics))
-            for topic in tuple(self._topics.values()):
-                topic.over(BridgeClosed(self._over))
-
     def _new_topic(self, name: str) -> Topic:
         return Topic(
             name,
-            send=self._send,
-            complain=self._doubts.message_failed,
-            too_large=self._doubts.too_large,
+            changed=self._link.subscribe,
             emptied=self._topic_emptied,
+            complain=self._faults.message_failed,
         )
 
     def _topic_emptied(self, topic: Topic) -> None:
         self._topics.pop(topic.name, None)
-
-    def _send(self, frame: bytes) -> None:
-        """Send what a new link will be told anyway; nothing happens while closed."""
-        if self._lane is not None and self._lane.state == "open":
-            try:
-                self._lane.send(frame)
-            except BridgeError as error:
-                self._report(error)
-
-    def _lane_or_raise(self) -> Lane:
-        self._refuse_if_over()
-        if self._lane is None:
-            raise BridgeClosed(f"the link to {self.url} was never opened")
-        return self._lane
+        self._link.unsubscribe(topic)
 
     def _opened(self) -> None:
-        self.stats.links += 1
-        self._protocol = Protocol()
-        self._trouble.opened()
-        self._graph.forget()
-        for frame in self._publications.again():
-            self._send(frame)
         for topic in list(self._topics.values()):
-            topic.again()
-            self._doubts.watch(topic)
-        self._renewals.begin()
+            self._faults.watch(topic)
         self._on_open.call()
 
-    def _link_lost(self, reason: str) -> None:
-        self._trouble.lost(reason)
-        self._doubts.forget()
-        self._renewals.forget()
+    def _closed(self, reason: str) -> None:
+        self._faults.forget()
         for topic in self._topics.values():
             topic.link_lost()
         self._on_close.call(reason)
 
+    def _received(self, topic: Topic, message: ReceivedMessage) -> bool:
+        usable = topic.received(message)
+        if usable:
+            self._fan_out.offer(message, topic.listeners)
+        return usable
+
     def _report(self, error: Exception) -> None:
         self._on_error.call(error)
 
-    def _received(self, frame: bytes | bytearray) -> None:
-        event = self._protocol.receive(frame, time.monotonic())
-        self.stats.frames += 1
-        self.stats.bytes += len(frame)
-        if isinstance(event, Publish):
-            topic = self._topics.get(event.topic)
-            if topic is not None and topic.received(event):
-                self._fan_out.offer(event, topic.listeners)
-        elif event is not None:
-            self._other(event)
 
-    def _other(self, event: Event) -> None:
-        if isinstance(event, Malformed):
-            self.stats.malformed += 1
-            said = self._trouble.malformed(event)
-            if said is not None:
-                self._mention(said)
-        elif isinstance(event, Status) and event.level == "error":
-            words = one_line(event.msg)
-            log.warning("%s says: %s", self.name, words)
-            self._report(BridgeError(f"{self.name} says: {words}"))
-        elif isinstance(event, CallService):
-            answer = "this client offers no services"
-            id = None if event.id is None else str(event.id)
-            self._send(service_response(event.service, answer, id=id, result=False))
+class TemporaryBridge(Bridge):
+    """A bridge for the time of an ``async with``, such as to look at a robot.
 
-    def _mention(self, fault: ProtocolError) -> None:
-        """Tell one of those who subscribed of what belongs to no topic."""
-        for topic in self._topics.values():
-            for listener in topic.listeners:
-                if listener.mention(fault):
-                    return
+    WebMap's life cycle does not start it.
+    """
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *exception: object) -> None:
+        await self.stop()
+
+    async def open(self) -> None:
+        """Open the link for messages; questions open one of their own.
+
+        Raises:
+            BridgeClosed: If it cannot be opened.
+
+        """
+        loop = asyncio.get_running_loop()
+        opened: asyncio.Future[None] = loop.create_future()
+
+        def failed(error: Exception) -> None:
+            if not opened.done():
+                opened.set_exception(error)
+
+        def succeeded() -> None:
+            if not opened.done():
+                opened.set_result(None)
+
+        with no_scope():
+            removals = (self.on_open(succeeded), self.on_error(failed))
+        self.start(loop)
+        try:
+            await opened
+        finally:
+            for removal in removals:
+                removal.remove()
+
+    def _enlist(self) -> None:
+        pass

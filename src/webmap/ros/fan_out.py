@@ -4,8 +4,8 @@ import asyncio
 import time
 from collections.abc import Iterable
 
-from webmap.ros.events import Publish
 from webmap.ros.offload import Offload
+from webmap.ros.received import ReceivedMessage
 from webmap.ros.subscriptions import Subscription
 
 
@@ -27,7 +27,9 @@ class FanOut:
         """Decode nothing any more."""
         await self._offload.stop()
 
-    def offer(self, message: Publish, listeners: Iterable[Subscription]) -> None:
+    def offer(
+        self, message: ReceivedMessage, listeners: Iterable[Subscription]
+    ) -> None:
         """Take a message that came, for listeners of whom not each may want it yet."""
         now = time.monotonic()
         due = []
@@ -39,7 +41,7 @@ class FanOut:
         if due:
             self._give(message, due)
 
-    def give_soon(self, message: Publish, listener: Subscription) -> None:
+    def give_soon(self, message: ReceivedMessage, listener: Subscription) -> None:
         """Give a message that came before there was this listener."""
         if self._loop is not None:
             self._loop.call_soon(self._give, message, [listener])
@@ -57,7 +59,7 @@ class FanOut:
         else:
             self._hold(listener)
 
-    def _give(self, message: Publish, listeners: list[Subscription]) -> None:
+    def _give(self, message: ReceivedMessage, listeners: list[Subscription]) -> None:
         _deliver(message, [each for each in listeners if each.undecoded])
         listeners = [each for each in listeners if not each.undecoded]
         if not listeners:
@@ -75,6 +77,6 @@ class FanOut:
             _deliver(message, listeners)
 
 
-def _deliver(message: Publish, listeners: list[Subscription]) -> None:
+def _deliver(message: ReceivedMessage, listeners: list[Subscription]) -> None:
     for listener in listeners:
         listener.deliver(message)

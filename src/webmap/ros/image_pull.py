@@ -4,11 +4,12 @@ import asyncio
 import socket
 import ssl
 from collections.abc import Callable
+from email.message import Message
 
 from webmap.errors import ProtocolError
 from webmap.ros.backoff import Backoff
 from webmap.ros.image_address import Address
-from webmap.ros.image_answer import Answer
+from webmap.ros.messages_image import MAX_BYTES
 
 PATIENCE = 10.0
 """Seconds for the next whole picture, however many bytes drip in."""
@@ -150,3 +151,238 @@ class Pull:
         if isinstance(error, ssl.SSLError):
             return "what answers there does not speak TLS"
         return f"the connection failed: {getattr(error, 'strerror', None) or error}"
+
+
+MAX_HEAD = 16_384
+"""The longest head of an answer, in bytes."""
+
+_ENDS = (b"\r\n\r\n", b"\n\n")
+
+_WORDS = {
+    401: "it wants a user and a password; put them into the address, before the host",
+    403: "it does not let us",
+    404: "there is nothing at this address",
+    503: "it has no picture now",
+}
+
+
+class Answer:
+    """Takes an HTTP answer apart, whether it is a stream or a single picture."""
+
+    def __init__(self) -> None:
+        self.streams: bool | None = None
+        """Whether pictures follow each other in it; None until its head has come."""
+        self._head = bytearray()
+        self._parts: Multipart | None = None
+        self._body = bytearray()
+        self._length: int | None = None
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take in what came and return the pictures that are whole by it.
+
+        Raises:
+            ProtocolError: If it is not what a camera answers.
+
+        """
+        if self.streams is None:
+            self._head += data
+            found = [(self._head.find(end), len(end)) for end in _ENDS]
+            ends = [(place, size) for place, size in found if place >= 0]
+            if not ends:
+                if len(self._head) > MAX_HEAD:
+                    raise ProtocolError(
+                        f"its answer begins with {MAX_HEAD} bytes of head"
+                    )
+                return []
+            end, size = min(ends)
+            data = bytes(self._head[end + size :])
+            self._read_head(bytes(self._head[:end]))
+        if self._parts is not None:
+            return self._parts.feed(data)
+        self._body += data
+        if len(self._body) > MAX_BYTES:
+            raise ProtocolError(f"a picture of more than {MAX_BYTES} bytes")
+        if self._length is not None and len(self._body) >= self._length:
+            return [self._take(self._length)]
+        return []
+
+    def end(self) -> list[bytes]:
+        """Take in that the connection has ended; what it leaves may be a picture.
+
+        Raises:
+            ProtocolError: If it ended too early.
+
+        """
+        if self.streams is None:
+            raise ProtocolError("it hung up without an answer")
+        if self.streams or not self._body:
+            return []
+        if self._length is not None:
+            raise ProtocolError("it hung up in the middle of a picture")
+        return [self._take(len(self._body))]
+
+    def _take(self, length: int) -> bytes:
+        picture = bytes(self._body[:length])
+        self._body.clear()
+        return picture
+
+    def _read_head(self, head: bytes) -> None:
+        first, *lines = head.decode("latin-1").splitlines() or [""]
+        words = first.split(None, 2)
+        if (
+            len(words) < 2
+            or not words[0].startswith("HTTP/")
+            or not words[1].isdecimal()
+        ):
+            raise ProtocolError("what answers there does not speak HTTP")
+        status = int(words[1][:4])
+        headers = {
+            name.strip().lower(): value.strip()
+            for name, _, value in (line.partition(":") for line in lines)
+        }
+        _check_status(status)
+        kind = Message()
+        kind["Content-Type"] = headers.get("content-type", "")
+        media = kind.get_content_type() if headers.get("content-type") else "nothing"
+        if media.startswith("multipart/"):
+            self._parts = Multipart(str(kind.get_param("boundary") or ""))
+        elif not media.startswith("image/"):
+            raise ProtocolError(
+                f"it answers with {_plain(media)}, expected pictures (image/jpeg, or "
+                "multipart/x-mixed-replace); this must be the address of the pictures "
+                "themselves, not that of a page that shows them"
+            )
+        if headers.get("transfer-encoding", "identity").lower() != "identity":
+            raise ProtocolError("it answers in chunks, which were not asked for")
+        length = headers.get("content-length", "")
+        if self._parts is None and length.isdecimal() and len(length) < 12:
+            self._length = int(length)
+            if self._length > MAX_BYTES:
+                raise ProtocolError(f"a picture of {length} bytes, {MAX_BYTES} at most")
+        self.streams = self._parts is not None
+
+
+def _check_status(status: int) -> None:
+    if 300 <= status < 400:
+        raise ProtocolError(
+            f"it answers {status} and sends us elsewhere, which is not followed; give "
+            "the address where the pictures are"
+        )
+    if status != 200:
+        words = _WORDS.get(status, "200 was expected")
+        raise ProtocolError(f"it answers {status}: {words}")
+
+
+def _plain(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text[:60])
+
+
+MAX_HEADERS = 8192
+"""The longest that stands before one picture, in bytes."""
+
+
+class Multipart:
+    """Takes the bytes of a ``multipart/x-mixed-replace`` answer apart.
+
+    Cameras differ in how they write it. The length of a part may be stated or not,
+    lines may end with or without a carriage return, and the boundary may be named
+    with the two dashes that only stand before it in the body.
+
+    Args:
+        boundary: What the answer's ``Content-Type`` names.
+
+    Raises:
+        ProtocolError: If no boundary is named.
+
+    """
+
+    def __init__(self, boundary: str) -> None:
+        name = boundary.strip().strip('"').lstrip("-").encode("latin-1", "replace")
+        if not name or len(name) > 200:
+            raise ProtocolError("its answer names no boundary between pictures")
+        self._mark = b"--" + name
+        self._rest = bytearray()
+        self._searched = 0
+        self._in_part = False
+        self._length: int | None = None
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take in what came and return the pictures that are whole by it.
+
+        Raises:
+            ProtocolError: If it is too long for a picture, or not of this form.
+
+        """
+        self._rest += data
+        pictures: list[bytes] = []
+        while True:
+            if not self._in_part and not self._begin():
+                return pictures
+            picture = self._picture()
+            if picture is None:
+                return pictures
+            if picture:
+                pictures.append(picture)
+
+    def _begin(self) -> bool:
+        """Go to the beginning of a picture; whether that is there yet."""
+        at = self._rest.find(self._mark)
+        if at < 0:
+            if len(self._rest) > MAX_HEADERS:
+                raise ProtocolError("its answer has no boundary between pictures")
+            return False
+        line = self._rest.find(b"\n", at)
+        found = [(self._rest.find(end, line), len(end)) for end in _BLANK_LINES]
+        ends = [(place, size) for place, size in found if line >= 0 and place >= 0]
+        if not ends:
+            if len(self._rest) - at > MAX_HEADERS:
+                raise ProtocolError(f"more than {MAX_HEADERS} bytes before a picture")
+            return False
+        end, size = min(ends)
+        self._length = _length(bytes(self._rest[line:end]))
+        del self._rest[: end + size]
+        self._in_part, self._searched = True, 0
+        return True
+
+    def _picture(self) -> bytes | None:
+        rest = self._rest
+        if self._length is not None:
+            end = self._length if len(rest) >= self._length else -1
+        else:
+            # What was looked at is not looked at again, but for a torn mark.
+            end = rest.find(self._mark, self._searched)
+            self._searched = max(0, len(rest) - len(self._mark))
+        if end < 0:
+            if len(rest) > MAX_BYTES:
+                raise ProtocolError(f"a picture of more than {MAX_BYTES} bytes")
+            return None
+        picture = bytes(rest[:end])
+        if self._length is None:
+            picture = picture.removesuffix(b"\n").removesuffix(b"\r")
+        del rest[:end]
+        self._in_part = False
+        return picture
+
+
+_BLANK_LINES = (b"\n\r\n", b"\n\n")
+
+
+def _length(headers: bytes) -> int | None:
+    """Return the stated length of a part, None if there is none.
+
+    Raises:
+        ProtocolError: If it is no length, or that of no picture.
+
+    """
+    for line in headers.splitlines():
+        name, _, value = line.partition(b":")
+        if name.strip().lower() != b"content-length":
+            continue
+        value = value.strip()
+        # Some cameras state 0 where they do not know.
+        if not value.isdigit() or len(value) > 12:
+            raise ProtocolError(f"a picture of {value[:20]!r} bytes")
+        if int(value) > MAX_BYTES:
+            raise ProtocolError(f"a picture of {int(value)} bytes, {MAX_BYTES} at most")
+        return int(value) or None
+    return None

@@ -5,7 +5,6 @@ bytes of a message are checked when it comes, and the number of values in it is 
 before any of them is built.
 """
 
-import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -17,20 +16,11 @@ MIB = 1 << 20
 MAX_FRAME = 64 * MIB
 """Most bytes of a WebSocket message; a longer one ends the link."""
 
-MAX_OTHER = 4 * MIB
-"""Most bytes of a frame that is not plainly a message on a topic."""
-
-MAX_NUMBERS = 200_000
-"""Most values in such a frame if only the slow decoder takes it, since it has NaN."""
-
 LARGE = 256 << 10
 """Bytes above which a frame is decoded by the worker process."""
 
 MAX_VALUES = 100_000
-"""Most objects and lists in one message, as JSON and CBOR have them."""
-
-MAX_ITEMS = 1_000_000
-"""Most data items in one message in CBOR, where an array of numbers is one item."""
+"""Most objects and lists in one message."""
 
 
 class TooLarge(ProtocolError):
@@ -58,7 +48,7 @@ GENERAL = Limit(
 
 _GRID = Limit(
     64 * MIB,
-    "a map of 64 million cells has this size in CBOR",
+    "a map of 64 million cells has this size in a binary encoding",
     "publish a coarser map, or a part of it",
 )
 
@@ -67,7 +57,7 @@ LIMITS: dict[str, Limit] = {
     "map_msgs/OccupancyGridUpdate": _GRID,
     "sensor_msgs/PointCloud2": Limit(
         64 * MIB,
-        "a cloud of 4 million points of 16 bytes has this size in CBOR",
+        "a cloud of 4 million points of 16 bytes has this size in a binary encoding",
         "thin the cloud on the robot, for instance with a voxel filter",
     ),
     "sensor_msgs/Image": Limit(
@@ -77,7 +67,7 @@ LIMITS: dict[str, Limit] = {
     ),
     "sensor_msgs/CompressedImage": Limit(
         8 * MIB,
-        "a picture of 4 MiB has 6 MiB in JSON, which writes it in base64",
+        "a picture of 4 MiB has 6 MiB as text, which writes it in base64",
         "publish a smaller picture, or compress it more",
     ),
 }
@@ -130,28 +120,6 @@ def check_size(size: int, limit: Limit, type: str | None) -> None:
         )
 
 
-def check_count(frame: bytes | bytearray) -> None:
-    """Refuse a frame that holds more values than anything would be built for.
-
-    Args:
-        frame: A whole frame, JSON or CBOR. One that is neither passes: whoever decodes
-            it says so.
-
-    Raises:
-        TooLarge: If there are more than :data:`MAX_VALUES` objects and lists, or more
-            than :data:`MAX_ITEMS` items of CBOR.
-
-    """
-    if frame[:1] and 0xA0 <= frame[0] <= 0xBF:
-        _count_cbor(frame)
-    elif (
-        _brackets(frame) > MAX_VALUES
-        # Texts may have brackets, too.
-        and (count := _brackets(_TEXT.sub(b"", frame))) > MAX_VALUES
-    ):
-        raise _too_many(count, MAX_VALUES)
-
-
 def check_items(field: str, count: int) -> None:
     """Refuse a list that is longer than anybody can use.
 
@@ -169,41 +137,3 @@ def check_items(field: str, count: int) -> None:
             f"got a message with {count} {field}; {most} are the limit: "
             f"{GENERAL.advice}"
         )
-
-
-# Possessive: nothing is kept in order to try again.
-_TEXT = re.compile(rb'"(?:[^"\\]++|\\.)*+"', re.DOTALL)
-
-
-def _brackets(text: bytes | bytearray) -> int:
-    return text.count(b"{") + text.count(b"[")
-
-
-def _too_many(count: int, most: int) -> TooLarge:
-    what = "objects and lists" if most == MAX_VALUES else "items of CBOR"
-    return TooLarge(
-        f"got a message with {count} or more {what}; {most} are the limit: "
-        f"{GENERAL.advice}"
-    )
-
-
-def _count_cbor(frame: bytes | bytearray) -> None:
-    """Walk from the head of one item to the next, as RFC 8949, 3 has them."""
-    at = items = values = 0
-    end = len(frame)
-    while at < end:
-        kind, info = frame[at] >> 5, frame[at] & 31
-        at += 1
-        length = info
-        if 24 <= info <= 27:
-            size = 1 << (info - 24)
-            length = int.from_bytes(frame[at : at + size], "big")
-            at += size
-        if kind in (2, 3) and info != 31:
-            at += length
-        items += 1
-        values += kind in (4, 5)
-        if values > MAX_VALUES:
-            raise _too_many(values, MAX_VALUES)
-        if items > MAX_ITEMS:
-            raise _too_many(items, MAX_ITEMS)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, ClassVar
 import msgspec
 
 from webmap.errors import ProtocolError
-from webmap.geometry import Pose, Quaternion, Twist, Vector3
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.arrays import Floats, Int8s
+from webmap.geometry import FARTHEST, Pose, Quaternion, Twist, Vector3
+from webmap.ros.arrays import Floats as Floats  # public here
+from webmap.ros.arrays import Int8s as Int8s
+from webmap.ros.arrays import Numbers as Numbers
 
 if TYPE_CHECKING:
     import numpy as np
@@ -274,8 +275,8 @@ class LaserScanMsg(Stamped, frozen=True, kw_only=True):
     def ranges(self) -> "NDArray[np.float32]":
         """Measured ranges, in metres, of shape (N,), read-only.
 
-        NaN and infinities are kept where the link can carry them (CBOR); in JSON
-        bridges write ``null`` for all three, which is NaN here.
+        NaN and infinities are kept in a binary encoding; as text bridges write
+        ``null`` for all three, which is NaN here.
         """
         return self.range_values.array()
 

@@ -1,16 +1,191 @@
-"""Pictures of cameras."""
+"""Pictures from cameras: their typed views, their encodings, and their sizes."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
 from webmap.errors import ProtocolError
-from webmap.ros.image_encodings import BAYER, YUV, from_bayer, from_yuv
-from webmap.ros.image_size import size_of
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+YUV = {
+    "yuv422": (1, 0, 2),
+    "uyvy": (1, 0, 2),
+    "yuv422_yuy2": (0, 1, 3),
+    "yuyv": (0, 1, 3),
+}
+"""For each encoding, where the first light, U and V are in the bytes of two pixels.
+
+``yuv422`` has them in the order of UYVY, as ``sensor_msgs/image_encodings.hpp`` says.
+"""
+
+
+class Mosaic(NamedTuple):
+    """How the filters lie before a sensor, in squares of two by two."""
+
+    red: tuple[int, int]
+    """Row and column of red."""
+
+    blue: tuple[int, int]
+    """Row and column of blue; green are the other two."""
+
+    octets: int
+    """Bytes of a value."""
+
+
+_CORNERS = {
+    "rggb": ((0, 0), (1, 1)),
+    "bggr": ((1, 1), (0, 0)),
+    "gbrg": ((1, 0), (0, 1)),
+    "grbg": ((0, 1), (1, 0)),
+}
+
+BAYER = {
+    f"bayer_{name}{8 * octets}": Mosaic(red, blue, octets)
+    for name, (red, blue) in _CORNERS.items()
+    for octets in (1, 2)
+}
+"""The encodings that are mosaics."""
+
+
+def from_yuv(
+    rows: "NDArray[np.uint8]", order: tuple[int, int, int]
+) -> "NDArray[np.uint8]":
+    """Return a picture whose colours are shared by two pixels each.
+
+    Args:
+        rows: Its bytes, of shape (height, 2 * width).
+        order: One of :data:`YUV`.
+
+    Returns:
+        Red, green and blue, of shape (height, width, 3), by BT.601 with light from 16
+        to 235, as cameras and OpenCV have it.
+
+    Raises:
+        ProtocolError: If the width is odd.
+
+    """
+    import numpy as np
+
+    height, width = rows.shape[0], rows.shape[1] // 2
+    if width % 2:
+        raise ProtocolError(
+            f"two pixels share their colours, so the width must be even, got {width}"
+        )
+    pairs = rows.reshape(height, width // 2, 4).astype(np.float32)
+    light, u, v = order
+    luma = 1.164 * (pairs[..., light::2] - 16)
+    blue, red = pairs[..., u, None] - 128, pairs[..., v, None] - 128
+    shades = (
+        luma + 1.596 * red,
+        luma - 0.813 * red - 0.391 * blue,
+        luma + 2.018 * blue,
+    )
+    flat = [shade.reshape(height, width) for shade in shades]
+    return np.stack(flat, axis=-1).clip(0, 255).round().astype(np.uint8)
+
+
+def from_bayer(mosaic: "NDArray[np.uint8]", filters: Mosaic) -> "NDArray[np.uint8]":
+    """Return the picture of a mosaic: each square of two by two becomes a pixel.
+
+    Args:
+        mosaic: Of shape (height, width).
+        filters: One of :data:`BAYER`.
+
+    Returns:
+        Red, green and blue, of shape (height // 2, width // 2, 3).
+
+    Raises:
+        ProtocolError: If it is not as large as one square.
+
+    """
+    import numpy as np
+
+    height, width = (side // 2 * 2 for side in mosaic.shape)
+    if height == 0 or width == 0:
+        raise ProtocolError(
+            f"a mosaic of {mosaic.shape[1]} x {mosaic.shape[0]}, 2 x 2 at least"
+        )
+
+    def of(row: int, column: int) -> "NDArray[np.uint8]":
+        return mosaic[row:height:2, column:width:2]
+
+    (red, left), (blue, right) = filters.red, filters.blue
+    one, other = of(red, 1 - left), of(blue, 1 - right)
+    green = ((one.astype(np.uint16) + other) // 2).astype(np.uint8)
+    return np.stack([of(red, left), green, of(blue, right)], axis=-1)
+
+
+MOST_SEGMENTS = 1000
+"""Segments of a JPEG that are passed over before its size."""
+
+_NO_FRAME = (0xC4, 0xC8, 0xCC)
+"""Markers from 0xC0 to 0xCF that are no begin of a frame."""
+
+
+def size_of(data: bytes) -> tuple[int, int]:
+    """Return width and height of a JPEG, PNG or WebP, in pixels, by its head alone.
+
+    A picture of a few kilobytes may have billions of pixels: whoever decodes it, a
+    browser too, runs out of memory. What a browser would have to search for is not
+    searched for here, so a picture whose size is not plain is refused.
+
+    Raises:
+        ProtocolError: If it does not say, or says it in a place where it may not be.
+
+    """
+    if data.startswith(b"\xff\xd8"):
+        size = _of_jpeg(data)
+    elif data[12:16] == b"IHDR":
+        size = _number(data[16:20]), _number(data[20:24])
+    elif data[8:12] == b"WEBP":
+        size = _of_webp(data)
+    else:
+        size = 0, 0
+    if not (size[0] > 0 and size[1] > 0):
+        raise ProtocolError("a picture whose head does not say how many pixels it has")
+    return size
+
+
+def _of_jpeg(data: bytes) -> tuple[int, int]:
+    at = 2
+    for _ in range(MOST_SEGMENTS):
+        while data[at : at + 2] == b"\xff\xff":  # bytes that fill
+            at += 1
+        if len(data) < at + 9 or data[at] != 0xFF:
+            break
+        marker = data[at + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in _NO_FRAME:
+            return _number(data[at + 7 : at + 9]), _number(data[at + 5 : at + 7])
+        if marker in (0xD9, 0xDA):  # the end, or pixels without a frame
+            break
+        at += 2 + _number(data[at + 2 : at + 4])
+    return 0, 0
+
+
+def _of_webp(data: bytes) -> tuple[int, int]:
+    kind, body = data[12:16], data[20:30]
+    if len(body) < 10:
+        return 0, 0
+    if kind == b"VP8X":
+        return 1 + _little(body[4:7]), 1 + _little(body[7:10])
+    if kind == b"VP8L" and body[0] == 0x2F:
+        bits = _little(body[1:5])
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    if kind == b"VP8 " and body[3:6] == b"\x9d\x01\x2a":
+        return _little(body[6:8]) & 0x3FFF, _little(body[8:10]) & 0x3FFF
+    return 0, 0
+
+
+def _number(data: bytes) -> int:
+    return int.from_bytes(data, "big")
+
+
+def _little(data: bytes) -> int:
+    return int.from_bytes(data, "little")
+
 
 MAX_BYTES = 4 << 20
 """The largest compressed picture that is shown."""

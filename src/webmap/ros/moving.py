@@ -1,14 +1,31 @@
-"""What sets robots in motion, by the names and the types of topics and services.
+"""What sets robots in motion, and what a bridge therefore never publishes or calls.
 
-Velocity, goals and cancel are written by the gate alone. This says what they are where
-nobody has declared them: by the names and types that ROS packages give them. A service
-that moves a robot by itself, such as one that docks, cannot be told by its name.
+Velocity, goals and cancel are written by the gate alone. :class:`WrittenByGate` refuses
+what was declared for a robot. Where nobody has declared anything, names and types that
+ROS packages give show what moves a robot. A service that moves a robot by itself, such
+as one that docks, cannot be recognised by its name.
 """
 
 import re
+from weakref import WeakValueDictionary
 
-from webmap.errors import ConfigError
-from webmap.ros.names import TypeName, split_type
+from webmap.errors import ConfigError, MotionRefused
+from webmap.ros.names import TypeName, is_type, split_type
+
+STOP = "what STOP says"
+"""What a topic carries that is a robot's stop hook."""
+
+INSTEAD = {
+    "a velocity": "Robot.twist()",
+    "a goal": "Robot.move()",
+    "the end of a goal": "Robot.cancel()",
+    "an initial pose": "Robot.locate()",
+    STOP: "Robot.stop() and Robot.reset_stop()",
+}
+"""What writes it, by what a topic carries."""
+
+_TWISTS = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+_SEND_GOAL = "/_action/send_goal"
 
 _TYPES: dict[str, tuple[str, ...]] = {
     "a velocity": (
@@ -137,3 +154,68 @@ def moved_by_both(name: str, type: str) -> str | None:
     except ConfigError:
         return None
     return "a velocity" if numbers and _NUMBERS_MOVE.search(name.lower()) else None
+
+
+class WrittenByGate(dict[str, str]):
+    """What the gate alone writes behind one address: what each topic carries."""
+
+    def declare(self, topic: str, carries: str) -> None:
+        """Refuse ``topic`` from now on.
+
+        Args:
+            topic: Its resolved name.
+            carries: What it carries, in the words of :data:`INSTEAD`.
+
+        """
+        if self.get(topic, STOP) == STOP:  # a goal stays one
+            self[topic] = carries
+
+    def refuse_message(self, topic: str, *types: str | None) -> None:
+        """Let a message pass unless it would move a robot.
+
+        Args:
+            topic: The resolved name of its topic.
+            types: The types that it is said to have; None where nobody knows.
+
+        Raises:
+            MotionRefused: If it would.
+
+        """
+        carried = self.get(topic)
+        if carried is not None:
+            instead = INSTEAD.get(carried, "Robot.twist() or Robot.move()")
+            raise MotionRefused(
+                f"{topic} carries {carried} of a robot, which the gate alone writes: "
+                f"use {instead}"
+            )
+        for type in types:
+            if type is not None and is_type(type, *_TWISTS):
+                raise MotionRefused(
+                    f"{topic}: {type} is a velocity: use Robot.twist(), "
+                    f"which goes through the gate"
+                )
+
+    def refuse_service(self, service: str) -> None:
+        """Let a call pass unless it would send a robot somewhere.
+
+        Args:
+            service: The resolved name.
+
+        Raises:
+            MotionRefused: If it would.
+
+        """
+        # A topic that is a stop hook may well have a service of its name beside it.
+        moves = self.get(service, STOP) != STOP
+        if service.endswith(_SEND_GOAL) or moves:
+            raise MotionRefused(
+                f"{service}: goals go through the gate: use Robot.move()"
+            )
+
+
+_written: WeakValueDictionary[str, WrittenByGate] = WeakValueDictionary()
+
+
+def written_behind(url: str) -> WrittenByGate:
+    """Return what the gate writes behind an address; the same for all its bridges."""
+    return _written.setdefault(url, WrittenByGate())

@@ -15,8 +15,8 @@ from webmap.children import python_command
 from webmap.errors import ProtocolError
 from webmap.ros.arrays import dec_hook
 from webmap.ros.decoding import Unreadable, convert
-from webmap.ros.events import Publish
 from webmap.ros.limits import LARGE, TooLarge
+from webmap.ros.received import ReceivedMessage
 from webmap.ros.worker import (
     LENGTH,
     MAX_MESSAGE,
@@ -238,7 +238,7 @@ _END = object()
 
 
 class _Job(NamedTuple):
-    message: Publish
+    message: ReceivedMessage
     types: frozenset[Any]
     then: tuple[Callable[[Any], None], ...]
 
@@ -257,12 +257,15 @@ class Offload:
         self._turn = asyncio.Lock()
         self._rests_until = 0.0
 
-    def wants(self, message: Publish) -> bool:
+    def wants(self, message: ReceivedMessage) -> bool:
         """Return whether ``message`` must not be decoded here and now."""
         return len(message.frame) > LARGE or message.topic in self._waiting
 
     def decode(
-        self, message: Publish, types: frozenset[Any], then: Callable[[Any], None]
+        self,
+        message: ReceivedMessage,
+        types: frozenset[Any],
+        then: Callable[[Any], None],
     ) -> None:
         """Decode ``message`` as each of ``types`` elsewhere, and call ``then`` of each.
 
@@ -303,8 +306,12 @@ class Offload:
                     await asyncio.sleep(wait)
                     if _is_late(job, waiting):
                         return
-                size, view = len(message.frame), view_name(type)
-                request = Request(size, message.topic, view)
+                request = Request(
+                    len(message.frame),
+                    message.topic,
+                    view_name(message.__class__),
+                    view_name(type),
+                )
                 worker = _acquire(self)
                 reply = await worker.ask(request, message.frame)
                 self._rests_until = time.monotonic() + reply.seconds

@@ -1,25 +1,110 @@
-"""Who listens to which topic, and what the bridge is asked for on their behalf."""
+"""Who listens to which topic, how often each listener hears of it, and what fails."""
 
 import time
 from asyncio import AbstractEventLoop, TimerHandle
 from collections.abc import Callable
+from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
 from webmap.errors import BridgeError, ConfigError, ProtocolError
-from webmap.identifiers import generate_id
-from webmap.ros import large, ops
 from webmap.ros.callbacks import Callback
-from webmap.ros.events import Publish
-from webmap.ros.large import InJson
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
-from webmap.ros.names import is_type, same_type, split_type
-from webmap.ros.throttle import Throttle
-from webmap.ros.wish import Wish
+from webmap.ros.names import is_type, same_type
+from webmap.ros.received import ReceivedMessage
 from webmap.scope import Scope, current_scope
 
+Encoding: TypeAlias = Literal["text", "binary", "raw"]
+
+T = TypeVar("T")
+
+_ENCODINGS = ("text", "binary", "raw")
 _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
+
+
+class SubscriptionOptions(NamedTuple):
+    """How the messages of a topic are wanted."""
+
+    type: str | None = None
+    throttle: int = 0
+    """Least time between two messages, in milliseconds."""
+
+    queue_length: int = 1
+    encoding: Encoding | None = None
+
+
+def checked(
+    options: SubscriptionOptions, callback: object, decode: object
+) -> SubscriptionOptions:
+    """Return the options of a subscription if its arguments make sense.
+
+    Raises:
+        ConfigError: If they do not.
+
+    """
+    if not callable(callback):
+        raise ConfigError(f"a subscription needs a function, got {callback!r}")
+    for name in ("throttle", "queue_length"):
+        value = getattr(options, name)
+        if not isinstance(value, int) or value < 0:
+            raise ConfigError(f"{name} is a whole number from 0 up, got {value!r}")
+    if options.encoding is not None and options.encoding not in _ENCODINGS:
+        known = ", ".join(_ENCODINGS)
+        raise ConfigError(f"encoding is one of {known}, got {options.encoding!r}")
+    if decode is not None and not _is_struct(decode):
+        raise ConfigError(f"decode is a msgspec.Struct type, got {decode!r}")
+    return options
+
+
+def _is_struct(decode: Any) -> bool:
+    return isinstance(decode, type) and issubclass(decode, msgspec.Struct)
+
+
+class Throttle(Generic[T]):
+    """Let one thing through in each period, and always the newest in the end.
+
+    Args:
+        period: Least time between two, in seconds; 0 lets everything through.
+
+    """
+
+    __slots__ = ("_due", "_held", "period")
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+        self._due = -float("inf")
+        self._held: T | None = None
+
+    def offer(self, thing: T, now: float) -> T | None:
+        """Return ``thing`` if its time has come; else hold it, instead of an older."""
+        if now < self._due:
+            self._held = thing
+            return None
+        return self._let_through(thing, now)
+
+    @property
+    def due(self) -> float | None:
+        """When what is held may pass, or None if nothing is held."""
+        return None if self._held is None else self._due
+
+    def take(self, now: float) -> T | None:
+        """Return what was held if its time has come."""
+        held = self._held
+        if held is None or now < self._due:
+            return None
+        return self._let_through(held, now)
+
+    def drop(self) -> None:
+        """Forget what is held: the link on which it came is gone."""
+        self._held = None
+
+    def _let_through(self, thing: T, now: float) -> T:
+        # Half a period of slack: a topic of just this rate jitters, and one that
+        # comes a millisecond early must not make every second one wait.
+        self._due = max(self._due + self.period, now + self.period / 2)
+        self._held = None
+        return thing
 
 
 class _Silence(ProtocolError):
@@ -36,17 +121,17 @@ class Subscription:
         self,
         topic: "Topic",
         callback: Callback,
-        wish: Wish,
+        options: SubscriptionOptions,
         decode: type[msgspec.Struct] | None,
     ) -> None:
         self.topic = topic.name
         """The resolved name of the topic."""
-        self.wish = wish
+        self.options = options
         self.decode = decode
         self.removed = False
         self.undecoded = False
         """Whether it is handed each message as it came, at once and not decoded."""
-        self.throttle: Throttle[Publish] = Throttle(wish.throttle / 1000)
+        self.throttle: Throttle[ReceivedMessage] = Throttle(options.throttle / 1000)
         self._of = topic
         self._callback = callback
         self._timer: TimerHandle | None = None
@@ -67,7 +152,7 @@ class Subscription:
             self._scope.discard(self)
         self._of.remove(self)
 
-    def deliver(self, message: Publish) -> None:
+    def deliver(self, message: ReceivedMessage) -> None:
         """Decode the message as the listener wants it and hand it over."""
         if self.removed:
             return
@@ -97,7 +182,7 @@ class Subscription:
                 self._scope.mended(self)
 
     def mention(self, fault: ProtocolError) -> bool:
-        """Tell whoever subscribed of what passes; False if nobody is to be told."""
+        """Call the subscribers with a message; False if there are none."""
         if self._scope is None or self._scope.report is None:
             return False
         self._scope.report(str(fault), None)
@@ -122,16 +207,14 @@ class Subscription:
 
 
 class Topic:
-    """All listeners to one topic of one bridge, and their one wire subscription.
+    """All listeners to one topic of one bridge.
 
     Args:
         name: The resolved name.
-        send: Sends a frame if the link is open, else does nothing.
+        changed: Called when the listeners want other messages than before.
+        emptied: Called when the last listener has gone.
         complain: Is told of a message that does not decode, once for each link and
             each kind of error.
-        too_large: Called when messages turn out to be too large for CBOR, with the
-            bytes of one in JSON; with None if links ended before one came.
-        emptied: Called when the last listener has gone.
 
     """
 
@@ -139,37 +222,30 @@ class Topic:
         self,
         name: str,
         *,
-        send: Callable[[bytes], None],
-        complain: Callable[["Topic", str, ProtocolError], None],
-        too_large: Callable[["Topic", int | None], None],
+        changed: Callable[["Topic"], None],
         emptied: Callable[["Topic"], None],
+        complain: Callable[["Topic", str, ProtocolError], None],
     ) -> None:
         self.name = name
         self.listeners: dict[Subscription, None] = {}
         self.count = 0
         """Messages since the link was opened."""
-        self._send = send
-        self._complain = complain
-        self._too_large = too_large
+        self._changed = changed
         self._emptied = emptied
-        self._in_json = InJson()
-        self._asked_at = 0.0
-        """When the wire was asked for the first message of this encoding."""
+        self._complain = complain
         self.failing: set[object] = set()
         """As what the newest messages could not be decoded."""
         self._fault: BridgeError | None = None
         self._found: dict[type[ProtocolError], ProtocolError | None] = {}
         """What was found out of each kind of error; None while it is looked for."""
-        self._latest: Publish | None = None
-        self._asked: Wish | None = None
-        self._id = ""
+        self._latest: ReceivedMessage | None = None
 
     @property
     def message_type(self) -> str | None:
         """The message type, if any listener said it."""
-        return next((s.wish.type for s in self.listeners if s.wish.type), None)
+        return next((s.options.type for s in self.listeners if s.options.type), None)
 
-    def check(self, wish: Wish) -> None:
+    def check(self, options: SubscriptionOptions) -> None:
         """Let a further listener join if what it wants goes with the others.
 
         Raises:
@@ -177,10 +253,12 @@ class Topic:
 
         """
         mine = self.message_type
-        if mine and wish.type and not same_type(mine, wish.type):
-            raise ConfigError(f"{self.name} is subscribed as {mine}, not {wish.type}")
-        raw = self._asked is not None and self._asked.compression == "cbor-raw"
-        if self.listeners and raw != (wish.compression == "cbor-raw"):
+        if mine and options.type and not same_type(mine, options.type):
+            raise ConfigError(
+                f"{self.name} is subscribed as {mine}, not {options.type}"
+            )
+        raw = any(each.options.encoding == "raw" for each in self.listeners)
+        if self.listeners and raw != (options.encoding == "raw"):
             raise ConfigError(
                 f"{self.name}: raw and decoded messages cannot share a subscription"
             )
@@ -190,7 +268,7 @@ class Topic:
         self.listeners[listener] = None
         if self._fault is not None:
             listener.report(self._fault)
-        self.update()
+        self._changed(self)
 
     def remove(self, listener: Subscription) -> None:
         """Let ``listener`` go, and ask the bridge for less if the others want less."""
@@ -199,105 +277,34 @@ class Topic:
             alone = all(o.decode is not listener.decode for o in self.listeners)
             if self.failing and alone:
                 self._succeeds(listener.decode)
-            self.update()
+            self._changed(self)
             return
-        if self._asked is not None:
-            self._send(ops.unsubscribe(self.name, id=self._id))
-        self._asked, self._latest = None, None
+        self._latest = None
         self._emptied(self)
 
-    def wish(self) -> Wish:
+    def options(self) -> SubscriptionOptions:
         """Return what serves every listener."""
-        type = self.message_type
-        each = [listener.wish for listener in self.listeners]
-        chosen = next((w.compression for w in each if w.compression), None)
-        bulk = type is not None and is_type(type, *large.BULK)
-        wish = Wish(
-            # The name as in ROS 1, which bridges of both kinds understand.
-            str(split_type(type)) if type else None,
-            min(w.throttle for w in each),
-            max(w.queue_length for w in each),
-            chosen or ("cbor" if bulk else None),
+        each = [listener.options for listener in self.listeners]
+        return SubscriptionOptions(
+            self.message_type,
+            min(options.throttle for options in each),
+            max(options.queue_length for options in each),
+            next((options.encoding for options in each if options.encoding), None),
         )
-        if wish.compression == "cbor" and self._in_json.on:
-            throttle = max(wish.throttle, large.THROTTLE)
-            return wish._replace(throttle=throttle, compression="none")
-        return wish
 
-    def ask_in_json(self) -> bool:
-        """Ask for JSON because CBOR does not come; return whether that was done."""
-        if self._asked is None:
-            return False
-        answer = self._in_json.silent(self._asked.type, self._asked.compression)
-        if answer == "ask":
-            self.renew()
-        elif answer == "given up":
-            self._too_large(self, None)
-        return answer == "ask"
-
-    @property
-    def awaits_large(self) -> bool:
-        """Whether the bridge may be busy with a large message for this topic."""
-        asked = self._asked
-        if self.count or asked is None or asked.type is None:
-            return False
-        if not is_type(asked.type, *large.REPLACED):
-            return False
-        waited = time.monotonic() - self._asked_at
-        return waited < large.PATIENCE.get(asked.compression or "", 0.0)
-
-    def update(self) -> None:
-        """Ask the bridge anew if what is wanted has changed.
-
-        The new subscription begins before the old one ends, so nothing is missed.
-        """
-        wish = self.wish()
-        if self._asked == wish:
-            return
-        old, had = self._id, self._asked is not None
-        self._ask(wish)
-        if had:
-            self._send(ops.unsubscribe(self.name, id=old))
-
-    def again(self) -> None:
-        """Ask the bridge on a new link, which knows nothing of the old one."""
+    def begin_anew(self) -> None:
+        """Forget what was found out on an earlier link: there is a new one."""
         self.count = 0
         self._found.clear()
-        self._in_json.begin()
         self._mend()
-        self._ask(self.wish())
-
-    def renew(self) -> None:
-        """Give the subscription up and ask for it anew.
-
-        While there is one, a bridge goes on with the old one's quality of service.
-        """
-        if self._asked is not None:
-            self._send(ops.unsubscribe(self.name, id=self._id))
-            self._ask(self.wish())
 
     def link_lost(self) -> None:
-        """Forget what the old link brought and was asked."""
-        self._asked, self._latest = None, None
+        """Forget what the old link brought."""
+        self._latest = None
         for listener in self.listeners:
             listener.hush()
 
-    def _ask(self, wish: Wish) -> None:
-        if self._asked is None or self._asked.compression != wish.compression:
-            self._asked_at = time.monotonic()
-        self._asked, self._id = wish, generate_id()
-        self._send(
-            ops.subscribe(
-                self.name,
-                id=self._id,
-                type=wish.type,
-                throttle_rate=wish.throttle,
-                queue_length=wish.queue_length,
-                compression=wish.compression,
-            )
-        )
-
-    def received(self, message: Publish) -> bool:
+    def received(self, message: ReceivedMessage) -> bool:
         """Note a message that came; False if it is too large for its type.
 
         One that is too large is reported and belongs to nobody.
@@ -314,17 +321,12 @@ class Topic:
                 self._find_out(error, None)
                 return False
         self._latest = message
-        too_large = self._in_json.received(in_parts=message.in_parts)
-        if too_large:
-            self._too_large(self, len(message.frame))
-        elif too_large is False:
-            self.renew()
         if size > LARGE and self.replay is None:  # nobody will ask for it
             self._latest = None
         return True
 
     @property
-    def replay(self) -> Publish | None:
+    def replay(self) -> ReceivedMessage | None:
         """What a listener that joins late is given, since it will not come again.
 
         A bridge sends a latched message once for each subscription of the wire.

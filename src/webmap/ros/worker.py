@@ -20,8 +20,7 @@ import msgspec
 from webmap.errors import ProtocolError
 from webmap.memory import return_large_pieces
 from webmap.ros.arrays import Numbers
-from webmap.ros.events import Publish
-from webmap.ros.limits import check_count, check_items
+from webmap.ros.limits import check_items
 
 LENGTH = struct.Struct("<I")
 MAX_MESSAGE = 512 << 20
@@ -43,6 +42,9 @@ class Request(msgspec.Struct, array_like=True):
     """Bytes that follow: the frame, or the function's first argument."""
 
     topic: str = ""
+    message: str | None = None
+    """``module:name`` of the :class:`ReceivedMessage` that reads the frame."""
+
     view: str | None = None
     """``module:name`` of a view of WebMap's own, or None for a plain mapping."""
 
@@ -84,9 +86,10 @@ def answer(request: Request, data: bytes) -> tuple[Answer, list[bytes]]:
         if request.call is not None:
             made = _named(request.call)(data, *request.arguments)
             return Answer([len(made)]), [made]
-        check_count(data)
+        received = _named(request.message)(request.topic, data)
+        received.check_count()
         view = _named(request.view)
-        message = Publish(request.topic, data).decode(view)
+        message = received.decode(view)
         if hasattr(view, "digest"):
             message = message.digest()
         field, parts = _parts(message)

@@ -3,8 +3,8 @@
 from typing import Any, Self
 
 from webmap.errors import SceneError
+from webmap.scene.allowed import format_value
 from webmap.scene.element import Child, Element
-from webmap.scene.values import format_value
 
 
 class BoundElement(Element):

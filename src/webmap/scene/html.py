@@ -4,7 +4,7 @@ There is one for each HTML tag that a scene may hold. Children come first, then
 ``text`` and attributes by keyword.
 """
 
-from webmap.scene.tag_maker import TagMaker
+from webmap.scene.element import TagMaker
 
 
 class Maker(TagMaker):

@@ -4,7 +4,7 @@ There is one for each SVG tag that a scene may hold. Children come first, then
 ``text`` and attributes by keyword.
 """
 
-from webmap.scene.tag_maker import TagMaker
+from webmap.scene.element import TagMaker
 
 namespace = "http://www.w3.org/2000/svg"
 """The XML namespace of SVG."""

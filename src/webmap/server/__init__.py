@@ -1,5 +1,11 @@
 """The web application: pages, files, sign-in, the two sockets, and what runs it.
 
-Nothing here is imported by ``import webmap``: the web stack is loaded when a program
-starts to serve.
+The only room that knows the web stack, which is loaded when a program starts to serve:
+``import webmap`` loads none of it. What a page shows and does is decided below, in
+:mod:`webmap.core` and :mod:`webmap.wire`; what moves a robot, in the gate.
+
+Begin with ``app``, which routes requests: ``security`` and ``access`` let them in,
+``scene_socket`` and ``drive_socket`` serve a page's sockets, ``open_pages`` has the
+pages, and ``files`` and ``html`` are what browsers load. ``application`` has the public
+functions, and ``runner`` is the server that they run.
 """

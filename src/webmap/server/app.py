@@ -1,5 +1,7 @@
 """The web application: which request goes where."""
 
+import asyncio
+import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
@@ -7,20 +9,21 @@ from pathlib import Path
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
-from webmap.server.answers import PageAnswers, answer_file
-from webmap.server.drive_socket import DriveSockets
-from webmap.server.files import File, NoSuchFile, read_below
-from webmap.server.hop import Hops
-from webmap.server.plain import plain
-from webmap.server.ports import Gate, Model, Site
-from webmap.server.published import FILES, IMAGES, Published
-from webmap.server.scene_socket import SceneSockets
-from webmap.server.security import Security
-from webmap.server.settings import Settings
+from webmap.core.page import PageEntry, Site
+from webmap.server.access import Settings
+from webmap.server.drive_socket import ConnectToGate, DriveSockets
+from webmap.server.files import FILES, IMAGES, File, NoSuchFile, Published, read_below
+from webmap.server.html import FOLDER, base_of, make_page, prepare_page
+from webmap.server.open_pages import OpenPages
+from webmap.server.outbox import BatchedCallsByLoop
+from webmap.server.scene_socket import SceneSockets, find_page
+from webmap.server.security import PAGE_KEY, SANDBOX, Security, plain
+
+log = logging.getLogger("webmap.server")
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
@@ -29,22 +32,37 @@ STATIC = (Path(__file__).parents[1] / "web", Path(__file__).parent / "assets")
 
 
 class WebApp:
-    """The ASGI application of WebMap; runs by itself, or mounted under a prefix."""
+    """The ASGI application of WebMap; runs by itself, or mounted under a prefix.
+
+    Args:
+        site: The pages that can be opened.
+        pages: The pages that are open.
+        connect_to_gate: Opens a connection of a page to the gate.
+        settings: Who may use it; a new token and this machine alone if not given.
+        published: What the program publishes, if it has published already.
+        lifespan: What to do when a server starts and stops the application, as
+            Starlette has it; a host that mounts the application does it itself.
+
+    Raises:
+        ConfigError: If the settings' token is too short.
+
+    """
 
     def __init__(
         self,
         site: Site,
-        model: Model,
-        gate: Gate,
-        settings: Settings,
-        published: Published,
-        lifespan: Lifespan | None,
+        pages: OpenPages,
+        connect_to_gate: ConnectToGate,
+        settings: Settings | None = None,
+        *,
+        published: Published | None = None,
+        lifespan: Lifespan | None = None,
     ) -> None:
-        self.settings = settings
-        self.published = published
-        hops = Hops()
-        scene = SceneSockets(site, model, hops, settings.max_pages)
-        drive = DriveSockets(model, gate, hops, settings.max_pages)
+        self.settings = settings = settings or Settings()
+        self.published = published or Published()
+        calls = BatchedCallsByLoop()
+        scene = SceneSockets(site, pages, calls, settings.max_pages)
+        drive = DriveSockets(pages, connect_to_gate, calls, settings.max_pages)
         self.routes = [
             WebSocketRoute("/_webmap/scene", scene.serve),
             WebSocketRoute("/_webmap/drive", drive.serve),
@@ -86,40 +104,6 @@ class WebApp:
         )
 
 
-def create_app(
-    site: Site,
-    model: Model,
-    gate: Gate,
-    settings: Settings | None = None,
-    *,
-    published: Published | None = None,
-    lifespan: Lifespan | None = None,
-) -> WebApp:
-    """Return the web application.
-
-    Args:
-        site: The pages there are.
-        model: What owns the pages' contents.
-        gate: What takes commands to robots.
-        settings: Who may use it; a new token and this machine alone if not given.
-        published: What the program publishes, if it has published already.
-        lifespan: What to do when a server starts and stops the application, as
-            Starlette has it; a host that mounts the application does it itself.
-
-    Raises:
-        ConfigError: If the settings' token is too short.
-
-    """
-    return WebApp(
-        site,
-        model,
-        gate,
-        settings or Settings(),
-        published or Published(),
-        lifespan,
-    )
-
-
 async def _key_fits(request: Request) -> Response:
     """Answer a page that asks why its socket was refused: this request was not."""
     del request
@@ -151,3 +135,118 @@ async def _answer_error(request: Request, error: Exception) -> Response:
     answer = plain(error.status_code, texts.get(error.status_code, error.detail))
     answer.headers.update(error.headers or {})
     return answer
+
+
+async def answer_file(
+    request: Request, read: Callable[[], File], *, unchanging: bool = False
+) -> Response:
+    """Answer with a file, or with nothing but "unchanged" if the browser has it.
+
+    Args:
+        request: What is answered.
+        read: Called in another thread; may raise :class:`NoSuchFile`.
+        unchanging: Whether this URL always means the same content.
+
+    Raises:
+        HTTPException: With status 404, if there is no such file.
+
+    """
+    try:
+        file = await asyncio.to_thread(read)
+    except NoSuchFile:
+        raise HTTPException(404) from None
+    tag = f'"{file.tag}"'
+    headers = {
+        "etag": tag,
+        "cache-control": "private, max-age=31536000, immutable"
+        if unchanging
+        else "no-cache",
+    }
+    if file.fleeting:
+        headers["cache-control"] = "no-store"
+    if file.media_type.startswith("image/"):
+        headers["content-security-policy"] = SANDBOX
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(file.data, media_type=file.media_type, headers=headers)
+
+
+class PageAnswers:
+    """Answers for every path that is not WebMap's own: pages, and files beside them."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self._warned: dict[Path, list[str]] = {}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        request = Request(scope, receive)
+        if request.method not in {"GET", "HEAD"}:
+            raise HTTPException(405, headers={"allow": "GET, HEAD"})
+        answer = await self._answer(request, request.path_params["path"])
+        await answer(scope, receive, send)
+
+    async def _answer(self, request: Request, path: str) -> Response:
+        entry = find_page(self._site, path)
+        if entry is not None:
+            return await self._page(request, entry)
+        entry = find_page(self._site, other_spelling(path))
+        if entry is not None:
+            root = base_of(request.scope.get("root_path", "")).removesuffix(FOLDER)
+            return RedirectResponse(root + entry.path, 308)
+        return await answer_file(request, lambda: self._beside_page("/" + path))
+
+    async def _page(self, request: Request, entry: PageEntry) -> Response:
+        base = base_of(request.scope.get("root_path", ""))
+        key = request.scope.get(PAGE_KEY)
+        headers = {"cache-control": "no-store" if key else "no-cache"}
+        if entry.html is None:
+            return HTMLResponse(make_page(entry.title, base, key), headers=headers)
+        try:
+            text = await asyncio.to_thread(entry.html.read_text, "utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            log.error("page %s: cannot read %s: %s", entry.path, entry.html, error)
+            return plain(500, "The HTML file of this page cannot be read as UTF-8.")
+        page = prepare_page(text, base, key)
+        self._warn(entry.html, page.blocked)
+        return HTMLResponse(page.text, headers=headers)
+
+    def _beside_page(self, path: str) -> File:
+        # Longest first: the nearest page knows its own files best.
+        for entry in sorted(self._site.pages.values(), key=_depth, reverse=True):
+            name = name_in_folder(entry, path)
+            if name is None or entry.folder is None:
+                continue
+            try:
+                return read_below(entry.folder, name)
+            except NoSuchFile:
+                continue
+        raise NoSuchFile
+
+    def _warn(self, html: Path, blocked: list[str]) -> None:
+        if self._warned.get(html) != blocked:
+            self._warned[html] = blocked
+            for sentence in blocked:
+                log.warning("%s, %s", html, sentence)
+
+
+def _depth(entry: PageEntry) -> int:
+    return entry.path.count("/")
+
+
+def other_spelling(path: str) -> str:
+    """Return a path with the slash at its end taken away, or added."""
+    return path[:-1] if path.endswith("/") else path + "/"
+
+
+def name_in_folder(page: PageEntry, path: str) -> str | None:
+    """Return a path relative to a page, as the page's HTML would write it.
+
+    Returns:
+        None if the page has no files beside it, or the path does not lie there.
+
+    """
+    if page.html is None:
+        return None
+    base = page.path.rpartition("/")[0] + "/"
+    return path[len(base) :] if path.startswith(base) else None

@@ -12,8 +12,8 @@ from webmap.errors import WebMapError
 if TYPE_CHECKING:
     from webmap.gate.display.client import DriveConnection
     from webmap.gate.messages import Role
+    from webmap.server.access import Authenticate
     from webmap.server.app import WebApp
-    from webmap.server.settings import Authenticate
 
 log = logging.getLogger("webmap")
 
@@ -79,8 +79,8 @@ def asgi_app(
         ConfigError: If the token is too short, or a host or an origin is none.
 
     """
+    from webmap.server.access import Settings
     from webmap.server.origins import Hosts, checked_origin
-    from webmap.server.settings import Settings
 
     settings: dict[str, Any] = {
         "authenticate": authenticate,
@@ -128,11 +128,10 @@ def run(
 def _serve(
     *, host: str, port: int, open_browser: bool, insecure_lan: bool, token: str | None
 ) -> None:
-    from webmap.server.listening import check_exposure, listen
+    from webmap.server.access import Settings
     from webmap.server.opening import opened
     from webmap.server.origins import Hosts
-    from webmap.server.runner import announce, serve
-    from webmap.server.settings import Settings
+    from webmap.server.runner import announce, check_exposure, listen, serve
 
     # All that can be refused is refused before anything starts.
     check_exposure(host, insecure_lan=insecure_lan)
@@ -165,16 +164,16 @@ def _serve(
 
 
 def _make_app(settings: Any, *, with_lifespan: bool) -> "WebApp":
-    from webmap.server.app import create_app
-    from webmap.server.model import Model
-    from webmap.server.published import Published
+    from webmap.server.app import WebApp
+    from webmap.server.files import Published
+    from webmap.server.open_pages import OpenPages
 
     published = Published()
-    model = Model(runtime, site.pages, published, max_pages=settings.max_pages)
-    runtime.on_stop(model.close)
+    pages = OpenPages(runtime, site.pages, published, max_pages=settings.max_pages)
+    runtime.on_stop(pages.close)
     lifespan = _live if with_lifespan else None
-    return create_app(
-        site, model, _Gate(), settings, published=published, lifespan=lifespan
+    return WebApp(
+        site, pages, _connect_to_gate, settings, published=published, lifespan=lifespan
     )
 
 
@@ -187,17 +186,12 @@ async def _live(app: object) -> AsyncIterator[None]:
         runtime.stop()
 
 
-class _Gate:
-    """The gate of the moment; it is there while WebMap runs."""
-
-    def connect(
-        self,
-        name: str,
-        role: "Role",
-        send: Callable[[str], None],
-        close: Callable[[str], None],
-    ) -> "DriveConnection":
-        """Open a connection to the gate."""
-        if runtime.gate is None:
-            raise WebMapError("WebMap has not been started: call webmap.start()")
-        return runtime.gate.connect(name, role, send, close)
+def _connect_to_gate(
+    name: str,
+    role: "Role",
+    send: Callable[[str], None],
+    close: Callable[[str], None],
+) -> "DriveConnection":
+    if runtime.gate is None:
+        raise WebMapError("WebMap has not been started: call webmap.start()")
+    return runtime.gate.connect(name, role, send, close)

@@ -6,19 +6,33 @@ sends goes to the gate unread; the gate alone decides.
 
 import logging
 import secrets
+from collections.abc import Callable
 
 from starlette.websockets import WebSocket
 
+from webmap.core.page import Viewer
+from webmap.gate.display.client import DriveConnection
 from webmap.gate.malformed_stop import begins_like_stop
-from webmap.server.bounds import DRIVE
-from webmap.server.hop import Hops
-from webmap.server.line import BROKEN_RULE, FAILED, Line, accept, close
-from webmap.server.paths import page_id_of
-from webmap.server.ports import DriveConnection, Gate, Model
-from webmap.server.queues import DriveQueue
-from webmap.server.seats import Seats
+from webmap.gate.messages import Role
+from webmap.server.open_pages import OpenPages
+from webmap.server.outbox import BatchedCallsByLoop, DriveQueue
+from webmap.server.page_socket import (
+    BROKEN_RULE,
+    DRIVE,
+    FAILED,
+    OpenSockets,
+    PageSocket,
+    accept,
+    close,
+    page_id_of,
+)
 from webmap.server.security import VIEWER
-from webmap.server.viewer import Viewer
+
+ConnectToGate = Callable[
+    [str, Role, Callable[[str], None], Callable[[str], None]], DriveConnection
+]
+"""Opens a connection to the gate for a viewer's name and role. The two callbacks send
+to the page and close its socket; they may be called from any thread."""
 
 log = logging.getLogger("webmap.server")
 
@@ -29,11 +43,17 @@ MOST_LAST_STOPS = 60
 class DriveSockets:
     """The ``/_webmap/drive`` sockets of one application."""
 
-    def __init__(self, model: Model, gate: Gate, hops: Hops, limit: int) -> None:
-        self._model = model
-        self._gate = gate
-        self._hops = hops
-        self._seats: Seats[Line] = Seats(limit)
+    def __init__(
+        self,
+        pages: OpenPages,
+        connect_to_gate: ConnectToGate,
+        calls: BatchedCallsByLoop,
+        limit: int,
+    ) -> None:
+        self._pages = pages
+        self._connect_to_gate = connect_to_gate
+        self._calls = calls
+        self._open = OpenSockets(limit)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -46,27 +66,31 @@ class DriveSockets:
             await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return
         name = f"drive for {viewer.name}"
-        line = Line(socket, name, self._hops.here(), DRIVE, DriveQueue())
-        async with self._seats.taken((viewer.id, page_id), line) as seated:
-            if seated:
-                await self._carry(line, page_id, viewer, limited=named)
+        page_socket = PageSocket(
+            socket, name, self._calls.of_this_loop(), DRIVE, DriveQueue()
+        )
+        async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
+            if has_room:
+                await self._carry(page_socket, page_id, viewer, limited=named)
             else:
-                await line.refuse_full()
+                await page_socket.refuse_full()
 
     async def _carry(
-        self, line: Line, page_id: str, viewer: Viewer, *, limited: bool
+        self, page_socket: PageSocket, page_id: str, viewer: Viewer, *, limited: bool
     ) -> None:
         try:
-            connection = self._connect(line, viewer)
+            connection = self._connect(page_socket, viewer)
             if limited:
                 # Until the model, which may be busy, has said what the page allows.
                 connection.set_speeds(0.0, 0.0)
         except Exception:
             log.exception("%s cannot reach the gate", viewer.name)
-            await line.refuse(FAILED, "the gate cannot be reached; the log says why")
+            await page_socket.refuse(
+                FAILED, "the gate cannot be reached; the log says why"
+            )
             return
         try:
-            self._model.drive_opened(page_id, viewer, connection)
+            self._pages.drive_opened(page_id, viewer, connection)
 
             last_stops = iter(range(MOST_LAST_STOPS))
 
@@ -79,16 +103,16 @@ class DriveSockets:
                 if begins_like_stop(data) and next(last_stops, None) is not None:
                     connection.receive(message)
 
-            await line.run(
-                connection.receive, lambda why: self._model.refused(viewer, why), rest
+            await page_socket.run(
+                connection.receive, lambda why: self._pages.refused(viewer, why), rest
             )
         finally:
             # The gate first: with the connection its leases end and robots stop.
             connection.close()
-            self._model.drive_closed(page_id, viewer, connection)
+            self._pages.drive_closed(page_id, viewer, connection)
 
-    def _connect(self, line: Line, viewer: Viewer) -> DriveConnection:
+    def _connect(self, page_socket: PageSocket, viewer: Viewer) -> DriveConnection:
         def close(reason: str) -> None:
-            line.end(BROKEN_RULE, reason)
+            page_socket.end(BROKEN_RULE, reason)
 
-        return self._gate.connect(viewer.name, viewer.role, line.offer, close)
+        return self._connect_to_gate(viewer.name, viewer.role, page_socket.offer, close)

@@ -9,6 +9,11 @@ from html import escape
 from html.parser import HTMLParser
 from urllib.parse import quote
 
+from webmap.server.access import KEY
+
+FOLDER = "/_webmap/"
+"""Where pages find WebMap's own files and sockets, under the application's root."""
+
 _MADE = """<!doctype html>
 <html lang="en">
 <head>
@@ -35,7 +40,7 @@ _LOADS = {"script": "src", "img": "src", "link": "href", "iframe": "src"}
 
 def base_of(root_path: str) -> str:
     """Return the URL below which WebMap's own files are, ending in a slash."""
-    return quote(root_path.rstrip("/")) + "/_webmap/"
+    return quote(root_path.rstrip("/")) + FOLDER
 
 
 def make_page(title: str, base: str, key: str | None = None) -> str:
@@ -51,7 +56,7 @@ def make_page(title: str, base: str, key: str | None = None) -> str:
 
 
 def _key_element(key: str | None) -> str:
-    return "" if key is None else f'<meta name="webmap-key" content="{escape(key)}">'
+    return "" if key is None else f'<meta name="{KEY}" content="{escape(key)}">'
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
+from webmap.server.access import CODE
 from webmap.server.auth import CODE_LIFE_S
-from webmap.server.request import CODE
 
 log = logging.getLogger("webmap")
 

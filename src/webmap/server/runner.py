@@ -1,19 +1,19 @@
-"""What runs the web application: uvicorn, set up for small messages and quick ends."""
+"""Listens and runs the web application: uvicorn, set up for small messages."""
 
 import logging
+import os
 import socket
 from collections.abc import Callable
 from types import FrameType
-from typing import Protocol
 
 import uvicorn
-from starlette.types import Receive, Scope, Send
 
-from webmap.errors import WebMapError
+from webmap.errors import ConfigError, WebMapError
 from webmap.memory import return_large_pieces
+from webmap.not_listening import why_not_listening
+from webmap.server.app import WebApp
 from webmap.server.connections import protocols
-from webmap.server.listening import check_exposure, listen, url_of
-from webmap.server.settings import Settings
+from webmap.server.origins import WILDCARD, is_loopback
 
 log = logging.getLogger("webmap.server")
 
@@ -26,16 +26,68 @@ _MAX_MESSAGE = 64 * 1024
 _ACCEPTED_AT_ONCE = 4
 _BACKLOG = 1024
 
+# A peer that acknowledges nothing for so long is gone, in milliseconds. Without it a
+# stalled viewer's socket lingers for a quarter of an hour.
+_USER_TIMEOUT_MS = 10_000
 
-class Application(Protocol):
-    """An ASGI application with settings; :class:`webmap.server.app.WebApp`."""
 
-    @property
-    def settings(self) -> Settings:
-        """Who may use it."""
+def check_exposure(host: str, *, insecure_lan: bool) -> None:
+    """Refuse to be reached from other machines unless that was asked for.
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, one socket, or the life of the application."""
+    Raises:
+        ConfigError: If ``host`` is not this machine alone and nobody said so.
+
+    """
+    if not is_loopback(host) and not insecure_lan:
+        raise ConfigError(
+            f"host {host!r} can be reached from other machines, and without TLS "
+            "everybody on the way can read the token and drive the robots: keep "
+            "127.0.0.1 and put a proxy with TLS or an SSH tunnel in front, or say "
+            "insecure_lan=True (--insecure-lan) if you trust this network"
+        )
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens.
+
+    Args:
+        host: A name or an address of this machine.
+        port: From 0 to 65535; 0 lets the kernel choose.
+
+    Raises:
+        ConfigError: If that is not possible, with what would be.
+
+    """
+    if not 0 <= port <= 65535:
+        raise ConfigError(f"a port is a number from 0 to 65535, got {port}")
+    try:
+        found = socket.getaddrinfo(
+            host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )
+    except (OSError, UnicodeError) as error:
+        raise ConfigError(f"there is no host {host!r} to listen on") from error
+    family, _, _, _, address = found[0]
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        if os.name == "posix":
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):
+            listener.setsockopt(
+                socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _USER_TIMEOUT_MS
+            )
+        listener.bind(address)
+        listener.listen(_BACKLOG)
+    except OSError as error:
+        listener.close()
+        raise ConfigError(why_not_listening(host, port, error)) from error
+    return listener
+
+
+def url_of(listener: socket.socket, host: str) -> str:
+    """Return the URL at which a browser on this machine finds a listening socket."""
+    name = "127.0.0.1" if host in WILDCARD else host
+    bracketed = f"[{name}]" if ":" in name else name
+    return f"http://{bracketed}:{listener.getsockname()[1]}/"
 
 
 def announce(url: str) -> None:
@@ -44,7 +96,7 @@ def announce(url: str) -> None:
 
 
 def serve(
-    app: Application,
+    app: WebApp,
     *,
     host: str = "127.0.0.1",
     port: int = 8000,
@@ -59,7 +111,7 @@ def serve(
         host: What to listen on.
         port: The port; 0 lets the kernel choose.
         insecure_lan: The explicit word without which only this machine is served.
-        listener: A socket of :func:`webmap.server.listening.listen` that was opened
+        listener: A socket of :func:`listen` that was opened
             before, so that nothing starts if the port is in use; closed here.
         on_ready: Called once with the URL when the page can be opened.
 
@@ -85,7 +137,7 @@ def serve(
         raise server.failure
 
 
-def make_server(app: Application, on_ready: Callable[[], object]) -> "Server":
+def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
     """Return what :func:`serve` runs, for those who start and stop it themselves."""
     http, ws = protocols()
     config = uvicorn.Config(

@@ -4,44 +4,39 @@ import logging
 
 from starlette.websockets import WebSocket
 
-from webmap.server.bounds import SCENE
-from webmap.server.hop import Hops
-from webmap.server.line import BROKEN_RULE, FAILED, Line, accept, close
-from webmap.server.paths import find_page, page_id_of
-from webmap.server.ports import Model, Site
-from webmap.server.queues import FrameQueue
-from webmap.server.seats import Seats
+from webmap.core.page import PageEntry, Site, Viewer
+from webmap.server.open_pages import OpenPages
+from webmap.server.outbox import BatchedCallsByLoop, FrameQueue
+from webmap.server.page_socket import (
+    BROKEN_RULE,
+    FAILED,
+    SCENE,
+    OpenSockets,
+    PageSocket,
+    accept,
+    close,
+    page_id_of,
+)
 from webmap.server.security import VIEWER
-from webmap.server.viewer import Viewer
 
 log = logging.getLogger("webmap.server")
 
 
-class SceneOutbox:
-    """The way of finished frames to one page; callable from any thread."""
-
-    __slots__ = ("_line",)
-
-    def __init__(self, line: Line) -> None:
-        self._line = line
-
-    def offer(self, data: bytes) -> None:
-        """Send one binary frame soon; nothing happens once the page is gone."""
-        self._line.offer(data)
-
-    def close(self, reason: str) -> None:
-        """End the socket and tell the page why."""
-        self._line.end(FAILED, reason)
+def find_page(site: Site, path: str) -> PageEntry | None:
+    """Return the page at a path, with or without the slash at its start."""
+    return site.pages.get("/" + path.removeprefix("/"))
 
 
 class SceneSockets:
     """The ``/_webmap/scene`` sockets of one application."""
 
-    def __init__(self, site: Site, model: Model, hops: Hops, limit: int) -> None:
+    def __init__(
+        self, site: Site, pages: OpenPages, calls: BatchedCallsByLoop, limit: int
+    ) -> None:
         self._site = site
-        self._model = model
-        self._hops = hops
-        self._seats: Seats[Line] = Seats(limit)
+        self._pages = pages
+        self._calls = calls
+        self._open = OpenSockets(limit)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -56,21 +51,29 @@ class SceneSockets:
             await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return
         name = f"scene of {entry.path} for {viewer.name}"
-        line = Line(socket, name, self._hops.here(), SCENE, FrameQueue())
-        async with self._seats.taken((viewer.id, page_id), line) as seated:
-            if seated:
-                await self._carry(line, entry.path, page_id, viewer)
+        page_socket = PageSocket(
+            socket, name, self._calls.of_this_loop(), SCENE, FrameQueue()
+        )
+        async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
+            if has_room:
+                await self._carry(page_socket, entry.path, page_id, viewer)
             else:
-                await line.refuse_full()
+                await page_socket.refuse_full()
 
-    async def _carry(self, line: Line, path: str, page_id: str, viewer: Viewer) -> None:
+    async def _carry(
+        self, page_socket: PageSocket, path: str, page_id: str, viewer: Viewer
+    ) -> None:
         try:
-            handle = self._model.open_scene(path, page_id, viewer, SceneOutbox(line))
+            handle = self._pages.open_scene(path, page_id, viewer, page_socket)
         except Exception:
             log.exception("the page %s could not be opened", path)
-            await line.refuse(FAILED, "the page could not be opened; the log says why")
+            await page_socket.refuse(
+                FAILED, "the page could not be opened; the log says why"
+            )
             return
         try:
-            await line.run(handle.receive, lambda why: self._model.refused(viewer, why))
+            await page_socket.run(
+                handle.receive, lambda why: self._pages.refused(viewer, why)
+            )
         finally:
             handle.closed()

@@ -1,23 +1,121 @@
-"""The door as ASGI middleware: nothing behind it sees a request it did not let in."""
+"""Access control as ASGI middleware, which also adds the headers of every answer."""
 
 import contextlib
 import inspect
 import logging
 import time
 from collections.abc import Callable
+from html import escape
+from http import HTTPStatus
 
-from starlette.responses import Response
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from webmap.core.page import Viewer
+from webmap.server.access import (
+    AccessControl,
+    Redirect,
+    Refusal,
+    RequestHead,
+    Settings,
+    SignedIn,
+    redact,
+)
 from webmap.server.connections import connection_of
-from webmap.server.door import Door, GoOn, Refusal, SignedIn
-from webmap.server.headers import with_headers
-from webmap.server.plain import go_on, refuse
-from webmap.server.request import Request, redact
-from webmap.server.settings import Settings
-from webmap.server.viewer import Viewer
 
 log = logging.getLogger("webmap.server")
+
+CONTENT_SECURITY_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+    "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; "
+    "form-action 'self'; require-trusted-types-for 'script'"
+)
+
+HEADERS = (
+    (b"content-security-policy", CONTENT_SECURITY_POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    # Another port of this machine is the same site: SameSite does not keep it out.
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+
+# An image that is opened by itself is a document; it gets no script, whatever it is.
+SANDBOX = CONTENT_SECURITY_POLICY + "; sandbox"
+
+_STARTS = {"http.response.start", "websocket.http.response.start"}
+
+
+def with_headers(send: Send, cookie: str | None = None) -> Send:
+    """Return ``send`` with the headers added that an answer does not have yet.
+
+    Args:
+        send: What answers.
+        cookie: A whole Set-Cookie header, which is added too.
+
+    """
+
+    async def send_with_headers(message: Message) -> None:
+        if message["type"] in _STARTS:
+            headers = [
+                (name, value)
+                for name, value in message.get("headers", [])
+                if name.lower() != b"server"
+            ]
+            present = {name.lower() for name, _ in headers}
+            headers += [header for header in HEADERS if header[0] not in present]
+            if b"cache-control" not in present:
+                headers.append((b"cache-control", b"no-store"))
+            if cookie is not None:
+                headers.append((b"set-cookie", cookie.encode("latin-1")))
+            message = {**message, "headers": headers}
+        await send(message)
+
+    return send_with_headers
+
+
+_SIGN_IN = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<meta name="color-scheme" content="light dark">
+<title>Sign in - WebMap</title>
+<main>
+<h1>Sign in to WebMap</h1>
+<p>{text}</p>
+<p>Open the address that WebMap printed when it started, or enter the token in it:</p>
+<form>
+<label>Token <input name="token" type="password" autocomplete="off" required></label>
+<button>Sign in</button>
+</form>
+<p>If you have just signed in through a link on another site, <a href="?">go on</a>.</p>
+</main>
+</html>
+"""
+
+
+def plain(status: int, text: str) -> Response:
+    """Return a refusal as a heading and a sentence of plain text."""
+    phrase = HTTPStatus(status).phrase
+    return PlainTextResponse(f"{status} {phrase}\n\n{text}\n", status)
+
+
+def refuse(refusal: Refusal, *, wants_html: bool) -> Response:
+    """Return what a refused request is answered with."""
+    if refusal.status == HTTPStatus.UNAUTHORIZED and wants_html:
+        return HTMLResponse(_SIGN_IN.format(text=escape(refusal.text)), refusal.status)
+    response = plain(refusal.status, refusal.text)
+    if refusal.retry_after:
+        response.headers["retry-after"] = str(refusal.retry_after)
+    return response
+
+
+def redirect(to: Redirect) -> Response:
+    """Return the redirect to an address without the token."""
+    response = Response(status_code=HTTPStatus.SEE_OTHER)
+    response.headers["location"] = to.location
+    return response
+
 
 VIEWER = "webmap.viewer"
 """The key of the scope under which the routes find who makes a request."""
@@ -37,7 +135,7 @@ class Security:
     ) -> None:
         self._app = app
         self._authenticate = settings.authenticate
-        self._door = Door(settings)
+        self._access = AccessControl(settings)
         self._now = now
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -45,7 +143,7 @@ class Security:
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
-        request = Request.of(scope)
+        request = RequestHead.of(scope)
         if self._authenticate is None:
             redact(scope)
         who = await self._who(request, scope)
@@ -60,8 +158,8 @@ class Security:
             connection = connection_of(scope)
             with connection.serving() if connection else contextlib.nullcontext():
                 await self._app(scope, receive, send)
-        elif isinstance(who, GoOn):
-            await go_on(who)(scope, receive, send)
+        elif isinstance(who, Redirect):
+            await redirect(who)(scope, receive, send)
         else:
             _log_refusal(who, request, scope)
             answer = refuse(who, wants_html=request.wants_html)
@@ -73,16 +171,16 @@ class Security:
 
     def new_code(self) -> str:
         """Return a one-time code that signs one browser in, soon."""
-        return self._door.codes.issue(self._now())
+        return self._access.codes.issue(self._now())
 
     async def _who(
-        self, request: Request, scope: Scope
-    ) -> Viewer | GoOn | SignedIn | Refusal:
-        refusal = self._door.check_address(request)
+        self, request: RequestHead, scope: Scope
+    ) -> Viewer | Redirect | SignedIn | Refusal:
+        refusal = self._access.check_address(request)
         if refusal is not None:
             return refusal
         if self._authenticate is None:
-            return self._door.identify(request, self._now())
+            return self._access.identify(request, self._now())
         viewer = self._authenticate(scope)
         if inspect.isawaitable(viewer):
             viewer = await viewer
@@ -99,7 +197,7 @@ async def _deny(answer: Response, scope: Scope, receive: Receive, send: Send) ->
         await send({"type": "websocket.close", "code": 1008, "reason": ""})
 
 
-def _log_refusal(refusal: Refusal, request: Request, scope: Scope) -> None:
+def _log_refusal(refusal: Refusal, request: RequestHead, scope: Scope) -> None:
     if refusal.status == 401 and not request.tokens():
         return
     # Repr: what a stranger sends must not write lines of its own into the log.

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from webmap.geometry import Pose, Quaternion
+from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.sim.maps import FloorPlan
 from webmap.sim.mounts import LASER_HEIGHT, mount
 from webmap.sim.planner import Point
 from webmap.sim.robot import Robot
-from webmap.sim.rosbridge.dialect import Dialect
 from webmap.sim.scanner import ScannerOptions
 from webmap.tf import Transform
 

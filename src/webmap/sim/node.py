@@ -6,15 +6,14 @@ from functools import partial
 from typing import Any
 
 from webmap.geometry import Pose, Twist
-from webmap.sim.actionlib import ActionlibServer
+from webmap.ros.rosbridge.server.encode import Publication
+from webmap.ros.rosbridge.server.graph import Deliver, Graph, Respond
+from webmap.ros.rosbridge.server.quirks import Quirks
+from webmap.sim.actions import ActionlibServer, NavigateToPose
 from webmap.sim.feeds import Feeds, depth, sonar
 from webmap.sim.messages import Messages, read_pose
 from webmap.sim.mounts import OVER, mount, overhead
-from webmap.sim.nav2 import NavigateToPose
 from webmap.sim.navigator import Goal
-from webmap.sim.rosbridge.encode import Publication
-from webmap.sim.rosbridge.graph import Deliver, Graph, Respond
-from webmap.sim.rosbridge.quirks import Quirks
 from webmap.sim.world import World
 
 log = logging.getLogger("webmap.sim")

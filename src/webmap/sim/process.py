@@ -58,7 +58,7 @@ async def run_simulator(
         drift: How wrong odometry grows, in metres a metre.
         nan: Whether scans and covariances hold some NaN.
         quirks: ``real``, ``polite``, or one of them with changes; see
-            :func:`webmap.sim.rosbridge.quirks.parse_quirks`.
+            :func:`webmap.ros.rosbridge.server.quirks.parse_quirks`.
         wander: Whether robots that nobody commands drive to random places.
         flat: Whether the only robot has its topics without a prefix: ``/odom``.
         extras: Whether robots have costmaps, clouds, footprints, particles, sonars,
@@ -81,16 +81,16 @@ async def run_simulator(
 
     """
     # Heavy, and needed by nobody who only imports the name.
+    from webmap.ros.rosbridge.server.dialect import Dialect
+    from webmap.ros.rosbridge.server.encode import Encoder
+    from webmap.ros.rosbridge.server.graph import Graph
+    from webmap.ros.rosbridge.server.quirks import parse_quirks
+    from webmap.ros.rosbridge.server.rosapi import Rosapi
+    from webmap.ros.rosbridge.server.schema import Schema
+    from webmap.ros.rosbridge.server.server import RosbridgeServer
     from webmap.sim.maps import FLOOR, load_map
     from webmap.sim.node import IMAGE, RobotsNode
     from webmap.sim.robot import BaseOptions
-    from webmap.sim.rosbridge.dialect import Dialect
-    from webmap.sim.rosbridge.encode import Encoder
-    from webmap.sim.rosbridge.graph import Graph
-    from webmap.sim.rosbridge.quirks import parse_quirks
-    from webmap.sim.rosbridge.rosapi import Rosapi
-    from webmap.sim.rosbridge.schema import Schema
-    from webmap.sim.rosbridge.server import RosbridgeServer
     from webmap.sim.scanner import ScannerOptions
     from webmap.sim.web_video import WebVideoServer
     from webmap.sim.world import World, WorldOptions

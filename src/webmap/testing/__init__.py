@@ -7,9 +7,8 @@ way to it, :func:`check_invariants` says in sentences what must not have happene
 
 from webmap.testing.invariants import Bounds, Quiet, check_invariants
 from webmap.testing.log import Heard, Moved, Told, WitnessLog
-from webmap.testing.proxy import FaultProxy
+from webmap.testing.proxy import FaultProxy, Shape
 from webmap.testing.sentinel import Sentinel
-from webmap.testing.shaping import Shape
 from webmap.testing.witness import WitnessRobot
 
 __all__ = [

@@ -76,10 +76,6 @@ class WitnessLog:
             if heard.op == op and topic in (None, heard.topic)
         ]
 
-    def last_moving(self, since: float) -> float | None:
-        """Return when the last velocity that moves came, if any did after ``since``."""
-        return next((t.at for t in reversed(self.moving_since(since))), None)
-
     def first_zero(self, since: float) -> float | None:
         """Return when the first zero came after ``since``."""
         return next((t.at for t in _from(self.told, since) if t.is_zero), None)

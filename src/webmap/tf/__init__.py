@@ -1,15 +1,21 @@
 """Frames: where each is in another, at a time.
 
-A :class:`Buffer` is told the transforms of ``/tf`` and ``/tf_static`` and asked for
-those between any two frames. It knows no sockets, no clocks and no messages.
+A :class:`Buffer` takes the transforms of ``/tf`` and ``/tf_static`` and returns those
+between any two frames. It knows no sockets, no clocks and no messages.
 """
 
-from webmap.tf.buffer import Buffer
-from webmap.tf.errors import FrameMissing, NotConnected, NotKnownThen, TransformError
-from webmap.tf.transform import Transform
+from webmap.tf.buffer import Buffer, Found
+from webmap.tf.transform import (
+    FrameMissing,
+    NotConnected,
+    NotKnownThen,
+    Transform,
+    TransformError,
+)
 
 __all__ = [
     "Buffer",
+    "Found",
     "FrameMissing",
     "NotConnected",
     "NotKnownThen",

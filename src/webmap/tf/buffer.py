@@ -4,44 +4,80 @@ import difflib
 import heapq
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from typing import NamedTuple
 
-from webmap.tf.errors import (
+from webmap.tf.track import Track
+from webmap.tf.transform import (
     FrameMissing,
     NotConnected,
     NotKnownThen,
+    Transform,
     TransformError,
 )
-from webmap.tf.track import Track
-from webmap.tf.transform import Transform
 
 HISTORY = 10.0
 """Seconds of transforms that are kept."""
 
 GAP = 1.0
-"""Seconds between two transforms beyond which nothing is told in between."""
+"""Seconds between two transforms beyond which nothing is interpolated."""
 
 JUMP = 1.0
 """Seconds by which a stamp may be older than the newest; more is a jump of time."""
 
 SHARED = ("map", "world", "earth")
-"""Frames that are the same for all robots, whatever namespace tells of them."""
+"""Frames that are the same for all robots, in whatever namespace they are published."""
 
 MOST_FRAMES = 4096
-"""Frames that are known at a time; of more, those heard of longest ago go."""
+"""Frames that are kept; of more, those without news for the longest time go."""
 
 LONGEST_NAME = 256
 """Characters of a frame's name."""
 
 MOST_COMPARED = 200
-"""Frames up to which it is looked for one whose name is like a missing one."""
+"""Frames up to which a name like that of a missing frame is searched."""
 
 _LISTED = 12
 _SENTENCES = 100
+_WAYS = 1000
+
+
+class Found(NamedTuple):
+    """One frame in another, as well as that is known."""
+
+    transform: Transform
+    """Takes coordinates of the one to those of the other."""
+
+    newest: float | None
+    """The newest time at which all between is known; None for all times."""
+
+    on_time: bool
+    """Whether the transform is of the time that was asked for, and not the newest."""
+
+
+class _Way(NamedTuple):
+    """The tracks between two frames, up to their nearest common ancestor."""
+
+    down: list[Track]
+    """From the target up."""
+
+    up: list[Track]
+    """From the source up."""
+
+    @property
+    def newest(self) -> float | None:
+        """The newest time at which all of it is known; None for all times."""
+        found = None
+        for tracks in self:
+            for track in tracks:
+                newest = track.newest
+                if newest is not None and (found is None or newest < found):
+                    found = newest
+        return found
 
 
 class Buffer:
-    """Knows where frames are in each other, from what it is told.
+    """The frames of one ROS system, each in its parent, over the last seconds.
 
     Args:
         history: How much is kept before the newest transform, in seconds.
@@ -61,13 +97,15 @@ class Buffer:
         self.gap = gap
         self.shared = frozenset(shared)
         self.notes: deque[str] = deque(maxlen=20)
-        """What was odd and was dealt with, in sentences, the newest last."""
+        """Faults that were dealt with, in sentences, the newest last."""
         self._tracks: dict[str, Track] = {}
-        """By the frame; the one that was heard of longest ago is the first."""
+        """By the frame; the first one is without news for the longest time."""
         self._roots: dict[str, int] = {}
-        """How many frames hang from each that any hangs from."""
+        """The number of child frames of each parent frame."""
         self._missing: dict[str, str] = {}
-        """What is said of frames that are missing, until others come or go."""
+        """The sentences about missing frames, until frames come or go."""
+        self._ways: dict[tuple[str, str], _Way] = {}
+        """Those that were looked up since the tree of frames last changed."""
 
     @property
     def frames(self) -> list[str]:
@@ -75,7 +113,7 @@ class Buffer:
         return sorted({*self._tracks, *self._roots})
 
     def name(self, frame: str, namespace: str = "") -> str:
-        """Return the whole name of a frame that was told in a namespace.
+        """Return the whole name of a frame that was published in a namespace.
 
         ``base_link`` on ``/robot_0/tf`` is ``robot_0/base_link``. A slash in front,
         as ROS 1 had it once, is left out, and what has the namespace in front
@@ -107,12 +145,12 @@ class Buffer:
             namespace: Of the topic: ``/robot_0`` for ``/robot_0/tf``.
 
         Returns:
-            What was odd and was dealt with, in a sentence; None if nothing was.
+            A fault that was dealt with, in a sentence; None if there was none.
 
         Raises:
-            TransformError: If it is none, would close a loop, or is of one frame too
-                many; nothing is changed. There are too many once all are static, or
-                have others that hang from them.
+            TransformError: If the transform is invalid, would close a loop, or is of
+                one frame too many; nothing is changed. A frame is too many if no
+                other can go: those that are static or have children stay.
 
         """
         parent, child = self.name(parent, namespace), self.name(child, namespace)
@@ -122,20 +160,20 @@ class Buffer:
                 f"a frame has a name of {longest} characters; {LONGEST_NAME} are the "
                 f"limit: {max(parent, child, key=len)[:40]!r}..."
             )
-        said = f"{parent!r} -> {child!r}"
+        names = f"{parent!r} -> {child!r}"
         if not parent or not child:
-            raise TransformError(f"{said}: a frame has no name")
+            raise TransformError(f"{names}: a frame has no name")
         try:
             transform = transform.checked()
         except TransformError as error:
-            raise TransformError(f"{said}: {error}") from None
+            raise TransformError(f"{names}: {error}") from None
         if not math.isfinite(stamp):
-            raise TransformError(f"{said}: the stamp is {stamp}")
+            raise TransformError(f"{names}: the stamp is {stamp}")
         track, note = self._track(parent, child, static)
         newest = track.newest
         if newest is not None and stamp < newest - JUMP:
             note = (
-                f"{said}: time jumped back by {newest - stamp:.3f} s; what was known "
+                f"{names}: time jumped back by {newest - stamp:.3f} s; what was known "
                 f"of it is forgotten"
             )
             track.clear()
@@ -159,51 +197,62 @@ class Buffer:
             source: The frame that the numbers are in.
             time: When, in seconds of the robot's clock; None for the newest time at
                 which the whole way is known.
-            ahead: How long after its newest transform a frame is taken to go on as it
-                did, in seconds.
+            ahead: Seconds after the newest transform of a frame for which its motion
+                is extrapolated.
 
         Raises:
-            FrameMissing: If nobody told of a frame; the words name what there is.
-            NotConnected: If nothing leads from one to the other.
-            NotKnownThen: If a part of the way is not known at that time.
+            FrameMissing: If there is no such frame; the sentence names those there are.
+            NotConnected: If the frames are in two trees.
+            NotKnownThen: If a transform between them is not known at that time.
 
         """
-        target, source = self._known(target), self._known(source)
-        if target == source:
-            return Transform()
-        down, up = self._way(target, source)
-        if time is None:
-            time = self._newest_common([*down, *up])
-        return self._along(down, time, ahead).inverse @ self._along(up, time, ahead)
+        way = self._way(target, source)
+        return self._along(way, (way.newest or 0.0) if time is None else time, ahead)
+
+    def find(self, target: str, source: str, time: float = 0.0) -> Found:
+        """Return one frame in another at a time, or as it is now if that is not known.
+
+        Args:
+            target: The frame that is wanted.
+            source: The frame that the numbers are in.
+            time: When, in seconds of the robot's clock; 0 for now.
+
+        Raises:
+            FrameMissing: If there is no such frame; the sentence names those there are.
+            NotConnected: If the frames are in two trees.
+            NotKnownThen: If there is no time at which all of them are known.
+
+        """
+        way = self._way(target, source)
+        newest = way.newest
+        if time:
+            try:
+                return Found(self._along(way, time, 0.0), newest, True)
+            except NotKnownThen:
+                pass
+        return Found(self._along(way, newest or 0.0, 0.0), newest, False)
 
     def newest(self, target: str, source: str) -> float | None:
-        """Return the newest time at which the way is known; None for all times.
+        """Return the newest time at which all between is known; None for all times.
 
         Raises:
-            FrameMissing: If nobody told of a frame.
-            NotConnected: If nothing leads from one to the other.
+            FrameMissing: If there is no such frame.
+            NotConnected: If the frames are in two trees.
 
         """
-        down, up = self._way(self._known(target), self._known(source))
-        stamps = [self._tracks[frame].newest for frame in (*down, *up)]
-        return min((stamp for stamp in stamps if stamp is not None), default=None)
+        return self._way(target, source).newest
 
     def chain(self, frame: str) -> list[str]:
-        """Return a frame and those that it hangs from, up to the root."""
+        """Return a frame and its ancestors, up to the root."""
         return self._ancestors(self.name(frame))
 
-    def clear(self) -> None:
-        """Forget everything."""
-        self._tracks.clear()
-        self._roots.clear()
-        self._missing.clear()
-
     def _track(self, parent: str, child: str, static: bool) -> tuple[Track, str | None]:
-        """Return where to keep a transform; parents and kinds may change."""
+        """Return the track of a frame, a new one if its parent or kind has changed."""
         track = self._tracks.get(child)
         if track is not None and track.parent == parent and track.static == static:
             self._tracks[child] = self._tracks.pop(child)
             return track, None
+        self._ways.clear()
         self._refuse_loop(parent, child)
         if track is None and len(self._tracks) >= MOST_FRAMES:
             self._make_room(parent, child)
@@ -219,14 +268,14 @@ class Buffer:
         if track is None or track.parent != parent:
             self._roots[parent] = self._roots.get(parent, 0) + 1
         self._tracks.pop(child, None)
-        self._tracks[child] = found = Track(parent, static=static)
+        self._tracks[child] = found = Track(parent, child, static=static)
         return found, note
 
     def _make_room(self, parent: str, child: str) -> None:
-        """Forget the frame that was heard of longest ago, for one that is new.
+        """Forget the frame without news for the longest time, for one that is new.
 
-        What detects things may name a new frame for each. Static frames stay, as they
-        are told once, and so does whatever others hang from.
+        A detector may name a new frame for each thing that it sees. Static frames stay,
+        as they are published once, and so do frames with children.
         """
         for frame, track in self._tracks.items():
             if not track.static and frame not in self._roots and frame != parent:
@@ -262,15 +311,15 @@ class Buffer:
                 f"there is no frame with a name of {len(name)} characters; "
                 f"{LONGEST_NAME} are the limit: {name[:40]!r}..."
             )
-        said = self._missing.get(name)
-        if said is None:  # Robots and modules ask for it at each message.
+        sentence = self._missing.get(name)
+        if sentence is None:  # It is needed at each message.
             if len(self._missing) >= _SENTENCES:
                 self._missing.clear()
-            self._missing[name] = said = self._sentence(name)
-        raise FrameMissing(said)
+            self._missing[name] = sentence = self._sentence(name)
+        raise FrameMissing(sentence)
 
     def _sentence(self, name: str) -> str:
-        """Return what is said of a frame that is missing."""
+        """Return the sentence about a missing frame."""
         frames = {*self._tracks, *self._roots}
         hint = ""
         if len(frames) <= MOST_COMPARED:
@@ -280,8 +329,17 @@ class Buffer:
         more = f" and {len(frames) - _LISTED} more" if len(frames) > _LISTED else ""
         return f"there is no frame {name!r}{hint}; there are: {listed}{more}"
 
-    def _way(self, target: str, source: str) -> tuple[list[str], list[str]]:
-        """Return the frames below the common ancestor, on both sides."""
+    def _way(self, target: str, source: str) -> _Way:
+        """Return the tracks between two frames, by their names as they were given."""
+        way = self._ways.get((target, source))
+        if way is None:
+            way = self._find_way(self._known(target), self._known(source))
+            if len(self._ways) >= _WAYS:
+                self._ways.clear()
+            self._ways[target, source] = way
+        return way
+
+    def _find_way(self, target: str, source: str) -> _Way:
         down, up = self._ancestors(target), self._ancestors(source)
         common = set(down) & set(up)
         if not common:
@@ -290,7 +348,10 @@ class Buffer:
                 f"of {up[-1]!r}, the other in that of {down[-1]!r}"
             )
         meet = next(frame for frame in up if frame in common)
-        return down[: down.index(meet)], up[: up.index(meet)]
+        return _Way(
+            [self._tracks[frame] for frame in down[: down.index(meet)]],
+            [self._tracks[frame] for frame in up[: up.index(meet)]],
+        )
 
     def _ancestors(self, frame: str) -> list[str]:
         way = [frame]
@@ -298,17 +359,22 @@ class Buffer:
             way.append(track.parent)
         return way
 
-    def _along(self, frames: Sequence[str], time: float, ahead: float) -> Transform:
-        """Return what takes the first frame's coordinates to the last one's parent."""
-        total = Transform()
-        for frame in reversed(frames):
-            track = self._tracks[frame]
-            try:
-                total = total @ track.at(time, self.gap, ahead)
-            except NotKnownThen as error:
-                raise NotKnownThen(f"{track.parent!r} -> {frame!r}: {error}") from None
-        return total
+    def _along(self, way: _Way, time: float, ahead: float) -> Transform:
+        """Return what takes coordinates of the way's source to those of its target."""
+        if not way.down:
+            return self._to_the_meeting(way.up, time, ahead)
+        down = self._to_the_meeting(way.down, time, ahead)
+        return down.inverse @ self._to_the_meeting(way.up, time, ahead)
 
-    def _newest_common(self, frames: Iterable[str]) -> float:
-        stamps = [self._tracks[frame].newest for frame in frames]
-        return min((stamp for stamp in stamps if stamp is not None), default=0.0)
+    def _to_the_meeting(
+        self, tracks: list[Track], time: float, ahead: float
+    ) -> Transform:
+        """Return what takes the first frame's coordinates to the last one's parent."""
+        total = None
+        for track in reversed(tracks):
+            try:
+                found = track.at(time, self.gap, ahead)
+            except NotKnownThen as error:
+                raise NotKnownThen(f"{track.name}: {error}") from None
+            total = found if total is None else total @ found
+        return total or Transform()

@@ -3,17 +3,16 @@
 import math
 from bisect import bisect_left, bisect_right
 
-from webmap.tf.errors import NotKnownThen
-from webmap.tf.transform import Transform, between
+from webmap.tf.transform import NotKnownThen, Transform, between
 
 MOST = 4096
 """Transforms that are kept of one frame, whatever their times."""
 
 SPAN = 0.1
-"""Seconds over which a motion is looked at to tell how it goes on."""
+"""Seconds of a motion from which it is extrapolated."""
 
 EVEN = 0.5
-"""Seconds between two transforms beyond which nobody knows how it goes on."""
+"""Seconds between two transforms beyond which a motion is not extrapolated."""
 
 FASTEST = 5.0
 """Metres per second; what is faster is no motion but a correction."""
@@ -27,12 +26,15 @@ class Track:
 
     Args:
         parent: The parent's name.
+        frame: The frame's own name.
         static: Whether the one transform holds for all times.
 
     """
 
-    def __init__(self, parent: str, *, static: bool = False) -> None:
+    def __init__(self, parent: str, frame: str = "", *, static: bool = False) -> None:
         self.parent = parent
+        self.name = f"{parent!r} -> {frame!r}"
+        """What people call it."""
         self.static = static
         self._stamps: list[float] = []
         self._transforms: list[Transform] = []
@@ -76,11 +78,11 @@ class Track:
         Args:
             time: When, in seconds.
             gap: The longest time between two transforms that is bridged, in seconds.
-            ahead: How long after the newest one it is taken to go on as it did, in
-                seconds.
+            ahead: Seconds after the newest transform for which the motion is
+                extrapolated.
 
         Raises:
-            NotKnownThen: If nothing was told of that time; the words have no frames.
+            NotKnownThen: If that time is not known; the sentence names no frames.
 
         """
         if not self._stamps:
@@ -112,9 +114,9 @@ class Track:
         return between(self._transforms[place - 1], self._transforms[place], share)
 
     def _going_on(self, time: float) -> Transform:
-        """Return where it gets if it goes on evenly; where it is if it leapt."""
+        """Return the extrapolated transform; the newest one after a leap."""
         newest, last = self._transforms[-1], self._stamps[-1]
-        # Stamps that are close together tell a speed badly.
+        # Stamps that are close together give a bad speed.
         place = bisect_right(self._stamps, last - SPAN) - 1
         took = last - self._stamps[max(place, 0)]
         before = self._transforms[max(place, 0)]
@@ -124,7 +126,7 @@ class Track:
 
 
 def leapt(one: Transform, other: Transform, took: float) -> bool:
-    """Tell whether nothing moves that fast.
+    """Return whether nothing moves that fast.
 
     Args:
         one: Where it was.

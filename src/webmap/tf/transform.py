@@ -1,11 +1,10 @@
-"""One frame in another, in space."""
+"""One frame in another, in space, and what can be wrong with that."""
 
 import math
 from dataclasses import dataclass
 
-from webmap.geometry import Affine, Pose, Quaternion, Vector3
-from webmap.geometry.reach import FARTHEST
-from webmap.tf.errors import TransformError
+from webmap.errors import WebMapError
+from webmap.geometry import FARTHEST, Affine, Pose, Quaternion, Vector3
 
 NEARLY = 0.1
 """How far the norm of a quaternion may be from 1; it is set right then."""
@@ -14,10 +13,26 @@ _PARALLEL = 0.9995
 """Cosine of half an angle above which a straight line between rotations will do."""
 
 _LEVEL = 1e-6
-"""Sine of half an angle below which nobody could tell a tilt from none."""
+"""Sine of half an angle below which a tilt cannot be seen."""
 
 _HERE = Vector3()
 _STRAIGHT = Quaternion()
+
+
+class TransformError(WebMapError):
+    """A transform that is invalid or not known; the sentence gives the reason."""
+
+
+class FrameMissing(TransformError, LookupError):
+    """There is no frame of that name."""
+
+
+class NotConnected(TransformError):
+    """Both frames exist, in two trees that nothing connects."""
+
+
+class NotKnownThen(TransformError):
+    """Both frames are connected, and a part between is not known at that time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +162,7 @@ def between(one: Transform, other: Transform, share: float) -> Transform:
 
 
 def alike(one: Transform, other: Transform, apart: float, turned: float) -> bool:
-    """Tell whether two transforms are the same as far as anybody sees.
+    """Return whether two transforms are the same within tolerances.
 
     Args:
         one: The one.

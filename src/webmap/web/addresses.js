@@ -1,7 +1,7 @@
+import { FOLDER } from "./constants.js";
+
 /** Where WebMap's own files and sockets are: beside this one. */
 export const BASE = new URL(".", import.meta.url);
-
-const OURS = "/_webmap/";
 
 /**
  * Resolve an address that the server gave for a file of the page.
@@ -11,9 +11,9 @@ const OURS = "/_webmap/";
  * @returns {string | null} null if it leads to another origin.
  */
 export function resolve(address, base) {
-  const ours = address.startsWith(OURS);
+  const ours = address.startsWith(FOLDER);
   try {
-    const url = ours ? new URL(address.slice(OURS.length), BASE) : new URL(address, base);
+    const url = ours ? new URL(address.slice(FOLDER.length), BASE) : new URL(address, base);
     const web = url.protocol === "http:" || url.protocol === "https:";
     return web && url.origin === BASE.origin ? url.href : null;
   } catch {

@@ -1,8 +1,8 @@
 import { resolve } from "./addresses.js";
-import { Loading } from "./loading.js";
 import { BOOLEAN_ATTRIBUTES } from "./opcodes.js";
 
 /** @typedef {import('./wire.js').Matrix} Matrix */
+
 /** @typedef {SVGElement | HTMLElement} AnyElement */
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -282,5 +282,106 @@ export class BoundItem extends Item {
     for (const [name, value] of this._own) super.setAttribute(name, value);
     this.setClasses("");
     this.element.classList.remove("stale");
+  }
+}
+
+/** Everything that is drawn as dots, and when it must be drawn again. */
+export class Dots {
+  constructor() {
+    /** @type {Set<Item>} */
+    this._all = new Set();
+    /** @type {Set<Item>} Those with new points. */
+    this._undrawn = new Set();
+    this._restyled = false;
+  }
+
+  /**
+   * @param {Item} item
+   * @param {number} unit Metres in one unit of `points`.
+   * @param {Int16Array} points
+   */
+  set(item, unit, points) {
+    item.setDots(unit, points);
+    this._all.add(item);
+    this._undrawn.add(item);
+  }
+
+  /** @param {Item} item */
+  forget(item) {
+    this._all.delete(item);
+    this._undrawn.delete(item);
+  }
+
+  /** Styles may give other sizes now. */
+  restyle() {
+    this._restyled = true;
+  }
+
+  draw() {
+    // All sizes are read before anything is drawn: styles are worked out once.
+    for (const item of this._restyled ? this._all : this._undrawn) {
+      if (!this._restyled && item.knowsDotSize) continue;
+      if (item.readDotSize()) this._undrawn.add(item);
+    }
+    this._restyled = false;
+    for (const item of this._undrawn) item.drawDots();
+    this._undrawn.clear();
+  }
+}
+
+/** Milliseconds after which a load that never tells its end holds up the next no more. */
+const PATIENCE = 5000;
+
+/**
+ * Has an image load one address at a time: the newest, once the one before is there.
+ *
+ * A browser gives up a load for the next. An image that changes more quickly than it
+ * loads would never be drawn; so it shows fewer of its versions, but each whole.
+ */
+class Loading {
+  /** @param {SVGImageElement | HTMLImageElement} element */
+  constructor(element) {
+    this._element = element;
+    this._busy = false;
+    /** @type {[string, string] | null} The attribute and address to load next. */
+    this._next = null;
+    this._patience = 0;
+    element.addEventListener("load", () => this._done());
+    element.addEventListener("error", () => this._done());
+  }
+
+  /**
+   * @param {string} name The attribute that holds the address.
+   * @param {string} address
+   */
+  show(name, address) {
+    if (this._busy) this._next = [name, address];
+    else this._load(name, address);
+  }
+
+  /** Load nothing more: the address was taken away. */
+  cancel() {
+    this._next = null;
+    this._done();
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} address
+   */
+  _load(name, address) {
+    // The same address again is no new load, and would tell no end.
+    if (this._element.getAttribute(name) === address) return;
+    this._busy = true;
+    this._patience = window.setTimeout(() => this._done(), PATIENCE);
+    this._element.setAttribute(name, address);
+  }
+
+  _done() {
+    window.clearTimeout(this._patience);
+    this._busy = false;
+    const next = this._next;
+    this._next = null;
+    if (next) this._load(...next);
   }
 }

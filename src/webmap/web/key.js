@@ -1,8 +1,5 @@
 import { BASE } from "./addresses.js";
-
-/** The subprotocol of both sockets. */
-const PROTOCOL = "webmap";
-const CODE = "webmap_code";
+import { CODE, KEY, PAGE_ID, PROTOCOL } from "./constants.js";
 
 /**
  * The storage belongs to one origin, so a server on another port of the same host, which
@@ -15,7 +12,7 @@ let given = "";
 
 /** Keep the key that the server handed to this page, and clean the address bar. */
 export function takeKey() {
-  const element = document.querySelector('meta[name="webmap-key"]');
+  const element = document.querySelector(`meta[name="${KEY}"]`);
   if (element instanceof HTMLMetaElement) {
     given = element.content;
     element.remove();
@@ -59,11 +56,60 @@ export function protocols() {
  */
 export async function whyRefused() {
   try {
-    const headers = key() ? { "webmap-key": key() } : undefined;
+    const headers = key() ? { [KEY]: key() } : undefined;
     const answer = await fetch(new URL("key", BASE), { method: "POST", headers });
     if (![401, 403, 421].includes(answer.status)) return "";
     return (await answer.text()).split("\n\n")[1]?.trim() ?? "";
   } catch {
     return ""; // There is no server.
+  }
+}
+
+/**
+ * Take the name by which this page's maps are found again after a reload.
+ *
+ * It lies in the session's storage only while the page is being left: a tab that is
+ * duplicated would else take the name along, and two pages cannot have one.
+ *
+ * @param {string} path
+ * @returns {string}
+ */
+export function takeIdentity(path) {
+  const entry = `webmap ${path}`;
+  const name = take(entry) ?? newIdentity();
+  addEventListener("pagehide", () => put(entry, name));
+  addEventListener("pageshow", () => take(entry));
+  return name;
+}
+
+function newIdentity() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/**
+ * @param {string} entry
+ * @returns {string | null}
+ */
+function take(entry) {
+  try {
+    const name = sessionStorage.getItem(entry);
+    sessionStorage.removeItem(entry);
+    return name && new RegExp(PAGE_ID).test(name) ? name : null;
+  } catch {
+    // A browser may keep its storage closed; a reload then starts anew.
+    return null;
+  }
+}
+
+/**
+ * @param {string} entry
+ * @param {string} name
+ */
+function put(entry, name) {
+  try {
+    sessionStorage.setItem(entry, name);
+  } catch {
+    // As above.
   }
 }

@@ -1,4 +1,15 @@
-import { LARGEST, SMALLEST } from "./view.js";
+import { LEVELS } from "./constants.js";
+import {
+  initialView,
+  LARGEST,
+  rotate,
+  scaleOf,
+  SMALLEST,
+  translate,
+  unapply,
+} from "./view.js";
+
+/** @typedef {import('./view.js').Matrix} Matrix */
 
 /**
  * What an operator's layout of a page is: what is seen of the map, what is switched on,
@@ -135,7 +146,7 @@ const switches = (value, path) => {
 
 const FAR = 1e9;
 
-const view = whole({
+const checkedPlace = whole({
   x: number(-FAR, FAR),
   y: number(-FAR, FAR),
   pixels_per_metre: number(SMALLEST, LARGEST),
@@ -144,9 +155,9 @@ const view = whole({
 
 /** @type {Record<keyof Layout, Check>} */
 const PARTS = {
-  view,
+  view: checkedPlace,
   layers: whole({ open: truth, shown: switches }),
-  log: whole({ open: truth, least: oneOf(["debug", "info", "warn", "error", "fatal"]) }),
+  log: whole({ open: truth, least: oneOf([...LEVELS]) }),
   camera: whole({
     dock: oneOf(["side", "below", "float"]),
     x: number(0, 1),
@@ -160,7 +171,7 @@ const PARTS = {
  */
 export function asPlace(value) {
   try {
-    return view(value, "view");
+    return checkedPlace(value, "view");
   } catch {
     return null;
   }
@@ -231,4 +242,125 @@ function parsed(text) {
  */
 export function writeLayout(layout) {
   return `${JSON.stringify({ version: VERSION, ...layout }, null, 2)}\n`;
+}
+
+/** @typedef {{width: number, height: number}} Size Pixels. */
+
+/** How much of its size a view may be skewed by rounding. */
+const ROUNDING = 1e-6;
+
+/**
+ * Say what is seen without saying on how large a screen.
+ *
+ * @param {Matrix} view
+ * @param {Size} size
+ * @returns {Place | null} null if the view is skewed or mirrored, which no hand does.
+ */
+export function placeOf(view, { width, height }) {
+  const scale = scaleOf(view);
+  const skewed = Math.max(Math.abs(view.a + view.d), Math.abs(view.b - view.c));
+  if (!(skewed <= ROUNDING * scale)) return null;
+  const { x, y } = unapply(view, width / 2, height / 2);
+  return { x, y, pixels_per_metre: scale, turn_rad: Math.atan2(-view.b, view.a) };
+}
+
+/**
+ * @param {Place} place
+ * @param {Size} size
+ * @returns {Matrix} The view with that place in its middle.
+ */
+export function viewOf({ x, y, pixels_per_metre: k, turn_rad }, { width, height }) {
+  const [across, down] = [width / 2, height / 2];
+  const straight = { ...initialView(width, height), a: k, d: -k };
+  const there = translate(straight, -k * x, k * y);
+  return rotate(there, (turn_rad * 180) / Math.PI, across, down);
+}
+
+/**
+ * What one module of a page adds to a layout.
+ *
+ * @template T
+ * @typedef {object} Part
+ * @property {() => T} read
+ * @property {(value: T) => void} write Takes what was read from a file, and checked.
+ * @property {() => void} reset Makes it as it was found.
+ */
+
+/** @typedef {Exclude<keyof Layout, 'view'>} Name */
+
+/** The parts of a map's layout, each from the module that has it, if that is there. */
+export class LayoutParts {
+  constructor() {
+    /** @type {Map<Name, Part<any>>} */
+    this._parts = new Map();
+  }
+
+  /**
+   * @template {Name} K
+   * @param {K} name
+   * @param {Part<Required<Layout>[K]>} part
+   * @returns {() => void} Takes it away.
+   */
+  add(name, part) {
+    this._parts.set(name, part);
+    return () => {
+      if (this._parts.get(name) === part) this._parts.delete(name);
+    };
+  }
+
+  /** @returns {Layout} How everything is. */
+  read() {
+    return Object.fromEntries([...this._parts].map(([name, part]) => [name, part.read()]));
+  }
+
+  /** @param {Layout} layout What of it this page has is taken. */
+  write(layout) {
+    for (const [name, part] of this._parts) {
+      if (layout[name] !== undefined) part.write(layout[name]);
+    }
+  }
+
+  /** Make everything as it was found. */
+  reset() {
+    for (const part of this._parts.values()) part.reset();
+  }
+}
+
+/** Where the last views are kept in this browser. */
+const KEPT = "webmap.views";
+
+/** Addresses whose view is kept, at the most; the one that was seen longest ago goes. */
+const MOST = 32;
+
+/**
+ * @param {string} address
+ * @returns {Place | null} How that page was seen last; null if that is not known.
+ */
+export function keptView(address) {
+  const views = all();
+  return Object.hasOwn(views, address) ? asPlace(views[address]) : null;
+}
+
+/**
+ * @param {string} address
+ * @param {Place | null} place null to forget it.
+ */
+export function keepView(address, place) {
+  const entries = Object.entries(all()).filter(([other]) => other !== address);
+  if (place) entries.push([address, place]);
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(Object.fromEntries(entries.slice(-MOST))));
+  } catch {
+    // Without storage the page begins as it was found.
+  }
+}
+
+/** @returns {Record<string, unknown>} */
+function all() {
+  try {
+    const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    return typeof value === "object" && value !== null && !Array.isArray(value) ? value : {};
+  } catch {
+    return {}; // storage may be forbidden, or hold what is not ours
+  }
 }

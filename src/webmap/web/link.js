@@ -1,3 +1,4 @@
+import { FOR_GOOD } from "./constants.js";
 import { onSignIn, protocols } from "./key.js";
 
 /** Milliseconds before a lost link is tried again: at first, and at the most. */
@@ -6,8 +7,6 @@ const LONGEST_WAIT = 5000;
 /** Milliseconds for which a link may be opened before it is given up: likewise. */
 const FIRST_PATIENCE = 5000;
 const LONGEST_PATIENCE = 20_000;
-/** Close codes after which another try would end the same way. */
-const FOR_GOOD = new Set([1008, 4001]);
 
 /**
  * @typedef {object} LinkEvents
@@ -115,7 +114,7 @@ export class Link {
   _lost(socket, reason, code) {
     if (this._socket !== socket) return;
     this._socket = null;
-    const forGood = FOR_GOOD.has(code);
+    const forGood = FOR_GOOD.includes(code);
     if (!forGood) {
       const jitter = 0.75 + Math.random() / 2;
       this._timer = setTimeout(() => this._open(), this._wait * jitter);

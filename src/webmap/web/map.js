@@ -1,19 +1,19 @@
-import { DragEnd } from "./drag_end.js";
-import { FarPictures } from "./far_pictures.js";
-import { Following } from "./following.js";
-import { LayoutParts } from "./layout_parts.js";
-import { Operations, operated } from "./operations.js";
+import { LayoutParts } from "./layout.js";
 import {
   apply,
+  FarPictures,
+  Following,
   initialView,
   isSame,
   isShifted,
   isView,
+  operated,
+  Operations,
   resize,
   translate,
   unapply,
+  ViewReports,
 } from "./view.js";
-import { ViewReports } from "./view_reports.js";
 
 /** @typedef {import('./view.js').Matrix} Matrix */
 /** @typedef {import('./view.js').Point} Point */
@@ -391,4 +391,40 @@ export function contentSize(element) {
   const across = sum("border-left-width", "border-right-width", "padding-left", "padding-right");
   const down = sum("border-top-width", "border-bottom-width", "padding-top", "padding-bottom");
   return { width: Math.max(0, width - across), height: Math.max(0, height - down) };
+}
+
+/** Milliseconds for which the click that ends a drag may keep us waiting. */
+const CLICK_PATIENCE = 500;
+
+/**
+ * Tells the click with which the browser ends a drag from one that somebody meant.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class DragEnd {
+  constructor() {
+    this._at = -Infinity;
+  }
+
+  /** @param {number} now A drag ended. */
+  note(now) {
+    this._at = now;
+  }
+
+  /** Something was pressed: the next click is its own. */
+  forget() {
+    this._at = -Infinity;
+  }
+
+  /**
+   * @param {number} detail Of the click: how many there were in a row; 0 from a key.
+   * @param {number} now
+   * @returns {boolean} Whether the click is the end of a drag, and means nothing.
+   */
+  swallows(detail, now) {
+    const waited = now - this._at;
+    this.forget();
+    // A click without a pointer comes from a key and ends no drag.
+    return detail !== 0 && waited <= CLICK_PATIENCE;
+  }
 }

@@ -1,12 +1,11 @@
 import { BASE, pagePath, socketAddress } from "./addresses.js";
-import { Halves } from "./halves.js";
-import { takeIdentity } from "./identity.js";
-import { importOf } from "./imports.js";
-import { takeKey, whyRefused } from "./key.js";
+import { LONGEST_TEXTS } from "./constants.js";
+import { Reports } from "./events.js";
+import { Halves, importOf } from "./halves.js";
+import { takeIdentity, takeKey, whyRefused } from "./key.js";
 import { Link } from "./link.js";
 import { contentSize } from "./map.js";
 import { Notices } from "./notices.js";
-import { Reports } from "./reports.js";
 import { Scene } from "./scene.js";
 import { VersionError } from "./wire.js";
 
@@ -98,7 +97,7 @@ export class Page {
    */
   trouble(text) {
     this.notices.error(text);
-    this.send({ op: "trouble", text: text.slice(0, 2000) });
+    this.send({ op: "trouble", text: text.slice(0, LONGEST_TEXTS.trouble) });
   }
 
   // The link -------------------------------------------------------------------
@@ -109,7 +108,7 @@ export class Page {
     this.send({
       op: "hello",
       page: this.id,
-      url: (this.path + location.search).slice(0, 2048),
+      url: (this.path + location.search).slice(0, LONGEST_TEXTS.url),
       width: innerWidth,
       height: innerHeight,
       dpr: devicePixelRatio,
@@ -209,7 +208,7 @@ function containers() {
   /** @type {Record<string, [number, number]>} */
   const sizes = {};
   const elements = [...document.body.querySelectorAll("[id]")];
-  for (const element of elements.filter(({ id }) => id.length <= 64).slice(0, 100)) {
+  for (const element of elements.filter(({ id }) => id.length <= LONGEST_TEXTS.name).slice(0, 100)) {
     const { width, height } = contentSize(element);
     sizes[element.id] = [Math.round(width), Math.round(height)];
   }

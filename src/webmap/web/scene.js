@@ -1,9 +1,7 @@
 import { BASE } from "./addresses.js";
-import { Ages } from "./ages.js";
-import { DisplayClock } from "./clock.js";
-import { Dots } from "./dots.js";
+import { Ages, DisplayClock } from "./ages.js";
 import { Listeners } from "./events.js";
-import { BoundItem } from "./item.js";
+import { BoundItem, Dots } from "./item.js";
 import { Maps } from "./maps.js";
 import { Mount } from "./mount.js";
 import { readFrame } from "./wire.js";

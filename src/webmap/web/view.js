@@ -183,3 +183,205 @@ export function isShifted(m, n) {
 export function isSame(m, n) {
   return isShifted(m, n) && m.e === n.e && m.f === n.f;
 }
+
+/**
+ * What an operation comes to; what it leaves alone is not there.
+ *
+ * @typedef {object} Outcome
+ * @property {Matrix} [view]
+ * @property {number} [follow] The element to follow from now on; 0 for none.
+ */
+
+/**
+ * Decide what an operation of a program makes of a view. Where no point is given, the
+ * middle is meant.
+ *
+ * @param {Matrix} view
+ * @param {{width: number, height: number}} size Pixels.
+ * @param {string} operation
+ * @param {number[]} args
+ * @returns {Outcome} Nothing for an operation that is not known here.
+ */
+export function operated(view, { width, height }, operation, args) {
+  const [first, x = width / 2, y = height / 2] = args;
+  switch (operation) {
+    case "follow":
+      return { follow: first };
+    case "translate":
+      return { view: translate(view, first, args[1]) };
+    case "scale":
+      return { view: scale(view, first, x, y) };
+    case "rotate":
+      return { view: rotate(view, first, x, y) };
+    case "fit": {
+      const [x0, y0, x1, y1] = args;
+      return { view: fit(view, [x0, y0, x1, y1], width, height), follow: 0 };
+    }
+    case "set": {
+      const [a, b, c, d, e, f] = args;
+      return { view: { a, b, c, d, e, f }, follow: 0 };
+    }
+    default:
+      return {};
+  }
+}
+
+/**
+ * The operations that came for a map: each is carried out once, and not before the map
+ * has a size.
+ */
+export class Operations {
+  constructor() {
+    /** The number of the newest that came. */
+    this.applied = 0;
+    /** @type {Array<() => void>} */
+    this._waiting = [];
+  }
+
+  /**
+   * An operation came, or is known to have been carried out.
+   *
+   * @param {number} number Counts operations.
+   * @returns {boolean} Whether it is a new one.
+   */
+  reach(number) {
+    if (number <= this.applied) return false;
+    this.applied = number;
+    return true;
+  }
+
+  /**
+   * @param {boolean} sized Whether the map has a size.
+   * @param {() => void} operate
+   */
+  whenSized(sized, operate) {
+    if (sized) operate();
+    else this._waiting.push(operate);
+  }
+
+  /** The map has a size: do what waited for that, in order. */
+  goOn() {
+    for (const operate of this._waiting.splice(0)) operate();
+  }
+}
+
+/** Pixels that nobody sees. */
+const UNSEEN = 0.01;
+
+/** Keeps an element of the world at one place of the screen. */
+export class Following {
+  constructor() {
+    /** The element, or 0. */
+    this.id = 0;
+    /** @type {Point | null} Where on the screen it stays. */
+    this._place = null;
+  }
+
+  /** @param {number} id The element to follow, or 0. */
+  start(id) {
+    this.id = id;
+    this._place = null;
+  }
+
+  /** @param {Point | null} place Where the element is, to stay there. */
+  settle(place) {
+    this._place = this.id ? place : null;
+  }
+
+  /**
+   * @param {Point | null} place Where the element is now.
+   * @returns {Point | null} By how much the view is to be shifted, if it is.
+   */
+  shift(place) {
+    if (!place || !this.id) return null;
+    this._place ??= place;
+    const [x, y] = [this._place.x - place.x, this._place.y - place.y];
+    return Math.hypot(x, y) < UNSEEN ? null : { x, y };
+  }
+}
+
+/** Milliseconds between two reports of a view, at least. */
+export const REPORT_PERIOD = 100;
+
+/** Has a view reported when it changed: soon, not too often, and with a frame if one comes. */
+export class ViewReports {
+  /** @param {() => void} report */
+  constructor(report) {
+    this._report = report;
+    this._reported = -Infinity;
+    this._changed = false;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this._timer = undefined;
+  }
+
+  /** There is something to report, which is the end of a frame's work. */
+  note() {
+    this._changed = true;
+  }
+
+  /** There is something to report, with a frame or without. */
+  soon() {
+    this._changed = true;
+    const wait = this._reported + REPORT_PERIOD - performance.now();
+    this._timer ??= setTimeout(() => this._now(), Math.max(0, wait));
+  }
+
+  /** A frame has been applied: report what changed. */
+  settle() {
+    if (this._changed) this._now();
+  }
+
+  /** Report nothing any more. */
+  end() {
+    clearTimeout(this._timer);
+  }
+
+  _now() {
+    clearTimeout(this._timer);
+    this._timer = undefined;
+    this._changed = false;
+    this._reported = performance.now();
+    this._report();
+  }
+}
+
+/**
+ * Marks the pictures of a map that are far away: several of their pixels share one of
+ * the screen's. The style sheet draws those smoothly and all others crisp, since without
+ * smoothing a wall that is one pixel thick is left out when it is seen from far away.
+ *
+ * A picture says in `data-cell` how wide its pixels are, in metres.
+ */
+export class FarPictures {
+  /** @param {SVGGElement} world */
+  constructor(world) {
+    this._world = world;
+    /** Pixels of the screen in a metre. */
+    this._scale = 0;
+    const mark = () => this._mark();
+    this._said = new MutationObserver(mark);
+    this._said.observe(world, { subtree: true, attributeFilter: ["data-cell"] });
+    this._added = new MutationObserver(mark);
+    this._added.observe(world, { childList: true });
+  }
+
+  /** @param {Matrix} view */
+  show({ a, b }) {
+    const pixels = Math.hypot(a, b) * devicePixelRatio;
+    if (pixels === this._scale) return;
+    this._scale = pixels;
+    this._mark();
+  }
+
+  _mark() {
+    for (const image of this._world.querySelectorAll("image[data-cell]")) {
+      const cell = Number(image.getAttribute("data-cell"));
+      image.toggleAttribute("data-far", cell * this._scale < 1);
+    }
+  }
+
+  end() {
+    this._said.disconnect();
+    this._added.disconnect();
+  }
+}

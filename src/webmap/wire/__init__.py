@@ -1,25 +1,5 @@
-"""Bytes between the display process and a browser page, without any socket."""
+"""Bytes between the display process and a browser page, without any socket.
 
-from webmap.wire.messages import (
-    ElementEvent,
-    Hello,
-    ModuleMessage,
-    ModuleReady,
-    PageEvent,
-    Trouble,
-    ViewReport,
-    read_hello,
-)
-from webmap.wire.session import SceneSession
-
-__all__ = [
-    "ElementEvent",
-    "Hello",
-    "ModuleMessage",
-    "ModuleReady",
-    "PageEvent",
-    "SceneSession",
-    "Trouble",
-    "ViewReport",
-    "read_hello",
-]
+Begin with ``session``, which is one page's; ``messages`` are what the page sends, and
+``encode`` makes the frames that it gets.
+"""

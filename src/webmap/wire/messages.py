@@ -12,8 +12,14 @@ from webmap.scene.allowed import EVENTS
 LONGEST = 16 * 1024
 """Bytes that a message from a page may have."""
 
+LONGEST_TEXTS = {"name": 64, "value": 8192, "url": 2048, "trouble": 2000}
+"""Characters that texts in these messages may have; the browser cuts longer ones."""
+
+PAGE_ID = "^[A-Za-z0-9_-]{8,64}$"
+"""The pattern of the name that a page chooses for itself."""
+
 _Id = Annotated[int, Meta(ge=0, le=2**53)]
-_Name = Annotated[str, Meta(max_length=64)]
+_Name = Annotated[str, Meta(max_length=LONGEST_TEXTS["name"])]
 
 
 class Message(
@@ -29,10 +35,10 @@ class Message(
 class Hello(Message, frozen=True, tag="hello"):
     """The first message on a socket: which page this is, and how large."""
 
-    page: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]{8,64}$")]
+    page: Annotated[str, Meta(pattern=PAGE_ID)]
     """Chosen by the page and kept through a reload, to find its maps again."""
 
-    url: Annotated[str, Meta(max_length=2048)]
+    url: Annotated[str, Meta(max_length=LONGEST_TEXTS["url"])]
     """Path and query of the page."""
 
     width: float
@@ -68,7 +74,7 @@ class ElementEvent(Message, frozen=True, tag="event"):
     ctrl: bool = False
     alt: bool = False
     meta: bool = False
-    value: Annotated[str, Meta(max_length=8192)] | None = None
+    value: Annotated[str, Meta(max_length=LONGEST_TEXTS["value"])] | None = None
     checked: bool | None = None
 
 
@@ -113,7 +119,7 @@ class ModuleMessage(Message, frozen=True, tag="module"):
 class Trouble(Message, frozen=True, tag="trouble"):
     """The page could not do something that somebody should know of."""
 
-    text: Annotated[str, Meta(max_length=2000)]
+    text: Annotated[str, Meta(max_length=LONGEST_TEXTS["trouble"])]
 
 
 class Seen(Message, frozen=True, tag="seen"):
@@ -152,17 +158,4 @@ def read_message(text: str | bytes) -> PageEvent | Seen | Resync:
         raise WireError(f"a page sent a message nested deeper than {MAX_DEPTH} levels")
     if isinstance(message, ElementEvent) and message.event not in EVENTS:
         raise WireError(f"a page sent an unknown event {message.event!r}")
-    return message
-
-
-def read_hello(text: str | bytes) -> Hello:
-    """Return the first message of a page.
-
-    Raises:
-        WireError: If it is anything else.
-
-    """
-    message = read_message(text)
-    if not isinstance(message, Hello):
-        raise WireError(f"a page must say hello first, got {type(message).__name__}")
     return message

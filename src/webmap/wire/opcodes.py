@@ -1,6 +1,6 @@
 """The one table of what is on the wire between the display and a page.
 
-``tools/make_opcodes.py`` writes the same table for the browser. Everything is
+``tools/make_javascript.py`` writes the same table for the browser. Everything is
 little-endian. In the layouts below, ``v`` is a variable-length integer of seven bits
 a byte, lowest first, ``s`` is text in UTF-8 after its length as ``v``, and ``u8``,
 ``u16``, ``u32``, ``i16``, ``f32`` and ``f64`` are what they say.

@@ -10,10 +10,8 @@ import msgspec
 
 from webmap.errors import WireError
 from webmap.scene.allowed import check_event
-from webmap.scene.classes import split_classes
-from webmap.scene.element import Element
+from webmap.scene.element import Element, split_classes
 from webmap.scene.fragment import Fragment
-from webmap.wire.canvas import Canvas
 from webmap.wire.encode import encode_changes, string, varint
 from webmap.wire.messages import (
     ElementEvent,
@@ -25,9 +23,8 @@ from webmap.wire.messages import (
     ViewReport,
     read_message,
 )
-from webmap.wire.mounts import Mount, flags
 from webmap.wire.opcodes import RESET, VERSION, Op
-from webmap.wire.unsaid import Unsaid
+from webmap.wire.page_state import MapView, Mount, PendingRecords, flags
 
 _HEADER = struct.Struct("<HBId").pack
 
@@ -47,7 +44,7 @@ class SceneSession:
     def __init__(self) -> None:
         self._key = secrets.randbits(31)
         self._mounts: dict[int, Mount] = {}
-        self._canvases: dict[int, Canvas] = {}
+        self._map_views: dict[int, MapView] = {}
         self._attached: dict[int, tuple[int, bytes]] = {}
         # The revision of each fragment that the page has; None if not yet.
         self._fragments: dict[Fragment, int | None] = {}
@@ -55,7 +52,7 @@ class SceneSession:
         self._frame = 0
         self._seen = 0
         self._spoke = math.inf
-        self._unsaid = Unsaid()
+        self._pending = PendingRecords()
 
     # Fragments ------------------------------------------------------------------
 
@@ -89,7 +86,7 @@ class SceneSession:
         number = next(self._numbers)
         self._mounts[number] = Mount(number, fragment, within or 0, under, order)
         self._fragments.setdefault(fragment, None)
-        self._unsaid.new.append(number)
+        self._pending.new.append(number)
         return number
 
     def unmount(self, mount: int) -> None:
@@ -102,19 +99,19 @@ class SceneSession:
             return
         for inner in [n for n, m in self._mounts.items() if m.within == mount]:
             self.unmount(inner)
-        for canvas in [c for c in self._canvases.values() if c.mount == mount]:
-            self._forget(canvas)
+        for map_view in [c for c in self._map_views.values() if c.mount == mount]:
+            self._forget(map_view)
         if all(m.fragment is not gone.fragment for m in self._mounts.values()):
             del self._fragments[gone.fragment]
-        if mount in self._unsaid.new:
-            self._unsaid.new.remove(mount)
+        if mount in self._pending.new:
+            self._pending.new.remove(mount)
         else:
-            self._unsaid.gone += bytes((Op.UNMOUNT, *varint(mount)))
+            self._pending.gone += bytes((Op.UNMOUNT, *varint(mount)))
 
-    def _forget(self, canvas: Canvas) -> None:
-        del self._canvases[canvas.svg]
+    def _forget(self, map_view: MapView) -> None:
+        del self._map_views[map_view.svg]
         for instance, (svg, _) in list(self._attached.items()):
-            if svg == canvas.svg:
+            if svg == map_view.svg:
                 self.detach(instance)
 
     def _mount(self, number: int) -> Mount:
@@ -132,7 +129,7 @@ class SceneSession:
                     place.classes[word] = None
                 else:
                     del place.classes[word]
-                self._unsaid.record(place.class_record(word, on))
+                self._pending.record(place.class_record(word, on))
 
     def listen(
         self,
@@ -152,13 +149,13 @@ class SceneSession:
         check_event(event)
         place = self._mount(mount)
         place.listening[element, event] = flags(prevent=prevent, stop=stop)
-        self._unsaid.record(place.listen_record(element, event))
+        self._pending.record(place.listen_record(element, event))
 
     def unlisten(self, mount: int, element: int, event: str) -> None:
         """Undo :meth:`listen`; it does nothing if there is nothing to undo."""
         place = self._mounts.get(mount)
         if place and place.listening.pop((element, event), None) is not None:
-            self._unsaid.record(place.listen_record(element, event))
+            self._pending.record(place.listen_record(element, event))
 
     def fragment(self, mount: int) -> Fragment | None:
         """Return the fragment of a mount, or None if it is not on the page."""
@@ -173,19 +170,19 @@ class SceneSession:
 
     # Maps and modules -----------------------------------------------------------
 
-    def _canvas(self, map_element: int) -> Canvas:
-        canvas = self._canvases.get(map_element)
-        if canvas is None:
-            canvas = self._find_canvas(map_element)
-            self._canvases[map_element] = canvas
-            self._unsaid.record(canvas.state(self._key))
-        return canvas
+    def _map_view(self, map_element: int) -> MapView:
+        map_view = self._map_views.get(map_element)
+        if map_view is None:
+            map_view = self._find_map_view(map_element)
+            self._map_views[map_element] = map_view
+            self._pending.record(map_view.state(self._key))
+        return map_view
 
-    def _find_canvas(self, map_element: int) -> Canvas:
+    def _find_map_view(self, map_element: int) -> MapView:
         for number in self._mounts:
             element = self.element(number, map_element)
             if element is not None and element._map is not None:
-                return Canvas(number, map_element)
+                return MapView(number, map_element)
         raise WireError(f"element {map_element} is no map on the page")
 
     def view(self, map_element: int, operation: str, *args: float) -> None:
@@ -204,8 +201,8 @@ class SceneSession:
             WireError: If there is no such map on the page.
 
         """
-        canvas = self._canvas(map_element)
-        self._unsaid.record(canvas.operate(operation, args))
+        map_view = self._map_view(map_element)
+        self._pending.record(map_view.operate(operation, args))
 
     def attach(
         self,
@@ -225,27 +222,27 @@ class SceneSession:
             css_url: Address of a style sheet, relative to the server's root.
 
         """
-        self._canvas(map_element)
+        self._map_view(map_element)
         record = bytearray([Op.ATTACH]) + varint(map_element) + varint(instance)
         record += string(module_url) + string(css_url or "")
         record += string(msgspec.json.encode(options).decode())
         self._attached[instance] = (map_element, bytes(record))
-        self._unsaid.record(record)
+        self._pending.record(record)
 
     def detach(self, instance: int) -> None:
         """Take the browser's half of a module away."""
         if self._attached.pop(instance, None) is not None:
-            self._unsaid.record(bytes((Op.DETACH, *varint(instance))))
+            self._pending.record(bytes((Op.DETACH, *varint(instance))))
 
     def send(self, instance: int, message: dict[str, Any]) -> None:
         """Send a message to the browser's half of a module."""
         if instance in self._attached:
             text = msgspec.json.encode(message).decode()
-            self._unsaid.message(bytes((Op.MESSAGE, *varint(instance))) + string(text))
+            self._pending.message(bytes((Op.MESSAGE, *varint(instance))) + string(text))
 
     def error(self, text: str) -> None:
         """Show a notice on the page, and again after it was loaded again."""
-        self._unsaid.notice(text)
+        self._pending.notice(text)
 
     def problem(self, number: int, text: str) -> None:
         """Show what fails until :meth:`mended`; a new text takes its place.
@@ -255,17 +252,17 @@ class SceneSession:
             text: A sentence for people, not empty.
 
         """
-        self._unsaid.problem(number, text)
+        self._pending.problem(number, text)
 
     def mended(self, number: int) -> None:
         """Take a problem back; an unknown one is gone already, which is all right."""
-        self._unsaid.problem(number, "")
+        self._pending.problem(number, "")
 
     # The socket -----------------------------------------------------------------
 
     def restart(self) -> None:
         """Tell everything again, because the page has a new socket or lost track."""
-        self._unsaid.tell_all = True
+        self._pending.send_all = True
         self._seen = self._frame
 
     def receive(self, text: str | bytes) -> list[PageEvent]:
@@ -299,7 +296,7 @@ class SceneSession:
 
     def _take_report(self, map_element: int, report: ViewReport) -> bool:
         try:
-            self._canvas(map_element).take(report)
+            self._map_view(map_element).take(report)
         except WireError:
             return False
         return True
@@ -316,32 +313,32 @@ class SceneSession:
         """
         if self._frame - self._seen >= self.WINDOW:
             return None
-        body = None if self._unsaid.tell_all else self._changes()
+        body = None if self._pending.send_all else self._changes()
         if body == b"" and now - self._spoke < self.HEARTBEAT:
             return None
         if body is None:
             body = self._everything()
-        head = _HEADER(VERSION, RESET * self._unsaid.tell_all, self._frame + 1, now)
+        head = _HEADER(VERSION, RESET * self._pending.send_all, self._frame + 1, now)
         self._frame += 1
         self._spoke = now
-        self._unsaid.said()
+        self._pending.sent()
         return head + body
 
     def _changes(self) -> bytes | None:
         """Return what is new since the last frame; None if it was forgotten."""
-        parts: list[bytes | bytearray] = [self._unsaid.gone]
+        parts: list[bytes | bytearray] = [self._pending.gone]
         fragments = self._fragments
         for fragment, known in fragments.items():
             revision = fragment.revision
             if known != revision and known is not None:
                 changes = encode_changes(fragment, known)
                 if changes is None:
-                    self._unsaid.tell_all = True
+                    self._pending.send_all = True
                     return None
                 parts.append(changes)
                 fragments[fragment] = revision
-        parts += [self._place(self._mounts[number]) for number in self._unsaid.new]
-        unsaid = self._unsaid
+        parts += [self._place(self._mounts[number]) for number in self._pending.new]
+        unsaid = self._pending
         parts += (unsaid.records, *unsaid.messages, *unsaid.problems.values())
         return b"".join(parts)
 
@@ -352,9 +349,9 @@ class SceneSession:
     def _everything(self) -> bytes:
         parts = [self._place(mount) for mount in self._mounts.values()]
         parts += [mount.choices() for mount in self._mounts.values()]
-        for canvas in self._canvases.values():
-            parts += (canvas.state(self._key), canvas.unreported)
+        for map_view in self._map_views.values():
+            parts += (map_view.state(self._key), map_view.unreported)
         parts += [record for _, record in self._attached.values()]
-        parts += self._unsaid.notices_again()
-        parts += self._unsaid.standing.values()
-        return b"".join((*parts, *self._unsaid.messages))
+        parts += self._pending.notices_again()
+        parts += self._pending.standing.values()
+        return b"".join((*parts, *self._pending.messages))

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { NewestPicture } from "../../../src/webmap/console/camera_picture.js";
+import { NewestPicture } from "../../../src/webmap/console/camera_panel.js";
 
 const settled = () => new Promise((resolve) => setImmediate(resolve));
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { afterEach, describe, test } from "node:test";
 
-import { keep, nextCorner, readKept } from "../../../src/webmap/console/camera_place.js";
+import { keep, nextCorner, readKept } from "../../../src/webmap/console/camera_view.js";
 
 const MEANT = { open: false, dock: "side", camera: "", x: 0, y: 0 };
 

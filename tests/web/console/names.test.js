@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { roomFor } from "../../../src/webmap/console/names.js";
+import { roomFor } from "../../../src/webmap/console/console.js";
 
 const name = (x, y, first = false) => ({ x, y, width: 60, first });
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { StopTestButton } from "../../../src/webmap/console/stop_test.js";
+import { StopTestButton } from "../../../src/webmap/console/card_actions.js";
 
 /** A drive that has one robot, and what was asked of it. */
 function driveWith(report) {

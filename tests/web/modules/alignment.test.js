@@ -8,7 +8,7 @@ import {
   normal,
   rounded,
   turned,
-} from "../../../src/webmap/web/modules/alignment.js";
+} from "../../../src/webmap/web/modules/align_drawing.js";
 import { apply, multiply } from "../../../src/webmap/web/view.js";
 
 function near(actual, expected) {

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { standingAlone } from "../../../src/webmap/web/modules/export_fonts.js";
+import { standingAlone } from "../../../src/webmap/web/modules/export_copy.js";
 
 test("a list of fonts ends with a kind that every program knows", () => {
   assert.equal(standingAlone("system-ui"), "system-ui, sans-serif");

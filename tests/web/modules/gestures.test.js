@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { apply, scaleOf, unapply } from "../../../src/webmap/web/view.js";
-import * as gestures from "../../../src/webmap/web/modules/gestures.js";
+import * as gestures from "../../../src/webmap/web/modules/mouse_view_control.js";
 
 const VIEW = { a: 40, b: 5, c: 5, d: -40, e: 300, f: 200 };
 const ZOOM = { min: 1, max: 2000 };

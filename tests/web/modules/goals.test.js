@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { assign, formation } from "../../../src/webmap/web/modules/formation.js";
+import { assign, formation } from "../../../src/webmap/web/modules/goal_tool.js";
 import { look, ShownGoals } from "../../../src/webmap/web/modules/goal_words.js";
 
 function goal(state, more = {}) {
@@ -17,10 +17,10 @@ test("a goal is said in words, with what the robot tells", () => {
   const told = { left: 3.24, eta: 75, recoveries: 2 };
   assert.equal(
     look(goal("under way", told)).text,
-    "Under way, 3.2 m to go, about 75 s, 2 × stuck",
+    "Goal under way, 3.2 m to go, about 75 s, 2 × stuck",
   );
-  assert.equal(look(goal("under way", { left: 12.3, eta: 150 })).text, "Under way, 12 m to go, about 3 min");
-  assert.equal(look(goal("failed", { why: "no path" })).text, "Failed, no path");
+  assert.equal(look(goal("under way", { left: 12.3, eta: 150 })).text, "Goal under way, 12 m to go, about 3 min");
+  assert.equal(look(goal("failed", { why: "no path" })).text, "Goal failed, no path");
   assert.equal(look(goal("failed")).over, true);
   assert.equal(look(goal("unknown")).over, false);
   assert.equal(look(goal("sent")).shape, "sent");

@@ -3,7 +3,7 @@ import { FakeElement } from "./fake_elements.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Halos } from "../../../src/webmap/web/modules/halos.js";
+import { Halos } from "../../../src/webmap/web/modules/teleop.js";
 
 globalThis.CSS = { escape: (text) => text };
 globalThis.SVGGraphicsElement = FakeElement;

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { crowded } from "../../../src/webmap/web/modules/label_sizes.js";
+import { crowded } from "../../../src/webmap/web/modules/labels.js";
 
 test("of names that lie on each other the first is shown", () => {
   const one = { x: 100, y: 100, across: 60 };

@@ -5,7 +5,7 @@ import {
   KEPT_FOR,
   keepRoute,
   keptRoute,
-} from "../../../src/webmap/web/modules/route_kept.js";
+} from "../../../src/webmap/web/modules/route_run.js";
 
 const ROUTE = { points: [{ x: 1, y: 2, yaw: 0 }], loop: true, open: true, runs: new Map() };
 

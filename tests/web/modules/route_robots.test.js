@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { RouteRobots } from "../../../src/webmap/web/modules/route_robots.js";
-import { TRIES } from "../../../src/webmap/web/modules/send_goal.js";
+import { RouteRobots } from "../../../src/webmap/web/modules/route_run.js";
+import { TRIES } from "../../../src/webmap/web/modules/goal_words.js";
 import { holdTimeouts, settle } from "./held_timeouts.js";
 
 const LINKLESS = "no link to where its goals go";

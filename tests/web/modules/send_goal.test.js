@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/modules/send_goal.js";
+import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/modules/goal_words.js";
 import { holdTimeouts, settle } from "./held_timeouts.js";
 
 const LINKLESS = "no link to where its goals go";

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { hidden } from "../../../src/webmap/web/modules/sent_elsewhere.js";
+import { hidden } from "../../../src/webmap/web/modules/goal_marks.js";
 
 test("a goal that the goal tool shows is not drawn a second time", () => {
   assert.equal(

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { withoutKeys } from "../../../src/webmap/web/modules/touch_words.js";
+import { withoutKeys } from "../../../src/webmap/web/modules/teleop.js";
 
 const READY = { state: "ready", title: "Ready", detail: "Hold the stick. Space stops." };
 const FINGERS = { touch: true, stick: true };

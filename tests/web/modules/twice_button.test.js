@@ -3,7 +3,7 @@ import "./fake_elements.js";
 import assert from "node:assert/strict";
 import { afterEach, beforeEach, mock, test } from "node:test";
 
-import { TwiceButton } from "../../../src/webmap/web/modules/twice_button.js";
+import { TwiceButton } from "../../../src/webmap/web/modules/elements.js";
 
 let now = 0;
 beforeEach(() => {

@@ -6,7 +6,8 @@ so that a terminal and a page say the same.
 """
 
 from webmap.discovery.doctor.meant import MeantRobot
-from webmap.discovery.doctor.observed import Finding, Heard, Observed
+from webmap.discovery.doctor.observed import Heard, Observed
 from webmap.discovery.doctor.verdict import is_ready, judge
+from webmap.ros.finding import Finding
 
 __all__ = ["Finding", "Heard", "MeantRobot", "Observed", "is_ready", "judge"]

@@ -3,8 +3,8 @@
 from webmap.discovery.tf_robots import MAP
 from webmap.errors import ProtocolError
 from webmap.geometry import Quaternion, Vector3
-from webmap.ros.events import Publish
 from webmap.ros.messages import TFMessage
+from webmap.ros.received import ReceivedMessage
 from webmap.tf import Buffer, Transform, TransformError
 
 
@@ -15,7 +15,7 @@ class FrameListening:
         self._buffers: dict[str, Buffer] = {}
         self._refused: dict[str, list[str]] = {}
 
-    def received(self, message: Publish) -> None:
+    def received(self, message: ReceivedMessage) -> None:
         """Take a message of ``tf`` or ``tf_static``."""
         namespace, _, name = message.topic.rpartition("/")
         buffer = self._buffers.setdefault(namespace, Buffer())

@@ -1,7 +1,8 @@
 """What the readiness check says of what came, or did not come, on a topic."""
 
-from webmap.discovery.doctor.observed import Finding, Heard, Level, Observed
+from webmap.discovery.doctor.observed import Heard, Observed
 from webmap.discovery.found import Guess
+from webmap.ros.finding import Finding, Level
 
 OLD = 1.0
 """Seconds after which a pose is too old to drive by."""
@@ -37,7 +38,7 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
             bad,
             name,
             f"{guess.topic} cannot be read: {heard.trouble}.",
-            "Look whether its type is the one that rosapi says.",
+            "Look whether its type is the one that the bridge says.",
         )
     said = f"{guess.topic}: {heard.rate:.1f} messages a second"
     if heard.frame:
@@ -90,7 +91,7 @@ def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
             "warning",
             name,
             f"{guess.topic} cannot be read: {heard.trouble}.",
-            "Look whether its type is the one that rosapi says.",
+            "Look whether its type is the one that the bridge says.",
         )
     age = age_of(heard, seen)
     old = "" if age is None else f", {max(age, 0.0):.1f} s old"

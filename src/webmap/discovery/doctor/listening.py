@@ -1,14 +1,33 @@
-"""What came on topics, counted; without I/O."""
+"""Listening to topics: what came on each is counted, and its age is taken."""
 
-from collections.abc import Iterable
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import msgspec
 
+from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.observed import Heard
 from webmap.errors import ProtocolError
-from webmap.ros import cbor
-from webmap.ros.events import Publish
+from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header
+from webmap.ros.received import ReceivedMessage
+from webmap.ros.subscriptions import Encoding
+from webmap.scope import no_scope
+
+ENOUGH = 4
+"""Messages after which a topic is left: three times between two of them."""
+
+MOST_BYTES = 1 << 21
+"""Of one topic, after which it is left though fewer came."""
+
+MOST_BYTES_IN_ALL = 1 << 24
+"""After which all topics are left: a radio link has more to do than to be looked at."""
+
+FRAMES_AT_ONCE = 100
+"""Messages with frames that the bridge may hold back; each one counts."""
 
 
 class _Stamped(msgspec.Struct, frozen=True):
@@ -31,9 +50,9 @@ class Listening:
         self._last = dict.fromkeys(topics, now)
         self._gap = dict.fromkeys(topics, 0.0)
         self._heard = {topic: Heard() for topic in topics}
-        self._newest: dict[str, tuple[Publish, float]] = {}
+        self._newest: dict[str, tuple[ReceivedMessage, float]] = {}
 
-    def received(self, message: Publish, now: float, wall: float) -> None:
+    def received(self, message: ReceivedMessage, now: float, wall: float) -> None:
         """Take a message.
 
         Args:
@@ -53,7 +72,6 @@ class Listening:
         self._heard[topic] = Heard(
             heard.count + 1,
             bytes=heard.bytes + len(message.frame),
-            in_parts=heard.in_parts or message.in_parts,
         )
 
     def end(self, now: float) -> dict[str, Heard]:
@@ -86,7 +104,165 @@ class Listening:
             child=child,
             stamp=stamp,
             arrived=wall,
-            binary=cbor.looks_like_cbor(message.frame),
-            in_parts=heard.in_parts,
+            binary=message.is_binary,
             trouble=trouble,
         )
+
+
+class Sampling:
+    """Listens to topics until each has said enough.
+
+    Args:
+        topics: Which.
+        now: When listening begins, on the monotonic clock.
+        enough: Messages after which a topic is left.
+
+    """
+
+    def __init__(
+        self, topics: Iterable[str], now: float, *, enough: int = ENOUGH
+    ) -> None:
+        self._enough = enough
+        self._topics = tuple(topics)
+        self._listening = Listening(self._topics, now)
+        self._bytes = dict.fromkeys(self._topics, 0)
+        self._came: dict[str, list[float]] = {topic: [] for topic in self._topics}
+        self._left: dict[str, Heard] = {}
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing more is to be heard."""
+        too_much = sum(self._bytes.values()) >= MOST_BYTES_IN_ALL
+        return too_much or len(self._left) == len(self._topics)
+
+    def received(self, message: ReceivedMessage, now: float, wall: float) -> bool:
+        """Take a message, and tell whether its topic is to be left now.
+
+        Args:
+            message: The message.
+            now: When it came, on the monotonic clock.
+            wall: The same on this machine's wall clock, in seconds.
+
+        """
+        topic = message.topic
+        if topic not in self._bytes or topic in self._left:
+            return False
+        self._listening.received(message, now, wall)
+        self._bytes[topic] += len(message.frame)
+        self._came[topic].append(now)
+        if len(self._came[topic]) < self._enough and self._bytes[topic] < MOST_BYTES:
+            return False
+        self._left[topic] = self._heard(topic, now)
+        return True
+
+    def end(self, now: float) -> dict[str, Heard]:
+        """Return what was heard until now; what was cut off in silence is left out."""
+        found = {
+            topic: self._left.get(topic) or self._heard(topic, now)
+            for topic in self._topics
+        }
+        cut = sum(self._bytes.values()) >= MOST_BYTES_IN_ALL
+        return {topic: each for topic, each in found.items() if each.count or not cut}
+
+    def _heard(self, topic: str, now: float) -> Heard:
+        came = self._came[topic]
+        every = (came[-1] - came[0]) / (len(came) - 1) if len(came) > 1 else 0.0
+        return replace(self._listening.end_of(topic, now), every=every)
+
+
+async def listen(
+    bridge: Bridge,
+    topics: Mapping[str, Encoding],
+    seconds: float,
+    tf: Sequence[str] = (),
+    frames: FrameListening | None = None,
+) -> dict[str, Heard]:
+    """Listen to topics for a while.
+
+    Args:
+        bridge: The link, which is open.
+        topics: How each is to be encoded.
+        seconds: How long.
+        tf: Topics with frames.
+        frames: What takes those.
+
+    Returns:
+        What came on each topic, those with frames too.
+
+    """
+    if not (topics or tf):
+        return {}
+    listening = Listening([*topics, *tf], time.monotonic())
+
+    def received(message: ReceivedMessage) -> None:
+        if frames is not None and message.topic in tf:
+            frames.received(message)
+        listening.received(message, time.monotonic(), time.time())
+
+    with no_scope():
+        subscriptions = [
+            bridge.subscribe(topic, received, encoding=encoding)
+            for topic, encoding in topics.items()
+        ]
+        subscriptions += [
+            bridge.subscribe(topic, received, queue_length=FRAMES_AT_ONCE)
+            for topic in tf
+        ]
+    for subscription in subscriptions:
+        subscription.undecoded = True
+    await asyncio.sleep(seconds)
+    for subscription in subscriptions:
+        subscription.remove()
+    return listening.end(time.monotonic())
+
+
+async def sample(
+    bridge: Bridge,
+    topics: Mapping[str, str],
+    seconds: float,
+    received: Callable[[ReceivedMessage], object],
+    *,
+    enough: int = ENOUGH,
+    encoding: Encoding = "binary",
+    throttle: int = 0,
+) -> dict[str, Heard]:
+    """Listen to a few messages of each topic, which may be large.
+
+    Args:
+        bridge: The link, which is open.
+        topics: The type of each.
+        seconds: How long at the most.
+        received: Called with each message too.
+        enough: Messages after which a topic is left.
+        encoding: How messages are to be encoded.
+        throttle: Least time between two messages of a topic, in milliseconds.
+
+    Returns:
+        What came on each topic.
+
+    """
+    sampling = Sampling(topics, time.monotonic(), enough=enough)
+    done = asyncio.Event()
+
+    def take(message: ReceivedMessage) -> None:
+        received(message)
+        if sampling.received(message, time.monotonic(), time.time()):
+            subscriptions[message.topic].remove()
+        if sampling.done:
+            done.set()
+
+    with no_scope():
+        subscriptions = {
+            topic: bridge.subscribe(
+                topic, take, type, encoding=encoding, throttle=throttle
+            )
+            for topic, type in topics.items()
+        }
+    for subscription in subscriptions.values():
+        subscription.undecoded = True
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(seconds):
+            await done.wait()
+    for subscription in subscriptions.values():
+        subscription.remove()
+    return sampling.end(time.monotonic())

@@ -24,7 +24,7 @@ TYPES: Mapping[Role, str] = {
     "plan": "nav_msgs/Path",
     "tf": "tf2_msgs/TFMessage",
 }
-"""What a topic is taken to carry if neither a person nor rosapi says it."""
+"""What a topic is taken to carry if neither a person nor the bridge says it."""
 
 WHERE: tuple[Role, ...] = ("odometry", "pose")
 

@@ -1,29 +1,34 @@
-"""Looking at a bridge: a thin shell around sockets and clocks.
+"""Looking at a bridge and the robots behind it: a thin shell around links and clocks.
 
-Nothing is published, each socket is of its own and closed after, and only those
-services of rosapi are called that were seen to answer on every bridge.
+Nothing is published, the links are closed after, and only those questions are asked
+that every bridge was seen to answer.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from urllib.parse import urlsplit
+from functools import partial
+from typing import TypeVar
 
 from webmap.discovery.asking import ask_topics
-from webmap.discovery.doctor.asking import Asking
 from webmap.discovery.doctor.frames import FrameListening
-from webmap.discovery.doctor.hanging import try_a_call
-from webmap.discovery.doctor.heard_from import listen, sample
+from webmap.discovery.doctor.listening import listen, sample
 from webmap.discovery.doctor.meant import MeantRobot, lay_over
-from webmap.discovery.doctor.observed import MOST_ROBOTS, Heard, Observed, Way
-from webmap.discovery.doctor.ports import is_loopback, listening_addresses
+from webmap.discovery.doctor.observed import MOST_ROBOTS, Clock, Heard, Observed, Way
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.found import Findings, FoundRobot
-from webmap.discovery.hearing import frame_topics, hear_frames
+from webmap.discovery.hearing import LateFrames, frame_topics
 from webmap.discovery.robots import discover, host_name
-from webmap.discovery.tf_robots import MAP
 from webmap.errors import BridgeClosed, BridgeError
-from webmap.ros.calls import Calls
+from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.names import is_type
+from webmap.ros.received import ReceivedMessage
+from webmap.ros.rosbridge import checks
+from webmap.ros.subscriptions import Encoding
+
+PATIENCE = 3.0
+"""Seconds for an answer; when a bridge takes longer, it is asked no more."""
 
 SLOW_TOPICS = 1.0
 """Seconds that maps and pictures have at the least, which come a few times a second."""
@@ -34,11 +39,16 @@ MOST_SCANS = 6
 LATCHED = ("nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
 """Types of maps, which are published once: one that is silent may be too large."""
 
-IN_JSON = 10.0
-"""Seconds for which a map that did not come in CBOR is awaited in JSON."""
+AS_TEXT = 10.0
+"""Seconds for which a map that did not come in binary is awaited as text."""
+
+ONCE = 300_000
+"""Least milliseconds between two of its messages: a bridge takes long to encode one."""
 
 NEEDLESS = ("/rosout", "/parameter_events")
 """Topics of every ROS that no client needs; whoever hides topics hides these."""
+
+T = TypeVar("T")
 
 TRYING = "Trying what a call that hangs holds up."
 
@@ -61,10 +71,10 @@ async def observe(
         url: The bridge's address.
         wait: How long to wait for a bridge that cannot be reached, in seconds.
         seconds: How long to listen to topics.
-        ask_parameters: Whether rosapi is asked for a parameter of rosbridge.
+        ask_parameters: Whether the bridge is asked for a parameter of its own.
         try_call: Whether a service is offered and called that hangs for a second, to
             see what that holds up.
-        topics: Types by topic, which are taken in place of what rosapi says.
+        topics: Types by topic, which are taken in place of those that the bridge lists.
         meant: Takes what was found and returns the robots as somebody configured
             them; if there are any, these are measured and no others.
         waiting: Called once with the reason if the bridge is waited for.
@@ -74,7 +84,7 @@ async def observe(
         ConfigError: If ``meant`` says that what was found cannot be meant.
 
     """
-    rosapi, told, asked = "", topics is not None, dict(topics or {})
+    unlisted, told, asked = "", topics is not None, dict(topics or {})
     progress("Asking which topics there are.")
     try:
         found = await ask_topics(url, wait=wait, waiting=waiting)
@@ -82,55 +92,47 @@ async def observe(
     except BridgeClosed as error:
         return Observed(url, trouble=error.why or str(error))
     except BridgeError as error:
-        rosapi = str(error)
-    trees = None
-    if frame_topics(asked):
-        progress("Listening to frames for a moment.")
-        trees = await hear_frames(url, asked)
-    seen = Observed(
-        url,
-        rosapi=rosapi,
-        told=told,
-        shown=tuple(name for name in NEEDLESS if name in asked and not told),
-        types=asked,
-        findings=discover(asked, host_name(url), trees),
-    )
-    seen = _as_meant(seen, meant(seen.findings))
-    if not rosapi:
-        progress("Asking for the time, and who writes and who listens.")
-        seen = await _ask(seen, ask_parameters=ask_parameters)
-    try:
-        if try_call:
-            progress(TRYING)
-            seen = await tried(seen)
-        progress(f"Listening for {seconds:g} s.")
-        seen = await _listen(seen, seconds)
-        rest = _shown(seen.findings.robots[:MOST_ROBOTS])
-        if rest:
-            # After the rest, and on a socket of its own: pictures and clouds would
-            # hold up the poses whose age is asked for.
-            progress("Listening for a few pictures, maps and plans.")
-            heard = await sample(url, rest, max(seconds, SLOW_TOPICS))
-            seen = replace(seen, heard={**seen.heard, **heard})
-            seen = await _in_json(seen, rest, progress)
-        return seen
-    except (OSError, TimeoutError) as error:
-        return Observed(url, trouble=str(error) or type(error).__name__)
+        unlisted = str(error)
+    async with TemporaryBridge(url) as bridge:
+        try:
+            await bridge.open()
+            trees = None
+            if frame_topics(asked):
+                progress("Listening to frames for a moment.")
+                trees = await LateFrames(bridge).listen(asked)
+            seen = Observed(
+                url,
+                unlisted=unlisted,
+                told=told,
+                shown=tuple(name for name in NEEDLESS if name in asked and not told),
+                types=asked,
+                findings=discover(asked, host_name(url), trees),
+                link=await checks.look(url),
+            )
+            seen = _as_meant(seen, meant(seen.findings))
+            if not unlisted:
+                progress("Asking for the time, and who writes and who listens.")
+                seen = await _ask(seen, bridge)
+                if ask_parameters:
+                    link = await checks.asked_about_threads(seen.link, bridge)
+                    seen = replace(seen, link=link)
+            if try_call:
+                progress(TRYING)
+                seen = await tried(seen)
+            progress(f"Listening for {seconds:g} s.")
+            seen = await _listen(seen, bridge, seconds)
+            return await _sample(seen, bridge, seconds, progress)
+        except BridgeClosed as error:
+            return Observed(url, trouble=error.why or str(error))
+        except (OSError, TimeoutError) as error:
+            return Observed(url, trouble=str(error) or type(error).__name__)
 
 
 async def tried(seen: Observed) -> Observed:
     """Return what was seen, with what a call that hangs holds up; it is tried."""
-    if seen.tried:  # what was found out before may be so no more
-        seen = replace(seen, calls_in_threads=None, tried=False)
-    if seen.rosapi:
-        return replace(seen, untold="it takes a rosapi that answers")
-    try:
-        free = await try_a_call(seen.url)
-    except (OSError, TimeoutError) as error:
-        return replace(seen, untold=str(error) or type(error).__name__)
-    if free is None:
-        return replace(seen, untold="the bridge offers no services of its clients")
-    return replace(seen, calls_in_threads=free, tried=True, untold="")
+    if seen.unlisted:
+        return replace(seen, link=checks.not_tried(seen.link))
+    return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
 
 
 def _as_meant(seen: Observed, robots: Sequence[MeantRobot]) -> Observed:
@@ -142,14 +144,55 @@ def _as_meant(seen: Observed, robots: Sequence[MeantRobot]) -> Observed:
     others = [robot.name for robot in seen.findings.robots if robot.name not in known]
     return replace(
         seen,
-        told=seen.told or seen.rosapi != "",
+        told=seen.told or seen.unlisted != "",
         findings=findings,
         meant=meant,
         others=tuple(others),
     )
 
 
-async def _ask(seen: Observed, *, ask_parameters: bool) -> Observed:
+class _Questions:
+    """Questions to a bridge; when one is not answered in time no more are asked."""
+
+    def __init__(self) -> None:
+        self._silent = False
+
+    async def ask(self, question: Callable[[], Awaitable[T]]) -> T | None:
+        if self._silent:
+            return None
+        try:
+            async with asyncio.timeout(PATIENCE):
+                return await question()
+        except TimeoutError:
+            self._silent = True
+            return None
+
+    async def nodes(
+        self, of: Callable[[str], Awaitable[list[str] | None]], topics: Iterable[str]
+    ) -> dict[str, tuple[str, ...]]:
+        """Return nodes by topic, where the bridge named them."""
+        found = {}
+        for topic in dict.fromkeys(filter(None, topics)):
+            names = await self.ask(partial(of, topic))
+            if names is not None:
+                found[topic] = tuple(names)
+        return found
+
+    async def clock(self, bridge: Bridge) -> Clock | None:
+        """Compare the clocks; the quickest of three answers tells most."""
+        found: list[Clock] = []
+        for _ in range(3):
+            began, wall = time.monotonic(), time.time()
+            theirs = await self.ask(bridge.time)
+            trip = time.monotonic() - began
+            if theirs is None:
+                break
+            found.append(Clock(theirs - (wall + trip / 2), trip))
+        # The first call opens the socket, which takes time of its own.
+        return min(found, key=lambda each: each.round_trip, default=None)
+
+
+async def _ask(seen: Observed, bridge: Bridge) -> Observed:
     robots = seen.findings.robots
     velocities = [robot.topic("velocity") for robot in robots]
     read = [
@@ -157,67 +200,77 @@ async def _ask(seen: Observed, *, ask_parameters: bool) -> Observed:
         for robot in robots[:MOST_ROBOTS]
         for topic in (place_of(robot), *_scans(robot), *_shown([robot]))
     ]
-    calls = Calls(seen.url)
-    try:
-        asking = Asking(calls)
-        return replace(
-            seen,
-            clock=await asking.clock(),
-            publishers=await asking.publishers([*velocities, *read]),
-            subscribers=await asking.subscribers(velocities),
-            calls_in_threads=await asking.threads() if ask_parameters else None,
-        )
-    finally:
-        await calls.stop()
+    questions = _Questions()
+    return replace(
+        seen,
+        clock=await questions.clock(bridge),
+        publishers=await questions.nodes(bridge.publishers, [*velocities, *read]),
+        subscribers=await questions.nodes(bridge.subscribers, velocities),
+    )
 
 
-async def _listen(seen: Observed, seconds: float) -> Observed:
+async def _listen(seen: Observed, bridge: Bridge, seconds: float) -> Observed:
     robots = seen.findings.robots[:MOST_ROBOTS]
-    topics: dict[str, str] = {}
+    topics: dict[str, Encoding] = {}
     for robot in robots:
-        topics[place_of(robot)] = topics[robot.topic("battery")] = "none"
-        topics.update(dict.fromkeys(_scans(robot), "cbor"))
+        topics[place_of(robot)] = topics[robot.topic("battery")] = "text"
+        topics.update(dict.fromkeys(_scans(robot), "binary"))
     topics.pop("", None)
     spaces = sorted({each.tf_namespace for each in robots} - {None})  # type: ignore[type-var]
     tf = [f"{space}/{name}" for space in spaces for name in ("tf", "tf_static")]
     frames = FrameListening()
-    peer, deflate, heard = await listen(seen.url, topics, seconds, tf, frames)
+    heard = await listen(bridge, topics, seconds, tf, frames)
     ways = {}
     for robot in robots:
         one = seen.meant.get(robot.name)
         way = _way(robot, heard, frames, one.map_frame if one else "")
         if way is not None:
             ways[robot.name] = way
-    port = urlsplit(seen.url).port
-    listens = listening_addresses(port) if port and is_loopback(peer) else ()
-    return replace(
-        seen, peer=peer, listens=listens, deflate=deflate, heard=heard, ways=ways
-    )
+    return replace(seen, heard=heard, ways=ways)
 
 
-async def _in_json(
-    seen: Observed, topics: Mapping[str, str], progress: Callable[[str], object]
+async def _sample(
+    seen: Observed, bridge: Bridge, seconds: float, progress: Callable[[str], object]
 ) -> Observed:
-    """Return what was seen, with published maps that came only in JSON."""
-    silent = {
-        topic: type
-        for topic, type in topics.items()
-        if is_type(type, *LATCHED)
-        and seen.publishers.get(topic)
-        and topic in seen.heard
-        and not seen.heard[topic].count
-    }
-    if not silent:
+    """Return what was seen, with pictures, maps and plans.
+
+    That is done last, since they would hold up the poses whose age is taken.
+    """
+    topics = _shown(seen.findings.robots[:MOST_ROBOTS])
+    if not topics:
         return seen
-    names = ", ".join(silent)
-    progress(f"Nothing came of {names} in CBOR: listening for {IN_JSON:g} s in JSON.")
-    came = await sample(seen.url, silent, IN_JSON, in_json=True)
-    found = {
-        topic: replace(heard, not_in_cbor=heard.in_parts)
-        for topic, heard in came.items()
-        if heard.count
+    progress("Listening for a few pictures, maps and plans.")
+    too_large: dict[str, int] = {}
+
+    def received(message: ReceivedMessage) -> None:
+        if checks.came_in_parts(message) and is_type(topics[message.topic], *LATCHED):
+            too_large[message.topic] = len(message.frame)
+
+    heard = await sample(bridge, topics, max(seconds, SLOW_TOPICS), received)
+    silent = {
+        topic: topics[topic]
+        for topic, each in heard.items()
+        if is_type(topics[topic], *LATCHED)
+        and seen.publishers.get(topic)
+        and not each.count
     }
-    return replace(seen, heard={**seen.heard, **found})
+    if silent:
+        names = ", ".join(silent)
+        progress(
+            f"Nothing came of {names} in binary: listening for {AS_TEXT:g} s to text."
+        )
+        late = await sample(
+            bridge,
+            silent,
+            AS_TEXT,
+            received,
+            enough=1,
+            encoding="text",
+            throttle=ONCE,
+        )
+        heard |= {topic: each for topic, each in late.items() if each.count}
+    link = replace(seen.link, too_large=too_large)
+    return replace(seen, heard={**seen.heard, **heard}, link=link)
 
 
 def _scans(robot: FoundRobot) -> list[str]:
@@ -241,13 +294,13 @@ def _way(
     Of one without odometry it is the frame of its base that counts. It is drawn in the
     frame ``start``, if somebody said so, else in the one that was found.
     """
-    space, where = robot.tf_namespace, heard.get(place_of(robot), Heard())
+    tf, where = robot.tf, heard.get(place_of(robot), Heard())
     frame, base = where.frame, where.child
     if robot.tf_alone:
         frame = base = robot.base_frame
-    if space is None or not frame:
+    if tf is None or not frame:
         return None
-    start = start or robot.tf_options.get("map_frame", MAP)
+    space, start = tf.namespace, start or tf.map_frame
     scan = heard.get(robot.topic("scan"), Heard()).frame
     return Way(
         frame,

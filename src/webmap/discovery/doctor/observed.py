@@ -1,36 +1,15 @@
-"""What the readiness check saw, and what it says."""
+"""What the readiness check saw."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
 
 from webmap.discovery.doctor.meant import MeantRobot
 from webmap.discovery.found import Findings
 from webmap.discovery.tf_robots import MAP
-
-Level: TypeAlias = Literal["wrong", "warning", "note", "good"]
-"""``wrong``: it will not work, or not safely. ``note``: cannot be told from here."""
+from webmap.ros.rosbridge.checks import LinkFacts
 
 MOST_ROBOTS = 10
 """How many robots are listened to."""
-
-LEVELS: tuple[Level, ...] = ("wrong", "warning", "note", "good")
-"""All levels, the worst first."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that was found out."""
-
-    level: Level
-    about: str
-    """A robot's name, or ``bridge``."""
-
-    words: str
-    """What is so, in a sentence."""
-
-    advice: str = ""
-    """What to do about it, in a sentence; empty if nothing is to be done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +34,7 @@ class Heard:
     """When it came in, in seconds of this machine's wall clock."""
 
     binary: bool = False
-    """Whether messages came as CBOR."""
-
-    in_parts: bool = False
-    """Whether a message came in fragments."""
-
-    not_in_cbor: bool = False
-    """Whether nothing came in CBOR, and messages came in JSON, in fragments."""
+    """Whether messages came in a binary encoding."""
 
     trouble: str = ""
     """Why a message could not be read."""
@@ -127,17 +100,8 @@ class Observed:
     trouble: str = ""
     """Why the bridge could not be reached, empty if it was."""
 
-    peer: str = ""
-    """The address that answered."""
-
-    listens: tuple[str, ...] = ()
-    """Where the bridge listens, if it is on this machine and that is known."""
-
-    deflate: bool = False
-    """Whether the bridge would compress its socket."""
-
-    rosapi: str = ""
-    """Why rosapi does not say the topics, empty if it does."""
+    unlisted: str = ""
+    """Why the bridge does not list its topics, empty if it does."""
 
     told: bool = False
     """Whether the topics are those that the user gave."""
@@ -146,7 +110,7 @@ class Observed:
     """Topics that no client needs and that the bridge shows all the same."""
 
     types: Mapping[str, str] = field(default_factory=dict)
-    """Types by topic, as rosapi or the user's list tells them."""
+    """Types by topic, as the bridge or the user's list has them."""
 
     findings: Findings = field(default_factory=Findings)
     """The robots that are measured, with the topics that are in use."""
@@ -159,20 +123,14 @@ class Observed:
 
     clock: Clock | None = None
     publishers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """The nodes that publish on a topic, where rosapi said so."""
+    """The nodes that publish on a topic, where the bridge said so."""
 
     subscribers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """The nodes that listen to a topic, where rosapi said so."""
+    """The nodes that listen to a topic, where the bridge said so."""
 
     heard: Mapping[str, Heard] = field(default_factory=dict)
     ways: Mapping[str, Way] = field(default_factory=dict)
     """What the frames say of each robot that has some, by its name."""
 
-    calls_in_threads: bool | None = None
-    """Whether calls do not hold up what comes after them, if that is known."""
-
-    tried: bool = False
-    """Whether that was tried with a call that hangs, and not only asked."""
-
-    untold: str = ""
-    """Why trying it told nothing; empty if it did, or if it was not tried."""
+    link: LinkFacts = field(default_factory=LinkFacts)
+    """What was found out about the bridge itself."""

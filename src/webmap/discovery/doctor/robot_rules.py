@@ -4,14 +4,15 @@ from collections.abc import Iterator
 
 from webmap.discovery.doctor.heard_rules import heard_finding, rare_finding
 from webmap.discovery.doctor.meant import MeantRobot
-from webmap.discovery.doctor.observed import Finding, Observed, Way
+from webmap.discovery.doctor.observed import Observed, Way
 from webmap.discovery.doctor.shown_rules import shown_findings
 from webmap.discovery.found import FoundRobot, Guess
+from webmap.ros.finding import Finding
 from webmap.ros.names import is_type, same_type
+from webmap.ros.rosbridge import advice
+from webmap.ros.rosbridge.graph import is_client_node
 
 MOST_ODDITIES = 3
-BRIDGES = ("rosbridge", "webmap")
-"""What is in the names of nodes that publish for their clients, ourselves too."""
 
 
 def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
@@ -199,16 +200,7 @@ def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
         )
     stamped = is_type(velocity.type, "geometry_msgs/TwistStamped")
     if not stamped and seen.findings.dialect == "ros2" and _has_client(velocity, seen):
-        # rosapi names one type of a topic, and of two the first in the alphabet.
-        return Finding(
-            "note",
-            robot.name,
-            f"rosapi names {short} for {velocity.topic}, and a client of a rosbridge, "
-            f"which may be WebMap itself, has announced that type, so rosapi cannot "
-            f"show whether the base takes TwistStamped.",
-            f"Look on the robot: ros2 topic info -v {velocity.topic}. A base that "
-            f"takes another type would neither move nor stop.",
-        )
+        return advice.type_not_certain(robot.name, velocity.topic, short)
     return Finding(
         "note" if said else "good",
         robot.name,
@@ -223,7 +215,7 @@ def _has_client(velocity: Guess, seen: Observed) -> bool:
         *(seen.publishers.get(velocity.topic) or ()),
         *(seen.subscribers.get(velocity.topic) or ()),
     ]
-    return any(word in name for name in nodes for word in BRIDGES)
+    return any(map(is_client_node, nodes))
 
 
 def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Finding]:
@@ -232,10 +224,11 @@ def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Fin
         yield Finding(
             "note",
             robot.name,
-            f"Who else writes to {velocity.topic} cannot be told: rosapi did not say.",
+            f"Who else writes to {velocity.topic} cannot be told: the bridge did not "
+            f"say.",
         )
         return
-    others = [name for name in writers if not any(word in name for word in BRIDGES)]
+    others = [name for name in writers if not is_client_node(name)]
     bridges = [name for name in writers if name not in others]
     if others:
         yield Finding(
@@ -247,11 +240,6 @@ def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Fin
             "webmap/cmd_vel, below the hand-held's priority.",
         )
     elif bridges:
-        yield Finding(
-            "note",
-            robot.name,
-            f"A client of a rosbridge ({', '.join(bridges)}) writes to "
-            f"{velocity.topic} now; it may be WebMap itself.",
-        )
+        yield advice.client_writes(robot.name, velocity.topic, bridges)
     else:
         yield Finding("good", robot.name, f"Nobody else writes to {velocity.topic}.")

@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from webmap.discovery.doctor.heard_rules import age_of, silence
-from webmap.discovery.doctor.observed import Finding, Heard, Level, Observed
+from webmap.discovery.doctor.observed import Heard, Observed
 from webmap.discovery.found import FoundRobot, Role
+from webmap.ros.finding import Finding, Level
+from webmap.ros.rosbridge import advice
 
 PICTURE_AGE = 1.0
 """Seconds after which a picture is too old to drive by."""
@@ -37,22 +39,15 @@ def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             continue
         if not heard.count:
             yield from _silent(kind, robot.name, topic, seen)
-        elif heard.not_in_cbor:
-            yield Finding(
-                "warning",
-                robot.name,
-                f"{topic} comes in JSON only ({heard.bytes} bytes, in parts): it is "
-                f"larger than max_message_size of the bridge, above which it sends no "
-                f"CBOR. JSON keeps the bridge busy for seconds.",
-                f"Set the parameter max_message_size of rosbridge_websocket to "
-                f"{heard.bytes} or more.",
-            )
+        elif topic in seen.link.too_large:
+            size = seen.link.too_large[topic]
+            yield advice.too_large(robot.name, topic, size)
         elif heard.trouble:
             yield Finding(
                 "warning",
                 robot.name,
                 f"{topic} cannot be read: {heard.trouble}.",
-                "Look whether its type is the one that rosapi says.",
+                "Look whether its type is the one that the bridge says.",
             )
         else:
             yield _came(kind, robot.name, topic, heard, age_of(heard, seen))
@@ -110,11 +105,8 @@ def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Findin
     if kind == "map" and writers:
         found = replace(found, advice=_map_advice(writers[0], topic, seen))
     if kind in ("map", "costmap", "cloud") and writers:
-        advice = (
-            f"{found.advice} If it is larger than max_message_size of "
-            f"rosbridge_websocket (10 MB unless set), set that higher."
-        )
-        found = replace(found, advice=advice)
+        words = f"{found.advice} {advice.MAYBE_TOO_LARGE}"
+        found = replace(found, advice=words)
     yield found
 
 

@@ -9,7 +9,7 @@ from webmap.gate.lanes import words
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.unproven import Unproven
 from webmap.geometry import Twist
-from webmap.ros import ops
+from webmap.ros.rosbridge import ops
 
 BUSY_PING = 0.05
 """Seconds between pings while somebody holds a lease on a machine behind the lane."""

@@ -12,7 +12,7 @@ from typing import Any
 from webmap.errors import ProtocolError
 from webmap.gate.events import Sweep
 from webmap.gate.rules.folding import folded, too_long
-from webmap.ros import ops
+from webmap.ros.rosbridge import ops
 
 THROTTLE = 100
 """Milliseconds between two scans at least."""
@@ -74,7 +74,7 @@ def check_parts(frame: bytes) -> None:
         size = int.from_bytes(frame[at - further : at], "big") if further else low
         parts += 1
         if kind in _STRINGS:
-            at += size
+            at = min(at + size, len(frame))  # it may claim 2**64 bytes
         elif kind in _LISTS_AND_MAPS:
             numbers += size
         if parts > MOST_PARTS or numbers > MOST_NUMBERS or low == _ENDLESS:
@@ -93,7 +93,7 @@ def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
         ProtocolError: If it is no CBOR, nested too deeply, or of too many parts.
 
     """
-    from webmap.ros import cbor
+    from webmap.ros.rosbridge import cbor
 
     if not cbor.looks_like_cbor(frame):
         return None

@@ -29,8 +29,8 @@ from webmap.errors import BridgeClosed, ProtocolError
 from webmap.gate.clock import now
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable
-from webmap.ros.pieces import Pieces
-from webmap.ros.turns import turns
+from webmap.ros.rosbridge.pieces import Pieces
+from webmap.ros.rosbridge.turns import turns
 
 log = logging.getLogger("webmap.gate")
 

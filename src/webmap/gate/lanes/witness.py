@@ -11,8 +11,8 @@ from webmap.gate.clock import now
 from webmap.gate.events import Event, Key, LinkDown, LinkUp, Measured, Scanned
 from webmap.gate.lanes import scans, words
 from webmap.gate.lanes.lane import Lane
-from webmap.ros import ops
-from webmap.ros.cbor import looks_like_cbor
+from webmap.ros.rosbridge import ops
+from webmap.ros.rosbridge.cbor import looks_like_cbor
 
 THROTTLE = 50
 """Milliseconds between two messages at least."""

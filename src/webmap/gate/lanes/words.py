@@ -15,8 +15,8 @@ from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.lanes.reading import check_parts, plain, too_deep
 from webmap.gate.messages import RobotSpec
 from webmap.geometry import Quaternion, Twist
-from webmap.ros import ops
 from webmap.ros.names import is_type
+from webmap.ros.rosbridge import ops
 
 
 def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:

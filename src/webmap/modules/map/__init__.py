@@ -1,7 +1,8 @@
 """Modules of maps, by name: ``webmap.modules.map.Teleop``.
 
-``register`` is a decorator that adds one's own; a package adds its modules by an
-entry point in the group ``webmap.modules.map``.
+A built-in module is the class that its file is named after. ``register`` is a
+decorator that adds one of your own, and a package adds its modules by an entry point
+in the group ``webmap.modules.map``.
 """
 
 from typing import Any

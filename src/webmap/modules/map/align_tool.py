@@ -35,10 +35,6 @@ class AlignTool:
     arrow keys nudge. The page shows where it would be and nothing moves until it is
     saved; then it holds for everybody, and for goals. It is kept in the state folder,
     until a program or a fleet file states another alignment.
-
-    Args:
-        map: The map.
-
     """
 
     def __init__(self, map: "Map") -> None:

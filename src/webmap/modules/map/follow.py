@@ -10,10 +10,6 @@ class Follow:
     """A button that keeps the selected robot where it is on the screen.
 
     It ends when the viewer moves the view by hand.
-
-    Args:
-        map: The map.
-
     """
 
     def __init__(self, map: "Map") -> None:

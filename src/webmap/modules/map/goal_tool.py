@@ -3,13 +3,17 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.robot_and_pose import robot_and_pose
+from webmap.core.given_pose import robot_and_pose
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
     from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.goal_tool")
+
+
+SPACING = (0.3, 20.0)
+"""Metres between robots that are sent together, the least and the most."""
 
 
 class GoalTool:
@@ -46,8 +50,11 @@ class GoalTool:
     ) -> None:
         if len(key) != 1:
             raise ValueError(f"GoalTool: key must be one character, got {key!r}")
-        if not 0.3 <= spacing <= 20.0:
-            raise ValueError(f"GoalTool: spacing is 0.3 to 20 m, got {spacing!r}")
+        least, most = SPACING
+        if not least <= spacing <= most:
+            raise ValueError(
+                f"GoalTool: spacing is {least:g} to {most:g} m, got {spacing!r}"
+            )
         self.map = map
         self.half = map.add_browser_half(
             self,

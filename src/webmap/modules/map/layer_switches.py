@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
+from webmap.core.declaration import declarations
 from webmap.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -10,25 +11,36 @@ if TYPE_CHECKING:
 
 LAYERS = {
     "Tiles": ".tiles",
-    "Maps": ".floor, .map-file, .occupancy-grid:not(.costmap)",
+    "Maps": ".floor, .map-file",
     "Pictures": ".images > image:not(.floor)",
-    "Costmaps": ".occupancy-grid.costmap",
-    "Cells": ".gridcells",
-    "Scans": ".laserscan",
-    "Clouds": ".pointcloud",
-    "Plans": ".path",
+    "Costmaps": "",
+    "Cells": "",
+    "Scans": "",
+    "Clouds": "",
+    "Plans": "",
     "Trails": ".trail",
-    "Poses": ".posearray, .posestamped",
-    "Points": ".pointstamped",
-    "Uncertainty": ".covariance",
-    "Footprints": ".polygon",
-    "Ranges": ".range",
-    "Markers": ".markers",
-    "Satellite fixes": ".navsatfix",
+    "Poses": "",
+    "Points": "",
+    "Uncertainty": "",
+    "Footprints": "",
+    "Ranges": "",
+    "Markers": "",
+    "Satellite fixes": "",
     "Labels": ".labels",
-    "Health": ".diagnostics",
+    "Health": "",
 }
-"""What the built-in modules and ``add_image`` draw: its name and CSS selector."""
+"""The names in the order of the list, with the CSS selectors of what is not drawn from
+a topic. Layers declare theirs; those with other names come last."""
+
+
+def all_layers() -> dict[str, str]:
+    """Return the CSS selector of each name, of all layers there are."""
+    selectors = {name: [said] if said else [] for name, said in LAYERS.items()}
+    for declared in declarations():
+        for name, selector in declared.switches.items():
+            if name:
+                selectors.setdefault(name, []).append(selector)
+    return {name: ", ".join(said) for name, said in selectors.items()}
 
 
 class LayerSwitches:
@@ -41,8 +53,8 @@ class LayerSwitches:
 
     Args:
         map: The map.
-        layers: A CSS selector for each name, in the order of the list; what the
-            built-in modules and ``map.add_image`` draw if not given.
+        layers: A CSS selector for each name, in the order of the list; what
+            layers and ``map.add_image`` draw if not given.
         off: Names of those that are off until the viewer switches them on.
 
     Raises:
@@ -57,7 +69,7 @@ class LayerSwitches:
         *,
         off: Iterable[str] = (),
     ) -> None:
-        chosen = dict(LAYERS if layers is None else layers)
+        chosen = dict(all_layers() if layers is None else layers)
         hidden = list(off)
         for name in hidden:
             if name not in chosen:

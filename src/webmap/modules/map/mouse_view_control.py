@@ -11,10 +11,6 @@ class MouseViewControl:
 
     On a touch screen two fingers zoom and turn. The click that ends a drag is not a
     click. It runs in the browser, which owns the view.
-
-    Args:
-        map: The map.
-
     """
 
     def __init__(self, map: "Map") -> None:

@@ -2,9 +2,9 @@
 
 import asyncio
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from webmap.core.anchored import Anchored
+from webmap.core.declaration import FoundTopic, TopicKind, layer
 from webmap.core.grid_picture import (
     Palette,
     check_palette,
@@ -12,132 +12,160 @@ from webmap.core.grid_picture import (
     grid_png,
     place_grid,
 )
-from webmap.core.layer import Layer
+from webmap.core.map_layer import MapLayer
 from webmap.core.pictures import Picture
-from webmap.core.refusals import refusing
+from webmap.core.problems import refusing
 from webmap.core.tasks import spawn
 from webmap.errors import ProtocolError
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages import MapMetaDataMsg, OccupancyGridMsg
-from webmap.ros.messages_grid import OccupancyGridUpdateMsg
+from webmap.geometry import FARTHEST
+from webmap.ros.messages import (
+    Int8s,
+    MapMetaDataMsg,
+    OccupancyGridMsg,
+    Stamped,
+    cells_of,
+)
+from webmap.tf import Transform
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
+    Found: TypeAlias = tuple[MapMetaDataMsg, NDArray[np.int8]]
 
 SMALL = 1 << 18
 """Cells up to which a grid is drawn at once; a larger one in the worker process."""
 
-NEVER = 1e9
-"""Seconds after which a grid without an age limit is drawn as old."""
+
+class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
+    """``map_msgs/OccupancyGridUpdate``: a rectangle of a grid."""
+
+    x: int
+    """The first column."""
+
+    y: int
+    """The first row."""
+
+    width: int
+    height: int
+    data: Int8s
+
+    @property
+    def cells(self) -> "NDArray[np.int8]":
+        """The cells, of shape (height, width), read-only.
+
+        Raises:
+            ProtocolError: If there are more or fewer than the size says.
+
+        """
+        return cells_of(self.data, self.width, self.height)
 
 
-class OccupancyGrid:
-    """Draws a ``nav_msgs/OccupancyGrid`` and its ``map_msgs/OccupancyGridUpdate``.
+@layer(
+    "nav_msgs/OccupancyGrid",
+    view=OccupancyGridMsg,
+    kinds=[
+        TopicKind(
+            "costmap",
+            {
+                r"local_costmap/costmap\Z": "a local costmap",
+                r"(?<!global_)costmap/costmap\Z": "a costmap",
+                r"\A(?!.*global_costmap/costmap\Z).*costmap": "named a costmap",
+            },
+            most=1,
+            options={"palette": "costmap", "throttle": 500},
+            role="costmap",
+        ),
+        TopicKind(
+            "global costmap",
+            {r"global_costmap/costmap\Z": "a global costmap"},
+            most=1,
+            # All of the map, under the local one: it is large, and changes slowly.
+            options={"palette": "costmap", "throttle": 5000, "order": 15.0},
+            role="costmap",
+        ),
+        TopicKind(
+            "map",
+            {r"/map\Z": "the usual name", r"map[^/]*\Z": "named a map"},
+            most=4,
+            shared=True,
+            role="map",
+        ),
+        TopicKind(
+            "grid", most=2, options={"palette": "costmap"}, shared=True, role="map"
+        ),
+    ],
+    switch={
+        "Maps": ".occupancy-grid:not(.costmap)",
+        "Costmaps": ".occupancy-grid.costmap",
+    },
+    css="occupancy-grid",
+    rank=10,
+)
+class OccupancyGrid(MapLayer):
+    """A map or a costmap as an image that all viewers share.
 
-    All maps that show the same grid share one image, which is drawn once a message.
-    What is unknown is transparent. Cells must be -1 to 100; other values are refused,
-    unless the palette is ``"raw"``.
+    The topic has a ``nav_msgs/OccupancyGrid``, and the same with ``_updates`` behind it
+    a ``map_msgs/OccupancyGridUpdate``. What is unknown is transparent. Cells must be -1
+    to 100; other values are refused, unless the palette is ``"raw"``.
 
     Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
-
-    Args:
-        map: The map.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic; its updates come on the same with ``_updates`` behind.
-        palette: ``"map"``: free is white and occupied black. ``"costmap"``: free is
-            transparent, then blue to red, inscribed cyan and lethal purple.
-            ``"raw"``: the 256 values of a byte from white to black.
-        throttle: The least time between two whole grids, in milliseconds.
-        age_limit: Seconds after which the grid is drawn as old; None for a map that
-            is sent but once.
-        map_frame: The map's frame, for data that is in another: it is taken there by
-            the frames of the bridge's ``/tf``. If not given, data is drawn as it
-            comes.
-        namespace: ``/robot_0`` where the frames are on ``/robot_0/tf``.
-        robot: Whose grid it is: it lies as that one is aligned, and as its bridge is if
-            it is nobody's own.
-        order: What lies over what: greater is nearer; robots have 100.
-
-    Raises:
-        ConfigError: If there is no such palette.
-
     """
 
-    def __init__(
-        self,
-        map: "Map",
-        bridge: Bridge,
-        topic: str = "/map",
-        *,
-        palette: Palette = "map",
-        throttle: int = 0,
-        age_limit: float | None = None,
-        map_frame: str | None = None,
-        namespace: str = "",
-        robot: "Robot | None" = None,
-        order: float | None = None,
-    ) -> None:
-        check_palette(palette)
-        self.map = map
-        self.layer = Grid.shared(
-            bridge, topic, palette, throttle, age_limit, map_frame, namespace, robot
-        )
-        if order is None:
-            order = 20.0 if palette == "costmap" else 10.0
-        self.layer.show_on(map, order=order)
+    topic: str = "/map"
 
+    palette: Palette = "map"
+    """``"map"``: free is white and occupied black. ``"costmap"``: free is transparent,
+    then blue to red, inscribed cyan and lethal purple. ``"raw"``: the 256 values of a
+    byte from white to black."""
 
-class Grid(Layer):
-    """One grid, for all maps that show it."""
+    throttle: int = 0
+    """The least time between two whole grids, in milliseconds."""
 
-    def __init__(
-        self,
-        bridge: Bridge,
-        topic: str,
-        palette: str,
-        throttle: int,
-        age_limit: float | None,
-        map_frame: str | None,
-        namespace: str,
-        robot: "Robot | None" = None,
-    ) -> None:
-        super().__init__()
-        self.anchor = Anchored(self, bridge, map_frame, namespace, robot)
-        self.bridge = bridge
-        self.topic = topic
-        self.palette = palette
-        self.throttle = throttle
-        self.age_limit = NEVER if age_limit is None else age_limit
+    map_frame: str | None = None
+    """The map's frame, for data that is in another, such as a local costmap in
+    ``odom``: it is taken there by the ``/tf`` of the bridge. If not given, data is
+    drawn as it comes."""
+
+    order: float | None = None
+    """What lies over what: greater is nearer; robots have 100. If not given, it is 20
+    for a costmap and 10 for any other."""
+
+    @classmethod
+    def options_for(cls, found: FoundTopic) -> dict[str, Any]:
+        """Return the options of a grid; a robot's own is not drawn too often."""
+        options = super().options_for(found)
+        if found.kind.name == "grid" and found.own:
+            options["throttle"] = 500
+        return options
+
+    def build(self) -> None:
+        """Make the image.
+
+        Raises:
+            ConfigError: If there is no such palette.
+
+        """
+        check_palette(self.palette)
+        self.usual_order = 20.0 if self.palette == "costmap" else 10.0
         self.info: MapMetaDataMsg | None = None
         """Size and place of what came last."""
         self.cells: NDArray[np.int8] | None = None
         """What came last, of shape (height, width), the lowest row first."""
         self._drawing: asyncio.Task[None] | None = None
         self._undrawn = False
-        self.svg.classes.add("occupancy-grid", palette)
-        self.svg.set(pointer_events="none")
-        if palette == "costmap":
-            self.svg.set(opacity=0.7)
-        else:  # each of several maps is switched by itself
-            self.svg.set("data-layer", topic)
-
-    def start(self) -> None:
-        """Subscribe to the grid and to its updates."""
+        self.svg.classes.add(self.palette)
+        # Each of several maps is switched by itself.
+        self.svg.set("data-layer", self.topic)
+        if self.palette == "costmap":
+            self.svg.set("data-layer", None).set(opacity=0.7)
         self.picture = Picture()
         self.svg.append(self.picture.element)
-        self.bridge.subscribe(
-            self.topic,
-            refusing(self, self.topic, self.on_grid),
-            "nav_msgs/OccupancyGrid",
-            throttle=self.throttle,
-            decode=OccupancyGridMsg,
-        )
+
+    def start(self) -> None:
+        """Make the image, and subscribe to the grid and to its updates."""
+        super().start()
         updates = self.topic.rstrip("/") + "_updates"
         # Every update counts, so none may be held back or replaced by the next.
         self.bridge.subscribe(
@@ -145,33 +173,37 @@ class Grid(Layer):
             refusing(self, updates, self.on_update),
             "map_msgs/OccupancyGridUpdate",
             decode=OccupancyGridUpdateMsg,
-            compression="cbor",
+            encoding="binary",
             queue_length=100,
         )
 
-    def on_grid(self, grid: OccupancyGridMsg) -> None:
-        """Draw a grid in place of the one before.
+    def read(self, message: OccupancyGridMsg) -> "Found":
+        """Return size and place of a grid, and its cells.
 
         Raises:
             ProtocolError: If its size, its place or a cell makes no sense.
 
         """
-        resolution = grid.info.resolution
+        info = message.info
+        resolution = info.resolution
         if not (math.isfinite(resolution) and resolution > 0):
             raise ProtocolError(
                 f"a cell must be a number of metres above 0, got {resolution}"
             )
-        _ = grid.info.origin.usable
-        cells = grid.cells
-        side = resolution * max(grid.info.width, grid.info.height)
+        _ = info.origin.usable
+        cells = message.cells
+        side = resolution * max(info.width, info.height)
         if side > FARTHEST:
             raise ProtocolError(
                 f"a grid has sides of {FARTHEST:g} m at the most, got "
-                f"{grid.info.width} x {grid.info.height} cells of {resolution:g} m"
+                f"{info.width} x {info.height} cells of {resolution:g} m"
             )
         check_values(cells, self.palette)
-        self.anchor.stand_in(grid.frame_id, grid.stamp)
-        self.info, self.cells = grid.info, cells
+        return info, cells
+
+    def draw(self, found: "Found", at: Transform) -> None:
+        """Draw the grid."""
+        self.info, self.cells = found
         self._draw()
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
@@ -195,9 +227,9 @@ class Grid(Layer):
             self.cells = self.cells.copy()
         self.cells[y : y + update.height, x : x + update.width] = patch
         self._draw()
+        self.be_new()
 
     def _draw(self) -> None:
-        self.svg.set_age(self.bridge.lag, limit=self.age_limit)
         if self.cells is not None and self.cells.size <= SMALL:
             self._show(grid_png(self.cells, self.palette), self.info)
             return

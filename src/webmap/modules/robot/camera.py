@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import msgspec
 
 from webmap.core.camera_feed import CameraFeed
-from webmap.core.refusals import refusing
+from webmap.core.problems import refusing
 from webmap.core.tasks import spawn
 from webmap.errors import ConfigError, ProtocolError
 from webmap.ros.bridge import Bridge
@@ -128,7 +128,7 @@ class Camera(CameraFeed):
                 self.type,
                 throttle=self._throttle,
                 decode=VIEWS[self.type],
-                compression="cbor",
+                encoding="binary",
             )
 
     def end(self) -> None:

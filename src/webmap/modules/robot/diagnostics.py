@@ -1,26 +1,98 @@
 """What the parts of a robot say of their health."""
 
+import binascii
 import time
+import weakref
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
-from webmap.core.part_owners import Whose, bare, part_owners
-from webmap.core.refusals import refusing
+import msgspec
+
+from webmap.core.declaration import FoundTopic, TopicKind, layer
+from webmap.core.problems import refusing
 from webmap.errors import ConfigError, ProtocolError
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages_diagnostics import (
-    LEVELS,
-    OK,
-    STALE,
-    DiagnosticArrayMsg,
-    DiagnosticStatusMsg,
-)
+from webmap.ros.messages import Stamped
 from webmap.scene import html, svg
 from webmap.scene.element import Element
 from webmap.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+
+Whose: TypeAlias = Literal["own", "another", "nobody"]
+"""Of a robot, a part is its own, another robot's, or by its name of nobody."""
+
+
+class PartOwners:
+    """The robots that follow one topic, by their namespaces.
+
+    Nothing in a ``diagnostic_msgs/DiagnosticArray`` says which robot it is about but
+    the names of the parts. Updaters put the name of their node in front: in ROS 1 with
+    its namespace and without the slash that it begins with (``robot_0/base: Motors``),
+    in ROS 2 without the namespace (``base: Motors``) unless they are told otherwise
+    (``/robot_0/base: Motors``). Aggregators name groups: ``/Power/base: Battery``.
+    """
+
+    def __init__(self) -> None:
+        self._followers: Counter[str] = Counter()
+
+    def join(self, namespace: str) -> Removal:
+        """Count a robot in until the current scope ends, or this is removed.
+
+        Args:
+            namespace: The robot's, as :func:`bare` has it; empty if it has none.
+
+        """
+        self._followers[namespace] += 1
+        return keep(Removal(lambda: self._leave(namespace)))
+
+    def whose(self, name: str, namespace: str) -> Whose:
+        """Return whose a part is.
+
+        All parts are those of the only robot. With several, a part is that of the
+        innermost namespace that its name begins with.
+
+        Args:
+            name: The part's name.
+            namespace: The namespace of the robot that asks, as :func:`bare` has it.
+
+        """
+        if len(self._followers) < 2:
+            return "own"
+        # What stands behind the colon is a task, which may have slashes too.
+        inside = bare(name).partition(":")[0]
+        while inside and inside not in self._followers:
+            inside = inside.rpartition("/")[0]
+        if not inside:
+            return "nobody"
+        return "own" if inside == namespace else "another"
+
+    def _leave(self, namespace: str) -> None:
+        self._followers[namespace] -= 1
+        if not self._followers[namespace]:
+            del self._followers[namespace]
+
+
+def bare(name: str) -> str:
+    """Return a name of a part, or a namespace, without slashes in front and behind."""
+    return name.strip("/")
+
+
+def part_owners(bridge: Bridge, topic: str) -> PartOwners:
+    """Return the robots that follow a topic behind a bridge."""
+    return _owners.setdefault(bridge, {}).setdefault(topic, PartOwners())
+
+
+_owners: weakref.WeakKeyDictionary[Bridge, dict[str, PartOwners]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+OK, WARN, ERROR, STALE = range(4)
+LEVELS = ("ok", "warn", "error", "stale")
+"""The names of the levels, by their numbers."""
 
 MAX_PARTS = 1000
 """The most parts that one robot may have."""
@@ -41,6 +113,49 @@ GREY = "#8a8f98"
 _WEIGHT = {"ok": 0, "warn": 1, "stale": 2, "error": 3}
 
 
+class KeyValueMsg(msgspec.Struct, frozen=True, gc=False):
+    """``diagnostic_msgs/KeyValue``."""
+
+    key: str
+    value: str
+
+
+class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True, gc=False):
+    """``diagnostic_msgs/DiagnosticStatus``."""
+
+    name: str
+    level_value: int | str = msgspec.field(name="level")
+    """The level as it came; :attr:`level` is what to count with."""
+
+    message: str = ""
+    hardware_id: str = ""
+    values: list[KeyValueMsg] = msgspec.field(default_factory=list)
+
+    @property
+    def level(self) -> int:
+        """0 ok, 1 warning, 2 error, 3 stale.
+
+        It is a ``byte``, which some bridges of ROS 2 write as text: the character
+        itself, or base64.
+
+        Raises:
+            ProtocolError: If it is none of them.
+
+        """
+        said = self.level_value
+        level = said if isinstance(said, int) else _byte(said)
+        if not 0 <= level < len(LEVELS):
+            raise ProtocolError(f"{self.name!r}: a level is 0 to 3, got {said!r}")
+        return level
+
+
+class DiagnosticArrayMsg(Stamped, frozen=True, kw_only=True):
+    """``diagnostic_msgs/DiagnosticArray``."""
+
+    separable: ClassVar = True
+    status: list[DiagnosticStatusMsg]
+
+
 @dataclass(frozen=True, slots=True)
 class Health:
     """What one part said last."""
@@ -59,6 +174,23 @@ class Health:
     """Whether several robots follow the topic and its name is of none of them."""
 
 
+@layer(
+    "diagnostic_msgs/DiagnosticArray",
+    view=DiagnosticArrayMsg,
+    kinds=[
+        TopicKind(
+            "health",
+            {
+                r"/diagnostics\Z": "the usual name",
+                r"/diagnostics_agg\Z": "what an aggregator says",
+            },
+            most=1,
+            shared=True,
+        )
+    ],
+    switch="Health",
+    rank=140,
+)
 class Diagnostics:
     """Follows a ``diagnostic_msgs/DiagnosticArray`` and says what is worst.
 
@@ -138,6 +270,12 @@ class Diagnostics:
             decode=DiagnosticArrayMsg,
             queue_length=20,
         )
+
+    @staticmethod
+    def options_for(found: FoundTopic) -> dict[str, Any]:
+        """Return the robot's namespace, by which parts of a shared topic are told."""
+        # On a topic of its own there is nobody to tell it from.
+        return {"namespace": "" if found.own else found.namespace}
 
     def destroy(self) -> None:
         """Take the badge away."""
@@ -276,3 +414,14 @@ def _level(parts: list[Health]) -> str | None:
         return None
     well = parts[0].level == LEVELS[OK]
     return None if well and all(part.shared for part in parts) else parts[0].level
+
+
+def _byte(text: str) -> int:
+    """Return the byte that a text stands for, or -1."""
+    if len(text) == 1:
+        return ord(text)
+    try:
+        data = binascii.a2b_base64(text, strict_mode=True)
+    except (binascii.Error, ValueError):
+        return -1
+    return data[0] if len(data) == 1 else -1

@@ -1,27 +1,26 @@
 """Cells of a grid that somebody publishes one by one, such as what is inflated."""
 
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from webmap.core.from_above import in_space
-from webmap.core.layer_names import label
-from webmap.core.placed import Placed, check_finite, thinned
-from webmap.core.refusals import refusing
-from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages_points import GridCellsMsg
+from webmap.core.declaration import TopicKind, layer
+from webmap.core.drawing import check_finite, in_space, thinned
+from webmap.core.layer_options import Count, Frame
+from webmap.core.robot_layer import RobotLayer
+from webmap.errors import ProtocolError
+from webmap.geometry import FARTHEST
+from webmap.ros.messages import PointMsg, Stamped
 from webmap.scene import svg
+from webmap.tf import Transform
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from webmap.core.robot import Robot
-    from webmap.ros.messages import PointMsg
-    from webmap.tf import Transform
-
     Points: TypeAlias = NDArray[np.float64]
+
+SMALLEST = 1e-4
+"""Metres: the side of the smallest cell that is drawn."""
 
 MAX_CELLS = 100_000
 """Cells of which no more are looked at."""
@@ -40,70 +39,87 @@ class Rows(NamedTuple):
     """How many cells each row has."""
 
 
-class GridCells:
-    """Draws a ``nav_msgs/GridCells``; one without cells draws nothing.
+class GridCellsMsg(Stamped, frozen=True, kw_only=True):
+    """``nav_msgs/GridCells``."""
 
-    Cells that touch along x are drawn as one rectangle, which is short on the wire.
+    cell_width: float
+    """Metres along x."""
 
-    Style it by CSS: ``.gridcells > .cells``; one of several by its name, which is a
-    class too: ``.gridcells.frontiers > .cells``.
+    cell_height: float
+    """Metres along y."""
 
-    Args:
-        robot: The robot that they are about.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic: ``/move_base/local_costmap/inflated_obstacles`` of older
-            robots, frontiers of one that explores.
-        name: A further class.
-        frame: ``"map"``, or ``"robot"`` for cells in the robot's own frame.
-        max_cells: How many are drawn at the most, evenly chosen. That there are more
-            is said.
-        throttle: The least time between two messages, in milliseconds.
-        age_limit: Seconds after which they are drawn as old.
+    cells: list[PointMsg]
+    """Their middles, in metres."""
 
-    Raises:
-        ConfigError: If ``max_cells`` is less than 1.
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of a cell, in metres.
 
+        Raises:
+            ProtocolError: If a cell of that size cannot be drawn.
+
+        """
+        for name, side in (
+            ("cell_width", self.cell_width),
+            ("cell_height", self.cell_height),
+        ):
+            if not SMALLEST <= side <= FARTHEST:  # nor is NaN
+                raise ProtocolError(
+                    f"{name} must be from {SMALLEST:g} to {FARTHEST:g} m, got {side:g}"
+                )
+        return self.cell_width, self.cell_height
+
+
+@layer(
+    "nav_msgs/GridCells",
+    view=GridCellsMsg,
+    kinds=[
+        TopicKind(
+            "cells",
+            {
+                r"local_costmap/(?!unknown_space\Z)": "of a local costmap",
+                r"\A(?!.*unknown_space\Z)": (
+                    "its type alone, unless it is all that nobody knows"
+                ),
+            },
+        )
+    ],
+    switch="Cells",
+    rank=100,
+)
+class GridCells(RobotLayer):
+    """Cells, such as the inflated ones of older costmaps or frontiers of a robot.
+
+    The older costmaps have them on ``/move_base/local_costmap/inflated_obstacles``. A
+    cell is 0.1 mm wide at the least. Cells that touch along x are drawn as one
+    rectangle, which is short on the wire; a message without cells draws nothing.
+
+    Style it by CSS: ``.gridcells > .cells``, and one of several by its name:
+    ``.gridcells.frontiers > .cells``.
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str,
-        *,
-        name: str = "",
-        frame: str = "map",
-        max_cells: int = 5000,
-        throttle: int = 1000,
-        age_limit: float = 10.0,
-    ) -> None:
-        if max_cells < 1:
-            raise ConfigError(f"max_cells must be at least 1, got {max_cells}")
-        self.robot = robot
-        self.topic = topic
-        self.max_cells = max_cells
-        self.age_limit = age_limit
+    frame: Frame = "map"
+    """``"robot"`` for cells in the robot's own frame."""
+
+    max_cells: Count = 5000
+    """How many are drawn at the most, evenly chosen. That there are more is said; more
+    than 100 000 are refused."""
+
+    throttle: int = 1000
+    age_limit: float = 10.0
+
+    def build(self) -> None:
+        """Make the path of all cells."""
         self._message: GridCellsMsg | None = None
-        self.drawn = svg.path(
-            class_="cells",
-            fill="#0f766e",
-            fill_opacity=0.35,
-            stroke="none",
-            # Rows that touch would have seams between them.
-            shape_rendering="crispEdges",
-        )
-        self._placed = Placed(
-            robot, self.drawn, class_=f"gridcells {name}".strip(), frame=frame
-        )
-        self.svg = self._placed.svg
-        label(self.svg, topic, robot)
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_cells),
-            "nav_msgs/GridCells",
-            throttle=throttle,
-            decode=GridCellsMsg,
+        self.drawn = self.add(
+            svg.path(
+                class_="cells",
+                fill="#0f766e",
+                fill_opacity=0.35,
+                stroke="none",
+                # Rows that touch would have seams between them.
+                shape_rendering="crispEdges",
+            )
         )
 
     @property
@@ -112,14 +128,13 @@ class GridCells:
         given = self._message.cells if self._message is not None else []
         return [(cell.x, cell.y) for cell in given]
 
-    def on_cells(self, message: GridCellsMsg) -> None:
-        """Draw cells in place of those before.
+    def read(self, message: GridCellsMsg) -> tuple[GridCellsMsg, Rows, float, float]:
+        """Return the message, the rows of cells to draw, and a cell's width and height.
 
         Raises:
             ProtocolError: If one that is to be drawn is not finite or farther away than
                 anything can be, if their size makes no sense, or there are too many to
-                look at; or if there are more than ``max_cells``, but so many are drawn
-                then.
+                look at.
 
         """
         given = message.cells
@@ -127,25 +142,22 @@ class GridCells:
             raise ProtocolError(f"{len(given)} cells; {MAX_CELLS} are the limit")
         # Only these are looked at: 100,000 would hold up the other robots for 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_cells)]
-        size = message.size if chosen else (1.0, 1.0)
-        rows = rows_of(_usable(chosen), *size)
-        draw = partial(self._draw, rows, *size)
-        self._placed.stand_in(message.frame_id, message.stamp, draw)
-        self._message = message
-        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
+        width, height = message.size if chosen else (1.0, 1.0)
+        rows = rows_of(_usable(chosen), width, height)
         if len(given) > len(chosen):
             # Without their number, which would be another in every message.
-            raise ProtocolError(
+            self.complain(
                 f"there are more than {self.max_cells} cells, of which so many are "
                 "drawn, evenly chosen; max_cells says how many"
             )
+        return message, rows, width, height
 
-    def on_odometry_update(self) -> None:
-        """Keep them where they are while the robot goes along."""
-        self._placed.follow()
-
-    def _draw(self, rows: Rows, width: float, height: float, tilt: "Transform") -> None:
-        (a, b, c, x), (d, e, f, y), _ = tilt.rows
+    def draw(
+        self, found: tuple[GridCellsMsg, Rows, float, float], at: Transform
+    ) -> None:
+        """Draw the rows as they look from above."""
+        self._message, rows, width, height = found
+        (a, b, c, x), (d, e, f, y), _ = at.rows
         east, north, up = (rows.first - (width / 2, height / 2, 0)).T
         aside = f"{_short(b * height)} {_short(e * height)}"
 

@@ -1,32 +1,25 @@
 """The readings of a laser scanner, as dots."""
 
 import math
-from functools import partial
-from typing import TYPE_CHECKING
+from dataclasses import KW_ONLY
+from typing import TYPE_CHECKING, Annotated, Any
 
-from webmap.core.dots import in_units
-from webmap.core.from_above import levelled
-from webmap.core.layer_names import label
-from webmap.core.placed import Placed
-from webmap.core.refusals import refusing
-from webmap.core.scan_doubts import scan_doubt
+from webmap.config.robot import scan_name
+from webmap.core.declaration import FoundTopic, TopicKind, layer
+from webmap.core.drawing import in_units, levelled
+from webmap.core.layer_options import Limit
+from webmap.core.robot_layer import RobotLayer
 from webmap.errors import ProtocolError
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.bridge import Bridge
+from webmap.geometry import FARTHEST
 from webmap.ros.messages import LaserScanMsg
 from webmap.scene import svg
-from webmap.scope import Removal, keep
+from webmap.tf import Transform
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from webmap.core.robot import Robot
     from webmap.geometry import Pose
-    from webmap.tf import Transform
-
-AGE_LIMIT = 1.0
-"""Seconds after which a scan is drawn as old."""
 
 MAX_RAYS = 1 << 18
 """The most rays that a scan may have."""
@@ -45,8 +38,24 @@ class SweepMsg(LaserScanMsg, frozen=True, kw_only=True):
     """Seconds between neighbouring rays; 0 for a scan of one moment."""
 
 
-class LaserScanner:
-    """Draws a dot where each ray of a ``sensor_msgs/LaserScan`` hit something.
+@layer(
+    "sensor_msgs/LaserScan",
+    view=SweepMsg,
+    kinds=[
+        TopicKind(
+            "scan",
+            {r"/(?:base_)?scan\Z": "the usual name", "": "its type alone"},
+            most=6,
+            options={"max_dots": None, "throttle": 100},
+            role="scan",
+        )
+    ],
+    switch="Scans",
+    css="laserscan",
+    rank=20,
+)
+class LaserScanner(RobotLayer):
+    """A dot where each ray of a laser scan hit something.
 
     A scan stays on the map where the robot was at its stamp, and what the robot turned
     and moved while the scan was taken is made up for, so that walls stand still. Of a
@@ -54,95 +63,84 @@ class LaserScanner:
     here. One that hangs upside down, is tilted or stands on its side is drawn as its
     plane looks from above.
 
-    The dots can be styled by CSS: ``.laserscan > .dot``; their size is the custom
-    property ``--dot-size``, in metres.
-
-    Args:
-        robot: The robot that carries the sensor.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic.
-        x: Where the sensor is on the robot, in metres forward.
-        y: In metres to the left.
-        angle: Where it looks, in degrees from the robot's x, counter-clockwise.
-        max_dots: How many dots are drawn at the most; None for one per ray.
-        throttle: The least time between two scans, in milliseconds.
-        name: A further class, by which one of several is told:
-            ``.laserscan.rear > .dot``.
-
-    Raises:
-        ValueError: If ``max_dots`` is less than 1.
-
+    Style the dots by CSS: ``.laserscan > .dot``, and those of one of several by its
+    name: ``.laserscan.rear > .dot``; their size is the custom property ``--dot-size``,
+    in metres.
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str,
-        x: float = 0.0,
-        y: float = 0.0,
-        angle: float = 0.0,
-        max_dots: int | None = 50,
-        throttle: int = 300,
-        *,
-        name: str = "",
-    ) -> None:
-        if max_dots is not None and max_dots < 1:
-            raise ValueError(f"max_dots must be at least 1 or None, got {max_dots}")
-        self.robot = robot
-        self.max_dots = max_dots
-        self.topic = topic
-        self._dots = svg.path(class_="dot")
-        self._placed = Placed(
-            robot,
-            self._dots,
-            class_=f"laserscan {name}".strip(),
-            frame="robot",
-            x=x,
-            y=y,
-            angle=angle,
-        )
-        self.svg = self._placed.svg
-        label(self.svg, topic, robot)
-        keep(Removal(lambda: robot.clear_problem(self)))
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_scan),
-            "sensor_msgs/LaserScan",
-            throttle=throttle,
-            decode=SweepMsg,
-        )
+    frame = "robot"
 
-    def on_scan(self, scan: LaserScanMsg) -> None:
-        """Draw a scan in place of the one before.
+    x: float = 0.0
+    """Where the sensor is on the robot, in metres forward."""
+
+    y: float = 0.0
+    """In metres to the left."""
+
+    angle: float = 0.0
+    """Where it looks, in degrees from the robot's x, counter-clockwise."""
+
+    max_dots: Annotated[
+        int | None,
+        Limit("at least 1 or None", lambda value: value is None or value >= 1),
+    ] = 50
+    """How many dots are drawn at the most, evenly chosen; None for one per ray."""
+
+    throttle: int = 300
+
+    _: KW_ONLY
+
+    age_limit: float = 1.0
+
+    @classmethod
+    def options_for(cls, found: FoundTopic) -> dict[str, Any]:
+        """Return the options of a scan, with a class of its own for each of several."""
+        return {**super().options_for(found), "name": scan_name(found.number)}
+
+    def build(self) -> None:
+        """Make the path of all dots."""
+        self.dots = self.add(svg.path(class_="dot"))
+
+    def read(self, message: LaserScanMsg) -> "NDArray[np.float64]":
+        """Return where the rays hit, as the sensor was when the first one did.
 
         Raises:
             ProtocolError: If its angles make no sense, or it has too many rays.
 
         """
-        check_rays(scan)
-        doubt = scan_doubt(scan)
-        if doubt is None:
-            self.robot.clear_problem(self)
-        else:
-            self.robot.set_problem(self, f"{self.topic}: {doubt}")
-        found = scan_points(scan, self.max_dots)
-        if found is None:
-            return
-        points, rays = found
-        took = len(scan.ranges) * getattr(scan, "time_increment", 0.0)
+        check_rays(message)
+        doubt = scan_doubt(message)
+        if doubt is not None:
+            self.complain(doubt)
+        points, rays = scan_points(message, self.max_dots)
+        took = len(message.ranges) * getattr(message, "time_increment", 0.0)
         if 0.0 < took <= LONGEST_SWEEP and len(points):
-            moved = self._placed.moved_within(scan.frame_id, scan.stamp, took)
-            points = straightened(points, rays / len(scan.ranges), moved)
-        draw = partial(self._draw, points)
-        self._placed.stand_in(scan.frame_id, scan.stamp, draw)
-        self.svg.set_age(self._bridge.lag, limit=AGE_LIMIT)
+            moved = self.placed.moved_within(message.frame_id, message.stamp, took)
+            points = straightened(points, rays / len(message.ranges), moved)
+        return points
 
-    def _draw(self, points: "NDArray[np.float64]", tilt: "Transform") -> None:
-        points, _ = levelled(points, tilt)
+    def draw(self, found: "NDArray[np.float64]", at: Transform) -> None:
+        """Draw the dots as they look from above."""
+        points, _ = levelled(found, at)
         dots, unit = in_units(points)
-        self._dots.set_dots(dots.tobytes(), unit)
+        self.dots.set_dots(dots.tobytes(), unit)
+
+
+def scan_doubt(scan: LaserScanMsg) -> str | None:
+    """Return what a person should know of a scan; None if it is as it should be.
+
+    A scan all of whose readings are infinite is not odd: it is one of an empty field.
+    """
+    ranges = scan.ranges
+    count = len(ranges)
+    if not count:
+        return "its scans have no ranges; expected one distance for each ray"
+    # A number is itself, NaN is not; the first settles it for nearly every scan.
+    if ranges[0] != ranges[0] and not (ranges == ranges).any():
+        return (
+            f"none of its {count} ranges is a number, all are null or NaN; expected "
+            "metres, or infinity where nothing is"
+        )
+    return None
 
 
 def check_rays(scan: LaserScanMsg) -> None:
@@ -197,26 +195,23 @@ def straightened(
 
 def scan_points(
     scan: LaserScanMsg, max_dots: int | None = None
-) -> "tuple[NDArray[np.float64], NDArray[np.int64]] | None":
+) -> "tuple[NDArray[np.float64], NDArray[np.int64]]":
     """Return where the rays hit, in metres in the sensor's own frame.
 
     A ray counts if its range lies within the sensor's limits, which leaves out what
     REP 117 has a driver report for "too near", "nothing there" and "bad reading".
 
     Args:
-        scan: The scan.
+        scan: The scan, whose angles are finite.
         max_dots: Keep so many at the most, evenly spread over the rays, so that the
             same bearings are kept in every scan; None for all.
 
     Returns:
-        Points of shape (N, 2), in ray order, and the number of each one's ray; None if
-        the scan's angles are not finite.
+        Points of shape (N, 2), in ray order, and the number of each one's ray.
 
     """
     import numpy as np
 
-    if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)):
-        return None
     ranges = scan.ranges
     rays = np.arange(len(ranges))
     if max_dots is not None and len(ranges) > max_dots:

@@ -1,30 +1,82 @@
 """Where satellites have a robot."""
 
+import math
 import time
-from typing import TYPE_CHECKING
 
-from webmap.core.frames import frames_of
+import msgspec
+
+from webmap.core.declaration import TopicKind, layer
 from webmap.core.local_plane import LocalPlane
-from webmap.core.placed import Placed
-from webmap.core.refusals import refusing
+from webmap.core.robot_layer import RobotLayer
 from webmap.errors import ConfigError, ProtocolError
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages_fix import NavSatFixMsg
-from webmap.ros.names import split_type
+from webmap.geometry import FARTHEST
+from webmap.ros.messages import Stamped
 from webmap.scene import svg
 
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
-TYPES = ("sensor_msgs/NavSatFix", "gps_msgs/GPSFix", "gps_common/GPSFix")
-"""What tells of a fix."""
+class NavSatStatusMsg(msgspec.Struct, frozen=True):
+    """``sensor_msgs/NavSatStatus``."""
+
+    status: int = -1
+    """-1 no fix, 0 a fix, above a fix with corrections."""
 
 
-class NavSatFix:
-    """Draws a ``sensor_msgs/NavSatFix`` as a cross with a circle of its doubt.
+class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
+    """``sensor_msgs/NavSatFix``, and what a ``GPSFix`` says of the same."""
 
-    A ``GPSFix`` of ``gps_common`` or ``gps_msgs`` says the same in the same words.
+    latitude: float
+    """Degrees, north positive."""
+
+    longitude: float
+    """Degrees, east positive."""
+
+    status: NavSatStatusMsg = NavSatStatusMsg()
+    position_covariance: list[float] = msgspec.field(default_factory=list)
+    """Nine numbers in square metres: east, north and up."""
+
+    position_covariance_type: int = 0
+    """0 if nobody knows it."""
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Latitude and longitude, in degrees.
+
+        Raises:
+            ProtocolError: If they are on no globe.
+
+        """
+        lat, lon = self.latitude, self.longitude
+        if not (-90 <= lat <= 90 and -360 <= lon <= 360):
+            raise ProtocolError(
+                "a fix has a latitude of -90 to 90 degrees and a longitude, got "
+                f"{lat} and {lon}"
+            )
+        return lat, lon
+
+    @property
+    def deviation(self) -> float | None:
+        """The standard deviation in the plane, in metres; None if it is not known."""
+        c = self.position_covariance
+        if self.position_covariance_type == 0 or len(c) != 9:
+            return None
+        variance = max(c[0], c[4])
+        known = math.isfinite(c[0] + c[4]) and variance >= 0
+        return math.sqrt(variance) if known else None
+
+
+@layer(
+    "sensor_msgs/NavSatFix",
+    "gps_msgs/GPSFix",
+    "gps_common/GPSFix",
+    view=NavSatFixMsg,
+    kinds=[
+        TopicKind("fix", {r"/fix\Z": "the usual name", "": "its type alone"}, most=1),
+    ],
+    switch="Satellite fixes",
+    rank=130,
+)
+class NavSatFix(RobotLayer):
+    """A cross where satellites have a robot, with a circle of one standard deviation.
 
     A fix is put on the map as on a plane that touches the globe at a datum: lengths are
     right to 4 mm at 10 km from there, and to 0.5 m at 50 km. ``TileLayer`` with the
@@ -33,92 +85,72 @@ class NavSatFix:
 
     Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .doubt`` and
     ``.navsatfix.lost``.
-
-    Args:
-        robot: The robot that carries the receiver.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic.
-        datum: Latitude and longitude of the map's origin, in degrees. If not given,
-            the first fix is taken to be where the robot is on the map then; fixes
-            before it has a place there are not drawn.
-        east: How far the map's x is turned from east, in degrees, counter-clockwise
-            from above.
-        throttle: The least time between two fixes, in milliseconds.
-        age_limit: Seconds after which a fix is drawn as old.
-        type: Of the messages: ``sensor_msgs/NavSatFix`` or a ``GPSFix``.
-
-    Raises:
-        ConfigError: If the datum is on no globe, ``east`` is not finite, or messages of
-            the type tell of no fix.
-
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str = "/fix",
-        *,
-        datum: tuple[float, float] | None = None,
-        east: float = 0.0,
-        throttle: int = 500,
-        age_limit: float = 5.0,
-        type: str = "sensor_msgs/NavSatFix",
-    ) -> None:
-        if str(split_type(type)) not in TYPES:
-            raise ConfigError(f"type is one of {', '.join(TYPES)}, got {type!r}")
-        if datum is not None and len(datum) != 2:
+    topic: str = "/fix"
+
+    datum: tuple[float, float] | None = None
+    """Latitude and longitude of the map's origin, in degrees. If not given, the first
+    fix is taken to be where the robot is on the map then; fixes before it has a place
+    there are not drawn. A robot with frames and no map, which is quiet about that, is
+    taken to be where its odometry has it, until there is a map."""
+
+    east: float = 0.0
+    """How far the map's x is turned from east, in degrees, counter-clockwise from
+    above."""
+
+    throttle: int = 500
+    age_limit: float = 5.0
+
+    type: str = "sensor_msgs/NavSatFix"
+    """``sensor_msgs/NavSatFix``, or a ``GPSFix`` of ``gps_msgs`` or ``gps_common``,
+    which says the same in the same words."""
+
+    def build(self) -> None:
+        """Make the cross and the circle.
+
+        Raises:
+            ConfigError: If the datum is on no globe, or ``east`` is not finite.
+
+        """
+        if self.datum is not None and len(self.datum) != 2:
             raise ConfigError(
-                f"datum is a latitude and a longitude in degrees, got {datum!r}"
+                f"datum is a latitude and a longitude in degrees, got {self.datum!r}"
             )
-        self._east = east
-        self._plane = LocalPlane(*(datum or (0.0, 0.0)), east)
-        self.robot = robot
-        self.topic = topic
-        self.datum = datum
-        self.age_limit = age_limit
+        # Fixes are switched together: a robot has one place.
+        self.svg.unset("data-layer")
+        self._plane = LocalPlane(*(self.datum or (0.0, 0.0)), self.east)
         self.position: tuple[float, float] | None = None
         """The last fix on the map, in metres."""
         self._origin = (0.0, 0.0)
-        self._waiting = datum is None
-        self.doubt = svg.circle(class_="doubt", fill="#3b82c4", fill_opacity=0.2, r=0)
-        self.cross = svg.path(
-            class_="cross",
-            d="M-0.15 0H0.15M0 -0.15V0.15",
-            stroke="#1f5f99",
-            stroke_width=2,
-            vector_effect="non-scaling-stroke",
-            visibility="hidden",
+        self._waiting = self.datum is None
+        self.doubt = self.add(
+            svg.circle(class_="doubt", fill="#3b82c4", fill_opacity=0.2, r=0)
         )
-        self._placed = Placed(robot, self.doubt, self.cross, class_="navsatfix")
-        self.svg = self._placed.svg
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_fix),
-            type,
-            throttle=throttle,
-            decode=NavSatFixMsg,
+        self.cross = self.add(
+            svg.path(
+                class_="cross",
+                d="M-0.15 0H0.15M0 -0.15V0.15",
+                stroke="#1f5f99",
+                stroke_width=2,
+                vector_effect="non-scaling-stroke",
+                visibility="hidden",
+            )
         )
 
-    def on_fix(self, fix: NavSatFixMsg) -> None:
-        """Draw a fix in place of the one before.
+    def take(self, message: NavSatFixMsg) -> None:
+        """Draw a fix in place of the one before; it is on the globe, not in a frame.
 
         Raises:
-            ProtocolError: If it claims to be one and is on no globe; or if its doubt
-                is larger than that, but the fix is drawn then.
+            ProtocolError: If it claims to be one and is on no globe.
 
         """
-        lost = fix.status.status < 0
+        lost = message.status.status < 0
         if not lost:
-            _ = fix.place
+            _ = message.place
         self.svg.classes.toggle("lost", lost)
         if not lost:
-            self._go(fix)
-
-    def on_odometry_update(self) -> None:
-        """Keep the fix where it is while the robot goes along."""
-        self._placed.follow()
+            self._go(message)
 
     def _go(self, fix: NavSatFixMsg) -> None:
         place = fix.place
@@ -134,9 +166,9 @@ class NavSatFix:
         doubt = fix.deviation or 0.0
         self.doubt.set(r=doubt if doubt <= FARTHEST else 0.0)
         self.cross.unset("visibility")
-        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
+        self.svg.set_age(self.bridge.lag, limit=self.age_limit)
         if doubt > FARTHEST:
-            raise ProtocolError(
+            self.complain(
                 f"a fix has a doubt of {FARTHEST:g} m at the most, got {doubt:g} m, "
                 "which is not drawn"
             )
@@ -152,7 +184,7 @@ class NavSatFix:
         if on_map or self.datum is None:
             at = self.robot.position
             self.datum, self._origin = place, (at.x, at.y)
-            self._plane = LocalPlane(*place, self._east)
+            self._plane = LocalPlane(*place, self.east)
         self._waiting = not on_map
 
     def _is_on_map(self) -> bool | None:
@@ -161,7 +193,6 @@ class NavSatFix:
         if tf is None or pose is None or pose.frame_id in ("", tf["map_frame"]):
             return True
         # Many robots have frames and no map, and that is no mistake if it is quiet.
-        missing = (
-            time.monotonic() >= frames_of(tf["bridge"], tf["namespace"]).complete_from
-        )
+        frames = self.robot.whereabouts.frames
+        missing = frames is not None and time.monotonic() >= frames.complete_from
         return False if tf["quiet"] and missing else None

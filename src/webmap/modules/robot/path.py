@@ -1,83 +1,72 @@
 """The way that a robot's planner has in mind."""
 
 import math
-from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Annotated
 
-from webmap.core.from_above import flat, in_space
-from webmap.core.layer_names import label
-from webmap.core.placed import Placed, check_finite, rounded, thinned
-from webmap.core.refusals import refusing
-from webmap.errors import ConfigError
-from webmap.ros.bridge import Bridge
+from webmap.core.declaration import TopicKind, layer
+from webmap.core.drawing import check_finite, flat, in_space, rounded, thinned
+from webmap.core.layer_options import Limit
+from webmap.core.robot_layer import RobotLayer
+from webmap.geometry import Vector3
 from webmap.ros.messages import PathMsg
 from webmap.scene import svg
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-    from webmap.geometry import Vector3
-    from webmap.tf import Transform
+from webmap.tf import Transform
 
 
-class Path:
-    """Draws a ``nav_msgs/Path`` as a line, and fires ``on_path_update``.
+@layer(
+    "nav_msgs/Path",
+    view=PathMsg,
+    kinds=[
+        TopicKind(
+            "local plan",
+            {r"/local_plan\Z": "the usual name"},
+            most=1,
+            options={"name": "local"},
+        ),
+        TopicKind(
+            "path",
+            {
+                r"/plan\Z": "the usual name",
+                r"plan|path|trajectory": "named a way to go",
+                "": "its type alone",
+            },
+            most=6,
+            role="plan",
+        ),
+    ],
+    switch="Plans",
+    rank=40,
+)
+class Path(RobotLayer):
+    """A line that stays in place on the map while the robot goes along.
 
-    The poses are in the map's frame, or in the frame that the message names if the
-    robot knows frames. A path without poses takes the line away.
+    Fires ``on_path_update``. The poses are in the map's frame, or in the frame that the
+    message names if the robot knows frames. A path without poses takes the line away.
 
-    Style it by CSS: ``.path > polyline``; a second path can be told by its ``name``,
-    which is a class too: ``.path.local > polyline { stroke: orange }``.
-
-    Args:
-        robot: The robot that is to go there.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic.
-        name: A further class.
-        max_points: How many poses are drawn at the most, evenly chosen.
-        throttle: The least time between two paths, in milliseconds.
-        age_limit: Seconds after which the path is drawn as old.
-
-    Raises:
-        ConfigError: If ``max_points`` is less than 2.
-
+    Style it by CSS: ``.path > polyline``, and one of several by its name:
+    ``.path.local > polyline``.
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str = "/plan",
-        *,
-        name: str = "",
-        max_points: int = 500,
-        throttle: int = 500,
-        age_limit: float = 5.0,
-    ) -> None:
-        if max_points < 2:
-            raise ConfigError(f"max_points must be at least 2, got {max_points}")
-        self.robot = robot
-        self.topic = topic
-        self.max_points = max_points
-        self.age_limit = age_limit
+    topic: str = "/plan"
+
+    max_points: Annotated[int, Limit("at least 2", lambda value: value >= 2)] = 500
+    """How many poses are drawn at the most, evenly chosen."""
+
+    throttle: int = 500
+    age_limit: float = 5.0
+
+    def build(self) -> None:
+        """Make the line."""
         self._message: PathMsg | None = None
-        self.line = svg.polyline(
-            fill="none",
-            stroke="#12805c",
-            stroke_width=2,
-            stroke_linejoin="round",
-            vector_effect="non-scaling-stroke",
-        )
-        self._placed = Placed(robot, self.line, class_=f"path {name}".strip())
-        self.svg = self._placed.svg
-        label(self.svg, topic, robot)
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_path),
-            "nav_msgs/Path",
-            throttle=throttle,
-            decode=PathMsg,
+        self.line = self.add(
+            svg.polyline(
+                fill="none",
+                stroke="#12805c",
+                stroke_width=2,
+                stroke_linejoin="round",
+                vector_effect="non-scaling-stroke",
+            )
         )
 
     @property
@@ -94,28 +83,32 @@ class Path:
         """How long the path is, in metres; 0 if there is none."""
         return sum(math.dist(one, next) for one, next in pairwise(self.points))
 
-    def on_path(self, path: PathMsg) -> None:
-        """Draw a path in place of the one before.
+    def take(self, message: PathMsg) -> None:
+        """Draw a path in place of the one before, and fire ``on_path_update``.
 
         Raises:
-            ProtocolError: If a position that is to be drawn is not finite, or farther
-                away than anything can be.
+            ProtocolError: If it cannot be drawn.
+
+        """
+        super().take(message)
+        self._message = message
+        self.robot.notify_modules("on_path_update", self)
+
+    def read(self, message: PathMsg) -> list[Vector3]:
+        """Return the positions that are to be drawn.
+
+        Raises:
+            ProtocolError: If one of them is not finite, or farther away than anything
+                can be.
 
         """
         # Only these are looked at, so that a long path does not hold up other robots.
-        kept = thinned(len(path.poses), self.max_points)
-        chosen = [path.poses[index].pose.position for index in kept]
+        kept = thinned(len(message.poses), self.max_points)
+        chosen = [message.poses[index].pose.position for index in kept]
         check_finite([(place.x, place.y) for place in chosen], "a path")
-        drawn = in_space(chosen)
-        self._placed.stand_in(path.frame_id, path.stamp, partial(self._draw, drawn))
-        self._message = path
-        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
-        self.robot.notify_modules("on_path_update", self)
+        return in_space(chosen)
 
-    def on_odometry_update(self) -> None:
-        """Keep the path where it is while the robot goes along."""
-        self._placed.follow()
-
-    def _draw(self, points: "list[Vector3]", tilt: "Transform") -> None:
-        line = flat(points, tilt)
+    def draw(self, found: list[Vector3], at: Transform) -> None:
+        """Draw the line as it looks from above."""
+        line = flat(found, at)
         self.line.set(points=[(rounded(x), rounded(y)) for x, y in line])

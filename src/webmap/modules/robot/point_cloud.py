@@ -1,27 +1,32 @@
 """Clouds of points, seen from above."""
 
+import binascii
 import math
-from functools import partial
-from typing import TYPE_CHECKING
+from array import array
+from dataclasses import KW_ONLY
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from webmap.core.dots import in_units
-from webmap.core.from_above import levelled
-from webmap.core.layer_names import label
-from webmap.core.placed import Placed
-from webmap.core.refusals import refusing
-from webmap.errors import ConfigError
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages_cloud import PointCloud2Msg
+import msgspec
+
+from webmap.core.declaration import TopicKind, layer
+from webmap.core.drawing import in_units, levelled
+from webmap.core.layer_options import Count, Frame, Limit
+from webmap.core.robot_layer import RobotLayer
+from webmap.errors import ConfigError, ProtocolError
+from webmap.geometry import FARTHEST
+from webmap.ros.messages import Numbers, Stamped
 from webmap.scene import svg
 from webmap.scene.element import Element
+from webmap.tf import Transform
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from webmap.core.robot import Robot
-    from webmap.tf import Transform
+    Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64] | None]
+
+MAX_POINTS = 1 << 23
+"""The most points that a cloud may have."""
 
 MANY = 100_000
 """Points of which no more are looked at one by one."""
@@ -36,16 +41,186 @@ COLOURS = (
 """From low to high."""
 
 
-class ShownCloudMsg(PointCloud2Msg, frozen=True, kw_only=True):
-    """A cloud of which no more is handed over than can be drawn."""
+# By the constants of sensor_msgs/PointField.
+_FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
-    def digest(self) -> PointCloud2Msg:
-        """Return what is to be drawn; called in the worker process."""
+
+class Octets(Numbers):
+    """Bytes of ``uint8[]``: JSON brings them in base64, or as a list of numbers."""
+
+    typecode = "B"
+    __slots__ = ()
+
+    @classmethod
+    def _numbers(cls, value: object) -> "array[Any]":
+        if isinstance(value, str):
+            try:
+                value = binascii.a2b_base64(value)
+            except binascii.Error as error:
+                raise ValueError(f"it is not base64: {error}") from None
+        return super()._numbers(value)
+
+    def array(self) -> "NDArray[np.uint8]":
+        """Return the bytes as a read-only array of shape (N,), not copied."""
+        import numpy as np
+
+        return np.frombuffer(memoryview(self.values).toreadonly(), np.uint8)
+
+
+class PointFieldMsg(msgspec.Struct, frozen=True):
+    """``sensor_msgs/PointField``: one number of each point."""
+
+    name: str
+    offset: int
+    """Bytes from the point's beginning."""
+
+    datatype: int
+    """1 to 8: int8, uint8, int16, uint16, int32, uint32, float32, float64."""
+
+    count: int = 1
+
+
+class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
+    """``sensor_msgs/PointCloud2``."""
+
+    height: int
+    width: int
+    fields: list[PointFieldMsg]
+    point_step: int
+    """Bytes a point."""
+
+    row_step: int
+    """Bytes a row; more than its points take, if rows are padded."""
+
+    data: Octets
+    is_bigendian: bool = False
+
+    def columns(self, *names: str) -> "list[NDArray[np.float64]]":
+        """Return fields of all points, each of shape (N,).
+
+        Args:
+            *names: The fields' names.
+
+        Raises:
+            ProtocolError: If there is no such field, or the sizes do not fit.
+
+        """
+        import numpy as np
+
+        row_step = self._row_step
+        self._check_sizes(row_step)
+        order = ">" if self.is_bigendian else "<"
+        formats, offsets = [], []
+        for name in names:
+            field = self._field(name)
+            formats.append(order + _FORMATS[field.datatype])
+            offsets.append(field.offset)
+        try:
+            layout = np.dtype(
+                {
+                    "names": list(names),
+                    "formats": formats,
+                    "offsets": offsets,
+                    "itemsize": self.point_step,
+                }
+            )
+        except (ValueError, OverflowError) as error:
+            raise ProtocolError(
+                f"the fields {', '.join(names)} do not fit into points of "
+                f"{self.point_step} bytes: {error}"
+            ) from None
+        used = self.width * self.point_step
+        rows = self.data.array()[: self.height * row_step]
+        rows = rows.reshape(self.height, row_step)[:, :used]
+        points = np.ascontiguousarray(rows).reshape(-1).view(layout)
+        return [points[name].astype(np.float64) for name in names]
+
+    def digest(self) -> "PointCloud2Msg":
+        """Return what can be drawn of the cloud; called in the worker process."""
         return self.thinned(MOST)
 
+    def thinned(self, most: int) -> "PointCloud2Msg":
+        """Return the cloud with ``most`` points at the most, evenly chosen, in one row.
 
-class PointCloud:
-    """Draws a ``sensor_msgs/PointCloud2`` as dots, as it looks from above.
+        Raises:
+            ProtocolError: If the sizes do not fit.
+
+        """
+        row_step = self._row_step
+        self._check_sizes(row_step)
+        if self.width * self.height <= most:
+            return self
+        used = self.width * self.point_step
+        rows = self.data.array()[: self.height * row_step]
+        rows = rows.reshape(self.height, row_step)[:, :used]
+        step = 1 + (self.width * self.height - 1) // most
+        kept = rows.reshape(-1, self.point_step)[::step]
+        return msgspec.structs.replace(
+            self,
+            height=1,
+            width=len(kept),
+            row_step=len(kept) * self.point_step,
+            data=Octets(array("B", kept.tobytes())),
+        )
+
+    def has(self, name: str) -> bool:
+        """Return whether points have a field of this name."""
+        return any(field.name == name for field in self.fields)
+
+    def _field(self, name: str) -> PointFieldMsg:
+        for field in self.fields:
+            if field.name == name:
+                if field.datatype not in _FORMATS or field.offset < 0:
+                    raise ProtocolError(
+                        f"the field {name!r} has the datatype {field.datatype} at byte "
+                        f"{field.offset}; datatypes are 1 to 8"
+                    )
+                return field
+        known = ", ".join(repr(field.name) for field in self.fields) or "none"
+        raise ProtocolError(f"points have no field {name!r}; they have {known}")
+
+    @property
+    def _row_step(self) -> int:
+        """Bytes a row; some drivers leave that out of a cloud of a single row."""
+        if self.row_step == 0 and self.height == 1:
+            return self.width * self.point_step
+        return self.row_step
+
+    def _check_sizes(self, row_step: int) -> None:
+        size = f"a cloud of {self.width} x {self.height} points"
+        if self.width < 0 or self.height < 0:
+            raise ProtocolError(f"{size} has less than none")
+        if self.width * self.height > MAX_POINTS:
+            raise ProtocolError(f"{size} is too large: {MAX_POINTS} are the limit")
+        if self.point_step < 1 or row_step < self.width * self.point_step:
+            raise ProtocolError(
+                f"{size} of {self.point_step} bytes does not fit into rows of "
+                f"{row_step} bytes"
+            )
+        if len(self.data) < row_step * self.height:
+            raise ProtocolError(
+                f"{size} has rows of {row_step} bytes, but came with "
+                f"{len(self.data)} bytes in all"
+            )
+
+
+@layer(
+    "sensor_msgs/PointCloud2",
+    view=PointCloud2Msg,
+    kinds=[
+        TopicKind(
+            "cloud",
+            {r"points|cloud": "named points or a cloud", "": "its type alone"},
+            most=2,
+            options={"throttle": 1000, "colour_by": "z"},
+            role="cloud",
+        )
+    ],
+    switch="Clouds",
+    rank=30,
+)
+class PointCloud(RobotLayer):
+    """A cloud of points as dots, as it looks from above.
 
     Points are first taken from the cloud's frame to the map as both were at its stamp,
     with all of its turns and its height: a lidar may be tilted or hang upside down, and
@@ -58,128 +233,91 @@ class PointCloud:
     plane. Where no frames tell how the sensor is mounted, its z is taken to point up
     and to begin at the base.
 
-    Of points above one another one dot is drawn. With ``colour_by`` the dots are in
+    A cloud of one row may have a ``row_step`` of 0. Of points above one another one dot
+    is drawn. With ``colour_by`` the dots are in
     eight bands of a field's values, each with a class: ``band-0`` is the lowest.
 
     Style it by CSS: ``.pointcloud > .dot``, ``.pointcloud > .dot.band-7``; the dots'
     size is the custom property ``--dot-size``, in metres.
-
-    Args:
-        robot: The robot that carries the sensor.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic.
-        x: Where the sensor is on the robot, in metres forward.
-        y: In metres to the left.
-        angle: Where it looks, in degrees from the robot's x, counter-clockwise.
-        z_min: The height of the lowest point that is drawn, in metres above the base.
-        z_max: The height of the highest.
-        cell: Of points in one square of this side, in metres, one is drawn; 0 for
-            all.
-        max_points: How many dots are drawn at the most, evenly chosen.
-        colour_by: The name of the field whose values give the colours, such as
-            ``"intensity"``; ``"z"`` is the height above the base.
-        low: The value that begins the lowest band; the least of a cloud if not given.
-        high: The value that ends the highest band; the greatest if not given.
-        frame: ``"robot"``, or ``"map"`` for a cloud that is given in the map's.
-        throttle: The least time between two clouds, in milliseconds.
-        age_limit: Seconds after which a cloud is drawn as old.
-
-    Raises:
-        ConfigError: If a number makes no sense.
-
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str,
-        x: float = 0.0,
-        y: float = 0.0,
-        angle: float = 0.0,
-        *,
-        z_min: float = -math.inf,
-        z_max: float = math.inf,
-        cell: float = 0.05,
-        max_points: int = 3000,
-        colour_by: str | None = None,
-        low: float | None = None,
-        high: float | None = None,
-        frame: str = "robot",
-        throttle: int = 500,
-        age_limit: float = 2.0,
-    ) -> None:
-        if not z_min < z_max:
-            raise ConfigError(f"z_min must be below z_max, got {z_min} and {z_max}")
-        if not (cell >= 0 and math.isfinite(cell)):
-            raise ConfigError(f"cell must be metres of at least 0, got {cell}")
-        if max_points < 1:
-            raise ConfigError(f"max_points must be at least 1, got {max_points}")
-        self.robot = robot
-        self.topic = topic
-        self.window = (z_min, z_max)
-        self.cell = cell
-        self.max_points = max_points
-        self.colour_by = colour_by
-        self.range = (low, high)
-        self.age_limit = age_limit
+    x: float = 0.0
+    """Where the sensor is on the robot, in metres forward."""
+
+    y: float = 0.0
+    """In metres to the left."""
+
+    angle: float = 0.0
+    """Where it looks, in degrees from the robot's x, counter-clockwise."""
+
+    _: KW_ONLY
+
+    z_min: float = -math.inf
+    """The height of the lowest point that is drawn, in metres above the base."""
+
+    z_max: float = math.inf
+    """The height of the highest."""
+
+    cell: Annotated[
+        float, Limit("metres of at least 0", lambda side: 0 <= side < math.inf)
+    ] = 0.05
+    """Of points in one square of this side, in metres, one is drawn; 0 for all."""
+
+    max_points: Count = 3000
+    """How many dots are drawn at the most, evenly chosen."""
+
+    colour_by: str | None = None
+    """The name of the field whose values give the colours, such as ``"intensity"``;
+    ``"z"`` is the height above the base."""
+
+    low: float | None = None
+    """The value that begins the lowest band; the least of a cloud if not given."""
+
+    high: float | None = None
+    """The value that ends the highest band; the greatest if not given."""
+
+    frame: Frame = "robot"
+    """``"map"`` for a cloud that is given in the map's frame."""
+
+    throttle: int = 500
+    age_limit: float = 2.0
+
+    def build(self) -> None:
+        """Make a path of dots, or one for each band of colours.
+
+        Raises:
+            ConfigError: If ``z_min`` is not below ``z_max``.
+
+        """
+        if not self.z_min < self.z_max:
+            raise ConfigError(
+                f"z_min must be below z_max, got {self.z_min} and {self.z_max}"
+            )
         self.dots: list[Element] = [
             svg.path(class_=f"dot band-{number}", fill=colour)
             for number, colour in enumerate(COLOURS)
         ]
-        if colour_by is None:
+        if self.colour_by is None:
             self.dots = [svg.path(class_="dot", fill="#c2410c")]
-        self._placed = Placed(
-            robot,
-            *self.dots,
-            class_="pointcloud",
-            frame=frame,
-            x=x,
-            y=y,
-            angle=angle,
-        )
-        self.svg = self._placed.svg
-        label(self.svg, topic, robot)
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_cloud),
-            "sensor_msgs/PointCloud2",
-            throttle=throttle,
-            decode=ShownCloudMsg,
-        )
+        self.svg.append(*self.dots)
 
-    def on_cloud(self, cloud: PointCloud2Msg) -> None:
-        """Draw a cloud in place of the one before; one without points draws nothing.
-
-        Raises:
-            ProtocolError: If its sizes do not fit, or it has not the fields.
-
-        """
-        points, values = self._read(cloud)
-        draw = partial(self._draw, points, values)
-        self._placed.stand_in(cloud.frame_id, cloud.stamp, draw)
-        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
-
-    def on_odometry_update(self) -> None:
-        """Keep a cloud in the map's frame where it is while the robot goes along."""
-        self._placed.follow()
-
-    def _read(
-        self, cloud: PointCloud2Msg
-    ) -> "tuple[NDArray[np.float64], NDArray[np.float64] | None]":
+    def read(self, message: PointCloud2Msg) -> "Found":
         """Return points of the cloud's frame, and a field's values.
 
         Points are of shape (N, 3), or (N, 2) if the cloud has no heights.
+
+        Raises:
+            ProtocolError: If the sizes of a cloud do not fit, or it has not the fields.
+
         """
         import numpy as np
 
-        high = cloud.has("z") or self.colour_by == "z"
+        high = message.has("z") or self.colour_by == "z"
         axes = ["x", "y", "z"] if high else ["x", "y"]
         names = list(axes)
         if self.colour_by is not None and self.colour_by not in names:
             names.append(self.colour_by)
-        columns = dict(zip(names, cloud.columns(*names), strict=True))
+        columns = dict(zip(names, message.columns(*names), strict=True))
         keep = np.ones(len(columns["x"]), dtype=bool)
         for axis in axes:
             keep &= abs(columns[axis]) < FARTHEST  # nor is what is not finite
@@ -188,14 +326,10 @@ class PointCloud:
             return points, None
         return points, columns[str(self.colour_by)][keep]
 
-    def _draw(
-        self,
-        points: "NDArray[np.float64]",
-        values: "NDArray[np.float64] | None",
-        tilt: "Transform",
-    ) -> None:
+    def draw(self, found: "Found", at: Transform) -> None:
         """Draw what is left of the points when they are flat."""
-        places, heights = levelled(points, tilt)
+        points, values = found
+        places, heights = levelled(points, at)
         if self.colour_by == "z":
             values = heights
         chosen = self._choose(places, heights if points.shape[1] == 3 else None)
@@ -220,8 +354,8 @@ class PointCloud:
 
         chosen = np.arange(len(places))
         if heights is not None:
-            z_min, z_max = self.window
-            chosen = np.flatnonzero((heights >= z_min) & (heights <= z_max))
+            seen = (heights >= self.z_min) & (heights <= self.z_max)
+            chosen = np.flatnonzero(seen)
         chosen = chosen[:: 1 + len(chosen) // MANY]
         if self.cell and len(chosen):
             chosen = chosen[one_a_cell(places[chosen], self.cell)]
@@ -234,7 +368,7 @@ class PointCloud:
         import numpy as np
 
         known = values[np.isfinite(values)]
-        low, high = self.range
+        low, high = self.low, self.high
         if low is None:
             low = float(known.min()) if len(known) else 0.0
         if high is None:

@@ -1,86 +1,94 @@
 """Many poses at once, such as the particles of a localisation."""
 
 import math
-from typing import TYPE_CHECKING
 
-from webmap.core.layer_names import label
-from webmap.core.placed import Placed, thinned
-from webmap.core.refusals import refusing
-from webmap.errors import ConfigError, ProtocolError
+import msgspec
+
+from webmap.core.declaration import TopicKind, layer
+from webmap.core.drawing import thinned
+from webmap.core.layer_options import Count, Frame, Metres
+from webmap.core.robot_layer import RobotLayer
 from webmap.geometry import Pose
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages_poses import ParticleCloudMsg, PoseArrayMsg
-from webmap.ros.names import split_type
+from webmap.ros.messages import PoseMsg, Stamped
 from webmap.scene import svg
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-
-VIEWS: dict[str, type[PoseArrayMsg] | type[ParticleCloudMsg]] = {
-    "geometry_msgs/PoseArray": PoseArrayMsg,
-    "nav2_msgs/ParticleCloud": ParticleCloudMsg,
-}
+from webmap.tf import Transform
 
 
-class PoseArray:
-    """Draws an arrow for each pose of a topic, in the map's frame.
+class PoseArrayMsg(Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/PoseArray``."""
+
+    poses: list[PoseMsg]
+
+
+class ParticleMsg(msgspec.Struct, frozen=True, gc=False):
+    """``nav2_msgs/Particle``."""
+
+    pose: PoseMsg
+    weight: float = 0.0
+
+
+class ParticleCloudMsg(Stamped, frozen=True, kw_only=True):
+    """``nav2_msgs/ParticleCloud``."""
+
+    particles: list[ParticleMsg]
+
+    @property
+    def poses(self) -> list[PoseMsg]:
+        """The poses, as in ``geometry_msgs/PoseArray``."""
+        return [particle.pose for particle in self.particles]
+
+
+POSES, PARTICLES = "geometry_msgs/PoseArray", "nav2_msgs/ParticleCloud"
+
+
+@layer(
+    POSES,
+    PARTICLES,
+    view={POSES: PoseArrayMsg, PARTICLES: ParticleCloudMsg},
+    kinds=[
+        TopicKind("particles", most=1, types=(PARTICLES,)),
+        TopicKind(
+            "particles",
+            {r"particle_?cloud\Z": "the usual name"},
+            most=1,
+            types=(POSES,),
+        ),
+        TopicKind("poses", types=(POSES,)),
+    ],
+    switch="Poses",
+    rank=50,
+)
+class PoseArray(RobotLayer):
+    """An arrow for each of many poses, such as ``/particlecloud`` of AMCL in ROS 1.
+
+    Poses with a quaternion of zeros are left out, and how many is said.
 
     Style them by CSS: ``.posearray > .arrow``.
-
-    Args:
-        robot: The robot that they are about.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic: ``/particlecloud`` of amcl in ROS 1, ``/particle_cloud`` in
-            ROS 2.
-        type: ``geometry_msgs/PoseArray`` or ``nav2_msgs/ParticleCloud``.
-        frame: ``"map"``, or ``"robot"`` for poses in the robot's own frame.
-        length: How long an arrow is, in metres.
-        max_poses: How many are drawn at the most, evenly chosen.
-        throttle: The least time between two messages, in milliseconds.
-        age_limit: Seconds after which they are drawn as old.
-
-    Raises:
-        ConfigError: If the type has no poses, or a number makes no sense.
-
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str,
-        *,
-        type: str = "geometry_msgs/PoseArray",
-        frame: str = "map",
-        length: float = 0.2,
-        max_poses: int = 500,
-        throttle: int = 500,
-        age_limit: float = 10.0,
-    ) -> None:
-        view = VIEWS.get(str(split_type(type)))
-        if view is None:
-            raise ConfigError(f"type is one of {', '.join(VIEWS)}, got {type!r}")
-        if max_poses < 1:
-            raise ConfigError(f"max_poses must be at least 1, got {max_poses}")
-        if not (math.isfinite(length) and length > 0):
-            raise ConfigError(f"length must be metres above 0, got {length}")
-        self.robot = robot
-        self.topic = topic
-        self.length = length
-        self.max_poses = max_poses
-        self.age_limit = age_limit
+    in_plane = True
+
+    type: str = POSES
+    """``geometry_msgs/PoseArray`` or ``nav2_msgs/ParticleCloud``, which is
+    ``/particle_cloud`` of Nav2."""
+
+    frame: Frame = "map"
+    """``"robot"`` for poses in the robot's own frame."""
+
+    length: Metres = 0.2
+    """How long an arrow is, in metres."""
+
+    max_poses: Count = 500
+    """How many are drawn at the most, evenly chosen."""
+
+    throttle: int = 500
+    age_limit: float = 10.0
+
+    def build(self) -> None:
+        """Make the path of all arrows."""
         self._message: PoseArrayMsg | ParticleCloudMsg | None = None
-        self.arrows = svg.path(class_="arrow", fill="#d03a7c", fill_opacity=0.7)
-        self._placed = Placed(robot, self.arrows, class_="posearray", frame=frame)
-        self.svg = self._placed.svg
-        label(self.svg, topic, robot)
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_poses),
-            type,
-            throttle=throttle,
-            decode=view,
+        self.arrows = self.add(
+            svg.path(class_="arrow", fill="#d03a7c", fill_opacity=0.7)
         )
 
     @property
@@ -95,32 +103,33 @@ class PoseArray:
         given = self._message.poses if self._message is not None else []
         return [pose.usable for pose in given if not pose.turns_nowhere]
 
-    def on_poses(self, message: PoseArrayMsg | ParticleCloudMsg) -> None:
-        """Draw poses in place of those before; none draw nothing.
+    def read(
+        self, message: PoseArrayMsg | ParticleCloudMsg
+    ) -> tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]]:
+        """Return the message and those of its poses that are to be drawn.
 
         Raises:
-            ProtocolError: If one that is to be drawn is not finite; or if one turns
-                nowhere, but the others are drawn then.
+            ProtocolError: If one of them is not finite.
 
         """
         given = message.poses
         # Only these are looked at: 20,000 would hold up the other robots for 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_poses)]
         poses = [pose.usable for pose in chosen if not pose.turns_nowhere]
-        self._placed.stand_in(message.frame_id, message.stamp)
-        self._message = message
-        self.arrows.set(d="".join(arrow(pose, self.length) for pose in poses) or None)
-        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
         missing = len(chosen) - len(poses)
         if missing:
-            raise ProtocolError(
+            self.complain(
                 f"{missing} of {len(chosen)} poses have a quaternion of zeros, which "
                 "turns nowhere, and are left out"
             )
+        return message, poses
 
-    def on_odometry_update(self) -> None:
-        """Keep them where they are while the robot goes along."""
-        self._placed.follow()
+    def draw(
+        self, found: tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]], at: Transform
+    ) -> None:
+        """Draw the arrows; no poses draw nothing."""
+        self._message, poses = found
+        self.arrows.set(d="".join(arrow(pose, self.length) for pose in poses) or None)
 
 
 def arrow(pose: Pose, length: float) -> str:

@@ -1,29 +1,49 @@
 """Sonars and other sensors that measure one distance."""
 
 import math
-from functools import partial
-from typing import TYPE_CHECKING
+from dataclasses import KW_ONLY
 
-from webmap.core.from_above import cone
-from webmap.core.layer_names import label
-from webmap.core.placed import Placed, sector
-from webmap.core.refusals import refusing
+from webmap.core.declaration import TopicKind, layer
+from webmap.core.drawing import cone, sector
+from webmap.core.robot_layer import RobotLayer
 from webmap.errors import ProtocolError
-from webmap.geometry.reach import FARTHEST
-from webmap.ros.bridge import Bridge
-from webmap.ros.messages_poses import RangeMsg
+from webmap.geometry import FARTHEST
+from webmap.ros.messages import Stamped
 from webmap.scene import svg
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-    from webmap.tf import Transform
+from webmap.tf import Transform
 
 LEVEL = 0.02
 """Sine of the angle up or down below which a sensor is said to look ahead."""
 
 
-class Range:
-    """Draws a ``sensor_msgs/Range`` as a cone up to what it measures.
+class RangeMsg(Stamped, frozen=True, kw_only=True):
+    """``sensor_msgs/Range``: one ray, as wide as a cone."""
+
+    field_of_view: float
+    """The cone's whole angle, in radians."""
+
+    min_range: float
+    """Metres."""
+
+    max_range: float
+    """Metres."""
+
+    range: float
+    """Metres; infinite if nothing is there, NaN if it does not know."""
+
+    radiation_type: int = 0
+    """0 ultrasound, 1 infrared."""
+
+
+@layer(
+    "sensor_msgs/Range",
+    view=RangeMsg,
+    kinds=[TopicKind("range", most=8)],
+    switch="Ranges",
+    rank=110,
+)
+class Range(RobotLayer):
+    """A cone up to what a sensor measures; the cone is in the robot's frame.
 
     The cone ends where something is, or at the sensor's reach if nothing is there;
     then it has the class ``clear``. Without a reading there is no cone. A sensor of
@@ -32,56 +52,35 @@ class Range:
     about its own axis does not matter.
 
     Style it by CSS: ``.range > .cone`` and ``.range > .cone.clear``.
-
-    Args:
-        robot: The robot that carries the sensor; the cone is in its frame.
-        bridge: The link to the ROS system that has the topic.
-        topic: The topic.
-        x: Where the sensor is on the robot, in metres forward.
-        y: In metres to the left.
-        angle: Where it looks, in degrees from the robot's x, counter-clockwise.
-        throttle: The least time between two messages, in milliseconds.
-        age_limit: Seconds after which it is drawn as old.
-
     """
 
-    def __init__(
-        self,
-        robot: "Robot",
-        bridge: Bridge,
-        topic: str,
-        x: float = 0.0,
-        y: float = 0.0,
-        angle: float = 0.0,
-        *,
-        throttle: int = 200,
-        age_limit: float = 1.0,
-    ) -> None:
-        self.robot = robot
-        self.topic = topic
-        self.age_limit = age_limit
+    encoding = "binary"  # text has no infinity, which is a reading
+
+    frame = "robot"
+
+    x: float = 0.0
+    """Where the sensor is on the robot, in metres forward."""
+
+    y: float = 0.0
+    """In metres to the left."""
+
+    angle: float = 0.0
+    """Where it looks, in degrees from the robot's x, counter-clockwise."""
+
+    _: KW_ONLY
+
+    age_limit: float = 1.0
+
+    def build(self) -> None:
+        """Make the cone."""
         self.distance: float | None = None
         """In metres; infinite if nothing is in reach, None if that is not known."""
-        self.cone = svg.path(
-            class_="cone", fill="#d9822b", fill_opacity=0.35, stroke="none"
-        )
-        self._placed = Placed(
-            robot, self.cone, class_="range", frame="robot", x=x, y=y, angle=angle
-        )
-        self.svg = self._placed.svg
-        label(self.svg, topic, robot)
-        self._bridge = bridge
-        bridge.subscribe(
-            topic,
-            refusing(robot, topic, self.on_range),
-            "sensor_msgs/Range",
-            throttle=throttle,
-            decode=RangeMsg,
-            compression="cbor",  # JSON takes infinity, which is a reading, for none
+        self.cone = self.add(
+            svg.path(class_="cone", fill="#d9822b", fill_opacity=0.35, stroke="none")
         )
 
-    def on_range(self, message: RangeMsg) -> None:
-        """Draw a reading in place of the one before.
+    def read(self, message: RangeMsg) -> tuple[float | None, float, float]:
+        """Return the distance, and the length and half the angle of the cone.
 
         Raises:
             ProtocolError: If the sensor's own numbers make no sense.
@@ -108,16 +107,15 @@ class Range:
                 f"a cone is {FARTHEST:g} m long at the most, got a max_range of "
                 f"{reach:g} m with nothing nearer"
             )
-        draw = partial(self._draw, drawn, view / 2)
-        self._placed.stand_in(message.frame_id, message.stamp, draw)
-        self.distance = distance
-        self.cone.classes.toggle("clear", self.distance == math.inf)
-        self.svg.set_age(self._bridge.lag, limit=self.age_limit)
+        return distance, drawn, view / 2
 
-    def _draw(self, reach: float, half: float, tilt: "Transform") -> None:
-        if abs(tilt.rows[2][0]) < LEVEL:
+    def draw(self, found: tuple[float | None, float, float], at: Transform) -> None:
+        """Draw the cone as it looks from above."""
+        self.distance, reach, half = found
+        self.cone.classes.toggle("clear", self.distance == math.inf)
+        if abs(at.rows[2][0]) < LEVEL:
             self.cone.set(d=sector(reach, half))
             return
-        outline = cone(reach, half, tilt) if reach > 0 else []
+        outline = cone(reach, half, at) if reach > 0 else []
         corners = "L".join(f"{x:.4f} {y:.4f}" for x, y in outline)
         self.cone.set(d=f"M{corners}z" if len(outline) > 2 else None)

@@ -5,7 +5,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from webmap.core.refusals import refusing
+from webmap.core.problems import refusing
 from webmap.errors import ConfigError
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_log import LEVELS, LogMsg

@@ -4,7 +4,8 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
-from webmap.core.placed import Placed, rounded
+from webmap.core.drawing import rounded
+from webmap.core.placed import Placed
 from webmap.errors import ConfigError
 from webmap.scene import svg
 from webmap.scene.element import Element
@@ -69,7 +70,6 @@ class Trail:
 
     def on_odometry_update(self) -> None:
         """Go on to where the robot is now."""
-        self._placed.follow()
         at = (self.robot.position.x, self.robot.position.y)
         far = math.inf if self._last is None else math.dist(self._last, at)
         if far < self.step:

@@ -1,9 +1,85 @@
 """What robots say beside odometry and scans, worked out only while somebody listens.
 
 Costmaps, clouds, footprints, particles, doubts, look-ahead points, sonars, fixes,
-markers, health and logs, under the names that Nav2 and move_base give them.
+markers, health and logs, under the names that Nav2 and move_base give them. All are
+advertised for each robot, and published when they are due.
 """
 
-from webmap.sim.feeds.all import Feeds
+from typing import TYPE_CHECKING
 
-__all__ = ["Feeds"]
+from webmap.sim.feeds.cloud import Clouds
+from webmap.sim.feeds.depth import DepthClouds
+from webmap.sim.feeds.feed import Feed
+from webmap.sim.feeds.health import Health
+from webmap.sim.feeds.localization import Localizations, Satellites
+from webmap.sim.feeds.logs import Logs
+from webmap.sim.feeds.marks import Marks
+from webmap.sim.feeds.navigation import CostmapTopics, Footprints, Lookaheads
+from webmap.sim.feeds.sonar import Sonars
+
+if TYPE_CHECKING:
+    from webmap.sim.node import RobotsNode
+
+
+class Feeds:
+    """What the robots of a node say besides.
+
+    Args:
+        node: Of the robots.
+        step: Seconds of a step of the world.
+
+    """
+
+    def __init__(self, node: "RobotsNode", step: float) -> None:
+        self._node = node
+        self._step = step
+        self.localizations = Localizations(node)
+        self._costmaps = CostmapTopics(node)
+        self._health = Health(node)
+        self._logs = Logs(node)
+        self._feeds: tuple[Feed, ...] = (
+            *self.localizations.feeds,
+            Clouds(node).feed,
+            Footprints(node).feed,
+            Lookaheads(node).feed,
+            Sonars(node).feed,
+            Satellites(node).feed,
+            Marks(node).feed,
+            *([DepthClouds(node).feed] if node.tilted else ()),
+        )
+
+    def start(self) -> None:
+        """Advertise and subscribe everything."""
+        for robot in self._node.world.robots:
+            for feed in self._feeds:
+                self._node.advertise(f"{robot.topics}/{feed.topic}", feed.type)
+        self.localizations.start()
+        self._costmaps.start()
+        self._health.start()
+        self._logs.start()
+
+    def publish(self, steps: int) -> None:
+        """Publish what is due and wanted.
+
+        Args:
+            steps: How many the world has made.
+
+        """
+        graph = self._node.graph
+        for feed in self._feeds:
+            if not self._is_due(steps, feed.period):
+                continue
+            for index, robot in enumerate(self._node.world.robots):
+                topic = f"{robot.topics}/{feed.topic}"
+                if graph.is_wanted(topic):
+                    message = feed.make(index, topic, graph.clock())
+                    if message is not None:
+                        self._node.publish(topic, message)
+        if self._is_due(steps, 0.2):
+            self._costmaps.publish()
+            self._logs.publish()
+        if self._is_due(steps, 1.0):
+            self._health.publish()
+
+    def _is_due(self, steps: int, period: float) -> bool:
+        return steps % round(period / self._step) == 0

@@ -1,4 +1,4 @@
-"""Where robots believe to be: a pose, how sure of it, and particles."""
+"""Where robots believe to be: a pose, how sure, particles, and a satellite fix."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from webmap.geometry import Pose, normalize_angle
+from webmap.ros.rosbridge.server.encode import Publication
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.messages import Message, pose, read_pose
-from webmap.sim.rosbridge.encode import Publication
 
 if TYPE_CHECKING:
     from webmap.sim.node import RobotsNode
@@ -21,6 +21,15 @@ robot that has driven about."""
 
 HALVED = 0.5
 """Metres of way in which a doubt, and an error, gets half as large."""
+
+DATUM = (48.4, 9.95)
+"""Latitude and longitude of the map's origin, in degrees; its x points east."""
+
+DEVIATION = 0.3
+"""Standard deviation that is claimed, in metres."""
+
+_SEMI_MAJOR, _FLATTENING = 6378137.0, 1 / 298.257223563
+_AUGMENTED, _GPS, _DIAGONAL = 1, 1, 2
 
 
 class Belief:
@@ -148,3 +157,42 @@ class Localizations:
             "header": self._node.messages.dialect.header(topic, stamp, "map"),
             "poses": [pose(Pose(*place)) for place in places],
         }
+
+
+class Satellites:
+    """Makes ``sensor_msgs/NavSatFix`` of where robots truly are."""
+
+    def __init__(self, node: "RobotsNode") -> None:
+        self._node = node
+        self.feed = Feed("fix", "sensor_msgs/NavSatFix", 0.5, self._make)
+
+    def _make(self, index: int, topic: str, stamp: float) -> Message:
+        robot = self._node.world.robots[index]
+        latitude, longitude = on_the_globe(robot.pose.x, robot.pose.y)
+        covariance = [0.0] * 9
+        covariance[0] = covariance[4] = DEVIATION**2
+        covariance[8] = (2 * DEVIATION) ** 2
+        return {
+            "header": self._node.messages.dialect.header(
+                topic, stamp, f"{robot.frames}base_link"
+            ),
+            "status": {"status": _AUGMENTED, "service": _GPS},
+            "latitude": latitude,
+            "longitude": longitude,
+            "altitude": 480.0,
+            "position_covariance": covariance,
+            "position_covariance_type": _DIAGONAL,
+        }
+
+
+def on_the_globe(x: float, y: float) -> tuple[float, float]:
+    """Return latitude and longitude in degrees of a place of the map, in metres."""
+    latitude = math.radians(DATUM[0])
+    squared = _FLATTENING * (2 - _FLATTENING)
+    bend = 1 - squared * math.sin(latitude) ** 2
+    meridian = _SEMI_MAJOR * (1 - squared) / bend**1.5
+    parallel = _SEMI_MAJOR / math.sqrt(bend) * math.cos(latitude)
+    return (
+        DATUM[0] + math.degrees(y / meridian),
+        DATUM[1] + math.degrees(x / parallel),
+    )

@@ -88,6 +88,13 @@ class Marks:
         alpha: float = 1.0,
         lifetime: float = 0.0,
     ) -> dict[str, Any]:
+        dialect = self._node.messages.dialect
+        texture: Message = {}
+        mesh_file: Message = {}
+        if dialect.is_ros2:
+            image = {"header": dialect.header("", 0.0, ""), "format": "", "data": b""}
+            texture = {"texture_resource": "", "texture": image, "uv_coordinates": []}
+            mesh_file = {"mesh_file": {"filename": "", "data": b""}}
         return {
             "ns": space,
             "id": number,
@@ -96,11 +103,13 @@ class Marks:
             "pose": pose(at),
             "scale": dict(zip("xyz", map(float, scale), strict=True)),
             "color": dict(zip("rgba", (*color, alpha), strict=True)),
-            "lifetime": self._node.messages.dialect.time(lifetime),
+            "lifetime": dialect.time(lifetime),
             "frame_locked": False,
             "points": [],
             "colors": [],
+            **texture,
             "text": text,
             "mesh_resource": "",
+            **mesh_file,
             "mesh_use_embedded_materials": False,
         }

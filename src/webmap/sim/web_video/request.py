@@ -1,12 +1,20 @@
 """What a client of the cameras asks for, as it stands in its request. No I/O."""
 
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 from urllib.parse import parse_qsl, urlsplit
 
-from webmap.sim.rosbridge.dialect import resolve
-from webmap.sim.web_video.form import MOST_SIDE, Form
+from PIL import Image
+
+from webmap.ros.rosbridge.server.dialect import resolve
+
+MOST_SIDE = 4096
+"""Pixels of the longest side that a picture is made or read with."""
+
+_TOO_LARGE = (Image.DecompressionBombError, Image.DecompressionBombWarning)
+
 
 EXAMPLE = "/stream?topic=/robot_0/camera/image_raw&type=mjpeg"
 
@@ -18,6 +26,56 @@ _PATHS: dict[str, Literal["list", "stream", "snapshot"]] = {
 _TYPES = ("mjpeg", "ros_compressed")
 _MOST_PARAMETERS = 32
 _SHOWN = 80
+
+
+class NoPicture(Exception):
+    """What a topic brought is no JPEG that can be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """The form of a picture; what is None stays as the camera has it."""
+
+    quality: int | None = None
+    """1 to 100."""
+
+    width: int | None = None
+    """In pixels; the height does not follow by itself."""
+
+    height: int | None = None
+    """In pixels."""
+
+    inverted: bool = False
+    """Whether it is turned by half a turn."""
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether pictures go out byte by byte as they came."""
+        return self == Form()
+
+    def apply(self, jpeg: bytes) -> bytes:
+        """Return a picture in this form.
+
+        Raises:
+            NoPicture: If it is none.
+
+        """
+        try:
+            with Image.open(io.BytesIO(jpeg), formats=("JPEG",)) as opened:
+                if max(opened.size) > MOST_SIDE:
+                    raise NoPicture(f"a picture of {opened.width} x {opened.height}")
+                shown: Image.Image = opened.convert("RGB")
+        except (OSError, ValueError, SyntaxError, *_TOO_LARGE) as error:
+            raise NoPicture(str(error)) from error
+        size = (self.width or shown.width, self.height or shown.height)
+        if size != shown.size:
+            shown = shown.resize(size)
+        if self.inverted:
+            shown = shown.transpose(Image.Transpose.ROTATE_180)
+        file = io.BytesIO()
+        # 95 is what web_video_server takes where nobody says.
+        shown.save(file, "JPEG", quality=self.quality or 95)
+        return file.getvalue()
 
 
 class Refusal(Exception):

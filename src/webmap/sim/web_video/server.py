@@ -7,12 +7,19 @@ import logging
 import socket
 from urllib.parse import quote
 
-from webmap.sim.rosbridge.graph import Graph
-from webmap.sim.web_video.feed import NewestPicture, image_topics
-from webmap.sim.web_video.form import NoPicture
-from webmap.sim.web_video.request import Refusal, Request, read_request
+from webmap.ros.rosbridge.server.encode import Publication
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.sim.web_video.request import NoPicture, Refusal, Request, read_request
 
 log = logging.getLogger("webmap.sim")
+
+NODE = "/web_video_server"
+COMPRESSED = "/compressed"
+"""What stands behind the name of an image's topic where its JPEG pictures are."""
+
+_TYPE = "sensor_msgs/CompressedImage"
+_JPEG = b"\xff\xd8\xff"
+
 
 MOST_CONNECTIONS = 64
 MOST_HEAD = 8192
@@ -33,6 +40,57 @@ _REASONS = {
     503: "Service Unavailable",
 }
 _NEVER_KEPT = "Cache-Control: no-cache, no-store, must-revalidate\r\nPragma: no-cache"
+
+
+def image_topics(graph: Graph) -> list[str]:
+    """Return the topics of images whose pictures there are as JPEG."""
+    return sorted(
+        name.removesuffix(COMPRESSED)
+        for name, topic in graph.topics.items()
+        if topic.type == _TYPE and name.endswith(COMPRESSED)
+    )
+
+
+class NewestPicture:
+    """Hears a camera's topic from when it is made until it is closed.
+
+    Args:
+        graph: Where the topic is.
+        topic: Of the image; one of :func:`image_topics`.
+
+    """
+
+    def __init__(self, graph: Graph, topic: str) -> None:
+        self._graph = graph
+        self._topic = topic + COMPRESSED
+        self._newest: tuple[bytes, float] | None = None
+        self._came = asyncio.Event()
+        graph.subscribe(self, self._topic, self._take, _TYPE, node=NODE)
+
+    async def next(self) -> tuple[bytes, float]:
+        """Wait for a picture that was not returned yet; of several, the newest.
+
+        Returns:
+            It, and its stamp in seconds.
+
+        """
+        while self._newest is None:
+            self._came.clear()
+            await self._came.wait()
+        picture, self._newest = self._newest, None
+        return picture
+
+    def close(self) -> None:
+        """Hear the topic no more."""
+        self._graph.unsubscribe(self, self._topic)
+
+    def _take(self, publication: Publication) -> None:
+        data = publication.message["data"]
+        if not data.startswith(_JPEG):
+            log.warning("%s: left out what is no JPEG", self._topic)
+            return
+        self._newest = data, publication.stamp
+        self._came.set()
 
 
 class WebVideoServer:

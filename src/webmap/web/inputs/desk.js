@@ -1,4 +1,4 @@
-import { Gamepads } from "./gamepads.js";
+import { Gamepads } from "./pads.js";
 import { Keys } from "./keys.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */

@@ -1,12 +1,15 @@
+import { deskOf } from "../inputs/desk.js";
+import { attentive } from "../motion/attention.js";
 import { apply, unapply } from "../view.js";
 
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../view.js').Matrix} Matrix */
 /** @typedef {import('../view.js').Point} Point */
 
 /** @typedef {{x: number, y: number, yaw: number}} Pose Metres and radians. */
 
 /** A drag shorter than this in pixels says a place but no heading. */
-export const HEADING_FROM = 12;
+const HEADING_FROM = 12;
 
 /**
  * Return the pose that a press and a drag on the map ask for.
@@ -48,4 +51,208 @@ export function onScreen(view, { x, y, yaw }) {
 function heading(from, to, otherwise) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   return dx === 0 && dy === 0 ? otherwise : Math.atan2(dy, dx);
+}
+
+/**
+ * What a tool does with what is aimed.
+ *
+ * @typedef {object} Aims
+ * @property {() => boolean} mayBegin Whether there is anything to aim for.
+ * @property {(active: boolean) => void} changed Aiming began or ended.
+ * @property {(pose: Pose | null) => void} preview What is aimed now; null when the press
+ *     was given up.
+ * @property {(pose: Pose) => void} done The press was let go of at this pose.
+ * @property {() => Pose | null} [origin] From where one comes, for a press without a
+ *     drag; the selected robot if not given.
+ * @property {boolean} [lasting] It aims press after press until it is left: a tool that
+ *     aims once in between hands the map back to it.
+ */
+
+/** @type {WeakMap<MapCanvas, PressAim>} The one that is active on a map. */
+const active = new WeakMap();
+
+/**
+ * Press where, drag which way, release: how a pose is given on a map.
+ *
+ * Begins by a key or {@link PressAim#activate}; Escape leaves. One tool of a map aims at
+ * a time; one that aims press after press goes on when another has aimed in between.
+ */
+export class PressAim {
+  /**
+   * @param {MapCanvas} map
+   * @param {string} key
+   * @param {Aims} aims
+   */
+  constructor(map, key, aims) {
+    this._map = map;
+    this._key = key;
+    this._aims = aims;
+    this.active = false;
+    /** @type {PressAim | null} What goes on when this one has ended. */
+    this._interrupted = null;
+    /** @type {{id: number, from: Point, robot: string | null} | null} */
+    this._press = null;
+    this._ending = new AbortController();
+    this._listen();
+    this._offEscape = deskOf(map.drive).claimEscape(() => this.leave());
+  }
+
+  destroy() {
+    this._interrupted = null;
+    this.leave();
+    this._ending.abort();
+    this._offEscape();
+  }
+
+  toggle() {
+    this.activate(!this.active);
+  }
+
+  /** Whether it goes on as soon as another has aimed. */
+  get waits() {
+    return active.get(this._map)?._interrupted === this;
+  }
+
+  /** @param {boolean} on */
+  activate(on) {
+    const was = this.active;
+    this.active = on && !this._ending.signal.aborted && this._aims.mayBegin();
+    if (this.active) this._takeMap();
+    const back = this.active ? null : this._leaveMap();
+    if (this.active !== was) {
+      this._map.svg.classList.toggle("webmap-aiming", active.has(this._map));
+    }
+    this._aims.changed(this.active);
+    // Else the next press of whom it was in would select no robot.
+    if (!active.has(this._map)) back?.activate(true);
+  }
+
+  _takeMap() {
+    const other = active.get(this._map);
+    active.set(this._map, this);
+    if (!other || other === this) return;
+    const back = other._aims.lasting ? other : other._interrupted;
+    other._interrupted = null;
+    this._interrupted = back === this ? null : back;
+    other.leave();
+  }
+
+  /** @returns {PressAim | null} What goes on now. */
+  _leaveMap() {
+    const back = this._interrupted;
+    this._interrupted = null;
+    this.drop();
+    if (active.get(this._map) === this) active.delete(this._map);
+    return back;
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  leave() {
+    if (!this.active) return false;
+    this.activate(false);
+    return true;
+  }
+
+  /** Give up the press that is aimed, if there is one. */
+  drop() {
+    if (!this._press) return;
+    this._press = null;
+    this._aims.preview(null);
+  }
+
+  _listen() {
+    const { signal } = this._ending;
+    const { svg } = this._map;
+    // Before anybody else, so that a press while aiming neither moves nor selects.
+    const first = { signal, capture: true };
+    svg.addEventListener("pointerdown", (event) => this._down(event), first);
+    svg.addEventListener("pointermove", (event) => this._move(event), first);
+    svg.addEventListener("pointerup", (event) => this._up(event), first);
+    svg.addEventListener("pointercancel", () => this.drop(), first);
+    svg.addEventListener("lostpointercapture", () => this.drop(), first);
+    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+  }
+
+  /** @param {KeyboardEvent} event */
+  _keyDown(event) {
+    if (event.key !== this._key || event.repeat || event.isComposing) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
+    const { active: desk } = deskOf(this._map.drive);
+    if (desk !== null && desk.map !== this._map) return;
+    this.toggle();
+  }
+
+  /** @param {PointerEvent} event */
+  _down(event) {
+    if (!this.active) return;
+    event.stopImmediatePropagation();
+    event.preventDefault();
+    if (this._press || event.button !== 0) {
+      // A second finger is a doubt about the first.
+      this.drop();
+      return;
+    }
+    const { selected: robot } = this._map;
+    this._press = { id: event.pointerId, from: this._map.pointOf(event), robot };
+    this._map.svg.setPointerCapture(event.pointerId);
+    this._preview(event);
+  }
+
+  /** @param {PointerEvent} event */
+  _move(event) {
+    if (!this.active) return;
+    event.stopImmediatePropagation();
+    if (event.pointerId === this._press?.id) this._preview(event);
+  }
+
+  /** @param {PointerEvent} event */
+  _up(event) {
+    if (event.pointerId !== this._press?.id) return;
+    event.stopImmediatePropagation();
+    this._map.suppressNextClick();
+    const pose = this._preview(event);
+    this._press = null;
+    if (pose) this._aims.done(pose);
+  }
+
+  /**
+   * @param {PointerEvent} event
+   * @returns {Pose | null}
+   */
+  _preview(event) {
+    const press = this._press;
+    if (!press) return null;
+    const selected = press.robot === null ? null : poseOf(this._map, press.robot);
+    const origin = this._aims.origin ? this._aims.origin() : selected;
+    const pose = aim(this._map.view, press.from, this._map.pointOf(event), origin);
+    this._aims.preview(pose);
+    return pose;
+  }
+}
+
+/**
+ * @param {MapCanvas} map
+ * @param {string} robot
+ * @returns {Pose | null} Where the map shows the robot; null where it does not.
+ */
+export function poseOf(map, robot) {
+  const element = map.world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
+  if (!(element instanceof SVGGraphicsElement)) return null;
+  const onMap = element.getCTM();
+  const world = map.world.getCTM();
+  if (!onMap || !world) return null;
+  const { a, b, e, f } = world.inverse().multiply(onMap);
+  return { x: e, y: f, yaw: Math.atan2(b, a) };
+}
+
+/**
+ * @param {MapCanvas} map
+ * @returns {string[]} The robots that are selected: the one, and those marked besides.
+ */
+export function chosen(map) {
+  if (map.selected === null) return [];
+  const marked = [...map.world.querySelectorAll(".robot.marked")].flatMap(
+    (element) => element.getAttribute("data-robot") ?? [],
+  );
+  return [map.selected, ...marked.filter((robot) => robot !== map.selected)];
 }

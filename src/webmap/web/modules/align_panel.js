@@ -1,6 +1,6 @@
 import { button, html, say } from "./elements.js";
 
-/** @typedef {import('./alignment.js').Alignment} Alignment */
+/** @typedef {import('./align_drawing.js').Alignment} Alignment */
 /** @typedef {import('./align_tool.js').Subject} Subject */
 
 /**

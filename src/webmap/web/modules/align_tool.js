@@ -1,12 +1,11 @@
 import { deskOf } from "../inputs/desk.js";
 import { unapply } from "../view.js";
-import { AlignDrawing } from "./align_drawing.js";
+import { AlignDrawing, moved, rounded, turned } from "./align_drawing.js";
 import { AlignPanel } from "./align_panel.js";
-import { moved, rounded, turned } from "./alignment.js";
 import { lay } from "./overlay.js";
 
 /** @typedef {import('../view.js').Point} Point */
-/** @typedef {import('./alignment.js').Alignment} Alignment */
+/** @typedef {import('./align_drawing.js').Alignment} Alignment */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
 /** @typedef {import('../halves.js').Half} Half */

@@ -2,16 +2,16 @@ import { onScreen } from "./aim.js";
 import { button, html, say, svg } from "./elements.js";
 import { look } from "./goal_words.js";
 import { lay } from "./overlay.js";
-import { SentElsewhere } from "./sent_elsewhere.js";
 
-/** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../motion/report.js').GoalWord} GoalWord */
 
 /** Points along x, 44 pixels long, with a ring around the place itself. */
-export const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
+const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
 
 /** What stands in the ring besides a colour, by the shape of the goal's look. */
+/** @type {Readonly<Record<string, string>>} */
 const SIGNS = {
   sent: "",
   way: "M-3 0h6M0-3v6",
@@ -131,4 +131,63 @@ export class GoalMarks {
       label.style.transform = `translate(${at}px, ${y}px) translate(${room ? 0 : -100}%, -50%)`;
     }
   }
+}
+
+/**
+ * Hides the goals that robots' own topics tell of, where the goal tool shows a goal: it is
+ * the same one. What it has shown stays hidden afterwards, until the topic tells of
+ * another.
+ */
+class SentElsewhere {
+  /** @param {SVGSVGElement} mapSvg The map's. */
+  constructor(mapSvg) {
+    this._svg = mapSvg;
+    /** @type {Set<string>} */
+    this._robots = new Set();
+    /** Poses that were shown, by robot.
+     * @type {Map<string, string[]>} */
+    this._seen = new Map();
+    this._sheet = new CSSStyleSheet();
+    document.adoptedStyleSheets.push(this._sheet);
+  }
+
+  destroy() {
+    const sheets = document.adoptedStyleSheets;
+    document.adoptedStyleSheets = sheets.filter((sheet) => sheet !== this._sheet);
+  }
+
+  /** @param {Set<string>} robots Those of which the goal tool shows a goal. */
+  hideFor(robots) {
+    const same = robots.size === this._robots.size;
+    if (same && [...robots].every((robot) => this._robots.has(robot))) return;
+    for (const robot of this._robots) {
+      if (!robots.has(robot)) this._seen.set(robot, this._poses(robot));
+    }
+    this._robots = robots;
+    this._sheet.replaceSync(hidden(robots, this._seen));
+  }
+
+  /** @param {string} robot @returns {string[]} */
+  _poses(robot) {
+    const drawn = this._svg.querySelectorAll(selector(robot));
+    return [...drawn].map((goal) => goal.getAttribute("data-pose") ?? "").filter(Boolean);
+  }
+}
+
+/** @param {string} robot @returns {string} */
+const selector = (robot) => `[data-robot=${JSON.stringify(robot)}] .posestamped.goal`;
+
+/**
+ * @param {Iterable<string>} robots Of which the goal tool shows a goal now.
+ * @param {Iterable<[string, string[]]>} seen What it showed before, by robot.
+ * @returns {string} The style sheet.
+ */
+export function hidden(robots, seen) {
+  const rules = [...robots].map(selector);
+  for (const [robot, poses] of seen) {
+    for (const pose of poses) {
+      rules.push(`${selector(robot)}[data-pose=${JSON.stringify(pose)}]`);
+    }
+  }
+  return rules.map((rule) => `${rule} { display: none; }`).join("\n");
 }

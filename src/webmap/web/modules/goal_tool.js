@@ -1,17 +1,16 @@
+import { SPACING } from "../constants.js";
+import { chosen, poseOf, PressAim } from "./aim.js";
 import { button, html, say } from "./elements.js";
-import { assign, formation } from "./formation.js";
 import { GoalMarks } from "./goal_marks.js";
-import { look, ShownGoals } from "./goal_words.js";
-import { Marking } from "./marking.js";
+import { look, sendGoal, ShownGoals } from "./goal_words.js";
 import { lay } from "./overlay.js";
-import { PressAim } from "./press_aim.js";
-import { chosen, poseOf } from "./robot_places.js";
-import { sendGoal } from "./send_goal.js";
 
-/** @typedef {import('./aim.js').Pose} Pose */
-/** @typedef {import('../map.js').MapCanvas} MapCanvas */
-/** @typedef {(message: object) => void} Send */
 /** @typedef {import('../halves.js').Half} Half */
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('./aim.js').Pose} Pose */
+/** @typedef {import('../view.js').Point} Point */
+
+/** @typedef {(message: object) => void} Send */
 /** @typedef {{button?: boolean, key?: string, spacing?: number}} Options */
 
 /**
@@ -68,8 +67,8 @@ class GoalTool {
     this._word = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
-      min: "0.3",
-      max: "20",
+      min: `${SPACING[0]}`,
+      max: `${SPACING[1]}`,
       step: "0.1",
       value: `${spacing}`,
     });
@@ -145,7 +144,8 @@ class GoalTool {
   _places(pose) {
     const robots = chosen(this._map);
     const apart = Number(this._spacing.value);
-    const spacing = Number.isFinite(apart) && apart >= 0.3 ? Math.min(apart, 20) : 1;
+    const [least, most] = SPACING;
+    const spacing = Number.isFinite(apart) && apart >= least ? Math.min(apart, most) : 1;
     const places = formation(pose, robots.length, spacing);
     const from = robots.map((robot) => poseOf(this._map, robot) ?? pose);
     return assign(from, places).map((place, i) => [robots[i], place]);
@@ -304,4 +304,131 @@ class GoalTool {
     }
     this._marks.show(goals);
   }
+}
+
+/** For how long a finger rests on a robot until that means something, in ms. */
+const LONG = 500;
+/** How far it may move meanwhile, in pixels. */
+const STILL = 10;
+
+/** A long press on a robot, which is to a finger what Shift is to a mouse. */
+class Marking {
+  /**
+   * @param {MapCanvas} map
+   * @param {(robot: string) => void} mark
+   */
+  constructor(map, mark) {
+    this._map = map;
+    this._mark = mark;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this._timer = undefined;
+    this._from = { x: 0, y: 0 };
+    this._marked = false;
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    const { svg } = map;
+    svg.addEventListener("pointerdown", (event) => this._down(event), { signal });
+    svg.addEventListener("pointermove", (event) => this._move(event), { signal });
+    for (const end of ["pointerup", "pointercancel"]) {
+      svg.addEventListener(end, () => this._up(), { signal });
+    }
+    // A browser's own menu would take the press away from us.
+    svg.addEventListener("contextmenu", (event) => this._noMenu(event), { signal });
+  }
+
+  destroy() {
+    clearTimeout(this._timer);
+    this._ending.abort();
+  }
+
+  /** @param {PointerEvent} event */
+  _down(event) {
+    clearTimeout(this._timer);
+    if (event.pointerType !== "touch" || !event.isPrimary) return;
+    const robot = robotAt(event);
+    if (robot === null) return;
+    this._from = { x: event.clientX, y: event.clientY };
+    this._timer = setTimeout(() => {
+      this._marked = true;
+      this._mark(robot);
+    }, LONG);
+  }
+
+  _up() {
+    clearTimeout(this._timer);
+    if (!this._marked) return;
+    this._marked = false;
+    this._map.suppressNextClick();
+  }
+
+  /** @param {PointerEvent} event */
+  _move(event) {
+    const { x, y } = this._from;
+    if (Math.hypot(event.clientX - x, event.clientY - y) > STILL) clearTimeout(this._timer);
+  }
+
+  /** @param {MouseEvent} event */
+  _noMenu(event) {
+    if (robotAt(event) !== null) event.preventDefault();
+  }
+}
+
+/** @param {MouseEvent} event */
+function robotAt({ target }) {
+  const robot = target instanceof Element ? target.closest(".robot") : null;
+  return robot?.getAttribute("data-robot") ?? null;
+}
+
+/** So many robots at most stand in one line; more stand in a grid. */
+const LONGEST_LINE = 4;
+
+/**
+ * Return places for several robots around a pose: a line across the heading, or a grid.
+ *
+ * The middle of the first line is the pose, and every other line is behind it.
+ *
+ * @param {Pose} pose
+ * @param {number} count
+ * @param {number} spacing Metres between neighbours.
+ * @returns {Pose[]}
+ */
+export function formation({ x, y, yaw }, count, spacing) {
+  const lines = Math.ceil(count / LONGEST_LINE);
+  const across = Math.ceil(count / lines);
+  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+  return Array.from({ length: count }, (_, n) => {
+    const line = Math.floor(n / across);
+    const inLine = Math.min(across, count - line * across);
+    const left = ((inLine - 1) / 2 - (n % across)) * spacing;
+    const ahead = -line * spacing;
+    return { x: x + cos * ahead - sin * left, y: y + sin * ahead + cos * left, yaw };
+  });
+}
+
+/**
+ * Match robots to places so that their straight ways are short all together; ways that
+ * cross could be made shorter by exchanging their ends, so none do.
+ *
+ * @param {Point[]} robots
+ * @param {Pose[]} places As many as there are robots.
+ * @returns {Pose[]} The place of each robot.
+ */
+export function assign(robots, places) {
+  const assigned = [...places];
+  /** @param {number} robot @param {number} place */
+  const way = (robot, place) =>
+    Math.hypot(robots[robot].x - assigned[place].x, robots[robot].y - assigned[place].y);
+  let better = true;
+  while (better) {
+    better = false;
+    for (let i = 0; i < robots.length; i++) {
+      for (let j = i + 1; j < robots.length; j++) {
+        if (way(i, j) + way(j, i) < way(i, i) + way(j, j) - 1e-9) {
+          [assigned[i], assigned[j]] = [assigned[j], assigned[i]];
+          better = true;
+        }
+      }
+    }
+  }
+  return assigned;
 }

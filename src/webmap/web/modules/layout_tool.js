@@ -1,6 +1,14 @@
-import { keepView, keptView } from "../kept_views.js";
-import { asPlace, checkSize, LayoutRefused, readLayout, writeLayout } from "../layout.js";
-import { placeOf, viewOf } from "../place.js";
+import {
+  asPlace,
+  checkSize,
+  keepView,
+  keptView,
+  LayoutRefused,
+  placeOf,
+  readLayout,
+  viewOf,
+  writeLayout,
+} from "../layout.js";
 import { button, html, say } from "./elements.js";
 import { joinSaveMenu, offer } from "./save_menu.js";
 

@@ -14,7 +14,7 @@ let grids = 0;
  * @returns {number | null} In metres, a round number from 1 on; null when the scale makes
  *     no sense.
  */
-export function gridStep(scale, least) {
+function gridStep(scale, least) {
   const metres = least / scale;
   if (!(metres > 0) || !Number.isFinite(metres)) return null;
   if (metres <= 1) return 1;

@@ -1,16 +1,16 @@
 import { deskOf } from "../inputs/desk.js";
 import { attentive } from "../motion/attention.js";
 import { apply } from "../view.js";
-import { AreaDrawing } from "./area_drawing.js";
-import { AreaPanel } from "./area_panel.js";
+import { button, html, svg } from "./elements.js";
+import { lay } from "./overlay.js";
 import { cleaned, MOST_CORNERS, problemOf } from "./polygon.js";
-import { PressAim } from "./press_aim.js";
-import { planSweeps } from "./sweeps.js";
+import { PressAim } from "./aim.js";
+import { planSweeps, SPACING } from "./sweeps.js";
 
-/** @typedef {import('../view.js').Point} Point */
-/** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
+/** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('./sweeps.js').Plan} Plan */
+/** @typedef {import('../view.js').Point} Point */
 
 /**
  * What an area asks of the route that it is for.
@@ -247,4 +247,174 @@ export class RouteArea {
     const ready = this._plan.points.length > 0;
     this._panel.show({ active, closed, corners: this._corners.length, ready });
   }
+}
+
+/**
+ * What can be done with an area.
+ *
+ * @typedef {object} Acts
+ * @property {() => void} begin
+ * @property {() => void} close No further corner is pressed.
+ * @property {() => void} undo The last corner is taken away.
+ * @property {() => void} here The robot's place becomes a corner.
+ * @property {() => void} changed The sweeps are wanted another way.
+ * @property {() => void} take
+ * @property {() => void} leave
+ */
+
+/** The buttons and the field with which an area is made into sweeps. */
+class AreaPanel {
+  /** @param {Acts} acts */
+  constructor(acts) {
+    /** Whether sweeps go across the longest side. */
+    this.across = false;
+    /** Begins an area. */
+    this.begin = button("webmap-area-begin", "Area", acts.begin);
+    this.begin.title = "Sweep back and forth over an area";
+    this._done = button("webmap-area-done", "Done", acts.close);
+    this._done.title = "Or press the first corner again";
+    this._undo = button("webmap-area-undo", "Undo", acts.undo);
+    this._undo.title = "Take the last corner away";
+    this._here = button("webmap-area-here", "Its place", acts.here);
+    this._here.title = "Add the place of the selected robot";
+    this._spacing = html("input", "webmap-area-spacing", {
+      type: "number",
+      min: `${SPACING.least}`,
+      max: `${SPACING.most}`,
+      step: "0.1",
+      value: `${SPACING.usual}`,
+    });
+    this._spacing.addEventListener("input", acts.changed);
+    this._spacing.addEventListener("keydown", ({ key }) => {
+      // The page leaves Escape to a field, and this one has no use for it.
+      if (key === "Escape") acts.leave();
+    });
+    this._turn = button("webmap-area-across", "Across", () => {
+      this.across = !this.across;
+      acts.changed();
+    });
+    this._turn.title = "Sweep across the longest side, not along it";
+    this._take = button("webmap-area-take", "Add to route", acts.take);
+    this._leave = button("webmap-area-leave", "Leave", acts.leave);
+    const label = html("label", "webmap-area-apart", {}, "Apart, in m ", this._spacing);
+    this._how = html("div", "webmap-route-row", {}, label, this._turn);
+    this.element = html(
+      "div",
+      "webmap-area",
+      { role: "group", "aria-label": "Area" },
+      this._how,
+      html(
+        "div",
+        "webmap-route-row",
+        {},
+        ...[this._done, this._undo, this._here, this._take, this._leave],
+      ),
+    );
+  }
+
+  /** The metres between sweeps; NaN where there is no number. */
+  get spacing() {
+    return this._spacing.value === "" ? NaN : Number(this._spacing.value);
+  }
+
+  /**
+   * @param {object} area
+   * @param {boolean} area.active Whether there is one.
+   * @param {boolean} area.closed
+   * @param {number} area.corners How many there are.
+   * @param {boolean} area.ready Whether there are sweeps to take.
+   */
+  show({ active, closed, corners, ready }) {
+    this._turn.setAttribute("aria-pressed", String(this.across));
+    this._how.hidden = this._take.hidden = !closed;
+    for (const each of [this._done, this._undo, this._here]) each.hidden = closed;
+    this._undo.disabled = corners === 0;
+    this._take.disabled = !ready;
+    this.element.hidden = !active;
+  }
+
+  /** @param {boolean} possible Whether a robot's place can be added. */
+  showHere(possible) {
+    this._here.disabled = !possible;
+  }
+
+  /** Whether the keys are with the buttons of an area. */
+  get focused() {
+    return this.element.contains(document.activeElement);
+  }
+
+  /** Let the keys go on with what is there now: a button that is gone has no next one. */
+  focus() {
+    const next = [this._done, this._take, this._turn, this.begin];
+    next.find((each) => !each.disabled && each.offsetParent !== null)?.focus();
+  }
+}
+
+/** An area over a map, its corners, and the sweeps that would go over it. */
+class AreaDrawing {
+  /** @param {MapCanvas} map */
+  constructor(map) {
+    this._map = map;
+    /** @type {Point[]} */
+    this._corners = [];
+    this._outline = svg("path", { class: "webmap-area-outline" });
+    this._ways = svg("path", { class: "webmap-area-ways" });
+    this._sweeps = svg("path", { class: "webmap-area-sweeps" });
+    // In metres, as the plan is: only the view moves it.
+    this._world = svg("g", {}, this._outline, this._ways, this._sweeps);
+    this._marks = svg("g", {});
+    this._drawing = svg(
+      "svg",
+      { class: "webmap-route-drawing webmap-area-drawing", "aria-hidden": "true" },
+      this._world,
+      this._marks,
+    );
+    this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
+    this._place();
+  }
+
+  destroy() {
+    for (const off of this._offs) off();
+  }
+
+  /**
+   * @param {Point[]} corners In metres.
+   * @param {object} how
+   * @param {boolean} how.closed Whether no further corner is pressed.
+   * @param {Point[]} how.points What the robot would go to, in this order.
+   * @param {[Point, Point][]} how.sweeps
+   */
+  show(corners, { closed, points, sweeps }) {
+    const shut = corners.length > 0 && (closed || points.length > 0);
+    this._corners = closed ? [] : corners;
+    this._outline.setAttribute("d", path(corners) + (shut ? "Z" : ""));
+    this._ways.setAttribute("d", path(points));
+    this._sweeps.setAttribute("d", sweeps.map(path).join(""));
+    while (this._marks.childElementCount > this._corners.length) {
+      this._marks.lastChild?.remove();
+    }
+    while (this._marks.childElementCount < this._corners.length) {
+      this._marks.append(svg("circle", { class: "webmap-area-corner" }));
+    }
+    this._place();
+  }
+
+  _place() {
+    const { a, b, c, d, e, f } = this._map.view;
+    this._world.setAttribute("transform", `matrix(${a} ${b} ${c} ${d} ${e} ${f})`);
+    for (const [i, { x, y }] of this._corners.entries()) {
+      const place = apply(this._map.view, x, y);
+      const mark = this._marks.children[i];
+      mark.setAttribute("cx", `${place.x}`);
+      mark.setAttribute("cy", `${place.y}`);
+      // The first is pressed again to close the area.
+      mark.setAttribute("r", i === 0 ? "10" : "6");
+    }
+  }
+}
+
+/** @param {Point[]} points */
+function path(points) {
+  const places = points.map(({ x, y }) => `${x} ${y}`);
+  return places.length > 0 ? `M${places.join("L")}` : "";
 }

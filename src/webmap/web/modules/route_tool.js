@@ -1,21 +1,15 @@
+import { MOST_POINTS } from "../constants.js";
+import { poseOf, PressAim } from "./aim.js";
 import { button, html, say } from "./elements.js";
 import { lay } from "./overlay.js";
-import { PressAim } from "./press_aim.js";
-import { poseOf } from "./robot_places.js";
 import { RouteArea } from "./route_area.js";
-import { keepRoute, keptRoute } from "./route_kept.js";
-import { RoutePoints } from "./route_points.js";
-import { RouteRobots } from "./route_robots.js";
-import { LEAST_LOOP } from "./route_run.js";
-import { SavedRoutes } from "./route_saved.js";
+import { RoutePoints, SavedRoutes } from "./route_points.js";
+import { keepRoute, keptRoute, LEAST_LOOP, RouteRobots } from "./route_run.js";
 
 /** @typedef {import('./aim.js').Pose} Pose */
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
 /** @typedef {import('../halves.js').Half} Half */
-
-/** As many as the server keeps of one route. */
-const MOST_POINTS = 500;
 
 const TOO_SHORT = `A loop needs ${LEAST_LOOP} points at least.`;
 

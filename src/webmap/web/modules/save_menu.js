@@ -52,7 +52,7 @@ export function joinSaveMenu(map, where, group) {
 }
 
 /** A button that opens a choice of what to save. */
-export class SaveMenu {
+class SaveMenu {
   /**
    * @param {MapCanvas} map
    * @param {Where} where

@@ -1,9 +1,11 @@
+import { Stick } from "../inputs/stick.js";
 import { isTested, motions, ownStop, testWords, timings } from "../motion/figures.js";
 import { heldByProgram, isLatched, stopKey } from "../motion/report.js";
 import { capOf } from "../motion/status.js";
-import { button, html, say, stopButton } from "./elements.js";
-import { TwiceButton } from "./twice_button.js";
+import { button, html, say, stopButton, TwiceButton } from "./elements.js";
 
+/** @typedef {import('../drive.js').Drive} Drive */
+/** @typedef {import('../motion/asking.js').Request} Request */
 /** @typedef {import('../motion/report.js').RobotReport} RobotReport */
 
 /** From this loop age on it is said aloud, in ms. */
@@ -186,4 +188,133 @@ function slowness(delay) {
  */
 function set(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
+
+/**
+ * The on-screen stick: there from the start where fingers are the pointer, and wherever
+ * it is asked for.
+ */
+export class StickPad {
+  /** @param {Drive} drive */
+  constructor(drive) {
+    this._sideways = false;
+    /** Whether the operator wants it. */
+    this.wanted = matchMedia("(pointer: coarse)").matches;
+    const knob = html("div", "webmap-stick-knob");
+    this._pad = html(
+      "div",
+      "webmap-stick",
+      { role: "img", "aria-label": "Stick: hold the knob and move it to drive" },
+      knob,
+    );
+    this._mode = button("webmap-panel webmap-stick-mode", "Sideways", () => {
+      this._stick.release();
+      this._sideways = !this._sideways;
+      this._mode.setAttribute("aria-pressed", String(this._sideways));
+    });
+    this._mode.title = "Left and right move the robot sideways and do not turn it";
+    this._mode.setAttribute("aria-pressed", "false");
+    this._mode.hidden = true;
+    this.element = html("div", "webmap-stick-place", {}, this._mode, this._pad);
+    this._stick = new Stick(drive, this._pad, () => this._sideways && !this._mode.hidden);
+    this.show(false, false);
+  }
+
+  /** Whether the base that it drives moves sideways, too. */
+  set holonomic(/** @type {boolean} */ holonomic) {
+    if (this._mode.hidden !== holonomic) return;
+    // What is held would mean something else from one moment to the next.
+    this._stick.release();
+    this._mode.hidden = !holonomic;
+  }
+
+  /** Let go. */
+  release() {
+    this._stick.release();
+  }
+
+  /**
+   * @param {boolean} useful Whether there is a robot that it could drive.
+   * @param {boolean} dead Whether what is held now does nothing.
+   */
+  show(useful, dead) {
+    const visible = useful && this.wanted;
+    if (!visible) this._stick.release();
+    this.element.hidden = !visible;
+    this._pad.classList.toggle("dead", dead);
+  }
+
+  destroy() {
+    this._stick.destroy();
+  }
+}
+
+/** Who asks the operator for robots, each with the two answers there are. */
+export class Requests {
+  /** @param {Drive} drive */
+  constructor(drive) {
+    this._drive = drive;
+    /** @type {Map<string, {item: HTMLElement, left: HTMLElement}>} */
+    this._items = new Map();
+    this.element = html("ul", "webmap-requests");
+    this.element.hidden = true;
+  }
+
+  /** @param {Request[]} requests */
+  show(requests) {
+    const asked = requests.filter(({ mine }) => mine);
+    const keys = new Set(asked.map(keyOf));
+    for (const [key, { item }] of this._items) {
+      if (keys.has(key)) continue;
+      item.remove();
+      this._items.delete(key);
+    }
+    for (const request of asked) {
+      const { left } = this._items.get(keyOf(request)) ?? this._add(request);
+      say(left, `(${request.left} s)`);
+    }
+    this.element.hidden = asked.length === 0;
+  }
+
+  /** @param {Request} request */
+  _add(request) {
+    const { robot, name, who } = request;
+    const left = html("span", "webmap-request-left", { role: "timer" });
+    const words = html(
+      "p",
+      "webmap-request-words",
+      {},
+      html("strong", "", { role: "alert" }, `${who} asks for ${name}`),
+      " ",
+      left,
+    );
+    const item = html(
+      "li",
+      "webmap-panel webmap-request",
+      {},
+      words,
+      answer("Hand over", name, () => this._drive.grant(robot)),
+      answer("Keep", name, () => this._drive.deny(robot)),
+    );
+    this.element.append(item);
+    const made = { item, left };
+    this._items.set(keyOf(request), made);
+    return made;
+  }
+}
+
+/**
+ * @param {string} label
+ * @param {string} name The robot's.
+ * @param {() => void} act
+ */
+function answer(label, name, act) {
+  const element = button("webmap-request-answer", label, act);
+  element.setAttribute("aria-label", `${label} ${name}`);
+  return element;
+}
+
+/** @param {Request} request */
+function keyOf({ robot, by, who, name }) {
+  return JSON.stringify([robot, by, who, name]);
 }

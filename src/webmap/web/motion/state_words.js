@@ -1,4 +1,4 @@
-// Made by tools/make_opcodes.py from webmap/core/robot_state.py: do not edit.
+// Made by tools/make_javascript.py from webmap/core/robot_state.py: do not edit.
 
 /** What a robot is doing, in words; `{who}` is who holds or drives it. */
 export const WORDS = Object.freeze({

@@ -1,0 +1,353 @@
+"""Checks of one value each: what was got, what was expected, and where."""
+
+import difflib
+import math
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from numbers import Integral, Real
+from typing import Any, TypeAlias
+
+from webmap.errors import ConfigError
+from webmap.outside_text import one_line
+from webmap.ros.names import normalise_topic, split_type
+
+Way: TypeAlias = tuple[str | int, ...]
+"""Keys and indices on the way to a value."""
+
+Check: TypeAlias = Callable[[Any], Any]
+"""Returns the value in its one form, or raises ConfigError with what was expected."""
+
+MOST_MISTAKES = 100
+"""How many mistakes are reported in full; others are only counted."""
+
+LARGEST = 1e6
+"""No speed, time or length is larger."""
+
+LONGEST_NAME = 100
+"""Characters of a name that still fits into a list."""
+
+HEAD = ("title", "floor")
+"""Keys of a fleet file that are texts, of the file itself and of no table in it."""
+
+_SHOWN = 60
+
+_KINDS: tuple[tuple[type, str], ...] = (
+    (bool, "the boolean"),
+    (Integral, "the whole number"),
+    (Real, "the number"),
+    (str, "the text"),
+    (list, "the array"),
+    (tuple, "the array"),
+    (dict, "the table"),
+)
+
+
+@dataclass(slots=True)
+class Mistakes:
+    """What is wrong, with the way to each of it."""
+
+    found: list[tuple[Way, str]] = field(default_factory=list)
+    more: int = 0
+    """How many more there are: nobody reads thousands, and writing them takes long."""
+    wrong: set[Way] = field(default_factory=set)
+    """The way to each mistake, reported or counted, up to three keys:
+    ``("robots", 3, "twist")``."""
+
+    def add(self, way: Way, words: str) -> None:
+        """Note one mistake."""
+        self.wrong.add(way[:3])
+        if self.full:
+            self.more += 1
+        else:
+            self.found.append((way, words))
+
+    def take(self, way: Way, others: "Mistakes") -> None:
+        """Note mistakes of a part, to which ``way`` leads."""
+        for inner, words in others.found:
+            self.add((*way, *inner), words)
+        self.more += others.more
+        self.wrong |= {(*way, *inner)[:3] for inner in others.wrong}
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.found) + self.more
+
+    @property
+    def full(self) -> bool:
+        """Whether no more mistakes are worded."""
+        return len(self.found) >= MOST_MISTAKES
+
+    def refuse(self, what: str) -> None:
+        """Raise all mistakes at once, if there are any.
+
+        Args:
+            what: What is configured, such as ``robot 'Bob'``.
+
+        Raises:
+            WrongConfig: If there are.
+
+        """
+        if self.count:
+            raise WrongConfig(what, self)
+
+
+class WrongConfig(ConfigError):
+    """A configuration with mistakes: a line for each.
+
+    Args:
+        what: What is configured.
+        mistakes: All that is wrong.
+
+    """
+
+    def __init__(self, what: str, mistakes: Mistakes) -> None:
+        self.mistakes = mistakes
+        lines = [
+            one_line(": ".join(filter(None, (what, way_in_words(way), words))))
+            for way, words in mistakes.found
+        ]
+        if mistakes.more:
+            lines.append(f"{what}: and {mistakes.more} mistakes more")
+        super().__init__("\n".join(lines))
+
+
+def way_in_words(way: Way) -> str:
+    """Return the way to a value as TOML writes it: ``robots[0].twist.v_max``."""
+    words = ""
+    for part in way:
+        dot = "." if words else ""
+        words += f"[{part}]" if isinstance(part, int) else f"{dot}{part}"
+    return words
+
+
+def show(value: object) -> str:
+    """Return a value and its kind, for people."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, int) and abs(value) >= 10**_SHOWN:
+        text = "of very many digits"
+    else:
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+    kind = next((words for cls, words in _KINDS if isinstance(value, cls)), "the value")
+    return f"{kind} {one_line(text, _SHOWN)}"
+
+
+def did_you_mean(got: object, known: Iterable[str]) -> str:
+    """Return a hint at what was meant, empty if nothing is like it."""
+    found = difflib.get_close_matches(str(got), list(known), n=1)
+    return f'; did you mean "{found[0]}"?' if found else ""
+
+
+def text(value: Any) -> str:
+    """Check a text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise ConfigError("a text that is not empty")
+    return value
+
+
+def any_text(value: Any) -> str:
+    """Check a text, which may be empty."""
+    if not isinstance(value, str):
+        raise ConfigError("a text")
+    return value
+
+
+def bridge(value: Any) -> str:
+    """Check the name or the address of a bridge."""
+    try:
+        return text(value)
+    except ConfigError:
+        raise ConfigError("the name or the address of a bridge") from None
+
+
+def is_name(text: str) -> bool:
+    """Return whether a text can stand in a list of robots: one line, not too long."""
+    return text.strip() != "" and text.isprintable() and len(text) <= LONGEST_NAME
+
+
+def same_name(name: str) -> str:
+    """Return what two names have in common that people would take for one."""
+    return unicodedata.normalize("NFKC", name).casefold().strip()
+
+
+def name(value: Any) -> str:
+    """Check a name: a text of one line that is not too long."""
+    plain = text(value)
+    if not is_name(plain):
+        raise ConfigError(
+            f"a text of one line with {LONGEST_NAME} characters at the most"
+        )
+    return plain
+
+
+def topic(value: Any) -> str:
+    """Check the name of a topic, and return it in its one spelling."""
+    try:
+        return normalise_topic(value)
+    except ConfigError:
+        raise ConfigError('the name of a topic, such as "/odom"') from None
+
+
+def frame(value: Any) -> str:
+    """Check the name of a frame; the leading slash of ROS 1 is left out."""
+    return text(value).removeprefix("/")
+
+
+def message_type(*allowed: str) -> Check:
+    """Return the check of a type: one of these, in either dialect."""
+
+    def check(value: Any) -> str:
+        try:
+            if isinstance(value, str) and (str(split_type(value)) in allowed):
+                return value
+        except ConfigError:
+            pass
+        raise ConfigError(f"one of the types {', '.join(allowed)}")
+
+    return check
+
+
+def _number(value: Any) -> bool:
+    """Return whether it is a number that makes sense; NaN and infinity do not."""
+    real = isinstance(value, Real) and not isinstance(value, bool)
+    return real and abs(value) <= LARGEST
+
+
+def _most(value: Any) -> str:
+    """Return how large a number may be, if this one is larger."""
+    real = isinstance(value, Real) and not isinstance(value, bool)
+    return f", {LARGEST:g} at the most" if real and LARGEST < value < math.inf else ""
+
+
+def above_zero(unit: str) -> Check:
+    """Return the check of a finite number above zero."""
+
+    def check(value: Any) -> float:
+        if not _number(value) or not value > 0:
+            raise ConfigError(f"a number of {unit} above 0{_most(value)}")
+        return float(value)
+
+    return check
+
+
+def from_zero(unit: str) -> Check:
+    """Return the check of a finite number that is not negative."""
+
+    def check(value: Any) -> float:
+        if not _number(value) or value < 0:
+            raise ConfigError(f"a number of {unit} from 0 on{_most(value)}")
+        return float(value)
+
+    return check
+
+
+def finite(expected: str) -> Check:
+    """Return the check of any finite number that is not absurdly large."""
+
+    def check(value: Any) -> float:
+        if not _number(value):
+            raise ConfigError(expected)
+        return float(value)
+
+    return check
+
+
+def between(low: float, high: float, unit: str) -> Check:
+    """Return the check of a number from ``low`` to ``high``."""
+
+    def check(value: Any) -> float:
+        if not _number(value) or not low <= value <= high:
+            raise ConfigError(f"a number of {unit} from {low:g} to {high:g}")
+        return float(value)
+
+    return check
+
+
+def whole(low: int, high: int) -> Check:
+    """Return the check of a whole number from ``low`` to ``high``."""
+
+    def check(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, Integral):
+            raise ConfigError(f"a whole number from {low} to {high}")
+        if not low <= int(value) <= high:
+            raise ConfigError(f"a whole number from {low} to {high}")
+        return int(value)
+
+    return check
+
+
+def milliseconds(value: Any) -> int:
+    """Check a whole number of milliseconds."""
+    number = isinstance(value, Integral) and not isinstance(value, bool)
+    if not number or int(value) < 0:
+        raise ConfigError("a whole number of milliseconds, 0 or more")
+    return int(value)
+
+
+def yes_or_no(value: Any) -> bool:
+    """Check a boolean."""
+    if not isinstance(value, bool):
+        raise ConfigError("true or false")
+    return value
+
+
+def one_of(*words: str) -> Check:
+    """Return the check of a word: one of these."""
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or value not in words:
+            listed = " or ".join(f'"{word}"' for word in words)
+            raise ConfigError(f"{listed}{did_you_mean(value, words)}")
+        return value
+
+    return check
+
+
+def array(value: Any) -> list[Any]:
+    """Check an array of arguments."""
+    if not isinstance(value, list | tuple):
+        raise ConfigError("an array of arguments")
+    return list(value)
+
+
+def table(value: Any) -> dict[str, Any]:
+    """Check a table of arguments."""
+    if not isinstance(value, Mapping):
+        raise ConfigError("a table of arguments by name")
+    return dict(value)
+
+
+def checked(check: Check, value: Any, way: Way, mistakes: Mistakes) -> Any:
+    """Return what a value means; None, and a mistake, if it is wrong."""
+    try:
+        return check(value)
+    except ConfigError as error:
+        hint = "" if mistakes.full else _otherwise(check, value)
+        mistakes.add(way, f"got {show(value)}, expected {error}{hint}")
+        return None
+
+
+def _otherwise(check: Check, value: Any) -> str:
+    """Return a hint if quotes, or their absence, are all that is wrong."""
+    try:
+        if isinstance(value, str):
+            plain = value.strip().lower()
+            named = {"true": True, "yes": True, "false": False, "no": False}
+            check(named[plain] if plain in named else _number_of(plain))
+            word = str(named[plain]).lower() if plain in named else value.strip()
+            return f"; write {word} without quotes"
+        if isinstance(value, int | float | date) and not isinstance(value, bool):
+            check(str(value))
+            return f'; a text stands in quotes: "{value}"'
+    except (ConfigError, ValueError):
+        pass
+    return ""
+
+
+def _number_of(text: str) -> int | float:
+    if len(text) > _SHOWN:
+        raise ValueError
+    return int(text) if text.lstrip("+-").isdigit() else float(text)

@@ -1,0 +1,347 @@
+"""Fleet files: which bridges, robots, maps and modules there are.
+
+A file is read strictly: every mistake in it is named with its line. What its keys mean
+is in ``docs/howto/fleet-file.md``.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from webmap.config import checks
+from webmap.config.checks import Mistakes, Way, same_name, show, way_in_words
+from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
+from webmap.config.robot import (
+    Alignment,
+    ModuleConfig,
+    RobotConfig,
+    bridges_of,
+    read_robot,
+)
+from webmap.errors import ConfigError
+from webmap.outside_text import escaped
+from webmap.ros.names import normalise_url
+
+
+def _address(value: Any) -> str:
+    try:
+        return normalise_url(value)
+    except ConfigError:
+        raise ConfigError(
+            'the address of a rosbridge, such as "ws://robot:9090"'
+        ) from None
+
+
+class BridgeConfig(Config, kw_only=True, frozen=True):
+    """A bridge of the file."""
+
+    url: Annotated[str, _address]
+    alignment: Alignment | None = None
+
+    @classmethod
+    def expand(cls, value: Any) -> dict[str, Any]:
+        """Return the table for an address alone."""
+        return {"url": value}
+
+
+class MapConfig(Config, kw_only=True, frozen=True):
+    """A map under the robots."""
+
+    bridge: Annotated[str, checks.text] = ""
+    """The name of its bridge; the only one if not given."""
+    topic: Annotated[str, checks.topic]
+    palette: Literal["map", "costmap", "raw"] | None = None
+    order: Annotated[float, checks.finite("a number; robots have 100")] | None = None
+
+
+class ImageConfig(Config, kw_only=True, frozen=True):
+    """A picture under everything."""
+
+    file: Annotated[str, checks.text]
+    x: Annotated[float, checks.finite("a number of metres: the left edge")]
+    y: Annotated[float, checks.finite("a number of metres: the lower edge")]
+    width: Annotated[float, checks.above_zero("metres")]
+    height: Annotated[float, checks.above_zero("metres")]
+
+
+class TilesConfig(Config, kw_only=True, frozen=True):
+    """Tiles of a map of the world."""
+
+    source: Annotated[str, checks.text]
+    latitude: Annotated[float, checks.between(-89.999, 89.999, "degrees")]
+    longitude: Annotated[float, checks.between(-360, 360, "degrees")]
+    east: Annotated[float, checks.between(-360, 360, "degrees")] | None = None
+    attribution: Annotated[str, checks.text] | None = None
+    tile_size: Annotated[int, checks.whole(256, 512)] | None = None
+    most: Annotated[int, checks.whole(1, 256)] | None = None
+    opacity: Annotated[float, checks.between(0, 1, "full opacity")] | None = None
+
+
+def _labels(value: Any) -> Any:
+    if isinstance(value, list) or (isinstance(value, str) and value.strip()):
+        return value
+    raise ConfigError("a file's name, or a table [[labels]] for each")
+
+
+def _bridges(value: Any, way: Way, mistakes: Mistakes) -> dict[str, BridgeConfig]:
+    if not isinstance(value, Mapping) or not value:
+        got = "nothing" if value is None else show(value)
+        example = 'a table [bridges] with lines such as hall = "ws://robot:9090"'
+        mistakes.add(way, f"got {got}, expected {example}")
+        return {}
+    found = {}
+    for name, each in value.items():
+        if name in checks.HEAD and isinstance(each, str) and "://" not in each:
+            words = f"the file's own {name} stands before the first [table]"
+            mistakes.add((*way, name), f"got {show(each)} for a bridge; {words}")
+            continue
+        bridge = read(BridgeConfig, each, (*way, name), mistakes)
+        if bridge is not None:
+            found[name] = bridge
+    return found
+
+
+def _robots(value: Any, way: Way, mistakes: Mistakes) -> list[RobotConfig]:
+    if not isinstance(value, list) or not value:
+        got = "nothing" if value is None else show(value)
+        more = " in two brackets" if isinstance(value, Mapping) else ""
+        words = f"got {got}, expected a table [[robots]]{more} for each"
+        mistakes.add(way, words)
+        return []
+    robots = []
+    for index, each in enumerate(value):
+        inner = (*way, index)
+        robot = read_robot(each, inner, mistakes) or RobotConfig(name="")
+        if isinstance(each, Mapping) and isinstance(each.get("name"), str):
+            checks.checked(checks.name, robot.name, (*inner, "name"), mistakes)
+        robots.append(robot)
+        if isinstance(each, Mapping) and "scan_assist" in each and "twist" not in each:
+            words = 'scan assist slows a driven robot: the key "twist" is missing'
+            mistakes.add((*inner, "scan_assist"), words)
+    return robots
+
+
+class FleetConfig(Config, kw_only=True, frozen=True):
+    """What a fleet file says."""
+
+    title: Annotated[str, checks.name] = ""
+    floor: Annotated[str, checks.text] = ""
+    map: Annotated[list[MapConfig], ONE_OR_MORE] = []
+    image: Annotated[list[ImageConfig], ONE_OR_MORE] = []
+    modules: list[ModuleConfig] = []
+    """Modules of the map."""
+    tiles: TilesConfig | None = None
+    labels: Annotated[list[Any] | str, _labels] = ""
+    """Tables of labels, or the name of a file with them."""
+    bridges: Annotated[dict[str, BridgeConfig], ReadBy(_bridges)] = {}
+    robots: Annotated[list[RobotConfig], ReadBy(_robots)] = []
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, as a file has it."""
+        data: dict[str, Any] = msgspec.to_builtins(self)
+        data["robots"] = [robot.to_dict() for robot in self.robots]
+        return data
+
+
+def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
+    """Return what a file's table means; what is wrong is noted.
+
+    Args:
+        data: The table as the TOML reader gives it.
+        mistakes: Where every mistake goes. What one is about is of no use in the
+            result.
+
+    """
+    whole = {"bridges": None, "robots": None, **data}
+    fleet = read(FleetConfig, whole, (), mistakes)
+    assert fleet is not None, "a file is a table"
+    if fleet.bridges:
+        fleet = _linked(fleet, mistakes)
+    _no_name_twice(fleet.robots, mistakes)
+    _no_base_twice(fleet, mistakes)
+    return fleet
+
+
+def _linked(fleet: FleetConfig, mistakes: Mistakes) -> FleetConfig:
+    """Return a fleet whose robots and maps all name their bridge."""
+    only = next(iter(fleet.bridges)) if len(fleet.bridges) == 1 else ""
+    replace = msgspec.structs.replace
+    maps = [replace(each, bridge=each.bridge or only) for each in fleet.map]
+    robots = [replace(each, bridge=each.bridge or only) for each in fleet.robots]
+    named: list[tuple[Way, str]] = []
+    places: set[tuple[str, str]] = set()
+    wrong = {way[:2] for way in mistakes.wrong}
+    for index, each in enumerate(maps):
+        way: Way = ("map",) if len(maps) == 1 else ("map", index)
+        named.append(((*way, "bridge") if each.bridge else way, each.bridge))
+        place = (each.bridge, each.topic)
+        if each.topic and place in places:
+            words = f"the map {each.topic} of {each.bridge} is in the file already"
+            mistakes.add(("map", index), words)
+        places.add(place)
+    for index, module in enumerate(fleet.modules):
+        named += [(("modules", index, *w), name) for w, name in bridges_of(module)]
+    for index, robot in enumerate(robots):
+        way = ("robots", index)
+        if robot.bridge:
+            named += [((*way, *inner), name) for inner, name in robot.bridges()]
+        elif robot.name:
+            words = 'the key "bridge" is missing: there are several bridges'
+            mistakes.add(way, words)
+        if way not in wrong:
+            robot.resolved().motion.check(way, mistakes)
+    for way, name in named:
+        if not name:
+            mistakes.add(way, 'the key "bridge" is missing')
+        elif name not in fleet.bridges:
+            listed = f"the name of a bridge ({', '.join(fleet.bridges)})"
+            hint = checks.did_you_mean(name, fleet.bridges)
+            mistakes.add(way, f"got {show(name)}, expected {listed}{hint}")
+    return msgspec.structs.replace(fleet, map=maps, robots=robots)
+
+
+def _no_base_twice(fleet: FleetConfig, mistakes: Mistakes) -> None:
+    """Refuse two robots with one base: who drives the one would move the other."""
+    first: dict[tuple[str, str], int] = {}
+    for index, robot in enumerate(fleet.robots):
+        twist = robot.resolved().motion.twist
+        bridge = None if twist is None else fleet.bridges.get(twist.bridge)
+        if twist is None or bridge is None or not twist.topic:
+            continue
+        other = first.setdefault((bridge.url, twist.topic), index)
+        if other != index:
+            mistakes.add(
+                ("robots", index, "twist", "topic"),
+                f'got the text "{twist.topic}", which drives '
+                f'"{fleet.robots[other].name}" ({way_in_words(("robots", other))}) '
+                "already, expected a topic of its own",
+            )
+
+
+def _no_name_twice(robots: Sequence[RobotConfig], mistakes: Mistakes) -> None:
+    first: dict[str, int] = {}
+    for index, robot in enumerate(robots):
+        if not robot.name:
+            continue
+        other = first.setdefault(same_name(robot.name), index)
+        if other != index:
+            mistakes.add(
+                ("robots", index, "name"),
+                f'got the text "{robot.name}", expected a name that differs from '
+                f'"{robots[other].name}" ({way_in_words(("robots", other))}) by more '
+                "than case and Unicode form",
+            )
+
+
+# Writing a file.
+
+SHORT = ("odometry", "twist", "move", "initial_pose", "cameras")
+"""Keys for which a topic alone may stand."""
+
+Remarks = Mapping[Way, str]
+
+
+def dump(
+    data: Mapping[str, Any],
+    *,
+    remarks: Remarks | None = None,
+    below: Mapping[Way, Sequence[str]] | None = None,
+    head: str = "",
+) -> str:
+    """Return a fleet file.
+
+    Args:
+        data: What it says, as :meth:`FleetConfig.to_dict` returns it.
+        remarks: What stands behind a value, by the way to it.
+        below: Remarks that stand on lines of their own below a value.
+        head: What stands before all of it.
+
+    """
+    writer = _Writer(remarks or {}, below or {})
+    plain = {key: each for key, each in data.items() if not _is_table(each)}
+    lines = writer.pairs((), plain)
+    for key in ("bridges", "map", "image", "modules", "tiles", "labels", "robots"):
+        value = data.get(key)
+        if value is None or not _is_table(value):
+            continue
+        if isinstance(value, Mapping):
+            lines += ["", f"[{key}]", *writer.pairs((key,), value)]
+        else:
+            for index, each in enumerate(value):
+                table = writer.pairs((key, index), each)
+                lines += ["", f"[[{key}]]", *table, *writer.under((key, index))]
+    # Remarks hold names of topics, too; a line break in one would begin a table.
+    text = "\n".join(map(escaped, lines)).lstrip("\n")
+    return f"{head}\n{text}\n" if head else f"{text}\n"
+
+
+def _is_table(value: object) -> bool:
+    return bool(value) and (
+        isinstance(value, Mapping)
+        or (isinstance(value, list) and all(isinstance(v, Mapping) for v in value))
+    )
+
+
+class _Writer:
+    """Writes tables of TOML, with remarks."""
+
+    def __init__(self, remarks: Remarks, below: Mapping[Way, Sequence[str]]) -> None:
+        self._remarks = remarks
+        self._below = below
+
+    def pairs(self, way: Way, table: Mapping[str, Any]) -> list[str]:
+        """Return the lines of a table, a key each, without its header."""
+        lines = []
+        for key, value in table.items():
+            lines += self._pair((*way, key), _key(key), value)
+            lines += self.under((*way, key))
+        return lines
+
+    def under(self, way: Way) -> list[str]:
+        """Return the remarks below a value."""
+        return [f"# {each}" for each in self._below.get(way, ())]
+
+    def _pair(self, way: Way, name: str, value: Any) -> list[str]:
+        inner = [each[: len(way)] == way != each for each in self._remarks]
+        if isinstance(value, Mapping) and any(inner):
+            lines = []
+            for key, each in value.items():
+                lines += self._pair((*way, key), f"{name}.{_key(key)}", each)
+            return lines
+        if isinstance(value, list) and way[-1] in ("modules", "cameras", "buttons"):
+            rows = [
+                f"  {self._value(each, way)},{self._remark((*way, index))}"
+                for index, each in enumerate(value)
+            ]
+            return [f"{name} = [", *rows, "]"]
+        return [f"{name} = {self._value(value, way)}{self._remark(way)}"]
+
+    def _remark(self, way: Way) -> str:
+        return f" # {self._remarks[way]}" if way in self._remarks else ""
+
+    def _value(self, value: Any, way: Way = ()) -> str:
+        match value:
+            case str():
+                return _text(value)
+            case bool():
+                return str(value).lower()
+            case list() | tuple():
+                return f"[{', '.join(map(self._value, value))}]"
+            case Mapping() if way and way[-1] in SHORT and set(value) == {"topic"}:
+                return _text(value["topic"])
+            case Mapping():
+                pairs = [f"{_key(k)} = {self._value(v)}" for k, v in value.items()]
+                return f"{{ {', '.join(pairs)} }}"
+        return str(value)
+
+
+def _text(value: str) -> str:
+    # A JSON text is a TOML text too, but for the characters that are not printable.
+    text = msgspec.json.encode(value).decode()
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
+
+
+def _key(name: str) -> str:
+    plain = name.replace("-", "").replace("_", "")
+    return name if plain.isascii() and plain.isalnum() else _text(name)

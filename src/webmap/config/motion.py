@@ -1,0 +1,239 @@
+"""Everything that moves a robot: velocity, goals, limits, stop hooks, scan assist.
+
+A process that only moves robots can load this file: it needs no display.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from numbers import Real
+from typing import Annotated, Any, ClassVar, Literal
+
+import msgspec
+
+from webmap.config import checks
+from webmap.config.checks import Mistakes, Way
+from webmap.config.reading import Config
+from webmap.errors import ConfigError
+from webmap.ros.names import normalise_topic
+
+TWIST_TYPES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+"""What carries a velocity."""
+
+NAVIGATE_TO_POSE = "nav2_msgs/action/NavigateToPose"
+MOVE_BASE = "move_base_msgs/MoveBaseAction"
+
+COVARIANCE = (0.25, 0.25, 0.068)
+"""RViz's default: half a metre in x and y, and 15 degrees."""
+
+_ACCELERATION = checks.above_zero("metres per second squared")
+
+
+class TopicConfig(Config, frozen=True):
+    """A table for which the name of its topic may stand."""
+
+    @classmethod
+    def expand(cls, value: Any) -> dict[str, Any]:
+        """Return the table for a topic alone."""
+        return {"topic": value}
+
+
+def _hook_name(value: Any) -> str:
+    try:
+        return normalise_topic(value)
+    except ConfigError:
+        raise ConfigError('a name, such as "/lock"') from None
+
+
+def _covariance(value: Any) -> tuple[float, ...]:
+    numbers = [] if isinstance(value, str) else list(_each(value))
+    number = checks.from_zero("m²")
+    try:
+        if len(numbers) == 3:
+            return tuple(number(each) for each in numbers)
+    except ConfigError:
+        pass
+    raise ConfigError(
+        "three numbers from 0 on: the variances of x and y in m², of yaw in rad², "
+        "such as [0.25, 0.25, 0.068]"
+    )
+
+
+def _footprint(value: Any) -> float | list[tuple[float, float]]:
+    radius, number = checks.above_zero("metres"), checks.finite("a number of metres")
+    try:
+        if isinstance(value, Real):
+            return float(radius(value))
+        corners = [tuple(map(number, _each(corner))) for corner in _each(value)]
+        if len(corners) >= 3 and all(len(corner) == 2 for corner in corners):
+            return [(x, y) for x, y in corners]
+    except ConfigError:
+        pass
+    raise ConfigError(
+        "the robot's radius in metres, above 0, or 3 corners of its outline or "
+        "more, such as [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]"
+    )
+
+
+def _each(value: Any) -> Iterable[Any]:
+    """Return the items of a list, a tuple or a numpy array; other values have none."""
+    many = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+    return value if many else ()
+
+
+class StopHook(Config, kw_only=True, frozen=True):
+    """What else the robot's bridge is sent on STOP."""
+
+    example: ClassVar[str] = '{topic = "/lock"} or {service = "/e_stop"}'
+
+    topic: Annotated[str, _hook_name] = ""
+    """A topic of ``std_msgs/Bool``: true is published, and false on reset."""
+    service: Annotated[str, _hook_name] = ""
+    """A service of ``std_srvs/Trigger``, which is called."""
+    type: Annotated[str, checks.text] = ""
+
+    def __post_init__(self) -> None:
+        if not self.type:
+            type = "std_msgs/Bool" if self.topic else "std_srvs/Trigger"
+            msgspec.structs.force_setattr(self, "type", type)
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its fields together."""
+        if bool(self.topic) == bool(self.service):
+            words = 'expected the key "topic" or the key "service", one of them'
+            mistakes.add(way, words)
+            return
+        allowed = "std_msgs/Bool" if self.topic else "std_srvs/Trigger"
+        checks.checked(
+            checks.message_type(allowed), self.type, (*way, "type"), mistakes
+        )
+
+
+class TwistConfig(TopicConfig, kw_only=True, frozen=True):
+    """Where velocity goes, and what is known of the base behind it."""
+
+    topic: Annotated[str, checks.topic]
+    type: Annotated[str, checks.message_type(*TWIST_TYPES)] | None = None
+    """If not given, the bridge is asked, and Twist is assumed."""
+    stops_within: Annotated[float, checks.above_zero("seconds")] | None = None
+    """The time within which the base stops by itself when velocity ceases, if known."""
+    v_max: Annotated[float, checks.from_zero("metres per second")] | None = None
+    """The highest speed, whatever the direction."""
+    w_max: Annotated[float, checks.from_zero("radians per second")] | None = None
+    """The highest rate of turn, whatever the axis."""
+    z_max: Annotated[float, checks.above_zero("metres per second")] | None = None
+    """The highest speed upward and downward; without it the robot takes no ``z``."""
+    rx_max: Annotated[float, checks.above_zero("radians per second")] | None = None
+    """The highest rate of turn about the forward axis; likewise."""
+    ry_max: Annotated[float, checks.above_zero("radians per second")] | None = None
+    """The highest rate of turn about the left axis; likewise."""
+    a_max: Annotated[float, checks.above_zero("metres per second squared")] | None = (
+        None
+    )
+    """The highest acceleration; slowing down is never delayed."""
+    holonomic: bool = False
+    """Whether the base can move sideways."""
+    stop_hooks: list[StopHook] = []
+    bridge: str = ""
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its fields together."""
+        for index, hook in enumerate(self.stop_hooks):
+            if self.topic in (hook.topic, hook.service):
+                words = f"its velocity goes to {self.topic}, so that is no stop hook"
+                mistakes.add((*way, "stop_hooks", index), words)
+
+
+class MoveConfig(TopicConfig, kw_only=True, frozen=True):
+    """Where goals go, and how one is called off."""
+
+    action: Annotated[str, checks.topic] | None = None
+    """The action that goals go to, which says how they go and how they end."""
+    action_type: Annotated[
+        str,
+        checks.message_type(
+            "nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction"
+        ),
+    ] = NAVIGATE_TO_POSE
+    topic: Annotated[str, checks.topic] = ""
+    """A topic of ``geometry_msgs/PoseStamped``; besides an action it is for bridges
+    that take no goals of actions."""
+    cancel_topic: Annotated[str, checks.topic] | None = None
+    """actionlib's topic by which goals are called off."""
+    frame: Annotated[str, checks.text] = "map"
+    """The frame of the goals."""
+    on_operator_loss: Annotated[str, checks.one_of("continue", "cancel")] = "continue"
+    """What becomes of a goal when its operator is lost."""
+    bridge: str = ""
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its fields together."""
+        if not self.topic and not self.action:
+            missing = 'the key "topic" is missing'
+            words = "goals go to a topic or to an action, and neither is given"
+            mistakes.add(way, f"{missing}: {words}")
+
+
+class InitialPoseConfig(TopicConfig, kw_only=True, frozen=True):
+    """The topic for the robot's initial pose, and how certain that pose is."""
+
+    topic: Annotated[str, checks.topic]
+    """A topic of ``geometry_msgs/PoseWithCovarianceStamped``."""
+    covariance: Annotated[tuple[float, float, float], _covariance] = COVARIANCE
+    """The variances of x and y in m², of yaw in rad²."""
+    frame: Annotated[str, checks.text] = "map"
+    """The frame of its map, which counts if the robot takes no goals."""
+    bridge: str = ""
+
+
+class ScanAssistConfig(Config, kw_only=True, frozen=True):
+    """How the robot is slowed down before what a laser scan sees."""
+
+    topic: Annotated[str, checks.topic]
+    """Of ``sensor_msgs/LaserScan``, on the bridge of the velocity."""
+    footprint: Annotated[float | list[tuple[float, float]], _footprint]
+    """The robot's radius, or its corners in its own frame, in order; metres."""
+    x: Annotated[float, checks.finite("a number of metres")] = 0.0
+    """Where the scanner is, forward of the base."""
+    y: Annotated[float, checks.finite("a number of metres")] = 0.0
+    """Where it is, left of the base."""
+    angle: Annotated[float, checks.finite("a number of degrees")] = 0.0
+    """Where it looks, counter-clockwise from the robot's x."""
+    upside_down: bool = False
+    """Whether it hangs head down, so that its rays go round the other way."""
+    frame: Annotated[str, checks.frame] = ""
+    """The frame that its scans must name; empty for any."""
+    stop_distance: Annotated[float, checks.from_zero("metres")] = 0.15
+    """What stays free before the robot."""
+    brake: Annotated[float, _ACCELERATION] = 0.5
+    """How hard the robot slows down."""
+    blind: Literal["stop", "creep"] = "stop"
+    """What happens while the scan is old, empty or mostly unknown."""
+    creep: Annotated[float, checks.from_zero("metres per second")] = 0.1
+    """The speed of creeping."""
+
+    @property
+    def yaw(self) -> float:
+        """Where the scanner looks, in radians."""
+        return math.radians(self.angle)
+
+
+class MotionConfig(Config, kw_only=True, frozen=True):
+    """Everything that moves a robot; what it does not have is None.
+
+    Each part that goes over a bridge may name one; else it is the robot's.
+    """
+
+    twist: TwistConfig | None = None
+    move: MoveConfig | None = None
+    initial_pose: InitialPoseConfig | None = None
+    scan_assist: ScanAssistConfig | None = None
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its parts together."""
+        move, pose = self.move, self.initial_pose
+        if move is not None and pose is not None and move.bridge != pose.bridge:
+            mistakes.add(
+                (*way, "initial_pose"),
+                f"goals go to {move.bridge} and the initial pose to {pose.bridge}: "
+                "both go to one bridge",
+            )

@@ -1,0 +1,239 @@
+"""From plain values to a Struct: the one check of a configuration.
+
+A configuration is a Struct. The annotation of each field names the check of its value:
+``v_max: Annotated[float, checks.from_zero("metres per second")] | None = None``.
+:func:`read` makes the Struct from plain values, as TOML, JSON or the arguments of a
+method give them, and notes every mistake with the way to it.
+"""
+
+import functools
+import types
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    TypeAlias,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+import msgspec
+
+from webmap.config import checks
+from webmap.config.checks import Mistakes, Way, checked, did_you_mean, show
+from webmap.errors import ConfigError
+
+ONE_OR_MORE = "one or more"
+"""Among the annotations of a list: one value may stand for a list of one."""
+
+Reader: TypeAlias = Callable[[Any, Way, Mistakes], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadBy:
+    """Among the annotations of a field: what reads its value."""
+
+    read: Reader
+
+
+class Config(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One table of a configuration, from which the others derive."""
+
+    example: ClassVar[str] = ""
+    """A table, for people."""
+
+    inline: ClassVar[str] = ""
+    """A field that is a table itself, whose keys are keys of this one."""
+
+    @classmethod
+    def expand(cls, value: Any) -> dict[str, Any] | None:
+        """Return the table that a short form stands for; None if it means nothing.
+
+        Raises:
+            ConfigError: If it is no short form, with what was expected.
+
+        """
+        such = f" such as {cls.example}" if cls.example else " of keys and values"
+        raise ConfigError(f"a table{such}")
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its fields together; each by itself is right."""
+
+
+S = TypeVar("S", bound=Config)
+
+
+def read(cls: type[S], value: Any, way: Way, mistakes: Mistakes) -> S | None:
+    """Return a table of plain values as its Struct; every mistake is noted.
+
+    Args:
+        cls: The Struct.
+        value: A table of keys and values, or a short form of it.
+        way: The way to it.
+        mistakes: Where every mistake goes. If there is one, the result is of no use:
+            what must be there and is wrong or missing is None.
+
+    Returns:
+        The Struct; None if the value is no table, or means nothing.
+
+    """
+    if isinstance(value, Mapping):
+        return _read_table(cls, value, way, mistakes)
+    try:
+        table = cls.expand(value)
+    except ConfigError as error:
+        mistakes.add(way, f"got {show(value)}, expected {error}")
+        return None
+    return None if table is None else _read_table(cls, table, way, mistakes, short=True)
+
+
+def _read_table(
+    cls: type[S],
+    table: Mapping[str, Any],
+    way: Way,
+    mistakes: Mistakes,
+    *,
+    short: bool = False,
+) -> S:
+    known, before = _fields(cls), mistakes.count
+    values: dict[str, Any] = {key: None for key in known if known[key].required}
+    for key, got in table.items():
+        if key not in known:
+            unknown(key, known, (*way, str(key)), mistakes)
+            continue
+        # A short form has no key of its own in the file.
+        value = known[key].read(got, way if short else (*way, key), mistakes)
+        if value is not None:
+            values[key] = value
+    for key, each in known.items():
+        if each.required and key not in table:
+            mistakes.add(way, f'the key "{key}" is missing')
+    if cls.inline:
+        part = _inline(cls)
+        keys = values.keys() & set(part.__struct_fields__)
+        values[cls.inline] = part(**{key: values.pop(key) for key in keys})
+    made = cls(**values)
+    if mistakes.count == before:
+        made.check(way, mistakes)
+    return made
+
+
+def read_part(
+    cls: type[S], key: str, values: Mapping[str, Any], what: str, bridge: str = ""
+) -> S:
+    """Return one part of a configuration, as the arguments of a method give it.
+
+    Args:
+        cls: The part.
+        key: What it is called in the whole.
+        values: The arguments. One that is empty where that is the default counts as
+            left out.
+        what: What is configured, such as ``robot 'Bob'``.
+        bridge: The address of the bridge that it goes over.
+
+    Raises:
+        ConfigError: If something in it is wrong; every mistake is named.
+
+    """
+    empty = {each.name for each in msgspec.structs.fields(cls) if each.default == ""}
+    given = {k: v for k, v in values.items() if not (k in empty and v == "")}
+    if bridge:
+        given["bridge"] = bridge
+    mistakes = Mistakes()
+    part = read(cls, given, (key,), mistakes)
+    mistakes.refuse(what)
+    assert part is not None, "a table without a mistake is a part"
+    return part
+
+
+def unknown(key: object, known: Iterable[str], way: Way, mistakes: Mistakes) -> None:
+    """Note a key that means nothing."""
+    if mistakes.full:
+        mistakes.add(way, str(key))  # counted alone: a hint takes long
+        return
+    listed = ", ".join(known)
+    hint = did_you_mean(key, known)
+    if key in checks.HEAD and len(way) > 1:
+        hint = f"; it is the file's own, and stands before the first [table]{hint}"
+    mistakes.add(way, f'there is no key "{key}" here{hint}; there are {listed}')
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    read: Reader
+    required: bool
+
+
+@functools.cache
+def _fields(cls: type[Config]) -> dict[str, _Field]:
+    hints = get_type_hints(cls, include_extras=True)
+    found: dict[str, _Field] = {}
+    for each in msgspec.structs.fields(cls):
+        if each.name == cls.inline:
+            found |= _fields(_inline(cls))
+        else:
+            found[each.name] = _Field(_reader_of(hints[each.name]), each.required)
+    return found
+
+
+@functools.cache
+def _inline(cls: type[Config]) -> type[Config]:
+    part: type[Config] = get_type_hints(cls)[cls.inline]
+    return part
+
+
+def _reader_of(hint: Any) -> Reader:
+    """Return what reads the value of a field with this annotation."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        for each in inner[1:]:
+            if isinstance(each, ReadBy):
+                return each.read
+            if callable(each):
+                return functools.partial(checked, each)
+        return _list_reader(get_args(inner[0])[0], single=True)
+    if origin in (Union, types.UnionType):
+        inner_read = _reader_of(
+            next(each for each in inner if each is not types.NoneType)
+        )
+        return lambda value, way, mistakes: (
+            None if value is None else inner_read(value, way, mistakes)
+        )
+    if origin is list:
+        return _list_reader(inner[0], single=False)
+    if origin is Literal:
+        return functools.partial(checked, checks.one_of(*inner))
+    if isinstance(hint, type) and issubclass(hint, Config):
+        return functools.partial(read, hint)
+    if hint is Any:
+        return lambda value, way, mistakes: value
+    return functools.partial(checked, {bool: checks.yes_or_no, str: checks.text}[hint])
+
+
+def _list_reader(hint: Any, *, single: bool) -> Reader:
+    inner_read, example = _reader_of(hint), getattr(hint, "example", "")
+
+    def read_all(value: Any, way: Way, mistakes: Mistakes) -> list[Any]:
+        if isinstance(value, list | tuple):
+            taken = (inner_read(v, (*way, i), mistakes) for i, v in enumerate(value))
+            return [each for each in taken if each is not None]
+        if single:
+            each = inner_read(value, way, mistakes)
+            return [] if each is None else [each]
+        name = ".".join(part for part in way if isinstance(part, str))
+        brackets = " in two brackets" if isinstance(value, Mapping) else ""
+        expected = f"a table [[{name}]]{brackets} for each"
+        if example:
+            expected = f"an array such as [{example.partition(' or ')[0]}]"
+        elif get_origin(hint) is Annotated and get_args(hint)[0] is str:
+            expected = 'an array of texts, such as ["one", "two"]'
+        mistakes.add(way, f"got {show(value)}, expected {expected}")
+        return []
+
+    return read_all

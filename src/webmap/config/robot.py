@@ -1,0 +1,374 @@
+"""The configuration of one robot, wherever it comes from.
+
+A fleet file, the command line, discovery, ``Robot.from_dict`` and ``Robot.to_dict`` all
+have this one form.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import msgspec
+
+from webmap.config import checks
+from webmap.config.buttons import check_buttons
+from webmap.config.checks import Mistakes, Way
+from webmap.config.motion import MotionConfig, TopicConfig
+from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
+from webmap.errors import ConfigError
+from webmap.ros.image_address import EXAMPLE, parse_address
+from webmap.ros.names import is_topic
+
+ODOMETRY_TYPES = (
+    "nav_msgs/Odometry",
+    "geometry_msgs/Pose",
+    "geometry_msgs/PoseStamped",
+    "geometry_msgs/PoseWithCovarianceStamped",
+    "geometry_msgs/Pose2D",
+)
+"""What has a pose."""
+
+MOTION = tuple(MotionConfig.__struct_fields__)
+"""Keys of a robot's table that are parts of its motion."""
+
+LINKED = ("odometry", "tf", "twist", "move", "initial_pose")
+"""Parts that go over a bridge."""
+
+
+class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
+    """The topic with the robot's poses."""
+
+    topic: Annotated[str, checks.topic]
+    type: Annotated[str, checks.message_type(*ODOMETRY_TYPES)] | None = None
+    """If not given, the bridge is asked."""
+    throttle: Annotated[int, checks.milliseconds] = 100
+    """The least time between two messages, in milliseconds."""
+    bridge: str = ""
+
+
+class TfConfig(Config, kw_only=True, frozen=True):
+    """The frames that the robot is drawn by."""
+
+    quiet: bool = False
+    """Whether poses that stay in the odometry's frame are no problem to be shown."""
+    namespace: Annotated[str, checks.topic] = ""
+    """``/robot_0`` where the topics are ``/robot_0/tf`` and ``/robot_0/tf_static``."""
+    base_frame: Annotated[str, checks.text] | None = None
+    """The robot's own frame; ``base_link`` of the robot if not given."""
+    map_frame: Annotated[str, checks.text] = "map"
+    """The frame that robots are drawn in."""
+    bridge: str = ""
+
+    @classmethod
+    def expand(cls, value: Any) -> dict[str, Any] | None:
+        """Return the table for true, and None for false."""
+        if isinstance(value, bool):
+            return {} if value else None
+        raise ConfigError("true, false or a table")
+
+
+class PictureConfig(Config, kw_only=True, frozen=True):
+    """A picture of the robot from above, its nose to the right unless it is turned."""
+
+    file: Annotated[str, checks.text]
+    """From the folder of the fleet file."""
+    width: Annotated[float, checks.above_zero("metres")]
+    height: Annotated[float, checks.above_zero("metres")]
+    x: Annotated[
+        float,
+        checks.finite("a number of metres: how far its middle is before the base"),
+    ] = 0.0
+    y: Annotated[
+        float,
+        checks.finite("a number of metres: how far its middle is left of the base"),
+    ] = 0.0
+    angle: Annotated[float, checks.finite("a number of degrees, counter-clockwise")] = (
+        0.0
+    )
+    """How far it is turned about its middle."""
+
+
+def _address(value: Any) -> str:
+    try:
+        parse_address(value)
+    except ConfigError:
+        raise ConfigError(f'the address of a camera, such as "{EXAMPLE}"') from None
+    return str(value)
+
+
+class CameraConfig(Config, kw_only=True, frozen=True):
+    """One camera: a topic, or an address on the web."""
+
+    topic: Annotated[str, checks.topic] = ""
+    url: Annotated[str, _address] = ""
+    name: Annotated[str, checks.text] = ""
+    """Counted, if not given."""
+    throttle: Annotated[int, checks.milliseconds] | None = None
+
+    @classmethod
+    def expand(cls, value: Any) -> dict[str, Any]:
+        """Return the table for a topic or an address alone."""
+        either = f'a topic, or an address such as "{EXAMPLE}"'
+        if not isinstance(value, str):
+            raise ConfigError(f"{either}, or a table")
+        try:
+            if "://" in value:
+                return {"url": _address(value)}
+            if is_topic(value):
+                return {"topic": value}
+        except ConfigError:
+            pass
+        raise ConfigError(either)
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its fields together."""
+        if bool(self.topic) == bool(self.url):
+            mistakes.add(way, 'a camera has either a "topic" or a "url"')
+
+
+class ModuleConfig(Config, kw_only=True, frozen=True):
+    """A module by its name, with what ``add_module`` takes.
+
+    A bridge among the arguments is ``{"bridge": NAME}``, and ``None``, for which TOML
+    has no word, is ``{"none": True}``. The module itself says what it takes.
+    """
+
+    name: Annotated[str, checks.text]
+    args: Annotated[list[Any], checks.array] = []
+    options: Annotated[dict[str, Any], checks.table] = {}
+
+
+class Layer(NamedTuple):
+    """A module of a robot, and which key of the configuration says so."""
+
+    way: Way
+    module: ModuleConfig
+
+
+def _alignment(value: Any) -> tuple[float, ...]:
+    expected = (
+        "x and y in metres and an angle in degrees, counter-clockwise, such as "
+        "[12.5, -3.0, 90.0]"
+    )
+    number = checks.finite(expected)
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise ConfigError(expected)
+    return tuple(number(each) for each in value)
+
+
+Alignment = Annotated[tuple[float, float, float], _alignment]
+"""Where a map lies on the common one: metres, metres, and degrees counter-clockwise."""
+
+
+def _any_table(value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError("a table of keys and values")
+    return dict(value)
+
+
+def _buttons(value: Any, way: Way, mistakes: Mistakes) -> list[dict[str, Any]]:
+    if not isinstance(value, list | tuple):
+        words = "expected a table [[robots.buttons]] for each"
+        mistakes.add(way, f"got {checks.show(value)}, {words}")
+        return []
+    check_buttons(value, way, mistakes)
+    return [dict(each) for each in value if isinstance(each, Mapping)]
+
+
+OWN_CLASSES = ("robot", "unplaced", "selected", "stale")
+"""Classes of CSS that WebMap gives to a robot by itself."""
+
+
+def _css_class(value: Any) -> str:
+    plain = checks.text(value)
+    if plain.split() != [plain] or plain in OWN_CLASSES:
+        own = ", ".join(OWN_CLASSES)
+        raise ConfigError(f"a class of CSS: one word, and none of {own}")
+    return plain
+
+
+class RobotConfig(Config, kw_only=True, frozen=True):
+    """A robot; what it does not have is left out.
+
+    In plain data the parts of ``motion`` are keys of the robot itself.
+    """
+
+    inline: ClassVar[str] = "motion"
+
+    name: Annotated[str, checks.any_text]
+    """What people call it."""
+    bridge: Annotated[str, checks.bridge] = ""
+    """The bridge of every part that names no other: its name, or its address."""
+    base_link: Annotated[str, checks.text] = "base_link"
+    """The frame that navigation calls the robot's own."""
+    picture: PictureConfig | None = None
+    odometry: OdometryConfig | None = None
+    tf: TfConfig | None = None
+    alignment: Alignment | None = None
+    """Where the robot's own map lies; that of its bridge if not given."""
+    scan: Annotated[list[Annotated[str, checks.topic]], ONE_OR_MORE] = []
+    """Topics of ``sensor_msgs/LaserScan``, drawn under the body of the robot."""
+    battery: Annotated[str, checks.topic] = ""
+    """A topic of ``sensor_msgs/BatteryState``."""
+    cameras: Annotated[list[CameraConfig], ONE_OR_MORE] = []
+    motion: MotionConfig = MotionConfig()
+    buttons: Annotated[list[dict[str, Any]], ReadBy(_buttons)] = []
+    """As the module ``Buttons`` takes them."""
+    modules: list[ModuleConfig] = []
+    classes: list[Annotated[str, _css_class]] = []
+    """Classes of CSS."""
+    model: Annotated[dict[str, Any], _any_table] | None = None
+    """How it looks: an element as plain data."""
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "RobotConfig":
+        """Return the configuration that plain data has.
+
+        Args:
+            data: As :meth:`to_dict` returns it, or a table ``[[robots]]`` of a fleet
+                file.
+
+        Raises:
+            ConfigError: If something in it is wrong; every mistake is named.
+
+        """
+        if not isinstance(data, Mapping):
+            raise ConfigError(
+                f"a robot's plain data is a table such as {{'name': 'Bob'}}, "
+                f"got {data!r}"
+            )
+        mistakes = Mistakes()
+        config = read_robot(data, (), mistakes)
+        if config is not None and not mistakes.count:
+            config.resolved().motion.check((), mistakes)
+        mistakes.refuse(f"robot {data.get('name', '?')!r}")
+        assert config is not None, "it is a table, and there is no mistake"
+        return config
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, which JSON and TOML can hold."""
+        data: dict[str, Any] = {}
+        for key, value in msgspec.to_builtins(self).items():
+            data |= value if key == "motion" else {key: value}
+        return data
+
+    def check(self, way: Way, mistakes: Mistakes) -> None:
+        """Note what is wrong with its fields together."""
+        if self.picture is not None and self.model is not None:
+            words = 'a robot has a "picture" or a "model"; remove one of them'
+            mistakes.add((*way, "picture"), words)
+
+    def part(self, key: str) -> Any:
+        """Return a part by its key, of ``motion`` or not; None if it has none."""
+        return getattr(self.motion if key in MOTION else self, key)
+
+    def with_part(self, key: str, part: Any) -> "RobotConfig":
+        """Return the robot with another part."""
+        if key in MOTION:
+            motion = msgspec.structs.replace(self.motion, **{key: part})
+            return msgspec.structs.replace(self, motion=motion)
+        return msgspec.structs.replace(self, **{key: part})
+
+    def resolved(self) -> "RobotConfig":
+        """Return the robot with a bridge in every part that goes over one."""
+        config = self
+        for key in LINKED:
+            part = self.part(key)
+            if part is not None and not part.bridge:
+                linked = msgspec.structs.replace(part, bridge=self.bridge)
+                config = config.with_part(key, linked)
+        return config
+
+    def bridges(self) -> Iterator[tuple[Way, str]]:
+        """Yield every bridge that is named, and where."""
+        if self.bridge:
+            yield ("bridge",), self.bridge
+        for key in LINKED:
+            part = self.part(key)
+            if part is not None and part.bridge:
+                yield (key, "bridge"), part.bridge
+        for index, module in enumerate(self.modules):
+            for way, bridge in bridges_of(module):
+                yield ("modules", index, *way), bridge
+
+    def layers(self) -> list[Layer]:
+        """Return every module that draws or shows something of the robot, in order."""
+        link = {"bridge": self.bridge}
+        layers: list[Layer] = []
+        for number, scan in enumerate(self.scan, 1):
+            options: dict[str, Any] = {"max_dots": None, "throttle": 100}
+            if number > 1:
+                options["name"] = scan_name(number)
+            module = ModuleConfig(
+                name="LaserScanner", args=[link, scan], options=options
+            )
+            layers.append(Layer(("scan", number - 1), module))
+        if self.battery:
+            battery = ModuleConfig(name="Battery", args=[link, self.battery])
+            layers.append(Layer(("battery",), battery))
+        if self.buttons:
+            buttons = ModuleConfig(name="Buttons", args=[link, self.buttons])
+            layers.append(Layer(("buttons",), buttons))
+        for index, camera in enumerate(named_cameras(self.cameras)):
+            throttle = camera.throttle
+            said = {} if throttle is None else {"throttle": throttle}
+            kind = "HttpCamera" if camera.url else "Camera"
+            where = [camera.url] if camera.url else [link, camera.topic]
+            module = ModuleConfig(name=kind, args=[*where, camera.name], options=said)
+            layers.append(Layer(("cameras", index), module))
+        listed = enumerate(self.modules)
+        return layers + [Layer(("modules", index), module) for index, module in listed]
+
+
+def read_robot(value: Any, way: Way, mistakes: Mistakes) -> RobotConfig | None:
+    """Return the robot that plain data has; every mistake is noted.
+
+    Args:
+        value: The plain data.
+        way: The way to it.
+        mistakes: Where every mistake goes. If there is one, the result is of no use.
+
+    """
+    if not isinstance(value, Mapping):
+        mistakes.add(way, f"got {checks.show(value)}, expected a table [[robots]]")
+        return None
+    config = read(RobotConfig, value, way, mistakes)
+    if config is None:
+        return None
+    taken: set[str] = set()
+    for index, camera in enumerate(named_cameras(config.cameras)):
+        if checks.same_name(camera.name) in taken:
+            words = f'a second camera is called "{camera.name}"; give each its own name'
+            mistakes.add((*way, "cameras", index), words)
+        taken.add(checks.same_name(camera.name))
+    return config
+
+
+def named_cameras(cameras: Sequence[CameraConfig]) -> list[CameraConfig]:
+    """Return cameras each of which has a name."""
+    many = len(cameras) > 1
+    return [
+        msgspec.structs.replace(each, name=f"Camera {number}" if many else "Camera")
+        if not each.name
+        else each
+        for number, each in enumerate(cameras, 1)
+    ]
+
+
+def scan_name(number: int) -> str:
+    """Return the class that gives one of a robot's scans a colour of its own."""
+    return f"scan-{number}" if number > 1 else ""
+
+
+def bridges_of(module: ModuleConfig) -> Iterator[tuple[Way, str]]:
+    """Yield every bridge among the arguments of a module, and the way to it."""
+    for index, each in enumerate(module.args):
+        if is_link(each):
+            yield ("args", index, "bridge"), each["bridge"]
+    for key, each in module.options.items():
+        if is_link(each):
+            yield ("options", key, "bridge"), each["bridge"]
+
+
+def is_link(value: Any) -> bool:
+    """Return whether an argument of a module stands for a bridge."""
+    return isinstance(value, Mapping) and set(value) == {"bridge"}

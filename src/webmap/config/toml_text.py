@@ -1,0 +1,323 @@
+"""The text of a fleet file: TOML, and on which line of it each value is.
+
+Python's reader of TOML gives values without their lines. :class:`Lines` goes through a
+text that was read already, so it may trust its form: it knows headers, keys, strings,
+arrays and inline tables, and skips what else values are made of. What would take the
+reader very long is found before, by going through the text once.
+"""
+
+import re
+import tomllib
+from pathlib import Path
+
+from webmap.config.checks import Mistakes, Way, way_in_words
+from webmap.errors import ConfigError
+from webmap.outside_text import one_line
+from webmap.plain_files import read_file
+
+LARGEST = 1 << 19
+"""Bytes that a file may have."""
+
+EXPECTED = "expected TOML with a table [bridges] and a table [[robots]] for each robot"
+
+DEEPEST = 20
+"""Parts of a key, and brackets in one another."""
+
+_STRING = (
+    r'"""(?:\\.|[^\\])*?""""{0,2}'
+    r"|'''.*?''''{0,2}"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'"
+)
+_TOKEN = re.compile(
+    rf"(?P<part>{_STRING}|[A-Za-z0-9_-]+)|(?P<dot>[ \t]*\.[ \t]*)"
+    r"|(?P<opens>[\[{])|(?P<closes>[\]}])|(?P<quote>[\"'])|(?:#[^\n]*|[^\w\"'.\[\]{}#])",
+    re.DOTALL,
+)
+
+_WHERE = re.compile(
+    r"(?P<words>.*) \(at (?:line (?P<line>\d+), column \d+|end of .*)\)"
+)
+_TABLE = re.compile(r"Cannot declare \((?P<keys>.*?),?\) twice")
+_NUMBER = re.compile(r"\d[\d_]{999,}")
+_LONGEST = 60
+
+SEVERAL = ("robots", "map", "image", "modules", "labels", "buttons")
+"""Tables of which there may be more than one."""
+
+WORDS = {
+    "Invalid value": "no value that TOML knows: a text stands in quotes, true and "
+    "false without",
+    "Illegal character '\\n'": "expected the quote that ends a text on the same line",
+    "Invalid statement": 'expected a table such as [bridges], or key = "value"',
+    "Expected '=' after a key in a key/value pair": "expected a key, an equals sign "
+    "and a value",
+    "Cannot overwrite a value": "this key stands there already",
+    "Expected newline or end of document after a statement": "expected the end of the "
+    "line after a value",
+}
+"""What the reader of TOML says, in the words of somebody who writes a file."""
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_SPACE = re.compile(r"[ \t]*")
+_GAP = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
+_PLAIN = re.compile(r"[^,\]}#\n]*")
+_TEXT = re.compile(
+    r'"""(?:\\.|[^\\])*?"""(?:"{0,2}(?!"))'
+    r"|'''.*?'''(?:'{0,2}(?!'))"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'",
+    re.DOTALL,
+)
+
+
+class FleetText:
+    """A file that was read, and where in it something stands.
+
+    Args:
+        name: The file's name, for people.
+        text: What is in it.
+
+    Raises:
+        ConfigError: If it is not TOML; line and column are named.
+
+    """
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name = name
+        if not text.strip():
+            raise ConfigError(f"{name}: the file is empty; {EXPECTED}")
+        line = too_deep(text)
+        if line is not None:
+            raise ConfigError(
+                f"{name}:{line}: keys and values are nested {DEEPEST} deep at the "
+                f"most; {EXPECTED}"
+            )
+        try:
+            self.data = tomllib.loads(text)
+        except ValueError as error:  # also whole numbers of thousands of digits
+            raise ConfigError(not_toml(name, text, error)) from None
+        except RecursionError:
+            raise ConfigError(
+                f"{name}: values are nested too deep; {EXPECTED}"
+            ) from None
+        self._lines = Lines(text)
+
+    def complaint(self, way: Way, words: str) -> str:
+        """Return a mistake with file, line and key."""
+        said = f"{way_in_words(way) or 'the file'}: {words}"
+        # What a file holds must not steer the terminal that shows it.
+        return f"{self.name}:{self._lines.of(way)}: {one_line(said)}"
+
+    def refuse(self, mistakes: Mistakes) -> None:
+        """Raise all mistakes at once, if there are any.
+
+        Raises:
+            ConfigError: If there are.
+
+        """
+        if mistakes.found:
+            lines = [self.complaint(way, words) for way, words in mistakes.found]
+            if mistakes.more:
+                lines.append(f"{self.name}: and {mistakes.more} mistakes more")
+            raise ConfigError("\n".join(lines))
+
+
+def read_text(file: Path) -> FleetText:
+    """Read a file.
+
+    Raises:
+        ConfigError: If it is no file, too large, not UTF-8, or not TOML.
+        OSError: If it cannot be read.
+
+    """
+    try:
+        data = read_file(file, LARGEST)
+    except ConfigError as error:
+        raise ConfigError(f"{error}; {EXPECTED}") from None
+    if data.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
+        raise ConfigError(
+            f"{file}: the file begins with a byte order mark; save it as UTF-8 without"
+        )
+    try:
+        return FleetText(str(file), data.decode())
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ConfigError(f"{file}:{line}: this is not UTF-8; {EXPECTED}") from None
+
+
+class Lines:
+    """The line of each key and each element of an array.
+
+    Args:
+        text: A text that is TOML.
+
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text.replace("\r\n", "\n")
+        self._at = 0
+        self._found: dict[Way, int] = {}
+        self._tables: dict[Way, int] = {}
+        self._seen_to = (0, 1)
+        self._document()
+
+    def of(self, path: Way) -> int:
+        """Return the line of a path, or of what is around it; 1 for the file."""
+        while path and path not in self._found:
+            path = path[:-1]
+        return self._found.get(path, 1)
+
+    def _document(self) -> None:
+        table: Way = ()
+        while self._skip(_GAP) < len(self._text):
+            if self._next("[["):
+                table = self._header(array=True)
+            elif self._next("["):
+                table = self._header(array=False)
+            else:
+                self._pair(table)
+
+    def _header(self, *, array: bool) -> Way:
+        keys = self._key()
+        self._at += 2 if array else 1
+        path: Way = ()
+        for place, key in enumerate(keys):
+            path = (*path, key)
+            if array and place == len(keys) - 1:
+                self._tables[path] = self._tables.get(path, -1) + 1
+            self._note(path)
+            if path in self._tables:
+                path = (*path, self._tables[path])
+        self._found[path] = self._line()
+        return path
+
+    def _pair(self, table: Way) -> None:
+        path = table
+        start = self._line()
+        for key in self._key():
+            path = (*path, key)
+            self._found.setdefault(path, start)
+        self._at += 1  # the equals sign
+        self._value(path)
+
+    def _value(self, path: Way) -> None:
+        self._skip(_GAP)
+        if self._next("["):
+            self._array(path)
+        elif self._next("{"):
+            self._inline(path)
+        else:
+            string = _TEXT.match(self._text, self._at)
+            self._at = string.end() if string else self._skip(_PLAIN)
+
+    def _array(self, path: Way) -> None:
+        index = 0
+        while self._skip(_GAP) < len(self._text) and not self._next("]"):
+            self._note((*path, index))
+            self._value((*path, index))
+            self._skip(_GAP)
+            self._next(",")
+            index += 1
+
+    def _inline(self, path: Way) -> None:
+        while self._skip(_GAP) < len(self._text) and not self._next("}"):
+            self._pair(path)
+            self._skip(_GAP)
+            self._next(",")
+
+    def _key(self) -> list[str]:
+        keys = []
+        while True:
+            self._skip(_SPACE)
+            string = _TEXT.match(self._text, self._at)
+            bare = _BARE.match(self._text, self._at)
+            if string is not None:
+                keys.append(_unquoted(string[0]))
+                self._at = string.end()
+            elif bare is not None:
+                keys.append(bare[0])
+                self._at = bare.end()
+            else:
+                raise ValueError(f"no key on line {self._line()}")
+            self._skip(_SPACE)
+            if not self._next("."):
+                return keys
+
+    def _skip(self, pattern: re.Pattern[str]) -> int:
+        found = pattern.match(self._text, self._at)
+        assert found is not None, "every one of these patterns matches nothing too"
+        self._at = found.end()
+        return self._at
+
+    def _next(self, text: str) -> bool:
+        if self._text.startswith(text, self._at):
+            self._at += len(text)
+            return True
+        return False
+
+    def _note(self, path: Way) -> None:
+        self._found.setdefault(path, self._line())
+
+    def _line(self) -> int:
+        at, line = self._seen_to
+        line += self._text.count("\n", at, self._at)
+        self._seen_to = (self._at, line)
+        return line
+
+
+def _unquoted(key: str) -> str:
+    if "\\" in key:
+        return str(tomllib.loads(f"key = {key}")["key"])
+    return key[1:-1]  # keys are of one line, with one quote on each side
+
+
+def too_deep(text: str) -> int | None:
+    """Return the line where a text is nested deeper than :data:`DEEPEST`, or None."""
+    brackets = parts = 0
+    for token in _TOKEN.finditer(text):
+        kind = token.lastgroup
+        if kind == "quote":  # a text without an end; the reader says so
+            return None
+        if kind == "dot":
+            parts += 1
+        elif kind != "part":
+            parts = 0
+        if kind == "opens":
+            brackets += 1
+        elif kind == "closes":
+            brackets -= 1
+        if brackets > DEEPEST or parts >= DEEPEST:
+            return text.count("\n", 0, token.start()) + 1
+    return None
+
+
+def not_toml(name: str, text: str, error: ValueError) -> str:
+    """Return what is wrong with a text, with its line and what stands there.
+
+    Args:
+        name: The file's name, for people.
+        text: What is in it.
+        error: What the reader of TOML says.
+
+    """
+    lines = text.splitlines() or [""]
+    found = _WHERE.fullmatch(str(error))
+    if found is None:
+        number = _NUMBER.search(text)
+        if number is None:
+            return f"{name}: this is not TOML: {error}"
+        line = text.count("\n", 0, number.start()) + 1
+        return f"{name}:{line}: this is not TOML: a whole number of far too many digits"
+    words = found["words"]
+    # The end of the file is told without a line.
+    line = int(found["line"] or len(lines))
+    table = _TABLE.fullmatch(words)
+    if table is not None:
+        keys = ".".join(key.strip().strip("'\"") for key in table["keys"].split(","))
+        words = f"a table [{keys}] stands there already"
+        if keys.rpartition(".")[2] in SEVERAL:
+            words += f"; several are [[{keys}]] in two brackets each"
+    here = one_line(lines[min(line, len(lines)) - 1].strip(), _LONGEST)
+    got = f"got {here}, " if here else ""
+    return f"{name}:{line}: this is not TOML: {got}{WORDS.get(words, words)}"

@@ -1,0 +1,154 @@
+"""The lists that unfold from the page's bar: the bridges, and what was refused."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from webmap import html, refusals
+from webmap.console.words import icon
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from webmap import Bridge, Element
+
+WORST = ("lost", "connecting", "late")
+"""States that are not well, the worst first."""
+
+LATE = 0.5
+"""Seconds from which on it is said that what comes from a bridge comes late."""
+
+
+class BridgeList:
+    """A summary of the bridges that unfolds into a list of them.
+
+    Args:
+        element: The page's element to fill.
+        bridges: The bridges.
+        buttons: For each bridge what can be done with it.
+
+    """
+
+    def __init__(
+        self,
+        element: "Element",
+        bridges: Sequence["Bridge"],
+        buttons: Sequence["Element"],
+    ) -> None:
+        self._bridges = list(bridges)
+        self._text = html.span()
+        self._summary = html.summary(
+            html.span(class_="dot").set("aria-hidden", "true"),
+            self._text,
+            icon("icon-chevron"),
+        )
+        self._words = [html.span(class_="word") for _ in self._bridges]
+        self._lines = [
+            html.li(
+                html.span(class_="dot").set("aria-hidden", "true"),
+                html.span(text=bridge.name or bridge.url, class_="url"),
+                word,
+                button,
+            ).set("title", bridge.url)
+            for bridge, word, button in zip(
+                self._bridges, self._words, buttons, strict=True
+            )
+        ]
+        element.append(
+            html.details(
+                self._summary, html.ul(*self._lines, class_="bridge-list")
+            ).set("data-webmap-menu", "")
+        )
+        self.poll()
+
+    def poll(self) -> None:
+        """Look at the bridges again."""
+        states = [describe_link(bridge) for bridge in self._bridges]
+        for line, word, (link, text) in zip(
+            self._lines, self._words, states, strict=True
+        ):
+            line.set("data-link", link)
+            word.text = text
+        links = {link for link, _ in states}
+        worst = next((name for name in WORST if name in links), "open")
+        self._summary.set("data-link", worst)
+        self._text.text = summary([link for link, _ in states])
+
+
+def describe_link(bridge: "Bridge") -> tuple[str, str]:
+    """Return what the page calls a bridge's state, and a sentence for it."""
+    if bridge.state == "open" and bridge.lag >= LATE:
+        return "late", f"open, {bridge.lag:.1f} s late"
+    if bridge.state == "open":
+        return "open", "open"
+    if bridge.lost:
+        why = f": {bridge.trouble}" if bridge.trouble else ""
+        return "lost", f"cannot be reached{why}; trying again"
+    return "connecting", "connecting"
+
+
+def summary(links: Sequence[str]) -> str:
+    """Return a few words for the states of all bridges."""
+    total, open_ = len(links), sum(link in ("open", "late") for link in links)
+    late = links.count("late")
+    if total == 1:
+        return {"open": "Bridge open", "lost": "No bridge", "late": "Bridge late"}.get(
+            links[0], "Bridge connecting"
+        )
+    if late:
+        return f"{open_} of {total} bridges open, {late} late"
+    if open_ == total:
+        return f"{total} bridges open"
+    return f"{open_} of {total} bridges open"
+
+
+SHOWN = 12
+"""How many people are listed."""
+
+
+class RefusedList:
+    """A count of refused messages that unfolds into who sent them, and what.
+
+    It is there once there is one, and not for those who may only look.
+
+    Args:
+        element: The page's element to fill.
+        role: What the viewer may do.
+
+    """
+
+    def __init__(self, element: "Element", role: str) -> None:
+        self._may = role != "viewer"
+        self._text = html.span()
+        self._newest = html.span(class_="newest")
+        self._list = html.ul(class_="bridge-list refused-list")
+        summary = html.summary(self._text, self._newest, icon("icon-chevron"))
+        summary.set(
+            "title", "Messages of pages that were not taken. They moved nothing."
+        )
+        self._details = html.details(summary, self._list).set(hidden=True)
+        self._details.set("data-webmap-menu", "")
+        element.append(self._details)
+        self._shown: object = ()
+        self.poll()
+
+    def poll(self) -> None:
+        """Look at the counts again."""
+        rows = refusals.rows
+        if not self._may or rows == self._shown:
+            return
+        self._shown = rows
+        self._details.set(hidden=not rows)
+        self._text.text = f"{refusals.total} refused"
+        self._newest.text = rows[0].last if rows else ""
+        self._list.clear()
+        for row in rows[:SHOWN]:
+            self._list.append(line(row.by, row.count, row.last, row.at))
+
+
+def line(by: str, count: int, last: str, at: "datetime") -> "Element":
+    """Return how many of one person's messages were refused, and the last of them."""
+    return html.li(
+        html.span(text=by, class_="url"),
+        html.span(text=f"{count}, last at {at.astimezone():%H:%M:%S}", class_="word"),
+        html.span(text=last, class_="refused-last"),
+    )

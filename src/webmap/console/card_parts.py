@@ -1,0 +1,351 @@
+"""Parts of the card of the selected robot: speeds, own stop, goal, health."""
+
+import math
+import time
+from typing import TYPE_CHECKING, Any, Protocol
+
+from webmap import html, svg
+from webmap.console.doctor import entry
+from webmap.console.words import UNKNOWN, number, sentence
+from webmap.geometry import Twist
+
+if TYPE_CHECKING:
+    from webmap import Element, Map, Robot
+
+COLUMNS = ("Sent", "Echoed", "Measured")
+
+OF_THE_PAGE = "limit of the page"
+"""Why a robot is driven no faster that might be."""
+
+NOBODY_KNOWS = "Nobody knows whether it stops by itself."
+
+
+class SpeedTable:
+    """Three views of one motion, which agree as long as all is well.
+
+    Args:
+        most: What this page asks for at most, in m/s and rad/s.
+
+    """
+
+    def __init__(self, most: tuple[float, float]) -> None:
+        self._most = most
+        self._linear = [html.td() for _ in COLUMNS]
+        self._turn = [html.td() for _ in COLUMNS]
+        self._cap = html.span()
+        self._why = html.div(class_="why")
+        self._reasons: tuple[str, ...] = ()
+        self.elements: list[Element] = [self._table(), self._limits()]
+
+    def show(self, robot: "Robot") -> None:
+        """Show what is known of a robot's motion."""
+        report = robot.report
+        sent = echoed = measured = None
+        if report is not None:
+            sent, echoed, measured = report.sent, report.echoed, report.measured
+        seen = robot.motion.axes.seen(robot.measured_twist)
+        if measured is None and seen is not None:
+            measured = seen.numbers
+        for index, velocity in enumerate((sent, echoed, measured)):
+            self._linear[index].text = linear(velocity)
+            self._turn[index].text = (
+                UNKNOWN if velocity is None else number(velocity[2])
+            )
+        self.elements[1].set(hidden=report is None)
+        if report is not None:
+            # Before somebody has it, its own limits alone are in the report.
+            self._cap.text = cap(
+                min(report.v, self._most[0]), min(report.w, self._most[1])
+            )
+            lower = report.v > self._most[0] or report.w > self._most[1]
+            self._show_reasons((*report.why, OF_THE_PAGE) if lower else report.why)
+
+    def _show_reasons(self, reasons: tuple[str, ...]) -> None:
+        if reasons == self._reasons:
+            return
+        self._reasons = reasons
+        self._why.clear()
+        for reason in reasons:
+            badge = html.span(text=reason, class_="badge")
+            if "unverified" in reason:
+                badge.set("data-tone", "warn")
+            self._why.append(badge)
+
+    def _table(self) -> "Element":
+        head = html.tr(
+            html.td(), *(html.th(text=name, scope="col") for name in COLUMNS)
+        )
+        rows = [
+            html.tr(
+                html.th(f"{name} ", html.span(text=unit, class_="unit"), scope="row"),
+                *cells,
+            )
+            for name, unit, cells in (
+                ("Speed", "m/s", self._linear),
+                ("Turn", "rad/s", self._turn),
+            )
+        ]
+        return html.table(html.thead(head), html.tbody(*rows), class_="speeds")
+
+    def _limits(self) -> "Element":
+        return html.dl(
+            html.div(
+                html.dt(text="Speed cap"), html.dd(self._cap, self._why), class_="wide"
+            ),
+            class_="facts",
+        )
+
+
+def linear(velocity: tuple[float, ...] | None) -> str:
+    """Return the speed, whatever the direction; backwards is below zero."""
+    if velocity is None:
+        return UNKNOWN
+    twist = Twist(*velocity)
+    return number(math.copysign(twist.speed, twist.vx))
+
+
+def cap(v: float, w: float) -> str:
+    """Return the speeds in force as people read them."""
+    return f"{number(v)} m/s, {number(w)} rad/s"
+
+
+class OwnStop:
+    """Shows the bound that holds when WebMap, its machine or the link dies.
+
+    Args:
+        fastest: What this page drives a robot at, in m/s.
+
+    """
+
+    def __init__(self, fastest: float) -> None:
+        self._fastest = fastest
+        self._bound = html.span()
+        self._how = html.span(class_="how")
+        self._test = html.p(class_="test")
+        self._test.set("role", "status")
+        self.elements: list[Element] = [
+            html.dl(
+                html.div(
+                    html.dt(text="If WebMap dies"),
+                    html.dd(self._bound, self._how),
+                    class_="own-stop",
+                ),
+                class_="facts",
+            ),
+            self._test,
+        ]
+
+    def show(self, robot: "Robot") -> None:
+        """Show what is known of a robot's own stop, and of the test of it."""
+        report = robot.report
+        self.elements[0].set(hidden=report is None)
+        if report is None:
+            self._test.text = ""
+            return
+        self._bound.text, self._how.text = bound(
+            report.stop_time,
+            f"tested {report.stop_date or ''}".strip()
+            if report.stop_source == "tested"
+            else report.stop_source,
+            min(report.v, self._fastest),
+            report.brake,
+        )
+        self.elements[0].set("data-tone", "warn" if report.stop_time is None else None)
+        test = report.test
+        shown = test is not None and test.state != "done"
+        self._test.text = f"Stop test: {sentence(test.text)}" if test and shown else ""
+
+
+def bound(
+    stop_time: float | None, source: str | None, v: float, brake: float
+) -> tuple[str, str]:
+    """Return within what time a robot stands that is told nothing, and how that comes.
+
+    Args:
+        stop_time: Seconds after which its base brakes by itself, if that is known.
+        source: How it is known; ``None`` if it is not.
+        v: The speed in force, in m/s.
+        brake: How hard it brakes, in m/s².
+
+    """
+    if stop_time is None:
+        if source is None:
+            return NOBODY_KNOWS, ""
+        return "It does not stop by itself.", f" {sentence(source)}"
+    braking = v / brake
+    return (
+        f"stands within {number(stop_time + braking)} s",
+        f" {number(stop_time)} s ({source}) + {number(braking)} s of braking "
+        f"from {number(v)} m/s",
+    )
+
+
+GOALS = {
+    "sent": ("Goal sent", "sent", "active"),
+    "accepted": ("Goal accepted", "sent", "active"),
+    "under way": ("Goal under way", "way", "active"),
+    "cancelling": ("Cancelling the goal", "cancelled", "warn"),
+    "unknown": ("State of the goal unknown", "unknown", "warn"),
+    "reached": ("Goal reached", "reached", "good"),
+    "failed": ("Goal failed", "failed", "bad"),
+    "cancelled": ("Goal cancelled", "cancelled", ""),
+}
+"""The words, the shape and the tone of each state of a goal.
+
+The page has a table of the words and shapes, made from this one. console.html has a
+symbol ``goal-SHAPE`` for each shape.
+"""
+
+
+LINGER = 30.0
+"""Seconds for which a goal that was reached or cancelled is shown; one that failed is
+shown until the next."""
+
+
+class Goal(Protocol):
+    """What a robot's report says of its goal, as far as it is told in numbers."""
+
+    @property
+    def state(self) -> str:
+        """How it stands."""
+
+    @property
+    def left(self) -> float | None:
+        """The rest of the way, in metres."""
+
+    @property
+    def eta(self) -> float | None:
+        """The rest of the time, in seconds."""
+
+    @property
+    def time(self) -> float | None:
+        """How long it has been under way, in seconds."""
+
+    @property
+    def recoveries(self) -> int | None:
+        """How often the robot had to free itself."""
+
+
+class GoalLine:
+    """One line of the card: what the robot's goal has come to, and how far it is."""
+
+    def __init__(self) -> None:
+        self._use = svg.use(href="#goal-sent")
+        shape = svg.svg(self._use, class_="shape").set("aria-hidden", "true")
+        self._words = html.span()
+        self._figures = html.span(class_="figures")
+        self.element = html.p(
+            shape, html.span(self._words, self._figures), class_="goal", hidden=True
+        )
+
+    def show(self, robot: "Robot") -> None:
+        """Show how it stands with the goal of a robot; nothing if it has none."""
+        goal = None if robot.report is None else robot.report.goal
+        ended = robot.goal_ended_at
+        past = ended is not None and time.monotonic() - ended > LINGER
+        if goal is None or (past and goal.state != "failed"):
+            self.element.set(hidden=True)
+            return
+        self.element.set(hidden=False)
+        words, shape, tone = GOALS[goal.state]
+        self._use.set(href=f"#goal-{shape}")
+        self.element.set("data-tone", tone or None)
+        self._words.text = f"{words}: {goal.why}" if goal.why else words
+        self._figures.text = figures(goal)
+
+
+def figures(goal: Goal) -> str:
+    """Return what the robot tells of a goal that it follows, in numbers with units."""
+    if goal.state not in ("under way", "cancelling"):
+        return ""
+    parts = []
+    if goal.left is not None:
+        parts.append(f"{goal.left:.1f} m to go")
+    if goal.eta is not None:
+        parts.append(f"about {goal.eta:.0f} s")
+    if goal.time is not None:
+        parts.append(f"{goal.time:.0f} s under way")
+    if goal.recoveries:
+        times = "once" if goal.recoveries == 1 else f"{goal.recoveries} times"
+        parts.append(f"got stuck {times}")
+    return ", ".join(parts)
+
+
+MOST = 6
+"""Parts that are listed; the worst come first."""
+
+LEVELS = {
+    "error": ("wrong", "Error"),
+    "stale": ("note", "Silent"),
+    "warn": ("warning", "Warning"),
+    "ok": ("good", "Well"),
+}
+"""For each level of diagnostics its shape and colour, and its word."""
+
+
+class RobotHealth:
+    """Lists the parts of the selected robot that are not well; a module of maps.
+
+    A robot without diagnostics has no such list. One of which all is well has one line,
+    and so has one of which nothing was heard.
+
+    Args:
+        map: The map.
+        card: The page's element to append to.
+
+    """
+
+    def __init__(self, map: "Map", card: "Element") -> None:
+        self.map = map
+        self._list = html.ul()
+        self.element: Element = html.section(
+            html.h3(text="Health"), self._list, class_="card-health", hidden=True
+        )
+        self.element.set("aria-label", "Health")
+        card.append(self.element)
+        self._shown: list[tuple[str, str, str]] = []
+        self.on_select()
+
+    def destroy(self) -> None:
+        """Take the list away."""
+        self.element.remove()
+
+    def on_select(self) -> None:
+        """Show the health of the robot that is selected now."""
+        self.poll()
+
+    def poll(self) -> None:
+        """Look at the parts again; those that say nothing become silent by that."""
+        robot = self.map.selected
+        modules = [] if robot is None else robot.modules
+        # Those that follow diagnostics.
+        found = [m for m in modules if hasattr(m, "parts") and hasattr(m, "hold")]
+        said = _lines([part for module in found for part in module.parts])
+        if found and not said:
+            said = [("note", "Unheard: ", "no part of this robot says how it is")]
+        if said == self._shown:
+            return
+        self._shown = said
+        self._list.clear()
+        for level, word, words in said:
+            self._list.append(entry(level, word, words))
+        self.element.set(hidden=not said)
+
+
+def _lines(parts: list[Any]) -> list[tuple[str, str, str]]:
+    """Return what is wrong, or that all is well; nothing if no part tells either."""
+    bad = [part for part in parts if part.level != "ok"]
+    lines = []
+    for part in bad[:MOST]:
+        level, word = LEVELS[part.level]
+        # A count of seconds would be another line every second.
+        words = "" if part.level == "stale" else f": {part.message}"
+        whose = " (of some robot here)" if part.shared else ""
+        lines.append((level, f"{word}: ", f"{part.name}{whose}{words}"))
+    if len(bad) > MOST:
+        lines.append(("note", "", f"and {len(bad) - MOST} more parts"))
+    # That the parts of nobody are well tells nothing of this robot.
+    if not bad and any(not part.shared for part in parts):
+        count = f"{len(parts)} part{'' if len(parts) == 1 else 's'}"
+        lines.append(("good", "All is well: ", count))
+    return lines

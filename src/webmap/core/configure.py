@@ -1,0 +1,296 @@
+"""From a configuration to a robot and back, and from one configuration to another."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+import msgspec
+
+from webmap.config import checks
+from webmap.config.checks import Mistakes, Way
+from webmap.config.robot import (
+    LINKED,
+    MOTION,
+    OWN_CLASSES,
+    Layer,
+    ModuleConfig,
+    OdometryConfig,
+    RobotConfig,
+    TfConfig,
+    is_link,
+)
+from webmap.core.alignment import numbers
+from webmap.core.frames import frames_of
+from webmap.core.module_arguments import WrongArgument, WrongArguments
+from webmap.core.robot_model import element_from_dict, element_to_dict
+from webmap.errors import ConfigError, ModuleNotFound, WebMapError
+from webmap.ros.bridge import Bridge
+from webmap.scene.element import Element
+from webmap.tf import Buffer
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+NONE = {"none": True}
+"""What stands for ``None`` among the arguments of a module."""
+
+Link: TypeAlias = Callable[[str], Bridge]
+"""Returns the bridge of a name or an address."""
+
+Made: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
+"""Name and arguments of a module, as it was added."""
+
+R = TypeVar("R", bound="Robot")
+
+
+def robot_of(
+    cls: type[R],
+    config: RobotConfig,
+    bridges: Mapping[str, Bridge] | None,
+    model: Element | None = None,
+) -> R:
+    """Make a robot; see :meth:`Robot.from_config`."""
+    mistakes = Mistakes()
+    if config.picture is not None and model is None:
+        words = "only the console shows a picture; give a model instead"
+        mistakes.add(("picture",), words)
+    if model is None and config.model is not None:
+        try:
+            model = element_from_dict(config.model)
+        except WebMapError as error:
+            mistakes.add(("model",), str(error))
+    robot = cls(config.name, model, base_link=config.base_link)
+    try:
+        before = RobotConfig(name=config.name)
+        mistakes.take((), apply(robot, before, config, bridges))
+        mistakes.refuse(f"robot {config.name!r}")
+    except BaseException:
+        robot.destroy()  # else the gate would be told of it
+        raise
+    return robot
+
+
+def apply(
+    robot: "Robot",
+    old: RobotConfig,
+    new: RobotConfig,
+    bridges: Mapping[str, Bridge] | None = None,
+) -> Mistakes:
+    """Change a robot by what differs between two configurations.
+
+    What both have stays as it is, and so does everything that neither of them has:
+    modules that a program added, for example. Name, model and frame of the base are
+    those that the robot was made with. Bridges and modules that are made belong to the
+    scope that this is called in.
+
+    Args:
+        robot: The robot.
+        old: What it was configured with.
+        new: What it is to be configured with.
+        bridges: Bridges by name or address; others are made.
+
+    Returns:
+        What is wrong; each part that is not named there has been changed.
+
+    """
+    links = dict(bridges or {})
+
+    def link(name: str) -> Bridge:
+        if not name:
+            raise ConfigError('the key "bridge" is missing')
+        if name not in links:
+            links[name] = Bridge(name)
+        return links[name]
+
+    mistakes = Mistakes()
+    for name in old.classes:
+        if name not in new.classes:
+            robot.svg.classes.remove(name)
+    for name in new.classes:
+        robot.svg.classes.add(name)
+    if _changes_bridge_of_goals(old.resolved(), new.resolved()):
+        robot.configure("initial_pose", None)  # both go to one bridge at any time
+    for key in ("odometry", "tf", "alignment", *MOTION):
+        before, after = old.resolved().part(key), new.resolved().part(key)
+        if before == after:
+            continue
+        try:
+            _set(robot, key, after, link)
+        except WebMapError as error:
+            _note(mistakes, (key,), error, robot.name)
+    _set_layers(robot, old, new, link, mistakes)
+    return mistakes
+
+
+def _changes_bridge_of_goals(old: RobotConfig, new: RobotConfig) -> bool:
+    """Return whether goals and the initial pose both go to another bridge now."""
+    parts = [(config.motion.move, config.motion.initial_pose) for config in (old, new)]
+    bridges = [part.bridge for pair in parts for part in pair if part is not None]
+    return len(bridges) == 4 and bridges[:2] != bridges[2:]
+
+
+def _set(robot: "Robot", key: str, part: Any, link: Link) -> None:
+    """Set or clear a part that is no module."""
+    if key == "alignment":
+        robot.unset_alignment() if part is None else robot.set_alignment(*part)
+    elif part is None:
+        robot.configure(key, None)
+    elif key == "tf":
+        _place(robot, part, link(part.bridge))
+    else:
+        values = msgspec.to_builtins(part)
+        over = values.pop("bridge", None)
+        robot.configure(key, values, link(over or "") if key in LINKED else None)
+
+
+def _place(robot: "Robot", tf: TfConfig, bridge: Bridge) -> None:
+    """Draw a robot by frames, and move the layers of its map into the same frame."""
+    before = robot.tf
+    options = {**msgspec.structs.asdict(tf), "bridge": bridge}
+    if before == {**options, **_names(robot, tf)}:
+        return
+    # What was heard of the frames is kept meanwhile.
+    held = frames_of(bridge, tf.namespace).join(lambda: None)
+    try:
+        robot.set_tf(**options)
+    finally:
+        held.remove()
+    frame = (robot.tf or {})["map_frame"]
+    for module in list(robot.modules):
+        made = robot.arguments_of(module)
+        if made is not None and made[2].get("map_frame", frame) != frame:
+            name, args, said = made
+            robot.remove_module(module)
+            robot.add_module(name, *args, **{**said, "map_frame": frame})
+
+
+def _names(robot: "Robot", tf: TfConfig) -> dict[str, str]:
+    """Return the whole names of the frames that a robot would be drawn by."""
+    base, name = tf.base_frame or robot.base_link, Buffer().name
+    space = tf.namespace
+    return {"map_frame": name(tf.map_frame, space), "base_frame": name(base, space)}
+
+
+def _set_layers(
+    robot: "Robot", old: RobotConfig, new: RobotConfig, link: Link, mistakes: Mistakes
+) -> None:
+    """Remove the modules that only the old configuration has, and add the new ones."""
+    left = [layer.module for layer in old.layers()]
+    added: list[Layer] = []
+    for layer in new.layers():
+        if layer.module in left:
+            left.remove(layer.module)
+        else:
+            added.append(layer)
+    for module in left:
+        made = module_call(module, link)
+        for each in list(robot.modules):
+            if robot.arguments_of(each) == made:
+                robot.remove_module(each)
+                break
+    for layer in added:
+        _add(robot, layer, link, mistakes)
+
+
+def _add(robot: "Robot", layer: Layer, link: Link, mistakes: Mistakes) -> None:
+    way, module = layer
+    inner = way if way[0] == "modules" else None
+    try:
+        name, args, options = module_call(module, link)
+        made = robot.add_module(name, *args, **options)
+        if way[0] == "scan":
+            robot.svg.insert(1, made.svg)  # after the title, under the body
+    except ModuleNotFound as error:
+        mistakes.add((*way, "name"), str(error))
+    except WrongArguments as error:
+        for wrong in error.wrong:
+            place = wrong.way if inner else ()
+            mistakes.add((*way, *place), wrong_argument(module, wrong))
+    except WebMapError as error:
+        # What a module says of a value begins with the name of the argument.
+        key = str(error).partition(" ")[0].rstrip(":")
+        place = ("options", key) if inner and key in module.options else ()
+        said = f"{module.name}: {error}" if inner else str(error)
+        mistakes.add((*way, *place), said)
+    except Exception as error:  # a module of somebody else's may raise anything
+        said = f"{type(error).__name__}: {error}"
+        mistakes.add(way, f"{module.name} refused its arguments: {said}")
+
+
+def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
+    """Return what is wrong with an argument, and what was expected."""
+    if not wrong.got:
+        return f"{module.name}: {wrong.words}"
+    expected = wrong.words
+    if expected == "a Bridge":
+        expected = 'a bridge, such as { bridge = "hall" }'
+    of = f", for {wrong.name} of {module.name}"
+    return f"got {checks.show(wrong.got[0])}, expected {expected}{of}"
+
+
+def _note(mistakes: Mistakes, way: Way, error: WebMapError, name: str) -> None:
+    """Note what a part refused, each mistake with the way to it."""
+    if isinstance(error, checks.WrongConfig):
+        mistakes.take((), error.mistakes)
+    else:
+        mistakes.add(way, str(error).removeprefix(f"robot {name!r}: "))
+
+
+def module_call(module: ModuleConfig, link: Link) -> Made:
+    """Return a module with its arguments as ``add_module`` takes them."""
+    args = tuple(_argument(value, link) for value in module.args)
+    options = {key: _argument(value, link) for key, value in module.options.items()}
+    return module.name, args, options
+
+
+def _argument(value: Any, link: Link) -> Any:
+    """Return what an argument of a module stands for."""
+    if is_link(value):
+        return link(value["bridge"])
+    return None if value == NONE else value
+
+
+def config_of(robot: "Robot") -> RobotConfig:
+    """Return what a robot is configured with; see :meth:`Robot.to_config`."""
+    feed, tf, own = robot.feed, robot.tf, robot.whereabouts.own_alignment
+    odometry = frames = None
+    if feed is not None:
+        odometry = OdometryConfig(
+            topic=feed.topic,
+            type=feed.type,
+            throttle=feed.throttle,
+            bridge=feed.bridge.url,
+        )
+    if tf is not None:
+        frames = TfConfig(**{**tf, "bridge": tf["bridge"].url})
+    return RobotConfig(
+        name=robot.name,
+        base_link=robot.base_link or "base_link",
+        classes=[name for name in robot.svg.classes if name not in OWN_CLASSES],
+        model=element_to_dict(robot.model, robot.model_images.names),
+        odometry=odometry,
+        tf=frames,
+        alignment=None if own is None else numbers(own),
+        motion=robot.motion.config,
+        modules=[
+            ModuleConfig(
+                name=name,
+                args=[_plain(value) for value in args],
+                options={key: _plain(value) for key, value in options.items()},
+            )
+            for name, args, options in robot.module_arguments()
+        ],
+    )
+
+
+def robot_to_dict(robot: "Robot") -> dict[str, Any]:
+    """Return a robot as plain data; see :meth:`Robot.to_dict`."""
+    try:
+        return config_of(robot).to_dict()
+    except TypeError as error:  # a module was given what no file can hold
+        raise ConfigError(f"robot {robot.name!r} is no plain data: {error}") from error
+
+
+def _plain(value: Any) -> Any:
+    if value is None:
+        return dict(NONE)
+    return {"bridge": value.url} if isinstance(value, Bridge) else value

@@ -1,0 +1,243 @@
+"""Positions, orientations, velocities and the matrices of the view: plain values.
+
+Lengths are metres and angles radians unless a name says otherwise (REP 103).
+"""
+
+import math
+from dataclasses import dataclass
+
+FARTHEST = 1e7
+"""Metres: a number beyond the size of a planet is a mistake, and no browser draws it.
+
+Numbers that are finite and absurd, such as 1e300, overflow the single precision that
+browsers draw with, and the whole view then fits nothing.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Vector3:
+    """Three numbers along x, y and z, as ``geometry_msgs/Vector3`` and ``Point``."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+def normalize_angle(angle: float) -> float:
+    """Return the same direction as ``angle`` in ``[-pi, pi]``, in radians.
+
+    Raises:
+        ValueError: If ``angle`` is infinite.
+
+    """
+    return math.remainder(angle, math.tau)
+
+
+@dataclass(frozen=True, slots=True)
+class Quaternion:
+    """An orientation, with the components' names of ``geometry_msgs/Quaternion``."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    w: float = 1.0
+
+    @classmethod
+    def from_yaw(cls, yaw: float) -> "Quaternion":
+        """Return the rotation by ``yaw`` radians about z, counter-clockwise."""
+        return cls(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+
+    @property
+    def norm(self) -> float:
+        """The length; 1 for a rotation, 0 or NaN for a message that is none."""
+        return math.hypot(self.x, self.y, self.z, self.w)
+
+    @property
+    def yaw(self) -> float:
+        """The heading about z, in radians in ``[-pi, pi]``, whatever the norm.
+
+        It is 0 for a quaternion of zeros and NaN for one with NaN.
+        """
+        return math.atan2(
+            2 * (self.w * self.z + self.x * self.y),
+            self.w * self.w + self.x * self.x - self.y * self.y - self.z * self.z,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """A velocity of a base in its own frame.
+
+    The first three numbers move it in the plane. The others are 0 for every base that
+    moves on the ground.
+    """
+
+    vx: float = 0.0
+    """Metres per second forward."""
+
+    vy: float = 0.0
+    """Metres per second to the left; 0 unless the base is holonomic."""
+
+    wz: float = 0.0
+    """Radians per second, counter-clockwise."""
+
+    vz: float = 0.0
+    """Metres per second upward."""
+
+    wx: float = 0.0
+    """Radians per second about the forward axis."""
+
+    wy: float = 0.0
+    """Radians per second about the left axis."""
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float, float]:
+        """All six components, in the order of the fields."""
+        return (self.vx, self.vy, self.wz, self.vz, self.wx, self.wy)
+
+    @property
+    def speed(self) -> float:
+        """Metres per second, whatever the direction."""
+        return math.hypot(self.vx, self.vy, self.vz)
+
+    @property
+    def turn(self) -> float:
+        """Radians per second, whatever the axis."""
+        return math.hypot(self.wx, self.wy, self.wz)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether every component is exactly 0."""
+        return not any(self.numbers)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether no component is NaN or infinite."""
+        return all(map(math.isfinite, self.numbers))
+
+    def to_message(self) -> dict[str, dict[str, float]]:
+        """Return it as ``geometry_msgs/Twist`` has it."""
+        return {
+            "linear": {"x": self.vx, "y": self.vy, "z": self.vz},
+            "angular": {"x": self.wx, "y": self.wy, "z": self.wz},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A place and a heading in the plane of a frame that the context names."""
+
+    x: float = 0.0
+    """Metres along the frame's x."""
+
+    y: float = 0.0
+    """Metres along the frame's y."""
+
+    yaw: float = 0.0
+    """Radians from the frame's x, counter-clockwise."""
+
+    def __matmul__(self, other: "Pose") -> "Pose":
+        """Return ``other``, given in this pose's own frame, in the outer frame."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose(
+            self.x + cos * other.x - sin * other.y,
+            self.y + sin * other.x + cos * other.y,
+            normalize_angle(self.yaw + other.yaw),
+        )
+
+    @property
+    def inverse(self) -> "Pose":
+        """The pose that undoes this one: ``pose @ pose.inverse`` is the origin."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return Pose(
+            -cos * self.x - sin * self.y,
+            sin * self.x - cos * self.y,
+            normalize_angle(-self.yaw),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Affine:
+    """A map of the plane, with the components' names of ``SVGMatrix``.
+
+    A point ``(x, y)`` goes to ``(a*x + c*y + e, b*x + d*y + f)``.
+    """
+
+    a: float = 1.0
+    b: float = 0.0
+    c: float = 0.0
+    d: float = 1.0
+    e: float = 0.0
+    f: float = 0.0
+
+    @classmethod
+    def translation(cls, x: float, y: float) -> "Affine":
+        """Return the map that moves every point by ``(x, y)``."""
+        return cls(e=x, f=y)
+
+    @classmethod
+    def scaling(cls, factor: float, x: float = 0.0, y: float = 0.0) -> "Affine":
+        """Return the map that scales by ``factor`` and leaves ``(x, y)`` in place.
+
+        Raises:
+            ValueError: If ``factor`` is not a finite number above 0.
+
+        """
+        if not (math.isfinite(factor) and factor > 0):
+            raise ValueError(f"factor must be a number above 0, got {factor}")
+        return cls(factor, 0.0, 0.0, factor, x - factor * x, y - factor * y)
+
+    @classmethod
+    def rotation(cls, angle: float, x: float = 0.0, y: float = 0.0) -> "Affine":
+        """Return the turn by ``angle`` that leaves ``(x, y)`` in place.
+
+        Args:
+            angle: Radians from the first axis towards the second. Seen on a screen,
+                where y points down, that is clockwise.
+            x: The point that stays, along the first axis.
+            y: The point that stays, along the second axis.
+
+        """
+        cos, sin = math.cos(angle), math.sin(angle)
+        return cls(cos, sin, -sin, cos, x - cos * x + sin * y, y - sin * x - cos * y)
+
+    def __matmul__(self, other: "Affine") -> "Affine":
+        """Return the map that applies ``other`` first and this one to its result."""
+        return Affine(
+            self.a * other.a + self.c * other.b,
+            self.b * other.a + self.d * other.b,
+            self.a * other.c + self.c * other.d,
+            self.b * other.c + self.d * other.d,
+            self.a * other.e + self.c * other.f + self.e,
+            self.b * other.e + self.d * other.f + self.f,
+        )
+
+    def apply(self, x: float, y: float) -> tuple[float, float]:
+        """Return where the point ``(x, y)`` goes."""
+        return (self.a * x + self.c * y + self.e, self.b * x + self.d * y + self.f)
+
+    @property
+    def determinant(self) -> float:
+        """The factor by which areas grow; negative if the map mirrors."""
+        return self.a * self.d - self.b * self.c
+
+    @property
+    def inverse(self) -> "Affine":
+        """The map that undoes this one.
+
+        Raises:
+            ValueError: If the map flattens the plane.
+
+        """
+        det = self.determinant
+        if not det:
+            raise ValueError(f"{self} flattens the plane and has no inverse")
+        a, b, c, d = self.d / det, -self.b / det, -self.c / det, self.a / det
+        return Affine(
+            a, b, c, d, -(a * self.e + c * self.f), -(b * self.e + d * self.f)
+        )
+
+    @property
+    def values(self) -> tuple[float, float, float, float, float, float]:
+        """The six components, in the order of SVG's ``matrix()``."""
+        return (self.a, self.b, self.c, self.d, self.e, self.f)

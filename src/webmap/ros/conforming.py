@@ -1,0 +1,236 @@
+"""Plain data checked against the definition of a message, field by field."""
+
+import math
+from collections.abc import Mapping, Sequence, Sized
+from dataclasses import replace
+from typing import Any
+
+from webmap.errors import ConfigError
+from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field
+
+MAX_TEXT = 10_000
+"""Characters of one text that a person gives."""
+
+
+class Misfit(ConfigError):
+    """A value does not fit its field.
+
+    Attributes:
+        path: Where the field is in the message: ``pose.position.x``, ``ranges[3]``;
+            empty for the message as a whole.
+        words: What is wrong with its value.
+        value: What was got.
+        expected: What the field takes, in words; empty if there is no such field.
+
+    """
+
+    def __init__(
+        self, words: str, path: str = "", *, value: Any = None, expected: str = ""
+    ) -> None:
+        super().__init__(words)
+        self.words = words
+        self.path = path
+        self.value = value
+        self.expected = expected
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.words}" if self.path else self.words
+
+    def inside(self, place: str) -> "Misfit":
+        """Return the same error, with ``place`` before the path."""
+        joint = "" if not self.path or self.path.startswith("[") else "."
+        self.path = f"{place}{joint}{self.path}"
+        return self
+
+
+class Conformer:
+    """Returns plain data as a message of its type, or says which field does not fit.
+
+    This class is as strict as a form: absent fields stay absent, numbers are finite,
+    and a time may be a number of seconds. Subclasses take messages from elsewhere.
+
+    Args:
+        ros2: Whether times are written as ROS 2 has them.
+
+    """
+
+    def __init__(self, *, ros2: bool) -> None:
+        self.ros2 = ros2
+
+    def message(self, fields: Sequence[Field], value: Any) -> dict[str, Any]:
+        """Return a message with the fields in the order of the definition.
+
+        Args:
+            fields: Those of the type.
+            value: The fields' values by their names.
+
+        Raises:
+            Misfit: If a value does not fit; its path names the field.
+
+        """
+        if not isinstance(value, Mapping):
+            raise wrong(value, "a table of fields")
+        made: dict[str, Any] = {}
+        found = 0
+        for field in fields:
+            try:
+                if field.name not in value:
+                    self.absent(field, made)
+                    continue
+                found += 1
+                each = value[field.name]
+                made[field.name] = (
+                    self.array(field, each) if field.is_array else self.one(field, each)
+                )
+            except Misfit as error:
+                if field.name not in value:  # perhaps it has another name there
+                    _check_names(fields, value)
+                raise error.inside(field.name) from None
+        if found < len(value):
+            _check_names(fields, value)
+        return made
+
+    def absent(self, field: Field, made: dict[str, Any]) -> None:
+        """Handle a field that is absent: here, it stays absent."""
+
+    def array(self, field: Field, value: Any) -> Any:
+        """Return the value of an array."""
+        if not isinstance(value, list | tuple):
+            raise wrong(value, expectation(field))
+        check_size(field, value)
+        made = []
+        for index, each in enumerate(value):
+            try:
+                made.append(self.one(field, each))
+            except Misfit as error:
+                raise error.inside(f"[{index}]") from None
+        return made
+
+    def one(self, field: Field, value: Any) -> Any:
+        """Return a value that is not an array, or one element of an array."""
+        if field.fields is not None:
+            return self.message(field.fields, value)
+        if field.type in FLOATS:
+            return self.number(field, value)
+        if field.type in INTEGERS:
+            return self.whole(field, value)
+        if field.type in TIMES:
+            return self.time(field, value)
+        return self.text(field, value) if field.type == "string" else self.truth(value)
+
+    def number(self, field: Field, value: Any) -> float:
+        """Return a number that may have a fraction."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise wrong(value, "a number")
+        if not abs(value) <= FLOATS[field.type]:  # neither NaN nor infinite
+            raise wrong(value, "a number")
+        return float(value)
+
+    def whole(self, field: Field, value: Any) -> int:
+        """Return a whole number."""
+        low, high = INTEGERS[field.type]
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise wrong(value, expectation(replace(field, is_array=False)))
+        if not low <= value <= high:
+            raise wrong(value, expectation(replace(field, is_array=False)))
+        return value
+
+    def truth(self, value: Any) -> bool:
+        """Return true or false."""
+        if not isinstance(value, bool):
+            raise wrong(value, "true or false")
+        return value
+
+    def text(self, field: Field, value: Any) -> str:
+        """Return a text."""
+        longest = MAX_TEXT if field.longest is None else field.longest
+        if not isinstance(value, str) or len(value) > longest:
+            raise wrong(value, expectation(replace(field, is_array=False)))
+        return value
+
+    def time(self, field: Field, value: Any) -> dict[str, int]:
+        """Return a moment, or a length of time, of a number of seconds."""
+        number = seconds(value)
+        fits = isinstance(number, int | float) and not isinstance(number, bool)
+        if not fits or not math.isfinite(number) or abs(number) >= 2**31:
+            raise wrong(value, "a number of seconds")
+        if field.type == "time" and number < 0:
+            raise wrong(value, "seconds from 0")
+        whole = math.floor(number)
+        rest = round((number - whole) * 1e9)
+        return (
+            self.spelled(whole + 1, 0) if rest == 10**9 else self.spelled(whole, rest)
+        )
+
+    def spelled(self, whole: int, rest: int) -> dict[str, int]:
+        """Return seconds and nanoseconds by the names that the dialect has for them."""
+        if self.ros2:
+            return {"sec": whole, "nanosec": rest}
+        return {"secs": whole, "nsecs": rest}
+
+
+def _check_names(fields: Sequence[Field], value: Mapping[str, Any]) -> None:
+    names = [field.name for field in fields]
+    for name in value:
+        if name not in names:
+            words = f"no such field; there are {', '.join(names) or 'none'}"
+            raise Misfit(words, str(name))
+
+
+def check_size(field: Field, value: Sized) -> None:
+    """Check that an array has as many elements as its field takes.
+
+    Raises:
+        Misfit: If it has more or fewer.
+
+    """
+    count = len(value)
+    fixed = field.size is not None and count != field.size
+    if fixed or (field.most is not None and count > field.most):
+        expected = expectation(field)
+        words = f"got {count} values, expected {expected}"
+        raise Misfit(words, value=value, expected=expected)
+
+
+def wrong(value: Any, expected: str) -> Misfit:
+    """Return the error of a value that is not what its field takes."""
+    words = f"got {show(value)}, expected {expected}"
+    return Misfit(words, value=value, expected=expected)
+
+
+def expectation(field: Field) -> str:
+    """Return in words what a field takes."""
+    if field.is_array:
+        most = "" if field.most is None else f"at most {field.most} "
+        many = most if field.size is None else f"{field.size} "
+        return f"{many}values of {field.type}"
+    if field.type in INTEGERS:
+        low, high = INTEGERS[field.type]
+        return f"a whole number from {low} to {high}"
+    if field.type in FLOATS:
+        return "a number"
+    if field.type in TIMES:
+        return "a number of seconds"
+    if field.type == "bool":
+        return "true or false"
+    return "a text" + ("" if field.longest is None else f" of {field.longest} at most")
+
+
+def seconds(value: Any) -> Any:
+    """Return a time of either dialect in seconds; anything else as it is."""
+    if not isinstance(value, Mapping):
+        return value
+    whole = value.get("secs", value.get("sec", 0))
+    rest = value.get("nsecs", value.get("nanosec", 0))
+    try:
+        return whole + rest / 1e9
+    except TypeError:
+        return value
+
+
+def show(value: Any) -> str:
+    """Return a value as an error shows it: short, without control characters."""
+    text = value if isinstance(value, str) else repr(value)
+    text = "".join(c if c.isprintable() else "?" for c in text[:41])
+    text = f"{text[:40]}..." if len(text) > 40 else text
+    return f'"{text}"' if isinstance(value, str) else text

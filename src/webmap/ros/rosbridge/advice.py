@@ -1,0 +1,249 @@
+"""What people are told about a rosbridge itself, and what they can do about it."""
+
+from collections.abc import Sequence
+from urllib.parse import urlsplit
+
+from webmap.ros.finding import BRIDGE, Finding
+from webmap.ros.rosbridge.checks import LinkFacts, is_loopback
+
+_AWAY = (
+    (
+        "name is not known",
+        "Look how the host is spelled, or give its number, as in ws://192.168.1.20:9090.",
+    ),
+    (
+        "nothing listens",
+        "Start rosbridge_server on the robot, and look at its address and port.",
+    ),
+    (
+        "",
+        "Start rosbridge_server on the robot, and look at address and firewall.",
+    ),
+)
+"""What to do, by what is in the reason; the last holds for any."""
+
+
+def unreachable(trouble: str) -> Finding:
+    """Say why a rosbridge cannot be reached."""
+    return Finding(
+        "wrong",
+        BRIDGE,
+        f"The rosbridge cannot be reached: {trouble}.",
+        next(advice for words, advice in _AWAY if words in trouble),
+    )
+
+
+def topics_not_listed(trouble: str, otherwise: str) -> Finding:
+    """Say that nobody lists the topics behind a rosbridge.
+
+    Args:
+        trouble: What went wrong.
+        otherwise: What else helps; empty where somebody has given a list.
+
+    """
+    return Finding(
+        "warning" if otherwise else "note",
+        BRIDGE,
+        f"rosapi does not say which topics there are: {trouble}.",
+        "Start the rosapi node beside rosbridge. Without it nobody tells who else "
+        "writes velocity, and robots that come later are not found."
+        + (f" {otherwise}" if otherwise else ""),
+    )
+
+
+def openness(
+    facts: LinkFacts, url: str, shown: Sequence[str], dialect: str | None
+) -> Finding:
+    """Say who can reach a rosbridge.
+
+    Args:
+        facts: What was found out about it.
+        url: Its address.
+        shown: Topics that no client needs and that it shows all the same.
+        dialect: ``ros1`` or ``ros2``; None if that is not known.
+
+    """
+    parts = urlsplit(url)
+    hidden = (
+        f" Nothing is hidden from anybody either ({', '.join(shown)} is shown)."
+        if shown
+        else ""
+    )
+    here = is_loopback(facts.peer or parts.hostname or "")
+    outward = [each for each in facts.listens if not is_loopback(each)]
+    if here and facts.listens and not outward:
+        return Finding("good", BRIDGE, "The rosbridge listens on this machine alone.")
+    if here and outward:
+        return Finding(
+            "warning",
+            BRIDGE,
+            f"The rosbridge is on this machine and listens at {', '.join(outward)}: it "
+            f"asks nobody who they are, so whoever reaches this machine can drive.",
+            _listen_advice(dialect, "this machine alone (address: 127.0.0.1)"),
+        )
+    if here:
+        return Finding(
+            "note",
+            BRIDGE,
+            "The rosbridge was reached at an address of this machine; whether others "
+            "reach it too cannot be seen.",
+        )
+    secret = (
+        "the way there is encrypted"
+        if parts.scheme == "wss"
+        else "everybody on the way can read and change what is sent"
+    )
+    return Finding(
+        "note" if parts.scheme == "wss" else "warning",
+        BRIDGE,
+        f"The rosbridge is open to the network ({facts.peer or parts.hostname}): it "
+        f"asks nobody who they are, so whoever reaches it can drive; {secret}.{hidden}",
+        f"{_listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide what "
+        f"nobody needs (topics_glob, services_glob), and use wss with a certificate.",
+    )
+
+
+def _listen_advice(dialect: str | None, where: str) -> str:
+    """Return how to keep others from the port."""
+    if dialect == "ros1":
+        return (
+            "Close its port for others in the firewall: rosbridge 0.11 for ROS 1 "
+            "listens on all addresses, whatever its parameter address is."
+        )
+    return f"Let it listen on {where}, or close its port in the firewall."
+
+
+def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
+    """Say whether a service that hangs holds up what comes after it.
+
+    Args:
+        facts: What was found out about the bridge.
+        url: Its address.
+        dialect: ``ros1`` or ``ros2``; None if that is not known.
+
+    """
+    advice = (
+        "Set call_services_in_new_thread: true on rosbridge_websocket. WebMap sends "
+        "velocity and calls over different sockets in any case."
+    )
+    how = " (tried)" if facts.tried else ", as the bridge says"
+    if facts.calls_in_threads is True:
+        return Finding("good", BRIDGE, f"A service that hangs blocks no socket{how}.")
+    if facts.calls_in_threads is False:
+        return Finding(
+            "warning",
+            BRIDGE,
+            f"A service that hangs blocks its whole socket{how}.",
+            advice,
+        )
+    if facts.untold:
+        return Finding(
+            "note",
+            BRIDGE,
+            f"Whether a service that hangs blocks its socket was tried, and is not "
+            f"known: {facts.untold}.",
+        )
+    if dialect is None:
+        return Finding(
+            "note",
+            BRIDGE,
+            "Whether a service that hangs blocks its socket is not known.",
+        )
+    if dialect == "ros2":
+        return Finding(
+            "note",
+            BRIDGE,
+            "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
+            "does unless told otherwise; it was not tried.",
+            f"The button Try a call of the console's report finds out, or webmap "
+            f"doctor {url} --try-call. {advice}",
+        )
+    return Finding(
+        "good",
+        BRIDGE,
+        "rosbridge for ROS 1 makes each call in a thread of its own, so one that hangs "
+        "blocks nothing.",
+    )
+
+
+def compression(facts: LinkFacts, packed: Sequence[str]) -> Finding:
+    """Say how what may be large comes.
+
+    Args:
+        facts: What was found out about the bridge.
+        packed: The scans that came in a binary encoding.
+
+    """
+    words = (
+        "The socket could be compressed"
+        if facts.deflate
+        else "No compression is offered"
+    )
+    if packed:
+        words = f"Scans come packed as CBOR ({', '.join(packed)}). {words}"
+    return Finding("good", BRIDGE, f"{words}; WebMap does without.")
+
+
+def too_large(robot: str, topic: str, size: int) -> Finding:
+    """Say that messages of a topic are too large for the bridge's CBOR.
+
+    Args:
+        robot: Whose topic it is.
+        topic: The topic.
+        size: Bytes of a message in JSON.
+
+    """
+    return Finding(
+        "warning",
+        robot,
+        f"{topic} comes in JSON only ({size} bytes, in parts): it is "
+        f"larger than max_message_size of the bridge, above which it sends no "
+        f"CBOR. JSON keeps the bridge busy for seconds.",
+        f"Set the parameter max_message_size of rosbridge_websocket to {size} or more.",
+    )
+
+
+MAYBE_TOO_LARGE = (
+    "If it is larger than max_message_size of rosbridge_websocket (10 MB unless set), "
+    "set that higher."
+)
+"""What may help where a large message does not come."""
+
+
+def type_not_certain(robot: str, topic: str, type: str) -> Finding:
+    """Say that the type that is named may be that of another client.
+
+    rosapi names one type of a topic, and of two the first in the alphabet.
+
+    Args:
+        robot: Whose velocity topic it is.
+        topic: The topic.
+        type: The type that is named, without its package.
+
+    """
+    return Finding(
+        "note",
+        robot,
+        f"rosapi names {type} for {topic}, and a client of a rosbridge, "
+        f"which may be WebMap itself, has announced that type, so rosapi cannot "
+        f"show whether the base takes TwistStamped.",
+        f"Look on the robot: ros2 topic info -v {topic}. A base that "
+        f"takes another type would neither move nor stop.",
+    )
+
+
+def client_writes(robot: str, topic: str, nodes: Sequence[str]) -> Finding:
+    """Say that a client of a rosbridge writes velocity.
+
+    Args:
+        robot: Whose velocity topic it is.
+        topic: The topic.
+        nodes: The nodes that write for their clients.
+
+    """
+    return Finding(
+        "note",
+        robot,
+        f"A client of a rosbridge ({', '.join(nodes)}) writes to "
+        f"{topic} now; it may be WebMap itself.",
+    )

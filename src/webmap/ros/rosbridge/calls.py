@@ -1,0 +1,153 @@
+"""Calls of ROS services, on a lane of their own.
+
+A rosbridge may handle what comes on one socket in order, so a service that takes its
+time holds up whatever was sent after it. Calls therefore share no socket with data,
+and a socket on which a call was not answered in time gets no further ones.
+"""
+
+import asyncio
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from webmap.errors import BridgeClosed, ServiceError
+from webmap.identifiers import generate_id
+from webmap.ros.rosbridge import ops
+from webmap.ros.rosbridge.connection import Lane
+from webmap.ros.rosbridge.events import Malformed, ServiceResponse, Status
+from webmap.ros.rosbridge.protocol import Protocol
+
+
+class Calls:
+    """The calls to one bridge; the socket is opened by the first of them."""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self._lane: _CallsLane | None = None
+        self._retired: set[_CallsLane] = set()
+
+    async def call(
+        self,
+        service: str,
+        args: Mapping[str, Any] | Sequence[Any] | None,
+        type: str | None,
+        patience: float,
+    ) -> Any:
+        """Call ``service`` and return the fields of its answer.
+
+        Raises:
+            ServiceError: If it fails, or does not answer within ``patience`` seconds.
+            BridgeClosed: If the link cannot be opened, or ends before the answer.
+            ValueError: If a number in ``args`` is NaN or infinite.
+            TypeError: If a value in ``args`` is nothing that JSON knows.
+
+        """
+        id = generate_id()
+        frame = ops.call_service(service, args, id=id, type=type)
+        if self._lane is None or self._lane.is_over:
+            self._lane = _CallsLane(self.url)
+        lane = self._lane
+        try:
+            async with asyncio.timeout(patience):
+                answer = await lane.ask(id, frame)
+        except TimeoutError:
+            self._retire(lane)
+            raise ServiceError(lane.why_unanswered(service, patience)) from None
+        if not answer.result:
+            raise ServiceError(f"{service} failed: {answer.values}")
+        return answer.values
+
+    def _retire(self, lane: "_CallsLane") -> None:
+        """Ask no more on ``lane``; other calls on it may still be answered."""
+        if self._lane is lane:
+            self._lane = None
+        self._retired = {each for each in self._retired if not each.is_over}
+        self._retired.add(lane)
+        lane.end_when_idle()
+
+    async def stop(self) -> None:
+        """Close every socket; calls under way fail."""
+        lanes = [*self._retired, *([self._lane] if self._lane else [])]
+        self._lane, self._retired = None, set()
+        await asyncio.gather(*(lane.stop() for lane in lanes))
+
+
+class _CallsLane:
+    def __init__(self, url: str) -> None:
+        self._protocol = Protocol()
+        self._waiting: dict[str, asyncio.Future[ServiceResponse]] = {}
+        self._ready: asyncio.Future[None] = asyncio.Future()
+        self._retired = False
+        self._ending: asyncio.Task[None] | None = None
+        self._unreadable: str | None = None
+        """What was wrong with the newest frame that could not be read."""
+        self._lane = Lane(
+            url,
+            opened=self._opened,
+            received=self._received,
+            closed=lambda reason: self._over(BridgeClosed(f"{url}: {reason}")),
+            failed=self._over,
+            again=False,
+        )
+        self._lane.start(asyncio.get_running_loop())
+
+    @property
+    def is_over(self) -> bool:
+        return self._lane.state == "closed"
+
+    def why_unanswered(self, service: str, patience: float) -> str:
+        """Return a sentence on why a call got no answer."""
+        if self._unreadable is None:
+            return f"{service} did not answer within {patience:g} s"
+        return (
+            f"{service}: no answer that can be read within {patience:g} s; the bridge "
+            f"sent what is not rosbridge: {self._unreadable}"
+        )
+
+    async def ask(self, id: str, frame: bytes) -> ServiceResponse:
+        await asyncio.shield(self._ready)
+        answer: asyncio.Future[ServiceResponse] = asyncio.Future()
+        self._waiting[id] = answer
+        try:
+            self._lane.send(frame)
+            return await answer
+        finally:
+            del self._waiting[id]
+            self._end_if_idle()
+
+    def end_when_idle(self) -> None:
+        self._retired = True
+        self._end_if_idle()
+
+    def _end_if_idle(self) -> None:
+        if self._retired and not self._waiting and self._ending is None:
+            self._ending = asyncio.ensure_future(self._lane.stop())
+
+    async def stop(self) -> None:
+        await self._lane.stop()
+
+    def _opened(self) -> None:
+        if not self._ready.done():
+            self._ready.set_result(None)
+
+    def _over(self, error: Exception) -> None:
+        if not self._ready.done():
+            self._ready.set_exception(error)
+            self._ready.exception()  # seen: nobody may be left to ask
+        for answer in self._waiting.values():
+            if not answer.done():
+                answer.set_exception(error)
+
+    def _received(self, frame: bytes | bytearray) -> None:
+        event = self._protocol.receive(frame, time.monotonic())
+        if isinstance(event, Malformed):
+            self._unreadable = event.reason[:200]
+        if not isinstance(event, ServiceResponse | Status):
+            return
+        answer = self._waiting.get(str(event.id))
+        if answer is None or answer.done():
+            return
+        if isinstance(event, ServiceResponse):
+            answer.set_result(event)
+        elif event.level == "error":
+            answer.set_exception(ServiceError(f"the bridge says: {event.msg}"))

@@ -1,0 +1,88 @@
+"""CBOR as rosbridge speaks it: maps, text, numbers and typed arrays, nothing else."""
+
+import sys
+from array import array
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from webmap.errors import ProtocolError
+from webmap.nesting import MAX_DEPTH
+
+# Dates, big numbers, shared references, regular expressions ... : tags that a
+# general decoder follows and that a robot has no reason to send.
+_REFUSED = (0, 1, 2, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256)
+_REFUSED_TOO = (258, 260, 261, 1004, 43000, 55799)
+
+# RFC 8746: tag -> type code, little-endian. Half and quadruple floats have none.
+_LITTLE = {64: "B", 68: "B", 69: "H", 70: "I", 71: "Q"}
+_LITTLE |= {72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d"}
+_BIG = {65: "H", 66: "I", 67: "Q", 73: "h", 74: "i", 75: "q", 81: "f", 82: "d"}
+TYPED_ARRAY_TAGS = frozenset(_LITTLE) | frozenset(_BIG)
+
+
+def looks_like_cbor(frame: bytes | bytearray) -> bool:
+    """Return whether the frame begins as a CBOR map, which no JSON text does."""
+    return len(frame) > 0 and 0xA0 <= frame[0] <= 0xBF
+
+
+def decode(frame: bytes | bytearray) -> dict[str, Any]:
+    """Return the map that ``frame`` holds; typed arrays are ``array.array``.
+
+    Raises:
+        ProtocolError: If the bytes are anything else.
+
+    """
+    import cbor2
+
+    try:
+        value = cbor2.loads(
+            frame,
+            max_depth=MAX_DEPTH,
+            strict_hashable_types=True,
+            semantic_decoders=_DECODERS,
+            tag_hook=_unknown_tag,
+        )
+    except (cbor2.CBORError, ValueError, TypeError, RecursionError) as error:
+        raise ProtocolError(f"not CBOR: {error}") from None
+    except (OverflowError, MemoryError) as error:
+        raise ProtocolError(f"CBOR with an impossible size: {error!r}") from None
+    if not isinstance(value, dict):
+        raise ProtocolError(f"expected a map in CBOR, got {type(value).__name__}")
+    return value
+
+
+def typed_array(tag: int, value: object) -> "array[Any]":
+    """Return the numbers of a CBOR typed array.
+
+    Raises:
+        ValueError: If the value is not a whole number of such numbers.
+
+    """
+    if not isinstance(value, bytes):
+        raise ValueError(f"typed array {tag} holds {type(value).__name__}, not bytes")
+    numbers: array[Any] = array(_LITTLE.get(tag) or _BIG[tag])
+    numbers.frombytes(value)
+    if (sys.byteorder == "big") != (tag in _BIG):
+        numbers.byteswap()
+    return numbers
+
+
+def _numbers(tag: int) -> Callable[[Any, bool], Any]:
+    return lambda value, _immutable: typed_array(tag, value)
+
+
+def _refuse(tag: int) -> Callable[[Any, bool], NoReturn]:
+    def refuse(_value: Any, _immutable: bool) -> NoReturn:
+        raise ValueError(f"tag {tag} has no place in a ROS message")
+
+    return refuse
+
+
+def _unknown_tag(tag: Any, _immutable: bool) -> NoReturn:
+    raise ValueError(f"tag {tag.tag} has no place in a ROS message")
+
+
+_DECODERS: dict[int, Callable[[Any, bool], Any]] = {
+    **{tag: _refuse(tag) for tag in (*_REFUSED, *_REFUSED_TOO)},
+    **{tag: _numbers(tag) for tag in TYPED_ARRAY_TAGS},
+}

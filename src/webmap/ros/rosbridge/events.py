@@ -1,0 +1,111 @@
+"""What a bridge says, as values.
+
+Of a published message only the head is read before somebody calls
+:meth:`Publish.decode`.
+"""
+
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from webmap.errors import ProtocolError
+from webmap.ros.decoding import check_depth, convert, decode_json
+from webmap.ros.received import ReceivedMessage
+from webmap.ros.rosbridge import cbor
+from webmap.ros.rosbridge.frame_limits import check_count
+
+
+class Publish(ReceivedMessage):
+    """A message on a topic (rosbridge protocol, 3.3.3)."""
+
+    __slots__ = ("_map", "in_parts")
+
+    def __init__(self, topic: str, frame: bytes | bytearray) -> None:
+        self.topic = topic
+        self.frame = frame
+        """The whole operation as it came, JSON or CBOR."""
+        self.in_parts = False
+        """Whether the bridge sent it in fragments."""
+        self._decoded = {}
+        self._map: dict[str, Any] | None = None
+
+    @property
+    def is_binary(self) -> bool:
+        """Whether it came as CBOR."""
+        return cbor.looks_like_cbor(self.frame)
+
+    def check_count(self) -> None:
+        """Refuse a message with more values than anything would be built for."""
+        check_count(self.frame)
+
+    def _decode(self, type: type[msgspec.Struct] | None) -> Any:
+        if cbor.looks_like_cbor(self.frame):
+            if self._map is None:
+                self._map = cbor.decode(self.frame)
+            self._verify(self._map.get("op"), self._map.get("topic"))
+            return convert(
+                self._map.get("msg"), dict[str, Any] if type is None else type
+            )
+        frame = decode_json(self.frame, _frame_of(type))
+        self._verify(frame.op, frame.topic)
+        if type is None:
+            check_depth(frame.msg)
+        return frame.msg
+
+    def _verify(self, op: object, topic: object) -> None:
+        if op != "publish" or topic != self.topic:
+            raise ProtocolError(
+                f"a frame that begins as a message on {self.topic!r} "
+                f"turned out to be {op!r} on {topic!r}"
+            )
+
+
+@lru_cache(maxsize=256)
+def _frame_of(type: type[msgspec.Struct] | None) -> Any:
+    """Return the type of a whole publish operation, to be decoded in one pass."""
+    message: Any = dict[str, Any] if type is None else type
+    return msgspec.defstruct("Frame", [("op", str), ("topic", str), ("msg", message)])
+
+
+class ServiceResponse(msgspec.Struct, frozen=True):
+    """The answer to a call (3.4.2)."""
+
+    service: str = ""
+    id: str | int | float | None = None
+    result: bool = True
+    values: Any = None
+    """The fields of the answer, or a text that says what went wrong."""
+
+
+class CallService(msgspec.Struct, frozen=True):
+    """The bridge asks a service of this client (3.4.1)."""
+
+    service: str
+    id: str | int | float | None = None
+    args: Any = None
+
+
+class Status(msgspec.Struct, frozen=True):
+    """The bridge says how it is (3.2.2); Python's bridges never do."""
+
+    level: str = "error"
+    msg: Any = ""
+    id: str | int | float | None = None
+
+
+class Unknown(msgspec.Struct, frozen=True):
+    """An operation that means nothing to a client."""
+
+    op: str
+
+
+class Malformed(msgspec.Struct, frozen=True):
+    """Bytes that are not rosbridge; the link itself can still be used."""
+
+    reason: str
+    size: int
+    """Bytes of the frame."""
+
+
+Event = Publish | ServiceResponse | CallService | Status | Unknown | Malformed

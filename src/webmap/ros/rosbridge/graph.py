@@ -1,0 +1,279 @@
+"""What rosapi knows of the ROS graph: topics, services, their types and nodes."""
+
+import json
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import msgspec
+
+from webmap.errors import BridgeError, ProtocolError, ServiceError
+from webmap.ros.decoding import convert
+from webmap.ros.definitions import Definitions
+from webmap.ros.messages import Time
+from webmap.ros.names import split_type
+
+if TYPE_CHECKING:
+    from webmap.ros.rosbridge.link import RosbridgeLink
+
+ACTIONS = {"navigate_to_pose": "nav2_msgs/action/NavigateToPose"}
+"""Actions by the name that their servers have everywhere: rosapi tells no types."""
+
+BRIEF = 2.0
+"""Seconds for rosapi to name the type of a service: somebody pressed a button."""
+
+CLIENTS = ("rosbridge", "webmap")
+"""What is in the names of nodes that publish for their clients, WebMap too."""
+
+
+def is_client_node(name: str) -> bool:
+    """Return whether a node publishes and listens for clients of a bridge."""
+    return any(part in name for part in CLIENTS)
+
+
+class Graph:
+    """Questions to a bridge's rosapi; what it knows is remembered for one link.
+
+    Neither ``get_param_names`` nor ``message_details`` is ever asked: on ROS 2 the
+    first hangs rosapi for good and the second kills it.
+
+    Args:
+        call: Calls a service and returns the fields of its answer.
+
+    """
+
+    def __init__(self, call: Callable[..., Awaitable[Any]]) -> None:
+        self._call = call
+        self._types: dict[str, str] = {}
+
+    def forget(self) -> None:
+        """Remember nothing: the robot may have been started anew."""
+        self._types.clear()
+
+    def known(self, topic: str) -> str | None:
+        """Return the type of ``topic`` if it was asked before."""
+        return self._types.get(topic)
+
+    async def topic_type(self, topic: str) -> str | None:
+        """Return the type of ``topic``, or None if nobody knows or answers."""
+        if topic in self._types:
+            return self._types[topic]
+        found = await self._type("/rosapi/topic_type", {"topic": topic})
+        if found is not None:
+            self._types[topic] = found
+        return found
+
+    async def service_type(self, service: str) -> str | None:
+        """Return the type of ``service``, or None if nobody knows or answers."""
+        question = "/rosapi/service_type"
+        return await self._type(question, {"service": service}, timeout=BRIEF)
+
+    async def _type(
+        self, question: str, about: Mapping[str, str], **how: float
+    ) -> str | None:
+        try:
+            answer = await self._call(question, about, **how)
+        except BridgeError:
+            return None
+        found = answer.get("type") if isinstance(answer, dict) else None
+        return found if isinstance(found, str) and found else None
+
+    async def published(self, topic: str) -> bool | None:
+        """Return whether anybody publishes ``topic``, or None if nobody answers."""
+        nodes = await self.nodes("publishers", topic)
+        return None if nodes is None else bool(nodes)
+
+    async def other_publishers(self, topic: str) -> list[str] | None:
+        """Return the nodes that publish ``topic``, but not for clients of a bridge."""
+        nodes = await self.nodes("publishers", topic)
+        return nodes and [name for name in nodes if not is_client_node(name)]
+
+    async def nodes(
+        self, kind: Literal["publishers", "subscribers"], topic: str
+    ) -> list[str] | None:
+        """Return the nodes that publish or hear a topic, or None if nobody answers."""
+        try:
+            answer = await self._call(f"/rosapi/{kind}", {"topic": topic})
+            nodes = answer.get(kind) if isinstance(answer, dict) else None
+            return convert(nodes, list[str]) if isinstance(nodes, list) else None
+        except (BridgeError, ProtocolError):
+            return None
+
+    async def time(self) -> float | None:
+        """Return the time of the ROS system in seconds, or None if nobody answers."""
+        try:
+            answer = await self._call("/rosapi/get_time")
+            told = answer.get("time") if isinstance(answer, dict) else None
+            seconds: float = convert(told, Time).seconds
+        except (BridgeError, ProtocolError):
+            return None
+        return seconds
+
+    async def set_parameter(self, name: str, value: Any, patience: float) -> Any:
+        """Set a parameter of ROS 1; return the value that it has then.
+
+        Raises:
+            BridgeError: If rosapi does not answer.
+
+        """
+        text = json.dumps(value, ensure_ascii=False)
+        await self._call(
+            "/rosapi/set_param", {"name": name, "value": text}, timeout=patience
+        )
+        # rosapi says nothing of a parameter that it may not set, so look.
+        answer = await self._call(
+            "/rosapi/get_param", {"name": name, "default": ""}, timeout=patience
+        )
+        now = answer.get("value") if isinstance(answer, dict) else None
+        try:
+            return json.loads(now) if isinstance(now, str) else None
+        except ValueError:
+            return now
+
+    async def topics(self) -> dict[str, str]:
+        """Return the type of every topic.
+
+        Of ROS 2 that is without hidden names, such as those of an action's topics. What
+        a known action says of its goals is added, since rosapi does name its server.
+
+        Raises:
+            BridgeError: If rosapi does not answer, or answers something else.
+
+        """
+        answer = await self._call("/rosapi/topics")
+        try:
+            names = convert(answer, _Topics)
+            found = dict(zip(names.topics, names.types, strict=True))
+        except (ProtocolError, ValueError) as error:
+            raise ServiceError(f"/rosapi/topics made no sense: {error}") from None
+        if any("/msg/" in type for type in found.values()):
+            found = {**await self._feedbacks(), **found}
+        self._types.update({name: type for name, type in found.items() if type})
+        return found
+
+    async def _feedbacks(self) -> dict[str, str]:
+        """Return the hidden topics on which known actions say how goals go."""
+        try:
+            answer = await self._call("/rosapi/action_servers")
+            servers = convert(answer, _ActionServers).action_servers
+        except (BridgeError, ProtocolError):
+            return {}
+        known = {name: ACTIONS.get(name.rpartition("/")[2]) for name in servers}
+        return {
+            f"{server}/_action/feedback": f"{type}_FeedbackMessage"
+            for server, type in known.items()
+            if type is not None
+        }
+
+
+class _ActionServers(msgspec.Struct):
+    action_servers: list[str]
+
+
+class _Topics(msgspec.Struct):
+    topics: list[str]
+    types: list[str]
+
+
+QUESTIONS = {
+    "msg": "/rosapi/message_details",
+    "srv": "/rosapi/service_request_details",
+}
+MAX_PARTS = 100
+"""Definitions that one answer may hold."""
+
+
+class _Part(msgspec.Struct):
+    type: str
+    fieldnames: list[str] = []
+    fieldtypes: list[str] = []
+    fieldarraylen: list[int] = []
+    constnames: list[str] = []
+    constvalues: list[str] = []
+
+
+class _Answer(msgspec.Struct):
+    typedefs: list[_Part]
+
+
+async def is_ros2(link: "RosbridgeLink") -> bool | None:
+    """Tell by the topics whether a bridge is of ROS 2; None if that is not known."""
+    try:
+        types = (await link.graph.topics()).values()
+    except BridgeError:
+        return None
+    slashes = {type.count("/") for type in types if type}
+    if 2 in slashes:
+        return True
+    return False if 1 in slashes else None
+
+
+async def ask_definitions(link: "RosbridgeLink", type: str, kind: str) -> Definitions:
+    """Return the definitions of a type and of all its parts, and the shipped ones.
+
+    A rosapi of ROS 2 may end for good when it is asked for them, so none ever is: not
+    where a topic is spelled as ROS 2 spells it, nor where that cannot be told.
+
+    Args:
+        link: The link to the bridge.
+        type: The type.
+        kind: ``"msg"``, or ``"srv"`` for the request of a service.
+
+    Raises:
+        ServiceError: If it may not be asked, or does not answer what makes sense.
+        BridgeClosed: If there is no link.
+
+    """
+    ros2 = await is_ros2(link)
+    if ros2 is not False:
+        why = "a ROS 2 bridge is not" if ros2 else "one whose ROS nobody knows is not"
+        raise ServiceError(
+            f"{why} asked for the fields of {type}, since that can end its rosapi: "
+            "write the values into the button's configuration"
+        )
+    name = str(split_type(type))
+    answer = await link.call_service(QUESTIONS[kind], {"type": name})
+    try:
+        parts = convert(answer, _Answer).typedefs
+        if not parts or len(parts) > MAX_PARTS:
+            raise ProtocolError(f"got {len(parts)} definitions")
+        texts = {part.type: _text(part) for part in parts}
+    except (ProtocolError, ValueError) as error:
+        raise ServiceError(f"{QUESTIONS[kind]} made no sense: {error}") from None
+    # The first is the one that was asked for; of a service it is called ...Request.
+    texts[name] = texts[parts[0].type]
+    return Definitions(texts, ros2=False)
+
+
+def _text(part: _Part) -> str:
+    lines = []
+    lengths = part.fieldarraylen or [-1] * len(part.fieldnames)
+    constants = zip(part.constnames, part.constvalues, strict=True)
+    for name, value in constants:
+        kind = "string" if not _is_number(value) else _kind_of(part, name)
+        lines.append(f"{kind} {name}={value}")
+    for name, type, length in zip(
+        part.fieldnames, part.fieldtypes, lengths, strict=True
+    ):
+        array = "" if length < 0 else f"[{length or ''}]"
+        lines.append(f"{type}{array} {name}")
+    return "\n".join(lines)
+
+
+def _kind_of(part: _Part, constant: str) -> str:
+    """Return the type of the field that a constant is most likely for.
+
+    rosapi tells the names and values of constants and not their types.
+    """
+    for name, type in zip(part.fieldnames, part.fieldtypes, strict=True):
+        if constant.startswith(f"{name.upper()}_"):
+            return type
+    whole = [type for type in part.fieldtypes if type.startswith(("int", "uint"))]
+    return whole[0] if whole else "int64"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,287 @@
+"""The link of a bridge to a rosbridge v2 server.
+
+It keeps the sockets and what was asked on them; which listeners there are, and what
+may be published, is decided by :class:`webmap.Bridge`.
+"""
+
+import logging
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from webmap.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.identifiers import generate_id
+from webmap.outside_text import one_line
+from webmap.ros.definitions import Definitions
+from webmap.ros.names import split_type
+from webmap.ros.received import BridgeStats, ReceivedMessage
+from webmap.ros.rosbridge import ops
+from webmap.ros.rosbridge.calls import Calls
+from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane
+from webmap.ros.rosbridge.events import CallService, Event, Malformed, Publish, Status
+from webmap.ros.rosbridge.graph import Graph, ask_definitions
+from webmap.ros.rosbridge.protocol import Protocol
+from webmap.ros.rosbridge.wire_subscription import (
+    IN_CBOR,
+    THROTTLE,
+    Renewals,
+    WireSubscription,
+)
+from webmap.ros.subscriptions import Topic
+
+log = logging.getLogger("webmap.ros")
+
+PATIENCE = 5.0
+"""Seconds that a question about the ROS graph may take."""
+
+
+class _Advertised(NamedTuple):
+    id: str
+    type: str
+
+
+class RosbridgeLink:
+    """Carries topics and services over a rosbridge, and opens the link again when lost.
+
+    Args:
+        url: The bridge's address.
+        name: What people call the bridge.
+        opened: Called when the link is open.
+        closed: Called with the reason when an open link has ended.
+        received: Called with each message of a topic that is subscribed to; returns
+            whether anybody can use it.
+        report: Is told of each error that a person might want to know of.
+
+    """
+
+    def __init__(
+        self,
+        url: str,
+        name: str,
+        *,
+        opened: Callable[[], None],
+        closed: Callable[[str], None],
+        received: Callable[[Topic, ReceivedMessage], bool],
+        report: Callable[[Exception], None],
+    ) -> None:
+        self.stats = BridgeStats()
+        self.trouble: str | None = None
+        """Why the link is not open: how the last attempt failed or the link ended."""
+        self.over: str | None = None
+        """Why nothing is opened any more; None while there is no such reason."""
+        self.graph = Graph(self.call_service)
+        self._url = url
+        self._name = name
+        self._on_open = opened
+        self._on_close = closed
+        self._on_message = received
+        self._report = report
+        self._complained = False
+        """Whether this link, or the attempts to open it, were complained of."""
+        self._protocol = Protocol()
+        self._calls = Calls(url)
+        self._subscriptions: dict[str, WireSubscription] = {}
+        self._advertised: dict[str, _Advertised] = {}
+        self._renewals = Renewals(self.graph.published, self._subscriptions.values)
+        self.lane = Lane(  # the socket for everything but calls
+            url,
+            opened=self._opened,
+            received=self._received,
+            closed=self._lost,
+            failed=self._not_opened,
+            busy=lambda: any(s.awaits_large for s in self._subscriptions.values()),
+        )
+
+    async def stop(self) -> None:
+        """Close every socket; what is subscribed to is kept for another start."""
+        await self.lane.stop()
+        await self._calls.stop()
+        await self._renewals.stop()
+
+    def subscribe(self, topic: Topic) -> None:
+        """Ask for a topic as its listeners want it now, if that is not asked yet."""
+        subscription = self._subscriptions.get(topic.name)
+        if subscription is None:
+            subscription = WireSubscription(
+                topic, send=self._send, too_large=self._too_large
+            )
+            self._subscriptions[topic.name] = subscription
+        subscription.update()
+
+    def unsubscribe(self, topic: Topic) -> None:
+        """Ask for a topic no more."""
+        subscription = self._subscriptions.pop(topic.name, None)
+        if subscription is not None:
+            subscription.end()
+
+    def published_type(self, topic: str) -> str | None:
+        """Return as what type ``topic`` is published here, None if it is not."""
+        advertised = self._advertised.get(topic)
+        return None if advertised is None else advertised.type
+
+    def publish(self, topic: str, type: str, message: Mapping[str, Any]) -> None:
+        """Publish a message now, or not at all; the topic is advertised first.
+
+        Raises:
+            BridgeClosed: If the link is not open.
+            ValueError: If a number in the message is NaN or infinite.
+            TypeError: If a value in the message is nothing that JSON knows.
+
+        """
+        text = ops.publish(topic, message)
+        self.refuse_if_over()
+        if topic not in self._advertised:
+            now = _Advertised(generate_id(), str(split_type(type)))
+            self.lane.send(ops.advertise(topic, now.type, id=now.id))
+            self._advertised[topic] = now
+        self.lane.send(text)
+
+    def unadvertise(self, topic: str) -> None:
+        """Publish no more on ``topic``; nothing happens if nobody did."""
+        before = self._advertised.pop(topic, None)
+        if before is not None:
+            self._send(ops.unadvertise(topic, id=before.id))
+
+    async def call_service(
+        self,
+        service: str,
+        args: Mapping[str, Any] | Sequence[Any] | None = None,
+        *,
+        type: str | None = None,
+        timeout: float = PATIENCE,
+    ) -> Any:
+        """Call a ROS service on a socket of its own; return the fields of the answer.
+
+        Raises:
+            ServiceError: If the service fails or does not answer in time.
+            BridgeClosed: If the link cannot be opened, or ends before the answer.
+
+        """
+        self.refuse_if_over()
+        return await self._calls.call(service, args, type, timeout)
+
+    async def definitions(self, type: str, kind: str) -> Definitions:
+        """Return the definitions of a type and of all its parts, and the shipped ones.
+
+        Args:
+            type: The type.
+            kind: ``"msg"``, or ``"srv"`` for the request of a service.
+
+        Raises:
+            ServiceError: If it may not be asked, or does not answer what makes sense.
+            BridgeClosed: If there is no link.
+
+        """
+        return await ask_definitions(self, type, kind)
+
+    def _send(self, frame: bytes) -> None:
+        """Send what a new link will be told anyway; nothing happens while closed."""
+        if self.lane.state == "open":
+            try:
+                self.lane.send(frame)
+            except BridgeError as error:
+                self._report(error)
+
+    def refuse_if_over(self) -> None:
+        """Raise BridgeClosed if nothing is opened any more."""
+        if self.over is not None:
+            raise BridgeClosed(self.over)
+
+    def _opened(self) -> None:
+        self.stats.links += 1
+        self.trouble, self._complained = None, False
+        log.info("%s: the link is open", self._name)
+        self._protocol = Protocol()
+        self.graph.forget()
+        for topic, each in self._advertised.items():
+            self._send(ops.advertise(topic, each.type, id=each.id))
+        for subscription in list(self._subscriptions.values()):
+            subscription.topic.begin_anew()
+            subscription.again()
+        self._renewals.begin()
+        self._on_open()
+
+    def _lost(self, reason: str) -> None:
+        level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
+        log.log(level, "%s: the link ended: %s", self._name, reason)
+        self.trouble = reason
+        self._renewals.forget()
+        for subscription in self._subscriptions.values():
+            subscription.link_lost()
+        self._on_close(reason)
+
+    def _not_opened(self, error: BridgeClosed) -> None:
+        # One line in the log for a bridge that is away, however long.
+        level = logging.DEBUG if self._complained else logging.WARNING
+        self._complained = True
+        self.trouble = error.why
+        log.log(level, "%s", error, extra={"source": self._name})
+        self._report(error)
+
+    def _received(self, frame: bytes | bytearray) -> None:
+        event = self._protocol.receive(frame, time.monotonic())
+        stats = self.stats
+        stats.frames += 1
+        stats.bytes += len(frame)
+        if isinstance(event, Publish):
+            subscription = self._subscriptions.get(event.topic)
+            if subscription is not None:
+                usable = self._on_message(subscription.topic, event)
+                if usable and subscription.doubts_cbor:
+                    subscription.received(event)
+        elif event is not None:
+            self._other(event)
+
+    def _other(self, event: Event) -> None:
+        if isinstance(event, Malformed):
+            self.stats.malformed += 1
+            if not self._complained:
+                self._complained = True
+                self._complain(event)
+        elif isinstance(event, Status) and event.level == "error":
+            words = one_line(event.msg)
+            log.warning("%s says: %s", self._name, words)
+            self._report(BridgeError(f"{self._name} says: {words}"))
+        elif isinstance(event, CallService):
+            answer = "this client offers no services"
+            id = None if event.id is None else str(event.id)
+            self._send(ops.service_response(event.service, answer, id=id, result=False))
+
+    def _complain(self, event: Malformed) -> None:
+        """Report a frame that is not rosbridge's, to one subscriber too."""
+        error = ProtocolError(
+            f"{self._name} sent {event.size} bytes that are not rosbridge: "
+            f"{event.reason}"
+        )
+        log.warning("%s", error, extra={"source": self._name})
+        self._report(error)
+        for subscription in self._subscriptions.values():
+            for listener in subscription.topic.listeners:
+                if listener.mention(error):
+                    return
+
+    def _too_large(self, topic: Topic, size: int | None) -> None:
+        """Report a topic whose messages are too large for the bridge's CBOR.
+
+        Args:
+            topic: The topic.
+            size: Bytes of a message in JSON; None if links ended before one came.
+
+        """
+        # A page shows three lines: what to do comes before the details.
+        if size is None:
+            words = (
+                f"{topic.name}: nothing came in CBOR for {IN_CBOR:g} s, though it is "
+                f"published, and the link ended before it came in JSON. If it is "
+                f"larger than max_message_size of rosbridge_websocket, set that higher"
+            )
+        else:
+            words = (
+                f"{topic.name} is larger than the bridge sends in CBOR: set "
+                f"max_message_size of rosbridge_websocket to {size} or more. Until "
+                f"then it comes in JSON, once in {THROTTLE // 60_000} minutes"
+            )
+        fault = BridgeError(words)
+        log.warning("%s: %s", self._name, fault)
+        self._report(fault)
+        topic.over(fault)

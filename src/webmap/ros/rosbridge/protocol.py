@@ -1,0 +1,376 @@
+"""The client's half of the rosbridge protocol, without I/O: frames in, events out.
+
+See Also:
+    https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
+
+"""
+
+import base64
+import binascii
+import io
+import math
+import re
+from typing import Any
+
+import msgspec
+
+from webmap.errors import ProtocolError
+from webmap.ros.decoding import check_depth, convert, decode_json
+from webmap.ros.limits import LARGE, MAX_FRAME, MIB
+from webmap.ros.rosbridge import cbor
+from webmap.ros.rosbridge.events import (
+    CallService,
+    Event,
+    Malformed,
+    Publish,
+    ServiceResponse,
+    Status,
+    Unknown,
+)
+from webmap.ros.rosbridge.frame_limits import MAX_NUMBERS, MAX_OTHER, check_count
+
+
+def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
+    """Return the text in the pixels of a PNG given in base64 (protocol, 2.2.3).
+
+    Raises:
+        ProtocolError: If it is no RGB picture in PNG, or one of more than
+            ``max_bytes`` of pixels.
+
+    """
+    try:
+        packed = base64.b64decode(data, validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise ProtocolError(f"a PNG that is not base64: {error}") from None
+    return _pixels(packed, max_bytes).rstrip(b"\n")
+
+
+def _pixels(packed: bytes, max_bytes: int) -> bytes:
+    from PIL import Image
+
+    # Its size stands in its first 24 bytes: refused before anything is unpacked.
+    width = int.from_bytes(packed[16:20], "big")
+    height = int.from_bytes(packed[20:24], "big")
+    if width * height * 3 > max_bytes:
+        raise ProtocolError(
+            f"a PNG of {width} x {height}, which is too large: it holds "
+            f"{width * height * 3} bytes, and {max_bytes} are the limit; subscribe "
+            "with compression='cbor'"
+        )
+    try:
+        with Image.open(io.BytesIO(packed), formats=["PNG"]) as image:
+            if image.mode != "RGB" or image.size != (width, height):
+                raise ProtocolError(f"expected an RGB picture, got {image.mode}")
+            return image.tobytes()
+    except ProtocolError:
+        raise
+    except Exception as error:  # Pillow raises whatever its parsers meet
+        raise ProtocolError(f"not a PNG: {error!r}") from None
+
+
+class Fragment(msgspec.Struct, frozen=True):
+    """One piece of a longer text."""
+
+    id: str | int | float | None
+    data: str
+    num: int
+    total: float
+
+    @property
+    def count(self) -> int:
+        """How many pieces there are."""
+        return math.floor(self.total)
+
+
+class _Assembly:
+    """The pieces of one message, as far as they came."""
+
+    def __init__(self, count: int, began: float) -> None:
+        self.count = count
+        self.began = began
+        self.pieces: dict[int, bytes] = {}
+        self.size = 0
+        self.received = 0
+        self.messages = 1
+
+    def add(self, fragment: Fragment) -> None:
+        try:
+            data = fragment.data.encode()
+        except UnicodeEncodeError as error:
+            raise ProtocolError(f"fragments that are no text: {error}") from None
+        self.received += 1
+        self.size += len(data)
+        if fragment.num in self.pieces:
+            # Another message of just this length: its pieces cannot be told apart.
+            if fragment.num == 0:
+                self.messages += 1
+            self.messages = max(self.messages, 2)
+        self.pieces[fragment.num] = data
+
+    @property
+    def is_complete(self) -> bool:
+        return self.received >= self.count * self.messages
+
+    @property
+    def is_ambiguous(self) -> bool:
+        return self.messages > 1
+
+    def text(self) -> bytes:
+        return b"".join(self.pieces[num] for num in range(self.count))
+
+
+class Fragments:
+    """The messages of one link that came in part (rosbridge protocol, 2.2.2).
+
+    Python's bridges give every message the same ``id`` and let the fragments of several
+    topics interleave under it, with a ``total`` that is the length less one, divided by
+    the size of a fragment, plus one: 5.1446 for five fragments. So a message is known
+    by ``id`` and ``total`` together; where two of one length interleave neither is
+    believed.
+
+    Args:
+        max_count: Most fragments of a message.
+        max_bytes: Most bytes that wait for their rest, in all.
+        max_age: Longest time from the first fragment to the last, in seconds.
+
+    """
+
+    MAX_OPEN = 16
+    """Most messages that wait for their rest at a time."""
+
+    def __init__(
+        self, *, max_count: int = 64, max_bytes: int = 64 << 20, max_age: float = 60.0
+    ) -> None:
+        self.max_count = max_count
+        self.max_bytes = max_bytes
+        self.max_age = max_age
+        self._open: dict[tuple[object, float], _Assembly] = {}
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def add(self, fragment: Fragment, now: float) -> bytes | None:
+        """Take one fragment; return the whole text if this was its last.
+
+        Raises:
+            ProtocolError: If it makes no sense, a bound is met, or two messages
+                were mixed; what belongs to it is forgotten.
+
+        """
+        self._expire(now)
+        self._check(fragment)
+        key = (fragment.id, fragment.total)
+        assembly = self._open.get(key)
+        if assembly is None:
+            assembly = self._open[key] = _Assembly(fragment.count, now)
+            self._bound_open()
+        assembly.add(fragment)
+        self._bound_bytes(key)
+        if not assembly.is_complete:
+            return None
+        del self._open[key]
+        if assembly.is_ambiguous:
+            raise ProtocolError(
+                f"{assembly.messages} messages of {assembly.count} fragments each "
+                f"interleave under id {fragment.id!r}: they cannot be told apart"
+            )
+        return assembly.text()
+
+    def _check(self, fragment: Fragment) -> None:
+        if not math.isfinite(fragment.total) or fragment.count < 1:
+            raise ProtocolError(f"a fragment of {fragment.total!r} fragments")
+        if fragment.count > self.max_count:
+            raise ProtocolError(
+                f"a message in {fragment.count} fragments, at most "
+                f"{self.max_count} are taken"
+            )
+        if not 0 <= fragment.num < fragment.count:
+            raise ProtocolError(f"fragment {fragment.num} of {fragment.count}")
+
+    def _expire(self, now: float) -> None:
+        late = [k for k, a in self._open.items() if now - a.began > self.max_age]
+        for key in late:
+            del self._open[key]
+
+    def _bound_open(self) -> None:
+        while len(self._open) > self.MAX_OPEN:
+            del self._open[next(iter(self._open))]
+
+    def _bound_bytes(self, key: tuple[object, float]) -> None:
+        if sum(assembly.size for assembly in self._open.values()) > self.max_bytes:
+            del self._open[key]
+            raise ProtocolError(
+                f"fragments of more than {self.max_bytes} bytes wait for their rest"
+            )
+
+
+# How every bridge measured begins a message on a topic.
+_JSON_HEAD = re.compile(
+    rb'\s*\{\s*"op"\s*:\s*"publish"\s*,\s*"topic"\s*:\s*"((?:[^"\\]|\\/){1,600})"'
+)
+_CBOR_HEAD = re.compile(
+    rb"[\xa3-\xb7]\x62op\x67publish\x65topic(?:([\x61-\x77])|\x78(.))", re.DOTALL
+)
+
+
+class _Op(msgspec.Struct):
+    op: str
+
+
+class _Topic(msgspec.Struct):
+    topic: str
+    msg: msgspec.Raw
+
+
+class _Png(msgspec.Struct):
+    data: str
+
+
+class _CborTopic(msgspec.Struct):
+    topic: str
+    msg: Any
+
+
+_PLAIN_EVENTS: dict[str, Any] = {
+    "service_response": ServiceResponse,
+    "call_service": CallService,
+    "status": Status,
+}
+
+
+class Protocol:
+    """One link's reading side; a new link needs a new one.
+
+    Args:
+        fragments: Bounds on messages that come in parts.
+
+    """
+
+    def __init__(self, fragments: Fragments | None = None) -> None:
+        self._fragments = Fragments() if fragments is None else fragments
+
+    def receive(self, frame: bytes | bytearray | str, now: float) -> Event | None:
+        """Return what ``frame`` says, or None if it is a part of something.
+
+        Args:
+            frame: One WebSocket message, text or binary; which of them it is
+                does not matter, its first byte tells.
+            now: Seconds of a monotonic clock, to give up on parts.
+
+        Returns:
+            :class:`~webmap.ros.rosbridge.events.Malformed` for bytes that are not
+            rosbridge. A :class:`~webmap.ros.rosbridge.events.Publish` may still turn
+            out to be malformed when its message is decoded.
+
+        """
+        if isinstance(frame, str):
+            frame = frame.encode(errors="replace")
+        try:
+            return self._read(frame, now, nested=False)
+        except ProtocolError as error:
+            return Malformed(str(error), len(frame))
+
+    def _read(
+        self, frame: bytes | bytearray, now: float, *, nested: bool
+    ) -> Event | None:
+        if len(frame) > MAX_FRAME:
+            raise ProtocolError(f"a frame of {len(frame)} bytes, at most {MAX_FRAME}")
+        topic = topic_in_head(frame)
+        if topic is not None:
+            return Publish(topic, frame)
+        if len(frame) > LARGE:
+            _check_other(frame)
+        if cbor.looks_like_cbor(frame):
+            return _read_map(frame)
+        op = decode_json(frame, _Op).op
+        if op == "publish":
+            return Publish(decode_json(frame, _Topic).topic, frame)
+        if op in _PLAIN_EVENTS:
+            return _flat(decode_json(frame, _PLAIN_EVENTS[op]))
+        if op in ("fragment", "png"):
+            return self._unwrap(op, frame, now, nested=nested)
+        return Unknown(op[:64])
+
+    def _unwrap(
+        self, op: str, frame: bytes | bytearray, now: float, *, nested: bool
+    ) -> Event | None:
+        if op == "png":
+            inner = decode_png(decode_json(frame, _Png).data)
+            return self._read_inner(inner, now)
+        if nested:
+            raise ProtocolError("a fragment within another wrapping")
+        text = self._fragments.add(decode_json(frame, Fragment), now)
+        if text is None:
+            return None
+        event = self._read(text, now, nested=True)
+        if isinstance(event, Publish):
+            event.in_parts = True
+        return event
+
+    def _read_inner(self, frame: bytes | bytearray, now: float) -> Event | None:
+        if topic_in_head(frame) is None and decode_json(frame, _Op).op in (
+            "fragment",
+            "png",
+        ):
+            raise ProtocolError("a PNG that holds another wrapping")
+        return self._read(frame, now, nested=True)
+
+
+def _check_other(frame: bytes | bytearray) -> None:
+    """Let a large frame pass that is decoded here and now, and not by the worker."""
+    if len(frame) > MAX_OTHER:
+        raise ProtocolError(
+            f"a frame of {len(frame) / MIB:.1f} MiB that does not begin as a message "
+            f'on a topic ({{"op":"publish","topic":...); others have '
+            f"{MAX_OTHER // MIB} MiB at most"
+        )
+    check_count(frame)
+    if b"NaN" in frame and frame.count(b",") > MAX_NUMBERS:
+        raise ProtocolError(
+            f"a frame with NaN and more than {MAX_NUMBERS} values; without NaN, which "
+            "is no JSON, it may have more"
+        )
+
+
+def topic_in_head(frame: bytes | bytearray) -> str | None:
+    """Return the topic of a publish operation, told from the frame's first bytes.
+
+    None where a closer look is needed;
+    :meth:`~webmap.ros.rosbridge.events.Publish.decode` verifies the topic.
+    """
+    match = _JSON_HEAD.match(frame)
+    if match is not None:
+        return _text(match[1].replace(rb"\/", b"/"))
+    match = _CBOR_HEAD.match(frame)
+    if match is None:
+        return None
+    length = match[1][0] - 0x60 if match[1] else match[2][0]
+    name = frame[match.end() : match.end() + length]
+    return _text(name) if len(name) == length else None
+
+
+def _text(name: bytes | bytearray) -> str | None:
+    try:
+        return name.decode()
+    except UnicodeDecodeError:
+        return None
+
+
+def _flat(event: ServiceResponse | CallService | Status) -> Event:
+    """Return an event whose free part is not nested too deeply."""
+    for name in ("values", "args", "msg"):
+        check_depth(getattr(event, name, None))
+    return event
+
+
+def _read_map(frame: bytes | bytearray) -> Event:
+    value = cbor.decode(frame)
+    op = value.get("op")
+    if not isinstance(op, str):
+        raise ProtocolError(f"an operation named {op!r}")
+    if op == "publish":
+        return Publish(convert(value, _CborTopic).topic, frame)
+    if op in _PLAIN_EVENTS:
+        event: Event = convert(value, _PLAIN_EVENTS[op])
+        return event
+    return Unknown(op[:64])

@@ -1,0 +1,290 @@
+"""One published message in the forms that subscribers ask for."""
+
+import base64
+import io
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import cbor2
+import msgspec
+import numpy as np
+
+from webmap.ros.definitions import OCTETS, Field
+from webmap.ros.rosbridge.server.quirks import Quirks
+from webmap.ros.rosbridge.server.schema import DTYPES, Schema
+
+# RFC 8746: typed arrays, little-endian.
+_ARRAY_TAGS = {
+    "u2": 69,
+    "u4": 70,
+    "u8": 71,
+    "i1": 72,
+    "i2": 77,
+    "i4": 78,
+    "i8": 79,
+    "f4": 85,
+    "f8": 86,
+}
+_NAN = msgspec.Raw(b"NaN")
+
+
+class Publication:
+    """A message on a topic; each form is made once, however many want it."""
+
+    __slots__ = ("_forms", "message", "stamp", "topic", "type")
+
+    def __init__(
+        self, topic: str, type_name: str, message: dict[str, Any], stamp: float
+    ) -> None:
+        self.topic = topic
+        self.type = type_name
+        self.message = message
+        self.stamp = stamp
+        self._forms: dict[str, str | bytes | None] = {}
+
+    def form(self, compression: str, encoder: "Encoder") -> str | bytes | None:
+        """Return the frame, or None if this server cannot send that form."""
+        if compression not in self._forms:
+            self._forms[compression] = encoder.publication(self, compression)
+        return self._forms[compression]
+
+
+MAX_MESSAGE_SIZE = 10_000_000
+"""What ``max_message_size`` of rosbridge_websocket is unless somebody sets it."""
+
+
+class Encoder:
+    """Makes frames in one dialect, with one server's quirks.
+
+    Args:
+        schema: The types.
+        quirks: Of the server.
+        max_message_size: Bytes above which a server with the quirk ``no_large_cbor``
+            sends JSON in parts and CBOR never.
+
+    """
+
+    def __init__(
+        self, schema: Schema, quirks: Quirks, max_message_size: int = MAX_MESSAGE_SIZE
+    ) -> None:
+        self.schema = schema
+        self.quirks = quirks
+        self.max_message_size = max_message_size
+        self._fixed: dict[str, bool] = {}
+
+    def json(self, operation: dict[str, Any]) -> str:
+        """Return an operation as JSON; NaN and infinity become ``null``."""
+        text = msgspec.json.encode(operation, enc_hook=_plain).decode()
+        return text.replace("/", "\\/") if self.quirks.escaped_slashes else text
+
+    def publication(
+        self, publication: Publication, compression: str
+    ) -> str | bytes | None:
+        """Return a publication's frame in a form, or None if it is never sent."""
+        operation = {
+            "op": "publish",
+            "topic": publication.topic,
+            "msg": publication.message,
+        }
+        if compression == "cbor":
+            return self._cbor(operation, publication)
+        if compression == "cbor-raw":
+            return self._cbor_raw(publication)
+        if self.quirks.bare_nan and self.has_fixed_array(publication.type):
+            operation["msg"] = _bare_nan(publication.message)
+        text = self.json(operation)
+        if compression != "png":
+            return text
+        return None if self.quirks.no_png else self.png(text)
+
+    def _cbor(
+        self, operation: dict[str, Any], publication: Publication
+    ) -> bytes | None:
+        if self.quirks.no_fixed_array_cbor and self.has_fixed_array(publication.type):
+            return None
+        return cbor2.dumps(operation, default=_tag_array)
+
+    def _cbor_raw(self, publication: Publication) -> bytes:
+        seconds, rest = divmod(round(publication.stamp * 1e9), 1_000_000_000)
+        octets = serialize(
+            self.schema.fields(publication.type),
+            publication.message,
+            ros2=self.schema.dialect.is_ros2,
+        )
+        return cbor2.dumps(
+            {
+                "op": "publish",
+                "topic": publication.topic,
+                # Both dialects say secs and nsecs here.
+                "msg": {"secs": seconds, "nsecs": rest, "bytes": octets},
+            }
+        )
+
+    def has_fixed_array(self, type_name: str) -> bool:
+        """Whether a type has, at any depth, a fixed array that is not of bytes."""
+        known = self._fixed.get(type_name)
+        if known is None:
+            known = _has_fixed_array(self.schema.fields(type_name))
+            self._fixed[type_name] = known
+        return known
+
+    def png(self, text: str) -> str:
+        """Return an operation's JSON packed into the pixels of a PNG."""
+        from PIL import Image
+
+        octets = text.encode()
+        width = max(math.isqrt(len(octets) // 3), 1)
+        height = math.ceil(len(octets) / 3 / width)
+        padded = octets.ljust(width * height * 3, b"\n")
+        out = io.BytesIO()
+        Image.frombytes("RGB", (width, height), padded).save(out, "png")
+        return self.json(
+            {"op": "png", "data": base64.b64encode(out.getvalue()).decode()}
+        )
+
+    def fragments(self, text: str, size: int, identifier: Any = None) -> list[str]:
+        """Return a frame in pieces of ``size`` characters, or whole if it fits."""
+        if len(text) <= size:
+            return [text]
+        pieces = [text[start : start + size] for start in range(0, len(text), size)]
+        total: float = len(pieces)
+        if self.quirks.float_fragments:
+            # Written for a division that drops the rest; the count is its floor.
+            total = (len(text) - 1) / size + 1
+        return [
+            self.json(
+                {
+                    "op": "fragment",
+                    "id": 0 if identifier is None else identifier,
+                    "data": piece,
+                    "num": number,
+                    "total": total,
+                }
+            )
+            for number, piece in enumerate(pieces)
+        ]
+
+
+def _has_fixed_array(fields: Sequence[Field]) -> bool:
+    return any(
+        (bool(field.size) and field.type not in OCTETS)
+        or (field.fields is not None and _has_fixed_array(field.fields))
+        for field in fields
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a message cannot hold a {type(value)}")
+
+
+def _tag_array(encoder: cbor2.CBOREncoder, value: Any) -> None:
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"a message cannot hold a {type(value)}")
+    tag = _ARRAY_TAGS.get(value.dtype.str[1:])
+    if tag is None:
+        raise TypeError(f"no typed array for {value.dtype}")
+    little = value.astype(value.dtype.newbyteorder("<"), copy=False)
+    encoder.encode(cbor2.CBORTag(tag, little.tobytes()))
+
+
+def _bare_nan(value: Any) -> Any:
+    """Return a message whose fixed arrays carry the token that JSON does not have."""
+    if isinstance(value, dict):
+        return {name: _bare_nan(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_NAN if item != item else _bare_nan(item) for item in value]
+    return value
+
+
+_CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+_CODES = {
+    **{"int8": "b", "uint8": "B", "byte": "B", "char": "B", "int16": "h"},
+    **{"uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"},
+    **{"float32": "f", "float64": "d"},
+}
+_NUMBERS = {name: struct.Struct(f"<{code}") for name, code in _CODES.items()}
+_UINT32 = struct.Struct("<I")
+_TIMES = {
+    (False, "time"): struct.Struct("<II"),
+    (False, "duration"): struct.Struct("<ii"),
+    (True, "time"): struct.Struct("<iI"),
+    (True, "duration"): struct.Struct("<iI"),
+}
+
+
+def serialize(
+    fields: Sequence[Field], message: Mapping[str, Any], *, ros2: bool
+) -> bytes:
+    """Return a message's bytes.
+
+    Args:
+        fields: Those of its type.
+        message: All of them; arrays of numbers are lists, arrays or bytes.
+        ros2: Whether as CDR, as in ROS 2; else in the serialisation of ROS 1.
+
+    Raises:
+        struct.error: If a number does not fit its type.
+
+    """
+    writer = _Writer(cdr=ros2)
+    writer.message(fields, message)
+    body = bytes(writer.out)
+    return _CDR_LITTLE_ENDIAN + body if ros2 else body
+
+
+class _Writer:
+    def __init__(self, *, cdr: bool) -> None:
+        self.cdr = cdr
+        self.out = bytearray()
+
+    def message(self, fields: Sequence[Field], message: Mapping[str, Any]) -> None:
+        if self.cdr and not fields:
+            self.out.append(0)  # CDR has no empty structure
+        for field in fields:
+            if field.is_array:
+                self._array(field, message[field.name])
+            else:
+                self._one(field, message[field.name])
+
+    def _array(self, field: Field, values: Any) -> None:
+        if field.size is None:
+            self._pack(_UINT32, len(values))
+        if isinstance(values, bytes):
+            self.out += values
+        elif field.type in DTYPES:
+            if len(values):
+                self._align(_NUMBERS[field.type].size)
+            self.out += np.asarray(values, DTYPES[field.type]).tobytes()
+        else:
+            for each in values:
+                self._one(field, each)
+
+    def _one(self, field: Field, value: Any) -> None:
+        number = _NUMBERS.get(field.type)
+        if number is not None:
+            self._pack(number, value)
+        elif field.fields is not None:
+            self.message(field.fields, value)
+        elif field.type == "string":
+            octets = value.encode() + (b"\x00" if self.cdr else b"")
+            self._pack(_UINT32, len(octets))
+            self.out += octets
+        elif field.type == "bool":
+            self.out.append(bool(value))
+        else:
+            self._align(4)
+            self.out += _TIMES[self.cdr, field.type].pack(*value.values())
+
+    def _pack(self, number: struct.Struct, value: Any) -> None:
+        out, size = self.out, number.size
+        if self.cdr and len(out) % size:
+            out += bytes(-len(out) % size)
+        out += number.pack(value)
+
+    def _align(self, size: int) -> None:
+        if self.cdr and len(self.out) % size:
+            self.out += bytes(-len(self.out) % size)

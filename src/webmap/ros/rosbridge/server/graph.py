@@ -1,0 +1,246 @@
+"""The ROS graph behind the server: topics, services, actions and who has them."""
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from webmap.ros.definitions import UnknownType
+from webmap.ros.rosbridge.server.dialect import canonical, resolve
+from webmap.ros.rosbridge.server.encode import Publication
+from webmap.ros.rosbridge.server.schema import MessageMismatch, Schema
+
+log = logging.getLogger("webmap.sim")
+
+BRIDGE_NODE = "/rosbridge_websocket"
+
+Deliver = Callable[[Publication], None]
+
+
+class GraphError(Exception):
+    """A request that the graph refuses; the text is for the client that asked."""
+
+
+class ServiceFailed(Exception):
+    """A service ran and failed; the text becomes the response's values."""
+
+
+class Respond(Protocol):
+    """Ends a service call, once."""
+
+    def __call__(self, values: Any, *, ok: bool = True) -> None:
+        """Give the response's values, or the reason of the failure."""
+
+
+ServiceHandler = Callable[[dict[str, Any], Respond], None]
+
+
+@dataclass(slots=True)
+class Topic:
+    """A topic with its type, and who publishes and subscribes."""
+
+    name: str
+    type: str
+    publishers: dict[object, str] = field(default_factory=dict)
+    """The node's name for each publisher."""
+    subscribers: dict[object, tuple[str, Deliver]] = field(default_factory=dict)
+    latched: dict[object, Publication | None] = field(default_factory=dict)
+    """The newest message of each publisher that latches."""
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A service with its type and the one who answers."""
+
+    name: str
+    type: str
+    node: str
+    owner: object
+    handle: ServiceHandler
+
+
+class GoalHandle(Protocol):
+    """A goal that an action server took."""
+
+    def cancel(self) -> None:
+        """Ask for the end of the goal; its result still comes."""
+
+
+class ActionServer(Protocol):
+    """What answers an action's goals."""
+
+    type: str
+
+    def send_goal(
+        self,
+        goal: dict[str, Any],
+        on_feedback: Callable[[dict[str, Any]], None],
+        on_result: Callable[[int, dict[str, Any]], None],
+    ) -> GoalHandle:
+        """Take a goal; ``on_result`` is called once, with action_msgs' status."""
+
+
+class Graph:
+    """One ROS system in one process."""
+
+    def __init__(
+        self, schema: Schema, *, clock: Callable[[], float] = time.time
+    ) -> None:
+        self.schema = schema
+        self.clock = clock
+        self.topics: dict[str, Topic] = {}
+        self.services: dict[str, Service] = {}
+        self.actions: dict[str, ActionServer] = {}
+
+    def advertise(
+        self,
+        owner: object,
+        name: str,
+        type_name: str,
+        *,
+        node: str = BRIDGE_NODE,
+        latch: bool = False,
+    ) -> None:
+        """Let ``owner`` publish on a topic.
+
+        Raises:
+            GraphError: If the type is unknown, or the topic has another.
+
+        """
+        topic = self._topic(name, type_name)
+        topic.publishers[owner] = node
+        if latch:
+            topic.latched.setdefault(owner, None)
+
+    def unadvertise(self, owner: object, name: str) -> None:
+        """Take the publisher away, with the message that it latched."""
+        topic = self.topics.get(resolve(name))
+        if topic:
+            topic.publishers.pop(owner, None)
+            topic.latched.pop(owner, None)
+            self._forget_if_unused(topic)
+
+    def subscribe(
+        self,
+        owner: object,
+        name: str,
+        deliver: Deliver,
+        type_name: str | None = None,
+        *,
+        node: str = BRIDGE_NODE,
+    ) -> None:
+        """Let ``owner`` hear a topic, what is latched included.
+
+        Raises:
+            GraphError: If the type is unknown, missing or not the topic's.
+
+        """
+        topic = self._topic(name, type_name)
+        topic.subscribers[owner] = (node, deliver)
+        self.repeat_latched(topic.name, deliver)
+
+    def repeat_latched(self, name: str, deliver: Deliver) -> None:
+        """Deliver what a topic has latched."""
+        topic = self.topics.get(name)
+        for publication in tuple(topic.latched.values()) if topic else ():
+            if publication:
+                deliver(publication)
+
+    def unsubscribe(self, owner: object, name: str) -> None:
+        """Take the subscriber away."""
+        topic = self.topics.get(resolve(name))
+        if topic:
+            topic.subscribers.pop(owner, None)
+            self._forget_if_unused(topic)
+
+    def is_wanted(self, name: str) -> bool:
+        """Whether anybody would get a message on this topic, now or later."""
+        topic = self.topics.get(name)
+        return bool(topic and (topic.subscribers or topic.latched))
+
+    def publish(self, owner: object, name: str, message: dict[str, Any]) -> None:
+        """Deliver a message that fits the topic's type to all who subscribed."""
+        topic = self.topics[resolve(name)]
+        publication = Publication(topic.name, topic.type, message, self.clock())
+        if owner in topic.latched:
+            topic.latched[owner] = publication
+        for _, deliver in tuple(topic.subscribers.values()):
+            try:
+                deliver(publication)
+            except Exception:
+                log.exception("a subscriber of %s failed", name)
+
+    def conform(self, type_name: str, value: Any, *, finite: bool) -> dict[str, Any]:
+        """Return a client's message in full.
+
+        Raises:
+            GraphError: If it does not fit its type.
+
+        """
+        try:
+            return self.schema.conform(type_name, value, finite=finite)
+        except (MessageMismatch, UnknownType) as error:
+            raise GraphError(str(error)) from None
+
+    def serve(
+        self,
+        owner: object,
+        name: str,
+        type_name: str,
+        handle: ServiceHandler,
+        *,
+        node: str = BRIDGE_NODE,
+    ) -> None:
+        """Let ``owner`` answer a service; the newest one who says so does."""
+        name = resolve(name)
+        self.services[name] = Service(name, canonical(type_name), node, owner, handle)
+
+    def unserve(self, owner: object, name: str) -> None:
+        """Take a service away, if it is still ``owner``'s."""
+        service = self.services.get(resolve(name))
+        if service and service.owner is owner:
+            del self.services[service.name]
+
+    def call(self, name: str, args: Any, respond: Respond) -> None:
+        """Call a service; ``respond`` is called once, now, later or never."""
+        service = self.services.get(resolve(name))
+        if service is None:
+            respond(f"Service {name} does not exist", ok=False)
+            return
+        try:
+            service.handle(self._request(service.type, args), respond)
+        except (GraphError, MessageMismatch, UnknownType, ServiceFailed) as error:
+            respond(str(error), ok=False)
+        except Exception as error:
+            log.exception("service %s failed", name)
+            respond(str(error), ok=False)
+
+    def _request(self, type_name: str, args: Any) -> dict[str, Any]:
+        request = f"{type_name}Request"
+        try:
+            self.schema.fields(request)
+        except UnknownType:
+            # A client's own type: it knows the fields, the graph does not.
+            return dict(args) if isinstance(args, Mapping) else {}
+        return self.schema.conform(request, args)
+
+    def _topic(self, name: str, type_name: str | None) -> Topic:
+        name = resolve(name)
+        topic = self.topics.get(name)
+        if type_name is None:
+            if topic is None:
+                raise GraphError(f"Cannot infer the type of {name}: nobody has it")
+            return topic
+        wanted = canonical(type_name)
+        if not self.schema.knows(wanted):
+            raise GraphError(f"Unable to load the message type {type_name}")
+        if topic is None:
+            topic = self.topics[name] = Topic(name, wanted)
+        if topic.type != wanted:
+            raise GraphError(f"{name} is a {topic.type}, not a {type_name}")
+        return topic
+
+    def _forget_if_unused(self, topic: Topic) -> None:
+        if not topic.publishers and not topic.subscribers:
+            self.topics.pop(topic.name, None)

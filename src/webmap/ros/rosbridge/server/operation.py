@@ -1,0 +1,98 @@
+"""What one client sent, field by field, and what waits to be sent to it."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from webmap.ros.rosbridge.server.encode import Publication
+from webmap.ros.rosbridge.server.graph import GraphError
+
+Operation = dict[str, Any]
+Handlers = dict[str, Callable[[Operation], None]]
+
+
+def text(operation: Operation, name: str) -> str:
+    """Return a field that must be a text.
+
+    Raises:
+        GraphError: If it is absent, empty or something else.
+
+    """
+    value = operation.get(name)
+    if not isinstance(value, str) or not value:
+        raise GraphError(f"{name} must be a non-empty string, got {value!r}")
+    return value
+
+
+def whole_number(operation: Operation, name: str) -> int:
+    """Return a field that must be a number from 0 up; 0 if it is absent.
+
+    Raises:
+        GraphError: If it is something else.
+
+    """
+    value = operation.get(name, 0)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value) or value < 0:
+        raise GraphError(f"{name} must be a number from 0 up, got {value!r}")
+    return int(value)
+
+
+DEFAULT_DEPTH = 100
+"""Publications of a topic that wait when the client asked for no queue length."""
+
+MOST_REPLIES = 10_000
+"""Replies that may wait before the client counts as gone."""
+
+
+class Outbox:
+    """Frames in the order they were made; each topic keeps only its newest ones."""
+
+    def __init__(self) -> None:
+        self._order: deque[str | list[str]] = deque()
+        self._topics: dict[str, deque[Publication]] = {}
+        self._replies = 0
+        self.dropped = 0
+        """Publications that a newer one of their topic pushed out."""
+
+    def __len__(self) -> int:
+        return len(self._order)
+
+    @property
+    def overflowed(self) -> bool:
+        """Whether more replies wait than any client that reads lets pile up."""
+        return self._replies > MOST_REPLIES
+
+    def reply(self, frames: list[str]) -> None:
+        """Append a reply, in one frame or in fragments; it is never dropped."""
+        self._replies += 1
+        self._order.append(frames)
+
+    def publication(self, publication: Publication, depth: int) -> None:
+        """Append a publication; beyond ``depth`` the topic's oldest goes."""
+        waiting = self._topics.setdefault(publication.topic, deque())
+        waiting.append(publication)
+        self._order.append(publication.topic)
+        while len(waiting) > max(depth, 1):
+            waiting.popleft()
+            # The order keeps one place for each that waits: the oldest place stays.
+            self._order.pop()
+            self.dropped += 1
+
+    def pop(self) -> list[str] | Publication | None:
+        """Return what goes out next: a reply's frames or a publication."""
+        while self._order:
+            entry = self._order.popleft()
+            if not isinstance(entry, str):
+                self._replies -= 1
+                return entry
+            waiting = self._topics.get(entry)
+            if waiting:
+                return waiting.popleft()
+        return None
+
+    def forget(self, topic: str) -> None:
+        """Drop what waits of a topic that the client unsubscribed."""
+        if self._topics.pop(topic, None):
+            self._order = deque(entry for entry in self._order if entry != topic)

@@ -1,0 +1,369 @@
+"""One client's side of the protocol, without its socket."""
+
+import json
+import logging
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from itertools import count
+from typing import Any
+
+from webmap.ros.rosbridge.server.dialect import canonical, resolve
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import GoalHandle, Graph, GraphError, Respond
+from webmap.ros.rosbridge.server.operation import Handlers, Operation, Outbox, text
+from webmap.ros.rosbridge.server.topics import Topics
+
+log = logging.getLogger("webmap.sim")
+
+_MOST_INPUT = 10_000
+
+
+class Session:
+    """Takes a client's frames, and has the frames that go to it.
+
+    Args:
+        graph: The ROS graph that the client sees.
+        encoder: Makes the frames; its quirks are the session's.
+        clock: Monotonic seconds.
+        wake: Called when :meth:`next_frames` may have something.
+
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        encoder: Encoder,
+        *,
+        clock: Callable[[], float],
+        wake: Callable[[], None],
+    ) -> None:
+        self.graph = graph
+        self.encoder = encoder
+        self.outbox = Outbox()
+        self._clock = clock
+        self._wake = wake
+        self._incoming = IncomingText()
+        self._queued: deque[Operation] = deque()
+        self._blocked_by: object | None = None
+        self._running = False
+        self._closed = False
+        self.spinning = False
+        """Whether the server does nothing else any more because of this client."""
+        self._topics = Topics(self)
+        self._services = Services(self)
+        self._handlers: Handlers = {
+            **self._topics.handlers,
+            **self._services.handlers,
+            **Goals(self).handlers,
+            "status": _log_status,
+        }
+
+    def receive(self, data: str | bytes) -> None:
+        """Take a frame of the client; it never raises, whatever came."""
+        operations = self._incoming.feed(data)
+        if not operations and not self._incoming.waits:
+            self._complain(None, "no JSON object in the frame")
+        self._queued.extend(operations)
+        self._run_queued()
+
+    def next_frames(self) -> list[str | bytes]:
+        """Return the frames of what goes out next; empty when nothing waits."""
+        while (entry := self.outbox.pop()) is not None:
+            if isinstance(entry, list):
+                return list(entry)
+            if frames := self._topics.frames(entry):
+                return frames
+        return []
+
+    def poll(self) -> float | None:
+        """Release what throttling held back; return seconds to the next, if any."""
+        return self._topics.poll()
+
+    @property
+    def overflowed(self) -> bool:
+        """Whether so much waits that the client should be let go."""
+        return self.outbox.overflowed or len(self._queued) > _MOST_INPUT
+
+    def close(self) -> None:
+        """Take everything of this client out of the graph; its goals go on."""
+        self._closed = True
+        self._topics.close()
+        self._services.close()
+
+    def reply(
+        self, operation: Operation, identifier: Any = None, fragment_size: Any = None
+    ) -> None:
+        """Send an operation to the client.
+
+        Args:
+            operation: What to send.
+            identifier: The id of the request, if it had one.
+            fragment_size: What the request asked for; anything but a number is none.
+
+        """
+        if self._closed:
+            return
+        if identifier is not None:
+            operation = {**operation, "id": identifier}
+        frame = self.encoder.json(operation)
+        if isinstance(fragment_size, int) and fragment_size > 0:
+            frames = self.encoder.fragments(frame, fragment_size, identifier)
+        else:
+            frames = [frame]
+        self.outbox.reply(frames)
+        self._wake()
+
+    def wake(self) -> None:
+        """Say that the outbox or a throttled subscription has something."""
+        self._wake()
+
+    def now(self) -> float:
+        """Return monotonic seconds."""
+        return self._clock()
+
+    def spin(self) -> None:
+        """Let the whole server hang for good."""
+        self.spinning = True
+
+    def block(self) -> Callable[[], None]:
+        """Hold the client's next operations back until the result is called."""
+        cause = self._blocked_by = object()
+
+        def unblock() -> None:
+            if self._blocked_by is cause:
+                self._blocked_by = None
+                self._run_queued()
+
+        return unblock
+
+    def _run_queued(self) -> None:
+        if self._running:
+            return  # an operation that ended at once: the loop below goes on
+        self._running = True
+        while self._queued and self._blocked_by is None and not self._closed:
+            self._run(self._queued.popleft())
+        self._running = False
+
+    def _run(self, operation: Operation) -> None:
+        try:
+            self._dispatch(operation)
+        except GraphError as error:
+            self._complain(operation.get("id"), str(error))
+        except Exception:
+            log.exception("an operation failed: %.200r", operation)
+            self._complain(operation.get("id"), "internal error")
+
+    def _dispatch(self, operation: Operation) -> None:
+        if not isinstance(operation.get("id"), str | int | float | None):
+            raise GraphError("id must be a text or a number")
+        name = operation.get("op")
+        handle = self._handlers.get(name) if isinstance(name, str) else None
+        if handle is None:
+            raise GraphError(f"Unknown operation: {name}")
+        handle(operation)
+
+    def _complain(self, identifier: Any, message: str) -> None:
+        log.debug("bad request: %s", message)
+        if not self.encoder.quirks.silent:
+            status = {"op": "status", "level": "error", "msg": message}
+            self.reply(status, identifier)
+
+
+def _log_status(operation: Operation) -> None:
+    log.info("status of a client: %.500s", operation.get("msg"))
+
+
+_MOST_KEPT = 64 * 1024
+_MOST_FAILURES = 50
+
+
+class IncomingText:
+    """Finds whole JSON objects; half of one waits for the rest, garbage is dropped.
+
+    As rosbridge: two objects in a frame are both run, and an object may come in
+    pieces. What cannot become one is let go of, and never costs more than a bounded
+    number of attempts.
+    """
+
+    def __init__(self) -> None:
+        self._kept = ""
+        # The real parser takes NaN, Infinity and 1e999: json does too.
+        self._decoder = json.JSONDecoder()
+
+    @property
+    def waits(self) -> bool:
+        """Whether the beginning of an object is kept for its rest."""
+        return bool(self._kept)
+
+    def feed(self, data: str | bytes) -> list[dict[str, Any]]:
+        """Return the operations that are complete now, in order."""
+        text = data.decode("utf-8", "replace") if isinstance(data, bytes) else data
+        found, rest = self._scan(self._kept + text)
+        if not found and self._kept:
+            # The new frame may be whole and only the kept half be garbage.
+            found, rest_alone = self._scan(text)
+            rest = rest_alone if found else rest
+        self._kept = rest if len(rest) <= _MOST_KEPT else ""
+        return found
+
+    def _scan(self, text: str) -> tuple[list[dict[str, Any]], str]:
+        found: list[dict[str, Any]] = []
+        rest_from: int | None = None
+        start = text.find("{")
+        failures = 0
+        while start >= 0 and failures < _MOST_FAILURES:
+            try:
+                value, end = self._decoder.raw_decode(text, start)
+            except (ValueError, RecursionError):
+                failures += 1
+                rest_from = start if rest_from is None else rest_from
+                start = text.find("{", start + 1)
+                continue
+            if "op" in value or rest_from is None:
+                found.append(value)
+                rest_from = None
+            start = text.find("{", end)
+        return found, "" if rest_from is None else text[rest_from:]
+
+
+class Services:
+    """One client's calls and the services that it advertised."""
+
+    def __init__(self, client: Session) -> None:
+        self._client = client
+        self._graph = client.graph
+        self._served: set[str] = set()
+        self._asked: dict[str, Respond] = {}
+        self._numbers = count(1)
+
+    @property
+    def handlers(self) -> Handlers:
+        """What serves each operation."""
+        return {
+            "call_service": self._call,
+            "advertise_service": self._advertise,
+            "unadvertise_service": self._unadvertise,
+            "service_response": self._response,
+        }
+
+    def close(self) -> None:
+        """Take the services out of the graph; calls that wait for them fail."""
+        for service in self._served:
+            self._graph.unserve(self, service)
+        self._served.clear()
+        while self._asked:
+            _, respond = self._asked.popitem()
+            respond("the client that answered the service has gone", ok=False)
+
+    def _call(self, operation: Operation) -> None:
+        service = text(operation, "service")
+        identifier = operation.get("id")
+        size = operation.get("fragment_size")
+        blocks = self._client.encoder.quirks.blocking_services
+        unblock: Callable[[], None] = self._client.block() if blocks else _nothing
+
+        def respond(values: Any, *, ok: bool = True) -> None:
+            response = {
+                "op": "service_response",
+                "service": service,
+                "values": values,
+                "result": ok,
+            }
+            self._client.reply(response, identifier, size)
+            unblock()
+
+        self._graph.call(service, operation.get("args", {}), respond)
+
+    def _advertise(self, operation: Operation) -> None:
+        service = resolve(text(operation, "service"))
+        ask = partial(self._ask, service)
+        self._graph.serve(self, service, text(operation, "type"), ask)
+        self._served.add(service)
+
+    def _unadvertise(self, operation: Operation) -> None:
+        service = resolve(text(operation, "service"))
+        if service not in self._served:
+            raise GraphError(f"{service} is not advertised")
+        self._served.discard(service)
+        self._graph.unserve(self, service)
+
+    def _ask(self, service: str, request: dict[str, Any], respond: Respond) -> None:
+        identifier = f"service_request:{service}:{next(self._numbers)}"
+        self._asked[identifier] = respond
+        call = {"op": "call_service", "id": identifier, "service": service}
+        self._client.reply({**call, "args": request})
+
+    def _response(self, operation: Operation) -> None:
+        respond = self._asked.pop(text(operation, "id"), None)
+        if respond is None:
+            raise GraphError("a response to a call that nobody waits for")
+        respond(operation.get("values", {}), ok=bool(operation.get("result", True)))
+
+
+def _nothing() -> None:
+    """Unblock nothing."""
+
+
+_UNKNOWN = 0
+
+
+class Goals:
+    """One client's goals. Their handles are its own: no other can cancel by id."""
+
+    def __init__(self, client: Session) -> None:
+        self._client = client
+        self._graph = client.graph
+        self._handles: dict[tuple[str, Any], GoalHandle] = {}
+
+    @property
+    def handlers(self) -> Handlers:
+        """What serves each operation."""
+        return {"send_action_goal": self._send, "cancel_action_goal": self._cancel}
+
+    def _send(self, operation: Operation) -> None:
+        action = text(operation, "action")
+        identifier = operation.get("id")
+        server = self._graph.actions.get(resolve(action))
+        wanted = canonical(text(operation, "action_type"))
+        if server is None or server.type != wanted:
+            reason = f"Action server {action} of type {wanted} is not available"
+            self._finish(action, identifier, _UNKNOWN, reason, ok=False)
+            return
+        args = operation.get("args", {})
+        goal = self._graph.conform(f"{server.type}_Goal", args, finite=True)
+        key = (resolve(action), identifier)
+        unblock: Callable[[], None] | None = None
+        if self._client.encoder.quirks.blocking_goals:
+            unblock = self._client.block()
+        ended = False
+
+        def on_feedback(values: dict[str, Any]) -> None:
+            if operation.get("feedback", False):
+                feedback = {"op": "action_feedback", "action": action}
+                self._client.reply({**feedback, "values": values}, identifier)
+
+        def on_result(status: int, values: dict[str, Any]) -> None:
+            nonlocal ended
+            ended = True
+            self._handles.pop(key, None)
+            self._finish(action, identifier, status, values, ok=True)
+            if unblock:
+                unblock()
+
+        handle = server.send_goal(goal, on_feedback, on_result)
+        if not ended:
+            self._handles[key] = handle
+
+    def _cancel(self, operation: Operation) -> None:
+        key = (resolve(text(operation, "action")), operation.get("id"))
+        handle = self._handles.get(key)
+        if handle is None:
+            raise GraphError(f"no goal {key[1]!r} of {key[0]} was sent on this socket")
+        handle.cancel()
+
+    def _finish(
+        self, action: str, identifier: Any, status: int, values: Any, *, ok: bool
+    ) -> None:
+        result = {"op": "action_result", "action": action, "values": values}
+        self._client.reply({**result, "status": status, "result": ok}, identifier)

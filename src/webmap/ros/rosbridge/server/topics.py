@@ -1,0 +1,280 @@
+"""What a client does with topics: advertise, publish, subscribe."""
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from webmap.ros.rosbridge.server.dialect import resolve
+from webmap.ros.rosbridge.server.encode import Publication
+from webmap.ros.rosbridge.server.graph import GraphError
+from webmap.ros.rosbridge.server.operation import (
+    DEFAULT_DEPTH,
+    Handlers,
+    Operation,
+    text,
+    whole_number,
+)
+
+if TYPE_CHECKING:
+    from webmap.ros.rosbridge.server.session import Session
+
+log = logging.getLogger("webmap.sim")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What one ``op: subscribe`` asked for."""
+
+    throttle: float = 0.0
+    """The least time between two messages, in seconds."""
+    queue_length: int = 0
+    fragment_size: int | None = None
+    compression: str = "none"
+
+
+class Subscription:
+    """All requests of a client for a topic, merged into one copy of each message."""
+
+    def __init__(self, send: Callable[[Publication, int], None]) -> None:
+        self._send = send
+        self._requests: dict[str | None, Request] = {}
+        self._waiting: deque[Publication] = deque()
+        self._sent_at = float("-inf")
+        self.merged = Request()
+        self._got_any = False
+
+    def ask(self, identifier: str | None, request: Request) -> bool:
+        """Add a request; return whether its id is new."""
+        is_new = identifier not in self._requests
+        self._requests[identifier] = request
+        self._merge()
+        return is_new
+
+    def drop(self, identifier: str | None) -> bool:
+        """Take a request away, all for None; return whether none is left."""
+        if identifier is None:
+            self._requests.clear()
+        else:
+            self._requests.pop(identifier, None)
+        if self._requests:
+            self._merge()
+        return not self._requests
+
+    def _merge(self) -> None:
+        # As rosbridge does: the lowest of each, and the densest compression.
+        requests = self._requests.values()
+        sizes = [r.fragment_size for r in requests if r.fragment_size is not None]
+        asked = {r.compression for r in requests}
+        dense = [c for c in ("cbor-raw", "cbor", "png") if c in asked]
+        self.merged = Request(
+            min(r.throttle for r in requests),
+            min(r.queue_length for r in requests),
+            min(sizes, default=None),
+            dense[0] if dense else "none",
+        )
+
+    def offer(self, publication: Publication, now: float) -> None:
+        """Send a message on, keep it until its time comes, or drop it."""
+        self._got_any = True
+        depth = self.merged.queue_length
+        if now >= self.due and not self._waiting:
+            self._pass_on(publication, now)
+        elif depth > 0:
+            self._waiting.append(publication)
+            while len(self._waiting) > depth:
+                self._waiting.popleft()
+
+    @property
+    def spins(self) -> bool:
+        """Whether a rosbridge 2.1.0 may hang when this subscription ends."""
+        return (
+            self._got_any and self.merged.throttle == 0 and self.merged.queue_length > 0
+        )
+
+    @property
+    def due(self) -> float:
+        """When the next message may go, on the clock of ``offer``."""
+        return self._sent_at + self.merged.throttle
+
+    @property
+    def next_due(self) -> float | None:
+        """When a message that waits may go; None if none waits."""
+        return self.due if self._waiting else None
+
+    def poll(self, now: float) -> None:
+        """Send what waited long enough."""
+        while self._waiting and now >= self.due:
+            self._pass_on(self._waiting.popleft(), now)
+
+    def _pass_on(self, publication: Publication, now: float) -> None:
+        self._sent_at = now
+        self._send(publication, self.merged.queue_length)
+
+
+_COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+
+
+class Topics:
+    """One client's publishers and subscriptions."""
+
+    def __init__(self, client: "Session") -> None:
+        self._client = client
+        self._graph = client.graph
+        self._advertised: set[str] = set()
+        self._subscriptions: dict[str, Subscription] = {}
+
+    @property
+    def handlers(self) -> Handlers:
+        """What serves each operation."""
+        return {
+            "advertise": self._advertise,
+            "unadvertise": self._unadvertise,
+            "publish": self._publish,
+            "subscribe": self._subscribe,
+            "unsubscribe": self._unsubscribe,
+        }
+
+    def poll(self) -> float | None:
+        """Release what throttling held back; return seconds to the next, if any."""
+        now = self._client.now()
+        for subscription in self._subscriptions.values():
+            subscription.poll(now)
+        dues = [s.next_due for s in self._subscriptions.values()]
+        soonest = min((due for due in dues if due is not None), default=None)
+        return None if soonest is None else max(soonest - now, 0.0)
+
+    def frames(self, publication: Publication) -> list[str | bytes]:
+        """Return a publication as this client asked for it; empty if it cannot be."""
+        subscription = self._subscriptions.get(publication.topic)
+        if subscription is None:
+            return []
+        request, encoder = subscription.merged, self._client.encoder
+        size = request.fragment_size
+        if size is None and encoder.quirks.no_large_cbor:
+            size = encoder.max_message_size
+        is_binary = request.compression in ("cbor", "cbor-raw")
+        if is_binary and request.fragment_size and encoder.quirks.no_cbor_fragments:
+            return []
+        frame = publication.form(request.compression, encoder)
+        if frame is None:
+            return []
+        if isinstance(frame, bytes):
+            return self._whole(frame, publication.topic)
+        if size is None:
+            return [frame]
+        return list(encoder.fragments(frame, size))
+
+    def _whole(self, frame: bytes, topic: str) -> list[str | bytes]:
+        encoder = self._client.encoder
+        if encoder.quirks.no_large_cbor and len(frame) > encoder.max_message_size:
+            log.error(
+                "%s: CBOR of %d bytes is above max_message_size (%d) and is not sent, "
+                "as rosbridge 2.1.0 does (quirk no_large_cbor)",
+                topic,
+                len(frame),
+                encoder.max_message_size,
+            )
+            return []
+        return [frame]
+
+    def close(self) -> None:
+        """Take the publishers and subscriptions out of the graph."""
+        for topic, subscription in self._subscriptions.items():
+            self._graph.unsubscribe(self, topic)
+            self._spin_if_queued(topic, subscription)
+        for topic in self._advertised:
+            self._graph.unadvertise(self, topic)
+        self._subscriptions.clear()
+        self._advertised.clear()
+
+    def _advertise(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        latch = bool(operation.get("latch", False))
+        self._graph.advertise(self, topic, text(operation, "type"), latch=latch)
+        self._advertised.add(topic)
+
+    def _unadvertise(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        if topic not in self._advertised:
+            raise GraphError(f"{topic} is not advertised")
+        self._advertised.discard(topic)
+        self._graph.unadvertise(self, topic)
+
+    def _publish(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        known = self._graph.topics.get(topic)
+        if known is None:
+            raise GraphError(f"Cannot infer the type of {topic}: nobody has it")
+        message = self._graph.conform(
+            known.type,
+            operation.get("msg", {}),
+            finite=not self._client.encoder.quirks.lenient_numbers,
+        )
+        if topic not in self._advertised:
+            self._graph.advertise(self, topic, known.type)
+            self._advertised.add(topic)
+        self._graph.publish(self, topic, message)
+
+    def _subscribe(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        request, identifier = _request(operation), operation.get("id")
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            subscription = Subscription(self._enqueue)
+            subscription.ask(identifier, request)
+            self._subscriptions[topic] = subscription
+            try:
+                deliver = partial(self._deliver, subscription)
+                type_name = operation.get("type") or None
+                self._graph.subscribe(self, topic, deliver, type_name)
+            except GraphError:
+                del self._subscriptions[topic]
+                raise
+        elif subscription.ask(identifier, request):
+            # Each new id gets what is latched once more, as in rosbridge.
+            self._graph.repeat_latched(topic, partial(self._enqueue, depth=0))
+
+    def _unsubscribe(self, operation: Operation) -> None:
+        topic = resolve(text(operation, "topic"))
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            raise GraphError(f"{topic} is not subscribed")
+        if subscription.drop(operation.get("id")):
+            self._spin_if_queued(topic, subscription)
+            del self._subscriptions[topic]
+            self._client.outbox.forget(topic)
+            self._graph.unsubscribe(self, topic)
+
+    def _spin_if_queued(self, topic: str, subscription: Subscription) -> None:
+        if self._client.encoder.quirks.spinning_queue and subscription.spins:
+            log.error(
+                "%s: a client with throttle_rate 0 and a queue left: this bridge hangs "
+                "from now on, as rosbridge 2.1.0 does (quirk spinning_queue)",
+                topic,
+            )
+            self._client.spin()
+
+    def _deliver(self, subscription: Subscription, publication: Publication) -> None:
+        subscription.offer(publication, self._client.now())
+        if subscription.next_due is not None:
+            self._client.wake()
+
+    def _enqueue(self, publication: Publication, depth: int) -> None:
+        self._client.outbox.publication(publication, depth or DEFAULT_DEPTH)
+        self._client.wake()
+
+
+def _request(operation: Operation) -> Request:
+    compression = operation.get("compression") or "none"
+    if compression not in _COMPRESSIONS:
+        raise GraphError(f"compression must be of {_COMPRESSIONS}, got {compression!r}")
+    size = operation.get("fragment_size")
+    return Request(
+        whole_number(operation, "throttle_rate") / 1000,
+        whole_number(operation, "queue_length"),
+        None if size is None else max(whole_number(operation, "fragment_size"), 1),
+        compression,
+    )

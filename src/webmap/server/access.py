@@ -1,0 +1,330 @@
+"""Who may come in: the decisions on one request, without I/O."""
+
+from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import parse_qsl, quote, urlencode
+
+from starlette.types import Scope
+
+from webmap.core.page import Viewer
+from webmap.server.auth import Attempts, Codes, Token, new_token
+from webmap.server.origins import Hosts, same_origin
+
+_SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
+
+TOKEN = "token"  # noqa: S105 - the name of a field
+CODE = "webmap_code"
+"""The fields of a query that sign in: the token, and a one-time code."""
+
+KEY = "webmap-key"
+"""The element of a page and the header of a request that carry the page's key."""
+
+PROTOCOL = "webmap"
+"""The subprotocol of both sockets. A page offers it together with its key, as a browser
+lets a page set no other header of a WebSocket."""
+
+_SECRET = {TOKEN, CODE}
+
+NOT_SIGNED_IN = (
+    "This browser is not signed in, or WebMap was started again with a new token. Open "
+    "the address that WebMap printed when it started."
+)
+
+Authenticate = Callable[
+    [MutableMapping[str, Any]], Viewer | Awaitable[Viewer | None] | None
+]
+"""Takes the ASGI scope of a request; gives who makes it, or None to refuse it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Who may use the application, from where, and how many at once."""
+
+    token: str = field(default_factory=new_token, repr=False)
+    """The secret that signs viewers in, of 256 bits or more; made if not given."""
+
+    authenticate: Authenticate | None = None
+    """How a host application tells who somebody is, in place of the token."""
+
+    hosts: Hosts = field(default_factory=Hosts)
+    """The names by which the server may be called."""
+
+    origins: frozenset[str] = frozenset()
+    """Origins besides the server's own that may open sockets: that of a proxy which
+    ends TLS in front of it. Made with :func:`webmap.server.origins.checked_origin`."""
+
+    max_pages: int = 100
+    """How many pages may be open at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class RequestHead:
+    """What access depends on in a request, or in one that opens a socket."""
+
+    path: str
+    """Decoded, with the prefix under which the application is mounted."""
+
+    root: str
+    """The prefix, without a slash at its end."""
+
+    changes: bool
+    """Whether it opens a socket or may change something."""
+
+    reads: bool
+    """Whether it is a plain GET or HEAD."""
+
+    secure: bool
+    hosts: tuple[str, ...]
+    origins: tuple[str, ...]
+    cookies: tuple[str, ...]
+    query: tuple[tuple[str, str], ...]
+    keys: tuple[str, ...]
+    """What it offers as the key of a page."""
+
+    address: str
+    """Where it came from, as the server says."""
+
+    wants_html: bool
+
+    @classmethod
+    def of(cls, scope: Scope) -> "RequestHead":
+        """Read an ``http`` or ``websocket`` scope."""
+        method = scope.get("method", "")
+        is_socket = scope["type"] == "websocket"
+        return cls(
+            path=scope["path"],
+            root=scope.get("root_path", "").rstrip("/"),
+            changes=is_socket or method not in _SAFE_METHODS,
+            reads=not is_socket and method in {"GET", "HEAD"},
+            secure=scope.get("scheme") in {"https", "wss"},
+            hosts=_headers(scope, b"host"),
+            origins=_headers(scope, b"origin"),
+            cookies=_headers(scope, b"cookie"),
+            query=tuple(
+                parse_qsl(
+                    scope.get("query_string", b"").decode("latin-1"),
+                    keep_blank_values=True,
+                )
+            ),
+            keys=(
+                *(name for name in scope.get("subprotocols", ()) if name != PROTOCOL),
+                *_headers(scope, KEY.encode()),
+            )[:4],
+            address=(scope.get("client") or ("",))[0],
+            wants_html=any("text/html" in one for one in _headers(scope, b"accept")),
+        )
+
+    @property
+    def host(self) -> str:
+        """The one Host header, empty if there is none or more than one."""
+        return self.hosts[0] if len(self.hosts) == 1 else ""
+
+    @property
+    def origin(self) -> str | None:
+        """The one Origin header, if there is exactly one."""
+        return self.origins[0] if len(self.origins) == 1 else None
+
+    @property
+    def port(self) -> str:
+        """The port that the browser sees."""
+        port = self.host.rpartition(":")[2]
+        return port if port.isdecimal() else ("443" if self.secure else "80")
+
+    def tokens(self) -> list[str]:
+        """Return every ``?token=`` of the query."""
+        return [value for name, value in self.query if name == TOKEN]
+
+    def codes(self) -> list[str]:
+        """Return every one-time code of the query."""
+        return [value for name, value in self.query if name == CODE]
+
+    def cookie(self, name: str) -> list[str]:
+        """Return every value of a cookie; nested paths may each have one."""
+        pairs = (
+            pair.strip().partition("=")
+            for header in self.cookies
+            for pair in header.split(";")
+        )
+        return [value for key, _, value in pairs if key == name]
+
+    def clean_url(self, code: str | None = None) -> str:
+        """Return this URL without what signs in, as a path on the same origin.
+
+        Args:
+            code: A one-time code that the URL carries in place of the token.
+
+        """
+        # Two slashes at the start would be another host.
+        path = "/" + quote(self.path.lstrip("/\\"), safe="/~!$&'()*+,;=:@-._")
+        kept = [(name, value) for name, value in self.query if name not in _SECRET]
+        if code is not None:
+            kept.append((CODE, code))
+        return f"{path}?{urlencode(kept)}" if kept else path
+
+
+def redact(scope: Scope) -> None:
+    """Take what signs in out of a scope, from which servers write access logs."""
+    query = scope.get("query_string", b"").decode("latin-1")
+    if any(name in query for name in _SECRET):
+        kept = [pair for pair in parse_qsl(query, keep_blank_values=True)]
+        scope["query_string"] = urlencode(
+            [(name, "..." if name in _SECRET else value) for name, value in kept],
+            safe=".",
+        ).encode("latin-1")
+
+
+def _headers(scope: Scope, name: bytes) -> tuple[str, ...]:
+    return tuple(
+        value.decode("latin-1") for key, value in scope["headers"] if key == name
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A request that is turned away."""
+
+    status: int
+    text: str
+    """What a person reads; never anything that the request said."""
+
+    retry_after: int = 0
+    """Seconds, for status 429."""
+
+
+@dataclass(frozen=True, slots=True)
+class Redirect:
+    """A request whose URL holds what must not stay there: the browser goes on."""
+
+    location: str
+
+
+@dataclass(frozen=True, slots=True)
+class SignedIn:
+    """A request that used a one-time code up: it is answered, with the new secrets."""
+
+    viewer: Viewer
+    key: str
+    """What the page that is answered keeps, and opens its sockets with."""
+
+    cookie: str | None
+    """The whole Set-Cookie header, None if the browser has its cookie already."""
+
+
+class AccessControl:
+    """Decides on every request before anything else sees it."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._token = Token(settings.token)
+        self._attempts = Attempts()
+        self.codes = Codes()
+
+    def check_address(self, request: RequestHead) -> Refusal | None:
+        """Refuse what names another host, or comes from a page of another origin."""
+        if not self._settings.hosts.allow(request.host):
+            return Refusal(
+                421,
+                "This server does not answer to that host name. Open the address that "
+                "WebMap printed when it started, or start it with this name among its "
+                "hosts.",
+            )
+        if request.changes and not self._is_own_origin(request):
+            return Refusal(
+                403,
+                "Only WebMap's own pages may do this, and this request does not come "
+                "from one of them.",
+            )
+        return None
+
+    def identify(
+        self, request: RequestHead, now: float
+    ) -> Viewer | Redirect | SignedIn | Refusal:
+        """Tell by cookie, key, token or code who makes a request.
+
+        Sockets, and requests that may change something, need a page's key. For all
+        others the cookie is enough.
+
+        Args:
+            request: One that :meth:`check_address` let pass.
+            now: Seconds, monotonic.
+
+        """
+        if request.changes:
+            return self._key_holder(request) or Refusal(401, NOT_SIGNED_IN)
+        viewer = self._cookie_holder(request)
+        if not request.reads:
+            return viewer or Refusal(401, "Sign in first.")
+        if any(self.codes.use(code, now) for code in request.codes()):
+            return self._sign_in(request, viewer)
+        tokens = request.tokens()
+        if any(self._token.matches(token) for token in tokens):
+            return Redirect(request.clean_url(self.codes.issue(now)))
+        if viewer is not None:
+            # An old link in a browser that has signed in is not an attempt.
+            return (
+                Redirect(request.clean_url()) if tokens or request.codes() else viewer
+            )
+        if tokens:
+            return self._refuse_token(request, now)
+        if request.codes():
+            return Refusal(
+                401, "This address works once, and soon after WebMap has made it."
+            )
+        return Refusal(401, "Sign in first.")
+
+    def _refuse_token(self, request: RequestHead, now: float) -> Refusal:
+        wait = self._attempts.wait(request.address, now)
+        if wait:
+            return Refusal(
+                429,
+                "Too many wrong tokens came from your address. The right one, in the "
+                f"address that WebMap printed, works now; a wrong one after {wait} s.",
+                retry_after=wait,
+            )
+        self._attempts.failed(request.address, now)
+        return Refusal(
+            401,
+            "That is not the token of this server. Unless it was given one, WebMap "
+            "makes a new token each time it starts.",
+        )
+
+    def _sign_in(self, request: RequestHead, viewer: Viewer | None) -> SignedIn:
+        if viewer is not None:
+            return SignedIn(viewer, self._token.key(viewer.id), None)
+        cookie = self._token.issue()
+        session = self._token.session(cookie)
+        assert session is not None
+        return SignedIn(
+            _viewer(session), self._token.key(session), _set_cookie(request, cookie)
+        )
+
+    def _is_own_origin(self, request: RequestHead) -> bool:
+        return request.origin in self._settings.origins or same_origin(
+            request.origin, secure=request.secure, host=request.host
+        )
+
+    def _cookie_holder(self, request: RequestHead) -> Viewer | None:
+        return _first(map(self._token.session, request.cookie(_name(request))))
+
+    def _key_holder(self, request: RequestHead) -> Viewer | None:
+        return _first(map(self._token.session_of_key, request.keys))
+
+
+def _first(sessions: Iterable[str | None]) -> Viewer | None:
+    return next((_viewer(session) for session in sessions if session), None)
+
+
+def _viewer(session: str) -> Viewer:
+    return Viewer(session, f"operator {session[:4]}")
+
+
+def _name(request: RequestHead) -> str:
+    # Cookies know no ports: two servers on one machine would share a name.
+    return f"webmap_{request.port}"
+
+
+def _set_cookie(request: RequestHead, value: str) -> str:
+    secure = "; Secure" if request.secure else ""
+    path = quote(request.root) + "/"
+    return f"{_name(request)}={value}; Path={path}; HttpOnly; SameSite=Strict{secure}"

@@ -1,0 +1,378 @@
+"""The open pages: where a socket, a viewer and a page function meet.
+
+The web thread calls :class:`SceneHandle`, and those methods of :class:`OpenPages` that
+only hand over. All else runs in the model's thread.
+"""
+
+import asyncio
+import inspect
+import logging
+import time
+from collections.abc import Awaitable, Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from webmap.core.page import Page, PageEntry, Viewer
+from webmap.core.pictures import Publisher
+from webmap.core.refused import refusals
+from webmap.core.runtime import Runtime
+from webmap.core.tasks import begin
+from webmap.core.view import Rect
+from webmap.errors import WireError
+from webmap.gate.display.client import DriveConnection
+from webmap.geometry import Affine
+from webmap.scene.events import Event
+from webmap.scope import Removal
+from webmap.server.page_socket import FAILED, PageSocket
+from webmap.wire.messages import (
+    ElementEvent,
+    Hello,
+    ModuleMessage,
+    ModuleReady,
+    PageEvent,
+    Trouble,
+    ViewReport,
+)
+from webmap.wire.session import SceneSession
+
+log = logging.getLogger("webmap.page")
+
+
+SAME = (
+    "x",
+    "y",
+    "world_x",
+    "world_y",
+    "key",
+    "button",
+    "delta",
+    "shift",
+    "ctrl",
+    "alt",
+    "meta",
+    "value",
+    "checked",
+)
+"""What an event of the scene has by the same names as a page's message."""
+
+PageKey = tuple[str, str, str]
+"""The path of a page, what the page calls itself, and its viewer."""
+
+KEPT_FOR = 30.0
+"""Seconds for which a page waits for its viewer to come back."""
+
+
+class PageHost:
+    """One page of one viewer, through losses of its socket and reloads."""
+
+    def __init__(
+        self,
+        pages: "OpenPages",
+        entry: PageEntry,
+        key: PageKey,
+        viewer: Viewer,
+    ) -> None:
+        self.viewer = viewer
+        self._pages = pages
+        self._entry = entry
+        self._key = key
+        self._session = SceneSession()
+        self._page: Page | None = None
+        self._socket: PageSocket | None = None
+        self._watching: Removal | None = None
+        self._giving_up: asyncio.TimerHandle | None = None
+        self.lost_at: float | None = None
+        """When its socket was lost, on the monotonic clock; None while it has one."""
+        self.drive: DriveConnection | None = None
+
+    def __repr__(self) -> str:
+        return f"<page {self._entry.path} of {self.viewer.name}>"
+
+    # From the socket.
+
+    def connected(self, socket: PageSocket) -> None:
+        """Speak to this socket from now on, once it has said hello."""
+        if self._socket is not None:
+            self._socket.end(FAILED, "this page was opened again elsewhere")
+        self._socket = socket
+        self._stop_watching()
+        self._stay()
+
+    def receive(self, socket: PageSocket, text: str) -> None:
+        """Take one message of the page."""
+        if socket is not self._socket:
+            return
+        try:
+            events = self._session.receive(text)
+        except WireError as error:
+            log.warning("%r: %s", self, error)
+            self._pages.count_refused(self.viewer, f"page: {error}")
+            return
+        for event in events:
+            self._hear(event)
+
+    def _hear(self, event: PageEvent) -> None:
+        match event:
+            case Hello(containers=sizes):
+                self._hello(sizes)
+            case ElementEvent():
+                self._element_event(event)
+            case ViewReport():
+                self._view_report(event)
+            case ModuleReady(instance=instance):
+                self._module_ready(instance)
+            case ModuleMessage(instance=instance, data=data):
+                self._module_message(instance, data)
+            case Trouble(text=text):
+                log.warning("%r: the page says: %s", self, text)
+
+    def lost(self, socket: PageSocket) -> None:
+        """Note that the socket is gone; the page is kept for a while."""
+        if socket is not self._socket:
+            return
+        self._socket = None
+        self._stop_watching()
+        self.lost_at = time.monotonic()
+        self._giving_up = asyncio.get_running_loop().call_later(KEPT_FOR, self.close)
+
+    def tick(self, now: float) -> None:
+        """Send what changed, if the page keeps up."""
+        if self._socket is not None:
+            data = self._session.frame(time.monotonic())
+            if data is not None:
+                self._socket.offer(data)
+
+    def notice(self, text: str) -> None:
+        """Show a sentence to the viewer until it is dismissed."""
+        self._session.error(text)
+
+    # From the page.
+
+    def _hello(self, sizes: Mapping[str, tuple[float, float]]) -> None:
+        self._session.restart()
+        if self._page is None:
+            self._open(sizes)
+        self._stop_watching()
+        self._watching = self._pages.runtime.watch(self)
+
+    def _view_report(self, report: ViewReport) -> None:
+        r = report
+        for map in self._page.maps if self._page else ():
+            if map.root.id == r.map_element:
+                tf = Affine(r.a, r.b, r.c, r.d, r.e, r.f)
+                map.on_view_report(tf, Rect(r.left, r.top, r.width, r.height))
+
+    def _module_ready(self, instance: int) -> None:
+        for map in self._page.maps if self._page else ():
+            map.on_module_ready(instance)
+
+    def _module_message(self, instance: int, message: dict[str, Any]) -> None:
+        for map in self._page.maps if self._page else ():
+            map.on_module_message(instance, message)
+
+    def _element_event(self, said: ElementEvent) -> None:
+        page, element = self._page, self._session.element(said.mount, said.element)
+        if page is None or element is None:
+            return
+        event = Event(
+            kind=said.event,
+            element=element,
+            viewer=self.viewer,
+            map=next((map for map in page.maps if map.shows(said.mount)), None),
+            **{name: getattr(said, name) for name in SAME},
+        )
+        page.dispatch(said.mount, element, event)
+
+    def close(self) -> None:
+        """End the page for good."""
+        self._stop_watching()
+        self._stay()
+        self._pages.forget(self._key, self)
+        if self._page is not None:
+            self._page.close()
+            self._page = None
+        if self._socket is not None:
+            self._socket.end(FAILED, "the page was closed")
+            self._socket = None
+
+    def tell_speeds(self) -> None:
+        """Tell the gate how fast this page's hands may drive."""
+        if self.drive is not None and self._page is not None:
+            self.drive.set_speeds(*self._page.speeds)
+
+    def _open(self, sizes: Mapping[str, tuple[float, float]]) -> None:
+        page = self._page = Page(
+            self._entry, self._session, self.viewer, self._pages.publisher, sizes
+        )
+        page.on_speeds = lambda v, w: self.tell_speeds()
+        try:
+            with page.scope.active():
+                result = self._entry.function(page)
+                if inspect.isawaitable(result):
+                    begin(_then_complete(result, page), self._failed)
+                else:
+                    page.complete()
+        except Exception as error:
+            self._failed(error)
+        self.tell_speeds()
+
+    def _failed(self, error: Exception) -> None:
+        if self._page is None:  # nobody looks any more, and it may well be for that
+            log.info("%r was closed before it was built: %s", self, error)
+            return
+        log.error("%r: the page function failed", self, exc_info=error)
+        self._session.error(
+            f"This page could not be built: {type(error).__name__}: {error}"
+        )
+
+    def _stay(self) -> None:
+        """Give up no more; a timer would hold what has ended for as long as it runs."""
+        self.lost_at = None
+        if self._giving_up is not None:
+            self._giving_up.cancel()
+            self._giving_up = None
+
+    def _stop_watching(self) -> None:
+        if self._watching is not None:
+            self._watching.remove()
+            self._watching = None
+
+
+async def _then_complete(building: Awaitable[Any], page: Page) -> None:
+    await building
+    page.complete()
+
+
+class SceneHandle:
+    """The web thread's end of one scene socket; it only hands over."""
+
+    def __init__(
+        self, pages: "OpenPages", key: PageKey, viewer: Viewer, socket: PageSocket
+    ) -> None:
+        self._pages = pages
+        self._socket = socket
+        self._host: PageHost | None = None
+        pages.runtime.call(self._open, key, viewer)
+
+    def receive(self, text: str) -> None:
+        """Hand one message over."""
+        self._pages.runtime.call(self._received, text)
+
+    def closed(self) -> None:
+        """Hand over that the socket is gone."""
+        if self._pages.runtime.running:
+            self._pages.runtime.call(self._lost)
+
+    def _open(self, key: PageKey, viewer: Viewer) -> None:
+        self._host = self._pages.host(key, viewer)
+        self._host.connected(self._socket)
+
+    def _received(self, text: str) -> None:
+        if self._host is not None:
+            self._host.receive(self._socket, text)
+
+    def _lost(self) -> None:
+        if self._host is not None:
+            self._host.lost(self._socket)
+
+
+class OpenPages:
+    """All open pages of this process.
+
+    Args:
+        runtime: The model's thread.
+        pages: What is behind each path.
+        publisher: Where the pages' files get URLs.
+        max_pages: How many pages there are at most; of those that are kept for a
+            viewer who may come back, the one that was lost first gives way.
+
+    """
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        pages: Mapping[str, PageEntry],
+        publisher: Publisher,
+        *,
+        max_pages: int,
+    ) -> None:
+        self.runtime = runtime
+        self.pages = pages
+        self.publisher = publisher
+        self._max_pages = max_pages
+        self._hosts: dict[PageKey, PageHost] = {}
+        self._drives: dict[tuple[str, str], DriveConnection] = {}
+
+    # From the web thread.
+
+    def open_scene(
+        self, entry_path: str, page_id: str, viewer: Viewer, socket: PageSocket
+    ) -> SceneHandle:
+        """Take up a page whose socket has opened; return without waiting."""
+        return SceneHandle(self, (entry_path, page_id, viewer.id), viewer, socket)
+
+    def drive_opened(
+        self, page_id: str, viewer: Viewer, connection: DriveConnection
+    ) -> None:
+        """Note by which connection a page drives, to set its speeds."""
+        self.runtime.call(self._drive_opened, (page_id, viewer.id), connection)
+
+    def drive_closed(
+        self, page_id: str, viewer: Viewer, connection: DriveConnection
+    ) -> None:
+        """Note that this connection is gone; another may have replaced it before."""
+        if self.runtime.running:
+            self.runtime.call(self._drive_closed, (page_id, viewer.id), connection)
+
+    def refused(self, viewer: Viewer, why: str) -> None:
+        """Count a message whose socket is ended for it."""
+        if self.runtime.running:
+            self.runtime.call(self.count_refused, viewer, f"socket: {why}")
+
+    # In the model's thread.
+
+    def count_refused(self, viewer: Viewer, last: str) -> None:
+        """Count a message of a page that was not taken."""
+        refusals.note(viewer.name, 1, last, datetime.now(UTC))
+
+    def host(self, key: PageKey, viewer: Viewer) -> PageHost:
+        """Return the page of that key: the one that was kept, or a new one."""
+        if key not in self._hosts:
+            self._make_room()
+            self._hosts[key] = host = PageHost(self, self.pages[key[0]], key, viewer)
+            host.drive = self._drives.get(key[1:])
+        return self._hosts[key]
+
+    def forget(self, key: PageKey, host: PageHost) -> None:
+        """Note that a page has ended for good."""
+        if self._hosts.get(key) is host:
+            del self._hosts[key]
+
+    def _make_room(self) -> None:
+        """End those that were lost longest ago, if there are too many for one more."""
+        lost = [host for host in self._hosts.values() if host.lost_at is not None]
+        lost.sort(key=lambda host: host.lost_at or 0.0)
+        for host in lost[: max(0, len(self._hosts) + 1 - self._max_pages)]:
+            host.close()
+
+    def close(self) -> None:
+        """End every page."""
+        for host in tuple(self._hosts.values()):
+            host.close()
+
+    def _drive_opened(self, key: tuple[str, str], connection: DriveConnection) -> None:
+        self._drives[key] = connection
+        self._tell_drive(key, connection)
+
+    def _drive_closed(self, key: tuple[str, str], connection: DriveConnection) -> None:
+        if self._drives.get(key) is connection:
+            del self._drives[key]
+            self._tell_drive(key, None)
+
+    def _tell_drive(
+        self, key: tuple[str, str], connection: DriveConnection | None
+    ) -> None:
+        for host_key, host in self._hosts.items():
+            if host_key[1:] == key:
+                host.drive = connection
+                host.tell_speeds()

@@ -1,0 +1,139 @@
+"""What waits to be sent to a page, and how other threads hand it over.
+
+Nothing here does I/O but to wake the event loop of the sockets.
+"""
+
+import asyncio
+import logging
+import weakref
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+
+log = logging.getLogger("webmap.server")
+
+FRAMES = 8
+FRAME_BYTES = 1024 * 1024
+MESSAGES = 1024
+MESSAGE_BYTES = 1024 * 1024
+
+_TICK = '{"op":"tick"'
+
+
+class FrameQueue:
+    """Frames of the scene, in order: up to 8, and together up to 1 MiB.
+
+    The page acknowledges frames, so that a queue that fills belongs to one that does
+    not behave. A frame that waits alone may have any size: the first one holds the
+    whole scene.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[bytes | str] = deque()
+        self._size = 0
+
+    def put(self, item: bytes | str) -> bool:
+        """Take a frame; False if there is no room."""
+        size = self._size + len(item)
+        if self._waiting and (len(self._waiting) >= FRAMES or size > FRAME_BYTES):
+            return False
+        self._waiting.append(item)
+        self._size = size
+        return True
+
+    def pop(self) -> bytes | str | None:
+        """Return the oldest frame; None if nothing waits."""
+        if not self._waiting:
+            return None
+        item = self._waiting.popleft()
+        self._size -= len(item)
+        return item
+
+
+class DriveQueue:
+    """Messages of the gate: the newest tick before all, the others in order.
+
+    A tick that waits is worth nothing once there is a newer one; what the gate says
+    of a robot, or refuses, is never left out.
+    """
+
+    def __init__(self) -> None:
+        self._tick: bytes | str | None = None
+        self._waiting: deque[bytes | str] = deque()
+        self._size = 0
+
+    def put(self, item: bytes | str) -> bool:
+        """Take a message; False if there is no room."""
+        if isinstance(item, str) and item.startswith(_TICK):
+            self._tick = item
+            return True
+        size = self._size + len(item)
+        if len(self._waiting) >= MESSAGES or size > MESSAGE_BYTES:
+            return False
+        self._waiting.append(item)
+        self._size = size
+        return True
+
+    def pop(self) -> bytes | str | None:
+        """Return the tick that waits, else the oldest message, else None."""
+        if self._tick is not None:
+            item, self._tick = self._tick, None
+            return item
+        if not self._waiting:
+            return None
+        item = self._waiting.popleft()
+        self._size -= len(item)
+        return item
+
+
+class BatchedCalls:
+    """Calls functions in one event loop, in order, waking it once for many.
+
+    A tick of the model offers frames to every viewer: fifty wake-ups would cost more
+    than the frames.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = weakref.ref(loop)
+        self._calls: deque[Callable[[], object]] = deque()
+        self._woken = False
+
+    def call(self, fn: Callable[..., object], /, *args: object) -> None:
+        """Call ``fn`` soon; callable from any thread, nothing if the loop has ended."""
+        self._calls.append(partial(fn, *args))
+        # Set after appending and cleared before draining, so no call is left behind.
+        if self._woken:
+            return
+        self._woken = True
+        loop = self._loop()
+        try:
+            if loop is None:
+                raise RuntimeError("the loop is gone")
+            loop.call_soon_threadsafe(self._drain)
+        except RuntimeError:
+            self._calls.clear()
+            self._woken = False
+
+    def _drain(self) -> None:
+        self._woken = False
+        for _ in range(len(self._calls)):
+            try:
+                self._calls.popleft()()
+            except Exception:
+                log.exception("a message to a page failed")
+
+
+class BatchedCallsByLoop:
+    """One :class:`BatchedCalls` for each event loop that serves."""
+
+    def __init__(self) -> None:
+        self._by_loop: weakref.WeakKeyDictionary[
+            asyncio.AbstractEventLoop, BatchedCalls
+        ] = weakref.WeakKeyDictionary()
+
+    def of_this_loop(self) -> BatchedCalls:
+        """Return the one whose functions are called in the running loop."""
+        loop = asyncio.get_running_loop()
+        if loop not in self._by_loop:
+            self._by_loop[loop] = BatchedCalls(loop)
+        return self._by_loop[loop]

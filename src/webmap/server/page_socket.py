@@ -1,0 +1,332 @@
+"""The WebSockets of pages: bounded both ways, and always ended with a reason.
+
+Which pages have a socket, how much each may send, and how one is read and written. The
+two sockets of a page are in ``scene_socket`` and ``drive_socket``.
+"""
+
+import asyncio
+import contextlib
+import logging
+import re
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from webmap.server.access import PROTOCOL
+from webmap.server.outbox import BatchedCalls, DriveQueue, FrameQueue
+
+log = logging.getLogger("webmap.server")
+
+BROKEN_RULE = 1008
+FAILED = 1011
+COME_BACK = 1013
+
+STALLED_S = 5.0
+"""How long a page may leave one message unread before it is given up."""
+
+_GOODBYE_S = 0.5
+
+_REST_S = 0.05
+"""How long messages that had come before the socket was ended are read."""
+
+_REST_PAUSE_S = 0.01
+"""How long the next of them is waited for."""
+
+# What sending to a page that has gone raises. The last is for one that the server gave
+# up itself, as its pings were not answered.
+_GONE = (WebSocketDisconnect, OSError, RuntimeError)
+
+_PAGE_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
+
+Key = tuple[str, str]
+"""A viewer and one of its pages."""
+
+REPLACED = 4001
+"""The close code of a socket whose page has opened another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What one socket may send."""
+
+    max_bytes: int
+    """The largest message, in bytes of UTF-8."""
+
+    rate: float
+    """Messages a second, over any long time."""
+
+    burst: float
+    """Messages at once. A link that stalled delivers what it held back in one go."""
+
+
+SCENE = Bounds(max_bytes=16 * 1024, rate=120.0, burst=240.0)
+# 20 commands a second for the 6 s after which a silent link is given up.
+DRIVE = Bounds(max_bytes=1024, rate=60.0, burst=120.0)
+
+
+class Allowance:
+    """What one socket has left of its bounds: a bucket that fills at a rate."""
+
+    __slots__ = ("_bounds", "_left", "_then")
+
+    def __init__(self, bounds: Bounds, now: float) -> None:
+        self._bounds = bounds
+        self._left = bounds.burst
+        self._then = now
+
+    def spend(self, text: str, now: float) -> str | None:
+        """Count one message; return why the socket must end, None if it need not.
+
+        Args:
+            text: The message.
+            now: Seconds, monotonic.
+
+        """
+        bounds = self._bounds
+        size = len(text) if text.isascii() else len(text.encode(errors="replace"))
+        if size > bounds.max_bytes:
+            return f"a message of {size} bytes, at most {bounds.max_bytes} are taken"
+        filled = self._left + (now - self._then) * bounds.rate
+        self._left, self._then = min(bounds.burst, filled) - 1.0, now
+        if self._left < 0.0:
+            return f"more than {bounds.rate:.0f} messages a second"
+        return None
+
+
+async def accept(socket: WebSocket) -> None:
+    """Accept a socket, with our subprotocol if the page offers it."""
+    offered = socket.scope.get("subprotocols", ())
+    await socket.accept(PROTOCOL if PROTOCOL in offered else None)
+
+
+async def close(socket: WebSocket, code: int, reason: str) -> None:
+    """Close a socket and say why, unless the page has gone or reads nothing."""
+    with contextlib.suppress(TimeoutError, *_GONE):
+        async with asyncio.timeout(_GOODBYE_S):
+            await socket.close(code, short(reason))
+
+
+class PageSocket:
+    """A socket that has been accepted.
+
+    Args:
+        socket: The socket, accepted.
+        name: What it is called in the log.
+        calls: Calls functions in the socket's event loop.
+        bounds: What the page may send.
+        queue: Where messages for the page wait.
+
+    """
+
+    def __init__(
+        self,
+        socket: WebSocket,
+        name: str,
+        calls: BatchedCalls,
+        bounds: Bounds,
+        queue: FrameQueue | DriveQueue,
+    ) -> None:
+        self._socket = socket
+        self._name = name
+        self._calls = calls
+        self._allowance = Allowance(bounds, time.monotonic())
+        self._queue = queue
+        self._wake = asyncio.Event()
+        self._over = asyncio.Event()
+        self._ended: tuple[int, str] | None = None
+        self._gone = False
+
+    def offer(self, item: bytes | str) -> None:
+        """Send a message soon; callable from any thread."""
+        self._calls.call(self._put, item)
+
+    def end(self, code: int, reason: str) -> None:
+        """End the socket and say why; callable from any thread."""
+        self._calls.call(self._end, code, reason)
+
+    async def refuse(self, code: int, reason: str) -> None:
+        """End the socket before anything was carried, and say why."""
+        self._end(code, reason)
+        await self._say_goodbye()
+
+    async def refuse_full(self) -> None:
+        """End the socket because too many pages are open."""
+        await self.refuse(
+            COME_BACK, "this server takes no more pages now: close one, or come back"
+        )
+
+    async def run(
+        self,
+        on_text: Callable[[str], None],
+        on_broken: Callable[[str], None],
+        on_rest: Callable[[str | bytes], None] | None = None,
+    ) -> None:
+        """Carry messages both ways until either side ends the socket.
+
+        Args:
+            on_text: Called with each text message that is within the bounds.
+            on_broken: Called with what is wrong with one that is not; it is the last.
+            on_rest: Called with the message that was not within the bounds, and with
+                those that had come behind it when this side ends the socket.
+
+        """
+        # The third waits for an end that comes while the other two are stuck.
+        tasks = [
+            asyncio.create_task(self._read(on_text, on_broken, on_rest)),
+            asyncio.create_task(self._write()),
+            asyncio.create_task(self._over.wait()),
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            for result in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(result, Exception):
+                    log.error("%s failed", self._name, exc_info=result)
+                    self._end(
+                        FAILED, "the server failed on this page; its log says why"
+                    )
+        if on_rest is not None and not self._gone:
+            await self._read_rest(on_rest)
+        await self._say_goodbye()
+
+    def _put(self, item: bytes | str) -> None:
+        if self._queue.put(item):
+            self._wake.set()
+        else:
+            self._end(COME_BACK, "this page does not read what it is sent")
+
+    def _end(self, code: int, reason: str) -> None:
+        if self._ended is None:
+            self._ended = (code, reason)
+            self._over.set()
+
+    async def _read(
+        self,
+        on_text: Callable[[str], None],
+        on_broken: Callable[[str], None],
+        on_rest: Callable[[str | bytes], None] | None,
+    ) -> None:
+        while self._ended is None:
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                self._gone = True
+                return
+            text: str | None = message.get("text")
+            if text is None:
+                broken: str | None = "a binary message; only text is taken"
+            else:
+                broken = self._allowance.spend(text, time.monotonic())
+            if broken is not None:
+                if on_rest is not None:
+                    on_rest(message.get("bytes") or "" if text is None else text)
+                on_broken(broken)
+                self._end(BROKEN_RULE, broken)
+                return
+            on_text(text or "")
+
+    async def _read_rest(self, on_rest: Callable[[str | bytes], None]) -> None:
+        """Read what has come already; a page that goes on sending is not waited for."""
+        until = time.monotonic() + _REST_S
+        while time.monotonic() < until:
+            try:
+                async with asyncio.timeout(_REST_PAUSE_S):
+                    message = await self._socket.receive()
+            except (TimeoutError, RuntimeError):
+                return
+            if message["type"] == "websocket.disconnect":
+                self._gone = True
+                return
+            on_rest(message.get("text") or message.get("bytes") or "")
+
+    async def _write(self) -> None:
+        while True:
+            item = self._queue.pop()
+            if item is None:
+                self._wake.clear()
+                await self._wake.wait()
+                continue
+            try:
+                async with asyncio.timeout(STALLED_S):
+                    await self._send(item)
+            except TimeoutError:
+                self._end(COME_BACK, f"this page read nothing for {STALLED_S:.0f} s")
+                return
+            except _GONE:
+                self._gone = True
+                return
+
+    async def _send(self, item: bytes | str) -> None:
+        if isinstance(item, str):
+            await self._socket.send_text(item)
+        else:
+            await self._socket.send_bytes(item)
+
+    async def _say_goodbye(self) -> None:
+        if self._gone or self._ended is None:
+            return
+        code, reason = self._ended
+        log.info("%s: closed with %d, %s", self._name, code, reason)
+        await close(self._socket, code, reason)
+
+
+def page_id_of(query: Mapping[str, str]) -> str | None:
+    """Return what a page calls itself; None if it is not an identifier."""
+    page_id = query.get("id", "")
+    return page_id if _PAGE_ID.fullmatch(page_id) else None
+
+
+def short(reason: str) -> str:
+    """Return a reason that fits into a close frame, which has room for 123 bytes."""
+    return reason.encode()[:123].decode(errors="ignore")
+
+
+class OpenSockets:
+    """The sockets of one kind that are open now: one for each page.
+
+    Args:
+        limit: How many pages may have one at once.
+
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._sockets: dict[Key, PageSocket] = {}
+
+    def __len__(self) -> int:
+        return len(self._sockets)
+
+    def add(self, key: Key, socket: PageSocket) -> bool:
+        """Add a page's socket; False if too many other pages have one.
+
+        It replaces the socket that this page had before, which may be one that the
+        network has lost while nobody has noticed yet.
+        """
+        before = self._sockets.get(key)
+        if before is None and len(self._sockets) >= self._limit:
+            return False
+        self._sockets[key] = socket
+        if before is not None:
+            before.end(REPLACED, "this page has been opened again")
+        return True
+
+    def remove(self, key: Key, socket: PageSocket) -> None:
+        """Remove a page's socket, unless another has replaced it."""
+        if self._sockets.get(key) is socket:
+            del self._sockets[key]
+
+    @asynccontextmanager
+    async def holding(self, key: Key, socket: PageSocket) -> AsyncIterator[bool]:
+        """Count a socket as open within an ``async with`` block.
+
+        Gives False if too many other pages have one.
+        """
+        added = self.add(key, socket)
+        try:
+            yield added
+        finally:
+            self.remove(key, socket)

@@ -1,0 +1,51 @@
+// Made by tools/make_javascript.py: do not edit.
+
+/** Where the server has WebMap's own files and sockets. */
+export const FOLDER = "/_webmap/";
+
+/** The subprotocol of both sockets. */
+export const PROTOCOL = "webmap";
+
+/** The field of a query that signs in once. */
+export const CODE = "webmap_code";
+
+/** The element and the header that carry the secret of a page. */
+export const KEY = "webmap-key";
+
+/** The pattern of the name that a page chooses for itself. */
+export const PAGE_ID = "^[A-Za-z0-9_-]{8,64}$";
+
+/** Characters that texts in messages to the server may have. */
+export const LONGEST_TEXTS = Object.freeze({
+  "name": 64,
+  "value": 8192,
+  "url": 2048,
+  "trouble": 2000,
+});
+
+/** Close codes after which another try would end the same way. */
+export const FOR_GOOD = Object.freeze([1008, 4001]);
+
+/** Points of a route, at the most. */
+export const MOST_POINTS = 500;
+
+/** Letters of a route's name, at the most. */
+export const LONGEST_NAME = 60;
+
+/** Metres between robots that are sent together. */
+export const SPACING = Object.freeze([0.3, 20.0]);
+
+/** The levels of a log, from the least. */
+export const LEVELS = Object.freeze(["debug", "info", "warn", "error", "fatal"]);
+
+/** The words and the shape of each state of a goal. */
+export const GOALS = Object.freeze({
+  "sent": ["Goal sent", "sent"],
+  "accepted": ["Goal accepted", "sent"],
+  "under way": ["Goal under way", "way"],
+  "cancelling": ["Cancelling the goal", "cancelled"],
+  "unknown": ["State of the goal unknown", "unknown"],
+  "reached": ["Goal reached", "reached"],
+  "failed": ["Goal failed", "failed"],
+  "cancelled": ["Goal cancelled", "cancelled"],
+});

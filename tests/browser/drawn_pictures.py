@@ -1,0 +1,246 @@
+"""What pages draw, held against recordings of it.
+
+A recording has a line for each element: see ``drawn_reader.js``. ``WEBMAP_DRAWN=write``
+in the environment writes them anew, once the pages stand still; look at the difference
+before it is committed. Boxes are those of one machine's Chromium and its fonts.
+"""
+
+import difflib
+import itertools
+import os
+import re
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page
+
+from real_browser import watched_tab
+
+HERE = Path(__file__).parent
+RECORDINGS = HERE / "drawn"
+WRITES = os.environ.get("WEBMAP_DRAWN") == "write"
+
+WIDTH, HEIGHT = 1280, 800
+"""Of the window, in pixels."""
+
+PIXELS = 2.0
+"""By how much boxes, and parts of colours from 0 to 255, may differ."""
+
+SMALL = 0.002
+"""By how much any other number may differ."""
+
+LONGEST, LOOKS = 25.0, 40
+"""Seconds, and number of looks, within which a page has to be as it was recorded.
+
+A look takes longer on a busy machine, whose pages say now and then that data is old.
+"""
+
+STILL = 1.0
+"""Seconds after which it has to look so again."""
+
+SHOWN = 12
+"""Differences that a failure names."""
+
+CLOSED = ("svg.sprite", "#help")
+"""Of these only the number of elements inside counts: they are a file's own HTML."""
+
+CONSOLE = (
+    "svg.webmap-view-control",
+    *(f".webmap-{name}" for name in ("align", "export", "goal", "labels", "layers")),
+    *(f".webmap-{name}" for name in ("measure", "rosout", "route", "scale-bar")),
+    *(f".webmap-{name}" for name in ("stop", "teleop", "teleop-stop")),
+)
+"""What the modules of the browser put on the console; hands come when all are there."""
+
+UNORDERED = (".webmap-overlay", ".webmap-corner", "#stop-place", ".map-tools")
+"""Here modules of the browser lie in the order in which they happened to be loaded."""
+
+_READER = (HERE / "drawn_reader.js").read_text().strip().removesuffix(";")
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_PARTS = re.compile(
+    r"(?P<word>~\d+|#[\da-f]+\b)"
+    r"|(?P<box>@-?\d+,-?\d+ \d+x\d+|\{[-\d |]+\})"
+    r"|(?P<points><[^>]+>)"
+    rf"|{_NUMBER.pattern}"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of a recording, apart from its numbers."""
+
+    text: str
+    shape: str
+    """The text with a sign in the place of each number."""
+
+    numbers: tuple[float, ...]
+    tolerances: tuple[float, ...]
+
+    @classmethod
+    def of(cls, text: str) -> "Line":
+        """Take a line apart."""
+        numbers: list[float] = []
+        tolerances: list[float] = []
+
+        def take(match: re.Match[str]) -> str:
+            if match["word"]:
+                return match[0]
+            found = [float(number) for number in _NUMBER.findall(match[0])]
+            numbers.extend(found)
+            # Points are rounded, and which way one goes is nobody's business.
+            largest = max(map(abs, found), default=0.0)
+            near = max(SMALL, largest / 2000) if match["points"] else SMALL
+            tolerances.extend(PIXELS if match["box"] else near for _ in found)
+            return _NUMBER.sub("%", match[0])
+
+        shape = _PARTS.sub(take, text)
+        return cls(text, shape, tuple(numbers), tuple(tolerances))
+
+    def matches(self, other: "Line") -> bool:
+        """Return whether another line differs by no more than numbers may."""
+        return self.shape == other.shape and all(
+            abs(mine - its) <= tolerance + 1e-9
+            for mine, its, tolerance in zip(
+                self.numbers, other.numbers, self.tolerances, strict=True
+            )
+        )
+
+
+@contextmanager
+def opened(chromium: Browser, url: str, *shown: str) -> Iterator[Page]:
+    """Open a page in a window of always the same size, and wait for what is shown."""
+    with watched_tab(chromium, WIDTH, HEIGHT) as page:
+        page.goto(url)
+        for selector in shown:
+            page.locator(selector).first.wait_for(state="attached")
+        yield page
+
+
+def robots(count: int) -> str:
+    """Return a selector of so many robots that have their places."""
+    placed = ".robot:not(.unplaced)"
+    return f"{placed}:nth-child({count} of {placed})"
+
+
+def expect_drawn(
+    page: Page,
+    name: str,
+    *,
+    hidden: str = "svg.webmap",
+    absent: Sequence[str] = (),
+    level: Sequence[str] = (),
+    unstable: Sequence[tuple[str, str]] = (),
+) -> None:
+    """Check that a page draws what was recorded, or record it.
+
+    Args:
+        page: The page; it has what the recording is of, or gets it soon.
+        name: Of the recording.
+        hidden: A selector of elements in which what hidden ones have inside counts too.
+        absent: Selectors of elements that are no part of the picture.
+        level: Selectors of elements in which neighbours of one kind come in any order.
+        unstable: Selectors and an attribute of each that is no part of the picture.
+
+    """
+    __tracebackhide__ = True
+    options = {
+        "hidden": hidden,
+        "closed": CLOSED,
+        "absent": list(absent),
+        "unordered": UNORDERED,
+        "level": list(level),
+        "unstable": list(unstable),
+    }
+
+    def read() -> list[str]:
+        return page.evaluate(_READER, options)
+
+    file = RECORDINGS / f"{name}.txt"
+    if WRITES:
+        lines = _still(page, read)
+        file.write_text("\n".join(lines) + "\n")
+        return
+    assert file.exists(), f"{file} is not there; WEBMAP_DRAWN=write writes it"
+    recorded = file.read_text().splitlines()
+    deadline, first = time.monotonic() + LONGEST, None
+    for looks in itertools.count(1):
+        found = differences(recorded, read())
+        now = time.monotonic()
+        if found and now > deadline and looks > LOOKS:
+            break
+        if not found and first is not None and now - first >= STILL:
+            return
+        if not found and first is None:
+            first = now
+        page.wait_for_timeout(1000 * (STILL / 2 if found else STILL))
+    more = [f"... and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
+    listed = "\n".join([*found[:SHOWN], *more])
+    raise AssertionError(
+        f"{name}: the page draws something else than was recorded "
+        f"(- recorded, + drawn; WEBMAP_DRAWN=write records it anew):\n{listed}"
+    )
+
+
+def _still(page: Page, read: Callable[[], list[str]]) -> list[str]:
+    """Return what a page draws now and drew some seconds ago."""
+    deadline = time.monotonic() + 4 * LONGEST
+    seen: dict[tuple[str, ...], float] = {}
+    while True:
+        lines, now = read(), time.monotonic()
+        if now - seen.setdefault(tuple(lines), now) >= 4 * STILL:
+            return lines
+        assert now < deadline, "the page does not stand still:\n" + "\n".join(
+            differences(list(seen)[-2], lines)
+        )
+        page.wait_for_timeout(500)
+
+
+def differences(recorded: Sequence[str], drawn: Sequence[str]) -> list[str]:
+    """Return the differences, each with the elements that the line lies in."""
+    if recorded == drawn:
+        return []
+    before, after = ([Line.of(text) for text in lines] for lines in (recorded, drawn))
+    shapes = ([line.shape for line in lines] for lines in (before, after))
+    found = []
+    matcher = difflib.SequenceMatcher(None, *shapes, autojunk=False)
+    for tag, i1, i2, j1, j2 in matcher.get_opcodes():
+        if tag == "equal":
+            pairs = zip(range(i1, i2), range(j1, j2), strict=True)
+            for i, j in pairs:
+                if not before[i].matches(after[j]):
+                    found.append(_difference(recorded, [i], drawn, [j]))
+        else:
+            found.append(_difference(recorded, range(i1, i2), drawn, range(j1, j2)))
+    return found
+
+
+def _difference(
+    recorded: Sequence[str],
+    old: Sequence[int],
+    drawn: Sequence[str],
+    new: Sequence[int],
+) -> str:
+    way = _way(recorded, old[0]) if old else _way(drawn, new[0])
+    lines = [
+        *(f"  - {recorded[i].strip()}" for i in old[:SHOWN]),
+        *(f"  + {drawn[j].strip()}" for j in new[:SHOWN]),
+    ]
+    return "\n".join([f"in {way}:", *lines])
+
+
+def _way(lines: Sequence[str], index: int) -> str:
+    """Return the elements that a line lies in, the innermost last."""
+    depth = _depth(lines[index])
+    way: list[str] = []
+    for line in reversed(lines[:index]):
+        if _depth(line) < depth:
+            depth = _depth(line)
+            way.append(line.split()[0])
+    return " > ".join(reversed(way[:4])) or "the page"
+
+
+def _depth(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))

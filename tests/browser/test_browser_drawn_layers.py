@@ -1,0 +1,77 @@
+"""Every layer, drawn from messages that never change, is drawn as it was recorded."""
+
+import pytest
+from drawn_files import make_files
+from drawn_pictures import CONSOLE, HERE, expect_drawn, opened, robots
+from fixed_bridge import FixedBridge, fixed_bridge
+from fixed_site import STEPS
+from playwright.sync_api import Page
+
+from webmap_process import page_of, webmap
+
+# A busy machine may say for long that links are slow.
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path, monkeypatch):
+    """Leave out what other tests put on the map to stay."""
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path / "state"))
+
+
+def go_along(page: Page, bridge: FixedBridge, *behind: str) -> None:
+    """Let Anna go her way, step by step, once all that follows her is there."""
+    for selector in behind:
+        page.locator(selector).first.wait_for(state="attached")
+    anna = page.locator('.robot[data-name="anna" i]')
+    for step in range(1, len(STEPS)):
+        before = anna.get_attribute("transform")
+        bridge.step = step
+        page.wait_for_function(
+            "([robot, before]) => robot.getAttribute('transform') !== before",
+            arg=[anna.element_handle(), before],
+        )
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_what_is_found_behind_a_bridge_is_drawn_as_it_was(chromium, dialect):
+    with (
+        fixed_bridge(dialect) as bridge,
+        webmap("view", bridge.url, "--port", "0", "--no-browser") as url,
+        opened(chromium, url, robots(4), *CONSOLE) as page,
+    ):
+        fix = ".navsatfix > .cross:not([visibility])"
+        go_along(page, bridge, ".trail", fix, ".pointcloud > .band-7[d]")
+        page.locator(".webmap-layers > summary").click()
+        page.get_by_role("checkbox", name="Costmaps", exact=True).check()
+        page.locator("#show-all").click()
+        # What is found at once lies on the map in the order in which it was asked for.
+        expect_drawn(page, f"view_{dialect}", level=[".world"])
+
+
+def test_each_way_to_a_pose_and_each_option_of_a_layer_is_drawn_as_it_was(
+    chromium, tmp_path
+):
+    make_files(tmp_path)
+    with fixed_bridge("ros1") as bridge:
+        told = {"DRAWN_BRIDGE": bridge.url, "DRAWN_FILES": str(tmp_path)}
+        file = HERE / "page_of_drawn.py"
+        with (
+            page_of(file, PYTHONPATH=str(HERE), **told) as url,
+            opened(chromium, url, robots(6)) as page,
+        ):
+            go_along(page, bridge, ".trail")
+            expect_drawn(page, "page")
+
+
+def test_a_fleet_is_drawn_as_it_was(chromium, tmp_path):
+    make_files(tmp_path)
+    with fixed_bridge("ros2") as bridge:
+        text = (HERE / "fixed_fleet.toml").read_text().replace("BRIDGE", bridge.url)
+        fleet = tmp_path / "fleet.toml"
+        fleet.write_text(text)
+        shown = (robots(3), *CONSOLE)
+        with page_of(fleet) as url, opened(chromium, url, *shown) as page:
+            page.locator("#robots .row button").first.click()
+            go_along(page, bridge)
+            expect_drawn(page, "fleet")

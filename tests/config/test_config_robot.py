@@ -1,0 +1,272 @@
+"""The configuration of one robot: read from plain values, checked, and back."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap import Bridge, Robot, RobotConfig
+from webmap.config.checks import Mistakes
+from webmap.config.motion import MotionConfig, TwistConfig
+from webmap.config.reading import read
+from webmap.config.robot import CameraConfig, ModuleConfig
+from webmap.core.configure import apply
+from webmap.errors import ConfigError
+from webmap.gate.specs import checked
+
+URL = "ws://robot:9090"
+WHOLE = {
+    "name": "Bob",
+    "bridge": URL,
+    "base_link": "base",
+    "odometry": {"topic": "/odom", "throttle": 50},
+    "tf": {"quiet": True, "namespace": "/bob"},
+    "alignment": (1.0, 2.0, 3.0),
+    "scan": ["/front", "/rear"],
+    "battery": "/battery",
+    "cameras": [{"topic": "/camera"}, {"url": "http://bob/", "throttle": 200}],
+    "twist": {
+        "topic": "/cmd_vel",
+        "stops_within": 0.25,
+        "stop_hooks": [{"topic": "/lock", "type": "std_msgs/Bool"}],
+    },
+    "move": {"action": "/navigate_to_pose", "frame": "hall"},
+    "initial_pose": {"topic": "/initialpose"},
+    "scan_assist": {"topic": "/front", "footprint": 0.3},
+    "buttons": [{"label": "Dock", "service": "/dock"}],
+    "modules": [{"name": "Trail", "options": {"length": 3.0}}],
+    "classes": ["fast"],
+    "model": {"tag": "circle", "attributes": {"r": 1}},
+}
+
+
+PICTURE = {"file": "bob.png", "width": 1.0, "height": 0.5}
+
+
+def test_plain_data_is_a_configuration_and_back():
+    config = RobotConfig.from_dict(WHOLE)
+    assert config.motion.twist.stops_within == 0.25
+    assert config.to_dict() == WHOLE
+    shown = {**WHOLE, "picture": PICTURE}
+    del shown["model"]
+    assert RobotConfig.from_dict(shown).to_dict() == shown
+
+
+def test_a_robot_has_a_picture_or_a_model():
+    with pytest.raises(ConfigError, match='picture: a robot has a "picture" or a "mod'):
+        RobotConfig.from_dict({**WHOLE, "picture": PICTURE})
+
+
+def test_mistakes_in_the_model_and_in_other_parts_are_named_together():
+    bad = {"name": "Bob", "model": {"tag": "script"}, "classes": ["fast"]}
+    bad["modules"] = [{"name": "Trial"}]
+    with pytest.raises(ConfigError) as error:
+        Robot.from_dict(bad)
+    assert "model: svg tag 'script'" in str(error.value)
+    assert "modules[0].name" in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["", "a b", "selected", 5])
+def test_a_class_is_one_word_that_is_not_webmap_s_own(name):
+    with pytest.raises(ConfigError, match=r"classes\[0\]: got .*expected a"):
+        RobotConfig.from_dict({"name": "Bob", "classes": [name]})
+
+
+def test_classes_are_an_array():
+    with pytest.raises(ConfigError, match="expected an array of texts"):
+        RobotConfig.from_dict({"name": "Bob", "classes": "fast"})
+
+
+def test_all_mistakes_in_buttons_are_named_with_those_of_other_keys():
+    buttons = [{"label": "Dock"}, 5, {"label": "A", "service": "/a"}, {"lable": "A"}]
+    with pytest.raises(ConfigError) as error:
+        RobotConfig.from_dict({"name": "Bob", "buttons": buttons, "battery": 5})
+    lines = str(error.value).splitlines()
+    assert len(lines) == 4
+    for index in (0, 1, 3):
+        assert any(f"buttons[{index}]" in line for line in lines)
+
+
+@pytest.mark.parametrize("robot", ["", "two\nlines", "x" * 101])
+def test_a_robot_of_a_program_may_have_any_name(robot):
+    made = Robot(robot, base_link="")
+    try:
+        assert RobotConfig.from_dict(made.to_dict()).name == robot
+    finally:
+        made.destroy()
+
+
+def test_goals_and_the_initial_pose_move_to_another_bridge_together():
+    other = "ws://other:9090"
+    bridges = {URL: Bridge(URL), other: Bridge(other)}
+    parts = {"move": {"topic": "/goal"}, "initial_pose": {"topic": "/initialpose"}}
+    old = RobotConfig.from_dict({"name": "Bob", "bridge": URL, **parts})
+    new = RobotConfig.from_dict({"name": "Bob", "bridge": other, **parts})
+    robot = Robot.from_config(old, bridges)
+    try:
+        assert apply(robot, old, new, bridges).found == []
+        motion = robot.motion.config
+        assert (motion.move.bridge, motion.initial_pose.bridge) == (other, other)
+    finally:
+        robot.destroy()
+
+
+def test_classes_that_a_new_configuration_leaves_out_are_removed():
+    old = RobotConfig(name="Bob", classes=["slow", "red"])
+    robot = Robot.from_config(old)
+    robot.svg.classes.add("mine")
+    try:
+        apply(robot, old, RobotConfig(name="Bob", classes=["red"]))
+        assert {"red", "mine"} <= set(robot.svg.classes)
+        assert "slow" not in robot.svg.classes
+    finally:
+        robot.destroy()
+
+
+@pytest.mark.parametrize("key", ["odometry", "tf", "twist", "move", "initial_pose"])
+def test_a_part_that_needs_a_bridge_says_so(key):
+    robot = Robot("Bob")
+    try:
+        with pytest.raises(ConfigError, match=f"{key}: a bridge is missing"):
+            robot.configure(key, {"topic": "/odom"} if key != "tf" else {})
+        with pytest.raises(ConfigError, match='there is no key "nonsense"'):
+            robot.configure("nonsense", None)
+    finally:
+        robot.destroy()
+
+
+def test_a_short_form_means_the_table_with_a_topic():
+    short = {"name": "Bob", "odometry": "odom", "scan": "/scan", "tf": True}
+    config = RobotConfig.from_dict({**short, "cameras": "http://bob/", "twist": "c"})
+    assert config.to_dict() == {
+        "name": "Bob",
+        "odometry": {"topic": "/odom"},
+        "tf": {},
+        "scan": ["/scan"],
+        "cameras": [{"url": "http://bob/"}],
+        "twist": {"topic": "/c"},
+    }
+    assert RobotConfig.from_dict({"name": "Bob", "tf": False}).tf is None
+
+
+def test_every_mistake_is_named_at_once_with_the_way_to_it():
+    wrong = {
+        "nmae": "Bob",
+        "odometry": {"topic": "/a b", "throtle": 5},
+        "twist": {"v_max": "0.5", "stop_hooks": [{"topic": "/a"}, {}]},
+        "cameras": [{"topic": "/a", "name": "Arm"}, {"topic": "/b", "name": "ARM"}],
+        "modules": {"name": "Trail"},
+    }
+    with pytest.raises(ConfigError) as refused:
+        RobotConfig.from_dict(wrong)
+    said = [line.removeprefix("robot '?': ") for line in str(refused.value).split("\n")]
+    begun = [
+        'nmae: there is no key "nmae" here; did you mean "name"?',
+        'odometry.topic: got the text "/a b", expected the name of a topic',
+        'odometry.throtle: there is no key "throtle" here; did you mean "throttle"?',
+        'twist.v_max: got the text "0.5", expected a number of metres per second',
+        'twist.stop_hooks[1]: expected the key "topic" or the key "service"',
+        'twist: the key "topic" is missing',
+        "modules: got the table",
+        'the key "name" is missing',
+        'cameras[1]: a second camera is called "ARM"',
+    ]
+    assert len(said) == len(begun)
+    for line, start in zip(said, begun, strict=True):
+        assert line.startswith(start)
+
+
+def test_a_number_that_is_too_large_is_told_how_large_it_may_be():
+    with pytest.raises(ConfigError, match="from 0 on, 1e\\+06 at the most"):
+        RobotConfig.from_dict({"name": "Bob", "twist": {"topic": "/c", "v_max": 1e9}})
+
+
+def test_a_part_without_any_bridge_is_refused():
+    with pytest.raises(ConfigError) as refused:
+        Robot.from_dict({"name": "Bob", "twist": "/cmd_vel", "scan": "/scan"})
+    assert str(refused.value).split("\n") == [
+        "robot 'Bob': twist: the key \"bridge\" is missing",
+        "robot 'Bob': scan[0]: the key \"bridge\" is missing",
+    ]
+
+
+NUMBERS = st.floats(allow_nan=True) | st.integers() | st.sampled_from(["1", True])
+LIMITS = ("stops_within", "v_max", "w_max")
+
+
+@given(st.dictionaries(st.sampled_from(LIMITS), NUMBERS))
+def test_what_passes_the_check_passes_the_gate_s_check_too(limits):
+    mistakes = Mistakes()
+    twist = read(TwistConfig, {"topic": "/c", **limits}, (), mistakes)
+    if mistakes.found:
+        return
+    robot = Robot.from_config(
+        RobotConfig(name="Bob", bridge=URL, motion=MotionConfig(twist=twist))
+    )
+    try:
+        spec = checked(robot.motion.spec())
+        assert {name: getattr(spec, name) for name in limits} == limits
+    finally:
+        robot.destroy()
+
+
+@pytest.fixture
+def bridges():
+    return {URL: Bridge(URL)}
+
+
+def modules_of(robot):
+    return [(name, args[1:]) for name, args, _ in robot.module_arguments()]
+
+
+def test_only_what_differs_is_changed(bridges):
+    old = RobotConfig(
+        name="Bob",
+        bridge=URL,
+        scan=["/front"],
+        battery="/battery",
+        cameras=[CameraConfig(topic="/a", name="A")],
+        motion=MotionConfig(twist=TwistConfig(topic="/cmd_vel")),
+    )
+    robot = Robot.from_config(old, bridges)
+    try:
+        kept = robot.modules[0]
+        robot.add_module("Trail")  # as a program does
+        new = RobotConfig(
+            name="Bob",
+            bridge=URL,
+            scan=["/front"],
+            cameras=[CameraConfig(topic="/b", name="B")],
+            modules=[ModuleConfig(name="Path", args=[{"bridge": URL}, "/plan"])],
+        )
+        assert apply(robot, old, new, bridges).found == []
+        assert robot.modules[0] is kept
+        assert modules_of(robot) == [
+            ("LaserScanner", ("/front",)),
+            ("Trail", ()),
+            ("Camera", ("/b", "B")),
+            ("Path", ("/plan",)),
+        ]
+        assert robot.motion.spec() is None
+    finally:
+        robot.destroy()
+
+
+def test_a_part_that_is_refused_keeps_no_other_from_being_changed(bridges):
+    old = RobotConfig(name="Bob", bridge=URL)
+    robot = Robot.from_config(old, bridges)
+    try:
+        new = RobotConfig.from_dict({**old.to_dict(), "battery": "/b", "tf": True})
+        broken = new.with_part("twist", TwistConfig(topic="/a b"))
+        mistakes = apply(robot, old, broken, bridges)
+        ((way, words),) = mistakes.found
+        assert (way, words[:17]) == (("twist", "topic"), 'got the text "/a ')
+        assert robot.tf is not None
+        assert modules_of(robot) == [("Battery", ("/b",))]
+    finally:
+        robot.destroy()
+
+
+def test_a_picture_without_a_page_to_show_it_is_refused():
+    picture = {"file": "bob.png", "width": 1, "height": 1}
+    with pytest.raises(ConfigError, match="picture: only the console shows a picture"):
+        Robot.from_dict({"name": "Bob", "picture": picture})

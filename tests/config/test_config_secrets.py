@@ -1,0 +1,68 @@
+"""A warning about passwords in a fleet file that others can read."""
+
+import pytest
+
+from webmap.cli.fleet import prepare
+from webmap.config.secrets import readable_secret
+
+HEAD = '[bridges]\nb = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "b"\n'
+CAMERA = 'cameras = ["http://{}"]\n'
+
+
+@pytest.fixture
+def warned(tmp_path, caplog):
+    """Read a file with some rights, and return what is logged."""
+
+    def read(text, mode, name="my fleet.toml"):
+        file = tmp_path / name
+        file.write_text(text)
+        file.chmod(mode)
+        prepare(file)
+        return [r.getMessage() for r in caplog.records if r.name == "webmap.cli"]
+
+    return read
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o620])
+@pytest.mark.parametrize(
+    "text",
+    [
+        HEAD + CAMERA.format("ann:word@cam.local/stream"),
+        HEAD + CAMERA.format("cam.local/stream?topic=/a&access_token=word"),
+        HEAD + CAMERA.format("cam.local/stream?pwd=word"),
+        HEAD.replace("robot:9090", "robot:9090/?token=word"),
+    ],
+)
+def test_a_password_that_others_can_read_is_warned_of(warned, text, mode):
+    (said,) = warned(text, mode)
+    assert "my fleet.toml holds a password, and other users of this comp" in said
+    assert f"(its mode is {mode:04o}): run chmod 600 '/" in said
+    assert said.endswith("/my fleet.toml'")
+    assert "word@" not in said
+
+
+@pytest.mark.parametrize(
+    ("data", "is_one"),
+    [
+        ({"robots": [{"modules": [{"options": {"password": "word"}}]}]}, True),
+        ({"camera_token": "word"}, True),
+        ({"api-key": "word"}, True),
+        ({"password": ""}, False),
+        ({"passage": "word", "keyboard": "word", "author": "word"}, False),
+        ({"url": "ftp://[bad", "token": 5}, False),
+    ],
+)
+def test_a_password_may_be_any_field(tmp_path, data, is_one):
+    file = tmp_path / "fleet.toml"
+    file.touch(0o644)
+    assert (readable_secret(file, data) is not None) == is_one
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o400, 0o700])
+def test_a_file_that_others_cannot_read_is_not_warned_of(warned, mode):
+    assert warned(HEAD + CAMERA.format("ann:word@cam.local/"), mode) == []
+
+
+def test_a_file_without_a_password_is_not_warned_of(warned):
+    text = HEAD + CAMERA.format("cam.local:8080/stream?topic=/a@b&type=mjpeg")
+    assert warned(text, 0o644) == []

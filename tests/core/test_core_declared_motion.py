@@ -1,0 +1,68 @@
+"""What a button may never write, once a robot was told that it is moved by it."""
+
+import pytest
+
+import webmap
+from webmap.config.buttons import ButtonSpec
+from webmap.core.robot_button import declared_motion
+
+HALL = "ws://core-buttons:9090"
+
+
+def ways():
+    """Yield how a robot is told of a topic, the topic, and what it carries."""
+    hook = {"topic": "bob/lock", "type": "std_msgs/Bool"}
+    yield "set_twist_topic", ["/bob/wheels"], {}, "/bob/wheels", "a velocity"
+    yield (
+        "set_twist_topic",
+        ["/bob/wheels"],
+        {"stop_hooks": [hook]},
+        "/bob/lock",
+        "what STOP says",
+    )
+    move = {"cancel_topic": "/bob/halt/", "action": "bob//walk"}
+    for topic, carried in (
+        ("/bob/there", "a goal"),
+        ("/bob/halt", "the end of a goal"),
+        ("/bob/walk/goal", "a goal"),
+        ("/bob/walk/cancel", "the end of a goal"),
+    ):
+        yield "set_move_topic", ["/bob/there"], move, topic, carried
+    yield "set_initial_pose_topic", ["/bob/here"], {}, "/bob/here", "an initial pose"
+
+
+@pytest.mark.parametrize(
+    ("setter", "args", "options", "topic", "carried"), list(ways())
+)
+def test_what_the_gate_writes_for_a_robot_no_button_does(
+    setter, args, options, topic, carried
+):
+    bridge = webmap.Bridge(HALL)
+    spec = ButtonSpec("Go", "topic", topic, "std_msgs/Bool")
+    assert declared_motion(spec, HALL) is None, "nobody knows the robot yet"
+    robot = webmap.Robot("Bob")
+    try:
+        getattr(robot, setter)(bridge, *args, **options)
+        said = declared_motion(spec, HALL)
+        assert said is not None
+        assert said.startswith(f"{topic} carries {carried}, and a button may not write")
+        assert declared_motion(spec, "ws://another:9090") is None
+    finally:
+        robot.destroy()
+    assert declared_motion(spec, HALL) is None, "the robot is gone"
+
+
+def test_a_button_that_would_say_where_a_robot_is_is_refused_when_it_is_made():
+    bridge = webmap.Bridge(HALL)
+    robot = webmap.Robot("Bob")
+    try:
+        robot.set_initial_pose_topic(bridge, "/bob/here")
+        button = {"label": "Here", "topic": "bob/here", "type": "std_msgs/Bool"}
+        with pytest.raises(webmap.errors.ConfigError) as refused:
+            robot.add_module("Buttons", bridge, [button])
+        assert str(refused.value) == (
+            "button 'Here': /bob/here carries an initial pose, and a button may not "
+            "write that: the gate does"
+        )
+    finally:
+        robot.destroy()

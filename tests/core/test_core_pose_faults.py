@@ -1,0 +1,112 @@
+"""What fails while poses and frames come leaves nothing behind."""
+
+import math
+
+import pytest
+from pose_script import ODOMETRY, header, odometry, play, transform, transforms
+
+from webmap import RobotLayer, layer
+from webmap.core.registry import robot_modules
+
+
+def tilted(parent, child, roll, stamp):
+    """Return a frame that is turned about its parent's x."""
+    found = transform(parent, child, 0.2, stamp=stamp)
+    half = roll / 2
+    turn = {"x": math.sin(half), "y": 0.0, "z": 0.0, "w": math.cos(half)}
+    found["transform"]["rotation"] = turn
+    return found
+
+
+@pytest.fixture
+def fussy(monkeypatch):
+    """A layer that fails to draw while it is told to."""
+    monkeypatch.setattr(robot_modules, "_registered", dict(robot_modules._registered))
+
+    @layer("geometry_msgs/PointStamped")
+    class Fussy(RobotLayer):
+        frame = "robot"
+        fails = False
+
+        def draw(self, found, at):
+            if Fussy.fails:
+                raise ValueError("no such tilt")
+
+    return Fussy
+
+
+def test_a_failure_to_draw_anew_leaves_the_drawing_in_place_and_is_cleared(
+    fussy, monkeypatch
+):
+    async def script(stage):
+        robot = stage.robot
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        robot.set_tf(stage.link)
+        drawn = robot.add_module("Fussy", stage.link, "/point")
+
+        async def go(count, roll=None):
+            for _ in range(count):
+                now = stage.loop.now
+                moved = [
+                    transform("map", "odom", 50.0, stamp=now),
+                    transform("odom", "base_link", 1.0, stamp=now),
+                ]
+                if roll is not None:
+                    moved.append(tilted("base_link", "camera", roll, now))
+                stage.tell("/tf", transforms(*moved))
+                stage.tell("/odom", odometry(1.0, stamp=now))
+                await stage.wait(0.1)
+
+        def point(stamp):
+            place = {"x": 1.0, "y": 0.0, "z": 0.0}
+            stage.tell("/point", {"header": header("camera", stamp), "point": place})
+
+        def failed():
+            return any("no such tilt" in words for words in robot.problems.values())
+
+        await go(60)
+        point(stage.loop.now + 2.0)  # newer than the frames, so it is drawn anew
+        await go(14, roll=0.5)
+        assert drawn.placed._on_robot
+        fussy.fails = True
+        await go(25, roll=1.0)
+        assert failed()
+        assert drawn.placed._on_robot, "it stays where it was drawn"
+        fussy.fails = False
+        point(stage.loop.now + 0.15)
+        assert not failed()
+        await go(3, roll=1.0)
+        point(stage.loop.now + 0.15)
+        fussy.fails = True
+        await go(3, roll=0.5)
+        assert failed()
+        fussy.fails = False
+        await go(2, roll=0.5)
+        point(stage.loop.now - 0.05)
+        assert robot.problems == {}
+
+    play(script, monkeypatch)
+
+
+def test_a_jump_is_no_problem_of_a_robot_whose_source_a_listener_ends(monkeypatch):
+    class Ends:
+        def __init__(self, robot):
+            self.robot = robot
+
+        def on_odometry_update(self):
+            if self.robot.position.x > 50:
+                self.robot.unsubscribe_odometry_topic()
+
+    async def script(stage):
+        stage.link.open()
+        stage.robot.add_module(Ends)
+        stage.robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        stage.tell("/odom", odometry(0.0, stamp=100.0))
+        await stage.wait(0.1)
+        stage.tell("/odom", odometry(100.0, stamp=100.1))
+        await stage.wait(60)
+        assert stage.robot.feed is None
+        assert stage.robot.problems == {}
+
+    play(script, monkeypatch)

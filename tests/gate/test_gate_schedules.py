@@ -1,0 +1,135 @@
+"""Random schedules of people, links, disks and the display, always the same ones.
+
+What the gate decides in each is recorded (see ``decisions.py``): these are schedules
+that nobody wrote by hand, in the order in which nobody would try them.
+"""
+
+import random
+
+import pytest
+from gate_harness import KEY, spec
+from machine_bench import PacedBench
+
+from webmap.gate import events, messages
+from webmap.gate.events import Press
+from webmap.geometry import Twist
+
+PEOPLE = ("a", "b")
+
+SCHEDULES = 24
+STEPS = 40
+
+
+def lose(bench, chance):
+    match chance.choice(["links", "display", "bridge", "page", "disk"]):
+        case "links":
+            bench.break_links()
+        case "display":
+            bench.beating = False
+        case "bridge":
+            bench.answering = False
+        case "page":
+            bench.tell(messages.Disconnect(chance.choice(PEOPLE)))
+        case "disk":
+            bench.full_disk = not bench.full_disk
+    bench.run(chance.choice([0.1, 0.4]))
+
+
+def mend(bench, chance):
+    bench.beating = bench.answering = True
+    bench.connect_links()
+    for who in PEOPLE:
+        bench.tell(messages.Disconnect(who))
+        bench.join(who)
+    bench.run(0.2)
+
+
+def hold(bench, chance):
+    who, x = chance.choice(PEOPLE), chance.choice([0.0, 0.0, 0.5, 1.0, -1.0, 3.0])
+    turn = chance.choice([0.0, 1.0])
+    bench.run(chance.choice([0.1, 0.3, 0.6]), lambda: bench.drive(who, x=x, turn=turn))
+
+
+def drive_off(bench, chance):
+    bench.drive_off(chance.choice(PEOPLE), x=chance.choice([0.5, 1.0]))
+
+
+def say(bench, chance):
+    op = chance.choice(["take", "release", "ask", "grant", "deny", "cancel"])
+    bench.say(chance.choice(PEOPLE), op=op, robot="r1")
+
+
+def stop(bench, chance):
+    bench.say(chance.choice(PEOPLE), op="stop", robot=chance.choice(["r1", "*"]))
+
+
+def reset(bench, chance):
+    bench.say(chance.choice(PEOPLE), op="reset", robot="r1")
+
+
+def stop_elsewhere(bench, chance):
+    bench.disk[KEY] = Press("Ann", f"other-{chance.randrange(1000)}")
+    bench.tell(events.LatchSeen(KEY, bench.disk[KEY]))
+
+
+def goal(bench, chance):
+    bench.goal(chance.choice(PEOPLE), x=chance.choice([1.0, 2.0]))
+
+
+def odometry(bench, chance):
+    seen = events.Measured(KEY, Twist(chance.choice([0.0, 0.02, 0.3, 1.0])))
+    bench.run(chance.choice([0.3, 1.2]), lambda: bench.tell(seen))
+
+
+def echo(bench, chance):
+    bench.tell(events.Echoed(KEY, Twist(chance.choice([0.0, 0.5]))))
+
+
+def speeds(bench, chance):
+    v = chance.choice([0.2, 0.8, 9.0])
+    bench.tell(messages.Speeds(chance.choice(PEOPLE), v, v))
+
+
+def program(bench, chance):
+    bench.tell(messages.ProgramTake(chance.randrange(1000), "r1"))
+    epoch = bench.report().epoch or 0
+    bench.tell(messages.ProgramTwist("r1", epoch, bench.tick, (0.4, 0.0, 0.0)))
+
+
+def declare(bench, chance):
+    odometry = chance.choice([None, "/odom"])
+    bench.tell(spec(v_max=chance.choice([0.4, 1.0]), odometry_topic=odometry))
+
+
+def wait(bench, chance):
+    bench.run(chance.choice([0.01, 0.2, 1.0, 3.0]))
+
+
+EVENTS = (
+    lose,
+    mend,
+    *(hold, drive_off, say, odometry) * 3,
+    stop,
+    *(reset,) * 2,
+    stop_elsewhere,
+    goal,
+    echo,
+    speeds,
+    program,
+    declare,
+    wait,
+)
+
+
+@pytest.mark.parametrize("number", range(SCHEDULES))
+def test_a_schedule_never_writes_motion_while_stop_is_in_force(number):
+    chance = random.Random(number)
+    bench = PacedBench()
+    bench.begin(spec(odometry_topic="/odom"))
+    for _ in range(STEPS):
+        before = len(bench.written)
+        is_stopped = bench.report().state == "stopped"
+        event = chance.choice(EVENTS)
+        event(bench, chance)
+        if is_stopped and event is not reset and bench.report().state == "stopped":
+            assert all(w.twist.is_zero for w in bench.written[before:])

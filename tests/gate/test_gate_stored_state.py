@@ -1,0 +1,136 @@
+"""A gate reads what an earlier version left on the disk, for every robot.
+
+The names of the files are made of the bridge's address and the velocity topic: if one
+of them came out otherwise, a STOP would be forgotten.
+"""
+
+import asyncio
+import contextlib
+import shutil
+
+import msgspec
+import pytest
+from gate_page import Page
+from gate_robot import eventually
+from stored_robots import FOLDER, IDENTITIES, PORT, ROBOTS, STOPPED, TESTED
+
+from webmap.gate import actions, events, shell
+from webmap.gate.display.client import GateClient
+from webmap.gate.events import Key
+from webmap.gate.kept.disk import Disk
+from webmap.gate.kept.locks import Locks
+from webmap.gate.kept.records import UNKNOWN, Records
+from webmap.gate.rules.motion import ZERO
+
+
+@pytest.fixture
+def stored(state_folder):
+    """The folder of a new gate, with what an earlier one left there."""
+    shutil.copytree(FOLDER, state_folder)
+    return state_folder
+
+
+@contextlib.contextmanager
+def new_gate():
+    """Start a gate that finds the folder; give a page that knows the robots."""
+    client = GateClient()
+    client.start()
+    for spec in ROBOTS:
+        client.declare(spec)
+    page = Page(client)
+    eventually(lambda: len(page.robots) == len(ROBOTS), "a report of each robot")
+    yield page
+    page.end()
+    client.stop()
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """What a new gate reports of each robot, by the robot's name."""
+    folder = tmp_path_factory.mktemp("stored") / "state"
+    shutil.copytree(FOLDER, folder)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("WEBMAP_STATE_DIR", str(folder))
+        with new_gate() as page:
+            return {report["name"]: report for report in page.robots.values()}
+
+
+def test_stop_is_still_in_force_by_the_same_people(reports):
+    stopped = [report for report in reports.values() if report["latched"]]
+    found = {report["name"]: report["stop"]["by"] for report in stopped}
+    assert found == {**STOPPED, "Unreadable": UNKNOWN}
+    assert {report["state"] for report in stopped} == {"stopped"}
+    assert not any(report["armable"] for report in stopped)
+
+
+def test_each_stop_has_the_identity_that_it_had(reports):
+    found = {name: reports[name]["stop"]["id"] for name in IDENTITIES}
+    assert found == IDENTITIES
+
+
+def test_the_results_of_stop_tests_are_known_with_their_days(reports):
+    found = {
+        name: (report["stop_time"], report["stop_date"])
+        for name, report in reports.items()
+        if report["stop_source"] == "tested"
+    }
+    assert found == TESTED
+
+
+def test_a_reset_ends_each_stop_on_the_disk_and_a_new_one_has_the_same_file(stored):
+    def stops():
+        return {path.name for path in stored.glob("*.stop*")}
+
+    before = {name.removesuffix(".lifted") for name in stops()}
+    with new_gate() as page:
+        for name in STOPPED:
+            page.say(op="reset", robot=name.lower())
+        eventually(lambda: not stops(), "a folder without STOPs")
+        for name in STOPPED:
+            page.say(op="stop", robot=name.lower())
+        eventually(lambda: stops() == before, "a file for each STOP")
+
+
+class Links:
+    """Notes what would be written to robots; every link of theirs is up."""
+
+    def __init__(self, tell):
+        self.written = []
+
+    def perform(self, action):
+        if not isinstance(action, actions.WriteTwist):
+            return None
+        self.written.append((action.key, action.twist))
+        return events.Wrote(action.key, action.twist, action.epoch, action.by, True)
+
+
+class Outbox:
+    def put(self, message):
+        pass
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]"])
+def test_a_robot_that_was_driven_is_told_zero_first_however_this_computer_is_spelled(
+    stored, monkeypatch, host
+):
+    monkeypatch.setattr(shell, "Links", Links)
+    url, other = f"ws://{host}:{PORT}", "ws://robot-nine.example:9090"
+    specs = {spec.name: spec for spec in ROBOTS}
+
+    async def scenario():
+        gate = shell.Shell(Outbox(), Locks(stored), Disk(Records(stored)))
+        gate.tell(msgspec.structs.replace(specs["Driven"], bridge_url=url))
+        gate.tell(specs["Untouched"])
+        for there in (url, other):
+            gate.tell(events.LinkUp(there, "control"))
+        return gate._links.written
+
+    assert asyncio.run(scenario()) == [(Key(url, "/driven/cmd_vel"), ZERO)]
+
+
+def test_only_what_was_driven_or_stopped_was_left_as_driven(stored):
+    """A gate that starts removes the files of machines that rest."""
+    Locks(stored).tidy()
+    left = [path.read_text().split()[:3] for path in stored.glob("*.lock")]
+    assert {driven for driven, *_ in left} == {"1"}
+    assert ["1", f"ws://127.0.0.1:{PORT}", "/driven/cmd_vel"] in left

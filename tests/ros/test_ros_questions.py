@@ -1,0 +1,103 @@
+"""Questions to a bridge, how messages are encoded, and a bridge for a moment."""
+
+import asyncio
+
+import pytest
+from fake_rosbridge import FakeRosbridge, bridged, until
+
+from webmap.errors import BridgeClosed, ConfigError, ServiceError
+from webmap.lifecycle import lifecycle
+from webmap.ros.bridge import Bridge, TemporaryBridge
+
+NODES = {"publishers": ["/base", "/rosbridge_websocket"], "subscribers": ["/webmap"]}
+
+
+def asked(question, **answers):
+    """What a bridge answers to a question, where rosapi answers so."""
+
+    async def scenario():
+        async with bridged(opened=False, **answers) as (_, bridge):
+            return await question(bridge)
+
+    return asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("question", "expected"),
+    [
+        (lambda bridge: bridge.publishers("/a"), ["/base", "/rosbridge_websocket"]),
+        (lambda bridge: bridge.other_publishers("/a"), ["/base"]),
+        (lambda bridge: bridge.subscribers("/a"), ["/webmap"]),
+        (lambda bridge: bridge.service_type("/dock"), "std_srvs/Trigger"),
+        (lambda bridge: bridge.topic_type("/a"), "std_msgs/Bool"),
+        (lambda bridge: bridge.time(), 7.5),
+    ],
+)
+def test_a_question_has_its_answer_and_none_where_nobody_answers(question, expected):
+    answers = {name: {name: nodes} for name, nodes in NODES.items()}
+    answers["service_type"] = {"type": "std_srvs/Trigger"}
+    answers["topic_type"] = {"type": "std_msgs/Bool"}
+    answers["get_time"] = {"time": {"secs": 7, "nsecs": 500_000_000}}
+    assert asked(question, **answers) == expected
+    assert asked(question) is None
+    assert asked(question, **{name: {"odd": 1} for name in answers}) is None
+
+
+def test_a_parameter_is_set_and_read_back():
+    def of(value):
+        answers = {"set_param": {}, "get_param": {"value": value}}
+        return asked(lambda bridge: bridge.set_parameter("/speed", 0.5), **answers)
+
+    assert of("0.25") == 0.25
+    assert of("fast") == "fast"
+    assert of(None) is None
+    with pytest.raises(ServiceError):
+        asked(lambda bridge: bridge.set_parameter("/speed", 0.5))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "compression"),
+    [("text", "none"), ("binary", "cbor"), ("raw", "cbor-raw")],
+)
+def test_an_encoding_is_asked_for_in_the_words_of_the_bridge(encoding, compression):
+    async def scenario():
+        async with bridged() as (server, bridge):
+            bridge.subscribe("/a", print, encoding=encoding)
+            (asked,) = await server.heard("subscribe")
+            assert asked["compression"] == compression
+
+    asyncio.run(scenario())
+
+
+def test_an_encoding_that_does_not_exist_is_refused():
+    bridge = Bridge("ws://127.0.0.1:1")
+    with pytest.raises(ConfigError, match="text, binary, raw, got 'cbor'"):
+        bridge.subscribe("/a", print, encoding="cbor")
+
+
+def test_a_temporary_bridge_is_open_within_its_block_only():
+    async def scenario():
+        server = FakeRosbridge()
+        await server.start()
+        async with TemporaryBridge(server.url) as bridge:
+            assert bridge not in lifecycle._services
+            assert bridge.state == "new"
+            await bridge.open()
+            assert bridge.state == "open"
+            bridge.subscribe("/a", print)
+            await server.heard("subscribe")
+        assert bridge.state == "closed"
+        await until(lambda: not server.links)
+        await server.stop()
+
+    asyncio.run(scenario())
+
+
+def test_a_temporary_bridge_that_cannot_be_reached_says_why():
+    async def scenario():
+        async with TemporaryBridge("ws://127.0.0.1:1") as bridge:
+            with pytest.raises(BridgeClosed) as raised:
+                await bridge.open()
+            assert "nothing listens there" in raised.value.why
+
+    asyncio.run(scenario())

@@ -1,0 +1,364 @@
+import pytest
+from server_fakes import TOKEN
+
+from webmap.core.page import Viewer
+from webmap.errors import ConfigError
+from webmap.server.access import (
+    AccessControl,
+    Redirect,
+    Refusal,
+    RequestHead,
+    Settings,
+    SignedIn,
+    redact,
+)
+from webmap.server.origins import Hosts, checked_origin
+
+HOST = "127.0.0.1:8080"
+
+
+def scope(
+    *,
+    host=(HOST,),
+    origin=(),
+    cookie=(),
+    path="/",
+    query="",
+    type="http",
+    method="GET",
+    scheme="http",
+    root="",
+    keys=(),
+):
+    headers = [(b"host", one.encode("latin-1")) for one in host]
+    headers += [(b"origin", one.encode("latin-1")) for one in origin]
+    headers += [(b"cookie", one.encode("latin-1")) for one in cookie]
+    made = {
+        "type": type,
+        "path": path,
+        "root_path": root,
+        "scheme": scheme,
+        "query_string": query.encode(),
+        "headers": headers,
+        "client": ("127.0.0.1", 5000),
+    }
+    if type == "http":
+        headers += [(b"webmap-key", one.encode("latin-1")) for one in keys]
+        return {**made, "method": method}
+    return {**made, "subprotocols": list(keys)}
+
+
+def status(access, **kwargs):
+    refusal = access.check_address(RequestHead.of(scope(**kwargs)))
+    return None if refusal is None else refusal.status
+
+
+@pytest.fixture
+def access():
+    return AccessControl(Settings(token=TOKEN))
+
+
+# The table of origins. The page is http://127.0.0.1:8080.
+ORIGINS = [
+    (["http://127.0.0.1:8080"], None),
+    ([], 403),
+    (["null"], 403),
+    ([""], 403),
+    (["http://127.0.0.1:8080", "http://127.0.0.1:8080"], 403),
+    (["http://127.0.0.1:8081"], 403),
+    (["http://127.0.0.1"], 403),
+    (["https://127.0.0.1:8080"], 403),
+    (["ws://127.0.0.1:8080"], 403),
+    (["http://localhost:8080"], 403),
+    (["http://[::1]:8080"], 403),
+    (["http://2130706433:8080"], 403),
+    (["http://127.0.0.1:8080.evil.com"], 403),
+    (["http://evil.127.0.0.1:8080"], 403),
+    (["http://127.0.0.1:8080/"], 403),
+    (["http://127.0.0.1:8080@evil.com"], 403),
+    (["http://user@127.0.0.1:8080"], 403),
+    (["http://127.0.0.1:8080 http://evil.com"], 403),
+    (["HTTP://127.0.0.1:8080"], 403),
+    (["file://"], 403),
+    (["http://192.168.1.5:8080"], 403),
+    (["http://evil.com"], 403),
+]
+
+
+@pytest.mark.parametrize(("origin", "expected"), ORIGINS)
+@pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
+def test_only_the_very_origin_may_open_sockets_and_change_things(
+    access, origin, expected, opening
+):
+    assert status(access, origin=origin, **opening) == expected
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS"])
+def test_reading_needs_no_origin(access, method):
+    assert status(access, method=method) is None
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "FOO", "get"])
+def test_every_other_method_needs_one(access, method):
+    assert status(access, method=method) == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "scheme", "expected"),
+    [
+        ("localhost:8080", "http://localhost:8080", "ws", None),
+        ("LOCALHOST:8080", "http://localhost:8080", "ws", None),
+        ("localhost:8080", "http://sub.localhost:8080", "ws", 403),
+        ("[::1]:8080", "http://[::1]:8080", "ws", None),
+        ("localhost", "http://localhost", "ws", None),
+        ("localhost:80", "http://localhost", "ws", None),
+        ("localhost", "https://localhost", "wss", None),
+        ("localhost:443", "https://localhost", "wss", None),
+        ("localhost", "http://localhost", "wss", 403),
+        ("localhost", "https://localhost", "ws", 403),
+    ],
+)
+def test_the_origin_follows_scheme_host_and_port(
+    access, host, origin, scheme, expected
+):
+    got = status(access, host=[host], origin=[origin], scheme=scheme, type="websocket")
+    assert got == expected
+
+
+def test_an_origin_that_was_named_may_open_sockets():
+    origin = checked_origin("https://Robots.example.com:443")
+    access = AccessControl(Settings(token=TOKEN, origins=frozenset({origin})))
+    good, bad = "https://robots.example.com", "https://x.robots.example.com"
+    assert status(access, origin=[good], type="websocket") is None
+    assert status(access, origin=[bad], type="websocket") == 403
+
+
+@pytest.mark.parametrize(
+    "text", ["", "robots", "ftp://robots", "https://", "https://r/", "https://u@r"]
+)
+def test_what_is_no_origin_cannot_be_named(text):
+    with pytest.raises(ConfigError, match="an origin is"):
+        checked_origin(text)
+
+
+HOSTS = [
+    (["127.0.0.1"], None),
+    (["127.0.0.1:1"], None),
+    (["localhost:8080"], None),
+    (["LocalHost"], None),
+    (["[::1]:8080"], None),
+    ([], 421),
+    ([""], 421),
+    (["127.0.0.1:8080", "127.0.0.1:8080"], 421),
+    (["localhost."], 421),
+    (["127.1"], 421),
+    (["127.0.0.2"], 421),
+    (["0.0.0.0:8080"], 421),
+    (["2130706433"], 421),
+    (["::1"], 421),
+    (["evil.com"], 421),
+    (["evil.com:8080"], 421),
+    (["localhost.evil.com"], 421),
+    (["localhost:8080.evil.com"], 421),
+    (["localhost:80:80"], 421),
+    (["localhost:"], 421),
+    (["localhost:x"], 421),
+    (["u@localhost"], 421),
+    (["localhost/"], 421),
+    (["localhost localhost"], 421),
+    (["192.168.1.5"], 421),
+    (["lo\xeccalhost"], 421),
+]
+
+
+@pytest.mark.parametrize(("host", "expected"), HOSTS)
+@pytest.mark.parametrize("type", ["http", "websocket"])
+def test_only_known_hosts_are_answered(access, host, expected, type):
+    origin = [f"http://{host[0].lower()}"] if host else []
+    assert status(access, host=host, origin=origin, type=type) == expected
+
+
+def test_the_address_that_is_listened_on_is_a_host_and_so_are_the_extra_names():
+    hosts = Hosts.of_binding("192.168.1.5", ["Robots.example.com", "fd00::1"])
+    assert hosts.allow("192.168.1.5:8000")
+    assert hosts.allow("robots.example.com")
+    assert hosts.allow("[fd00::1]:8000")
+    assert hosts.allow("localhost")
+    assert not hosts.allow("192.168.1.6")
+
+
+def test_a_server_on_all_addresses_answers_to_any_address_but_not_to_any_name():
+    hosts = Hosts.of_binding("0.0.0.0")
+    assert hosts.allow("192.168.1.5:8000")
+    assert hosts.allow("[fe80::1]")
+    assert not hosts.allow("evil.com")
+
+
+@pytest.mark.parametrize("name", ["", "a b", "http://a", "a:80", "a/b"])
+def test_what_is_no_host_cannot_be_named(name):
+    with pytest.raises(ConfigError, match="a host is"):
+        Hosts.of_binding("127.0.0.1", [name])
+
+
+def cookie_of(signed_in):
+    assert isinstance(signed_in, SignedIn)
+    assert signed_in.cookie is not None
+    return signed_in.cookie.partition(";")[0]
+
+
+def sign_in(access, *, now=0.0, **kwargs):
+    query = f"webmap_code={access.codes.issue(now)}"
+    return access.identify(RequestHead.of(scope(query=query, **kwargs)), now)
+
+
+def offer(access, token, **kwargs):
+    return access.identify(RequestHead.of(scope(query=f"token={token}", **kwargs)), 0.0)
+
+
+def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(access):
+    query = f"a=1&token={TOKEN}&b=%2F"
+    to = access.identify(RequestHead.of(scope(path="/lab", query=query)), 0.0)
+    assert isinstance(to, Redirect)
+    assert to.location.startswith("/lab?a=1&b=%2F&webmap_code=")
+    query = to.location.partition("?")[2]
+    got = access.identify(RequestHead.of(scope(path="/lab", query=query)), 1.0)
+    assert isinstance(got, SignedIn)
+    assert got.cookie.startswith("webmap_8080=")
+    assert got.cookie.endswith("; Path=/; HttpOnly; SameSite=Strict")
+    for secret in (to.location, got.cookie, got.key):
+        assert TOKEN not in secret
+    assert got.key not in got.cookie
+
+
+def test_a_code_is_good_once_and_for_two_minutes(access):
+    query = f"webmap_code={access.codes.issue(0.0)}"
+    assert isinstance(
+        access.identify(RequestHead.of(scope(query=query)), 119.9), SignedIn
+    )
+    assert access.identify(RequestHead.of(scope(query=query)), 119.9).status == 401
+    query = f"webmap_code={access.codes.issue(0.0)}"
+    assert access.identify(RequestHead.of(scope(query=query)), 120.0).status == 401
+
+
+@pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
+def test_the_key_opens_sockets_and_the_cookie_does_not(access, opening):
+    got = sign_in(access)
+    cookie = [cookie_of(got)]
+    with_cookie = RequestHead.of(scope(cookie=cookie, **opening))
+    assert access.identify(with_cookie, 0.0).status == 401
+    with_key = RequestHead.of(scope(keys=["webmap", got.key], **opening))
+    assert access.identify(with_key, 0.0) == got.viewer
+    assert access.identify(RequestHead.of(scope(cookie=cookie)), 0.0) == got.viewer
+
+
+def test_the_key_reads_no_page(access):
+    got = sign_in(access)
+    assert access.identify(RequestHead.of(scope(keys=[got.key])), 0.0).status == 401
+
+
+def test_the_cookie_is_bound_to_prefix_and_port_and_to_tls(access):
+    got = sign_in(access, host=["localhost"], scheme="https", root="/robots", path="/x")
+    assert got.cookie.startswith("webmap_443=")
+    assert got.cookie.endswith("; Path=/robots/; HttpOnly; SameSite=Strict; Secure")
+
+
+def test_the_cookie_tells_who_it_is(access):
+    cookie = cookie_of(sign_in(access))
+    got = access.identify(RequestHead.of(scope(cookie=[f"a=b; {cookie}; c=d"])), 0.0)
+    assert isinstance(got, Viewer)
+    assert got.role == "operator"
+    again = access.identify(RequestHead.of(scope(cookie=["x=y", cookie])), 9.0)
+    assert again == got
+
+
+def test_a_cookie_of_another_path_before_ours_does_no_harm(access):
+    cookie = cookie_of(sign_in(access))
+    cookies = [f"webmap_8080=old; {cookie}"]
+    assert isinstance(
+        access.identify(RequestHead.of(scope(cookie=cookies)), 0.0), Viewer
+    )
+
+
+def test_two_browsers_are_two_viewers(access):
+    first, second = (
+        access.identify(RequestHead.of(scope(cookie=[cookie_of(sign_in(access))])), 0.0)
+        for _ in range(2)
+    )
+    assert first.id != second.id
+
+
+@pytest.mark.parametrize("cookie", [[], ["webmap_8080="], ["webmap_8080=a.b"], ["="]])
+def test_without_a_cookie_nobody_comes_in(access, cookie):
+    got = access.identify(RequestHead.of(scope(cookie=cookie)), 0.0)
+    assert isinstance(got, Refusal)
+    assert got.status == 401
+
+
+def test_the_token_itself_is_no_cookie(access):
+    got = access.identify(RequestHead.of(scope(cookie=[f"webmap_8080={TOKEN}"])), 0.0)
+    assert got.status == 401
+
+
+@pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
+def test_a_token_opens_no_socket_and_changes_nothing(access, opening):
+    assert offer(access, TOKEN, **opening).status == 401
+    assert sign_in(access, **opening).status == 401
+
+
+def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_always_works(access):
+    for _ in range(10):
+        assert offer(access, "wrong").status == 401
+    got = offer(access, "wrong")
+    assert (got.status, got.retry_after) == (429, 60)
+    assert isinstance(offer(access, TOKEN), Redirect)
+    assert isinstance(sign_in(access), SignedIn)
+    assert offer(access, "wrong").status == 429
+
+
+def test_who_has_signed_in_is_not_kept_out_by_the_wall(access):
+    cookie = cookie_of(sign_in(access))
+    for _ in range(20):
+        access.identify(RequestHead.of(scope(query="token=wrong")), 0.0)
+    assert isinstance(
+        access.identify(RequestHead.of(scope(cookie=[cookie])), 0.0), Viewer
+    )
+
+
+def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(access):
+    cookie = cookie_of(sign_in(access))
+    for _ in range(20):
+        request = RequestHead.of(
+            scope(query="token=wrong", cookie=[cookie], path="/lab")
+        )
+        assert access.identify(request, 0.0) == Redirect("/lab")
+    assert offer(access, "wrong").status == 401
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("//evil.com/", "/evil.com/"),
+        ("/\\evil.com", "/evil.com"),
+        ("/a b\r\nSet-Cookie: x", "/a%20b%0D%0ASet-Cookie:%20x"),
+        ("/é?#", "/%C3%A9%3F%23"),
+    ],
+)
+def test_the_redirect_stays_on_this_origin(access, path, expected):
+    location = offer(access, TOKEN, path=path).location
+    assert location.partition("?webmap_code=")[0] == expected
+
+
+def test_refusals_never_repeat_what_was_sent(access):
+    secret = "wrong-but-nearly-right"
+    got = access.identify(RequestHead.of(scope(query=f"token={secret}")), 0.0)
+    assert secret not in got.text
+
+
+def test_the_token_is_taken_out_of_what_servers_log():
+    one = scope(query=f"a=1&token={TOKEN}&token=x&webmap_code=y")
+    redact(one)
+    assert one["query_string"] == b"a=1&token=...&token=...&webmap_code=..."
+
+
+def test_settings_do_not_show_their_token():
+    assert TOKEN not in repr(Settings(token=TOKEN))

@@ -1,0 +1,195 @@
+import asyncio
+import threading
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.server.outbox import (
+    FRAME_BYTES,
+    FRAMES,
+    MESSAGES,
+    BatchedCalls,
+    BatchedCallsByLoop,
+    DriveQueue,
+    FrameQueue,
+)
+from webmap.server.page_socket import (
+    DRIVE,
+    REPLACED,
+    SCENE,
+    Allowance,
+    Bounds,
+    OpenSockets,
+    short,
+)
+
+TICK = '{"op":"tick","tick":%d,"ack":-1}'
+
+
+def test_messages_up_to_the_bound_pass_and_larger_ones_do_not():
+    for bounds in (SCENE, DRIVE):
+        allowance = Allowance(bounds, 0.0)
+        assert allowance.spend("x" * bounds.max_bytes, 0.0) is None
+        assert "bytes" in allowance.spend("x" * (bounds.max_bytes + 1), 0.0)
+
+
+def test_size_is_counted_in_bytes_not_in_characters():
+    bounds = Bounds(max_bytes=3, rate=1.0, burst=9.0)
+    assert Allowance(bounds, 0.0).spend("é€", 0.0) is not None
+    assert Allowance(bounds, 0.0).spend("€", 0.0) is None
+    assert Allowance(bounds, 0.0).spend("\ud800", 0.0) is None
+
+
+def test_sixty_commands_a_second_pass_for_ever_and_more_do_not():
+    allowance = Allowance(DRIVE, 0.0)
+    assert all(allowance.spend("x", n / 60) is None for n in range(6000))
+    hasty = Allowance(DRIVE, 0.0)
+    refused = [n for n in range(6000) if hasty.spend("x", n / 66) is not None]
+    assert "60 messages a second" in hasty.spend("x", 1.0)
+    assert refused
+
+
+def test_what_a_stalled_link_held_back_may_come_at_once():
+    allowance = Allowance(DRIVE, 0.0)
+    assert all(allowance.spend("x", 6.0) is None for _ in range(120))
+    assert allowance.spend("x", 6.0) is not None
+
+
+def test_frames_keep_their_order():
+    queue = FrameQueue()
+    assert queue.put(b"a")
+    assert queue.put(b"b")
+    assert [queue.pop(), queue.pop(), queue.pop()] == [b"a", b"b", None]
+
+
+def test_frames_that_nobody_reads_do_not_pile_up():
+    queue = FrameQueue()
+    assert all(queue.put(b"x") for _ in range(FRAMES))
+    assert not queue.put(b"x")
+    queue.pop()
+    assert queue.put(b"x")
+
+
+def test_a_frame_of_any_size_may_wait_alone_but_not_behind_another():
+    queue = FrameQueue()
+    assert queue.put(bytes(2 * FRAME_BYTES))
+    assert not queue.put(b"x")
+    queue.pop()
+    assert queue.put(b"x")
+    assert not queue.put(bytes(FRAME_BYTES))
+
+
+def test_the_newest_tick_goes_first_and_alone():
+    queue = DriveQueue()
+    for item in ("robot 1", TICK % 1, "robot 2", TICK % 2):
+        assert queue.put(item)
+    sent = [queue.pop() for _ in range(4)]
+    assert sent == [TICK % 2, "robot 1", "robot 2", None]
+
+
+def test_ticks_always_find_room():
+    queue = DriveQueue()
+    while queue.put("robot"):
+        pass
+    assert queue.put(TICK % 1)
+    assert queue.pop() == TICK % 1
+    assert sum(queue.pop() is not None for _ in range(MESSAGES + 1)) == MESSAGES
+
+
+@given(st.lists(st.one_of(st.integers(0, 99), st.none()), max_size=200))
+def test_no_word_of_the_gate_is_lost_or_reordered(steps):
+    queue, put, popped = DriveQueue(), [], []
+    for step in steps:
+        if step is None:
+            popped.append(queue.pop())
+        elif step % 3 == 0:
+            queue.put(TICK % step)
+        else:
+            queue.put(f"robot {step}")
+            put.append(f"robot {step}")
+    while (item := queue.pop()) is not None:
+        popped.append(item)
+    assert [item for item in popped if item and item.startswith("robot")] == put
+
+
+class Guest:
+    def __init__(self):
+        self.told = []
+
+    def end(self, code, reason):
+        self.told.append(code)
+
+
+def test_a_page_that_opens_again_replaces_its_own_socket():
+    sockets, old, new = OpenSockets(1), Guest(), Guest()
+    assert sockets.add(("v", "p"), old)
+    assert sockets.add(("v", "p"), new)
+    assert (old.told, new.told) == ([REPLACED], [])
+    sockets.remove(("v", "p"), old)
+    assert len(sockets) == 1
+    sockets.remove(("v", "p"), new)
+    assert len(sockets) == 0
+
+
+def test_there_are_so_many_sockets_and_no_more():
+    sockets, first, second = OpenSockets(1), Guest(), Guest()
+    assert sockets.add(("v", "p"), first)
+    assert not sockets.add(("w", "p"), second)
+    sockets.remove(("w", "p"), second)
+    sockets.remove(("v", "p"), first)
+    assert sockets.add(("w", "p"), second)
+
+
+def test_calls_keep_order_over_threads_and_wakes_the_loop_once():
+    async def scenario():
+        seen = []
+        calls = BatchedCallsByLoop().of_this_loop()
+        thread = threading.Thread(
+            target=lambda: [calls.call(seen.append, n) for n in range(1000)]
+        )
+        thread.start()
+        thread.join()
+        assert seen == []
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        return seen
+
+    assert asyncio.run(scenario()) == list(range(1000))
+
+
+def test_a_call_that_fails_does_not_stop_the_next(caplog):
+    async def scenario():
+        seen = []
+        calls = BatchedCallsByLoop().of_this_loop()
+        calls.call(lambda: 1 / 0)
+        calls.call(seen.append, 1)
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        return seen
+
+    assert asyncio.run(scenario()) == [1]
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_a_call_into_a_loop_that_has_ended_does_nothing_and_keeps_nothing():
+    loop = asyncio.new_event_loop()
+    calls = BatchedCalls(loop)
+    loop.close()
+    calls.call(print, "never")
+    calls.call(print, "never")
+    assert not calls._calls
+
+
+def test_each_loop_has_one_hop():
+    hops = BatchedCallsByLoop()
+
+    async def same():
+        assert hops.of_this_loop() is hops.of_this_loop()
+        return hops.of_this_loop()
+
+    assert asyncio.run(same()) is not asyncio.run(same())
+
+
+def test_reasons_fit_into_a_close_frame():
+    assert short("short") == "short"
+    assert len(short("€" * 100).encode()) <= 123

@@ -1,0 +1,100 @@
+import assert from "node:assert/strict";
+
+import { Hands } from "../../../src/webmap/web/motion/hands.js";
+import { Loop } from "../../../src/webmap/web/motion/loop.js";
+import { Pilot } from "../../../src/webmap/web/motion/pilot.js";
+
+export const FORWARD = { x: 1, y: 0, turn: 0 };
+
+/** A gate of one page, as far as the page can tell, and a page stepped at 20 Hz. */
+export class Bench {
+  constructor(options = {}) {
+    this.now = 0;
+    this.attentive = true;
+    this.ticking = true;
+    this.acking = true;
+    this.arming = true;
+    this.tick = 1000;
+    this.ack = -1;
+    this.epoch = 7;
+    /** @type {any[]} */
+    this.sent = [];
+    this.loop = new Loop();
+    this.hands = new Hands(-1000);
+    this.pilot = new Pilot(this.hands, this.loop, 0, options);
+    this.loop.open(0);
+    this.loop.receive(this.tick, -1, 0);
+    this.say("r1");
+    this.say("r2");
+    this.pilot.choose("r1", 0);
+  }
+
+  say(robot, fields = {}) {
+    const report = {
+      robot,
+      name: robot,
+      state: "free",
+      doing: "free",
+      holder: null,
+      mine: false,
+      epoch: null,
+      armed: false,
+      v: 1,
+      w: 1,
+      why: [],
+      link: "up",
+      sent: [0, 0, 0],
+      echoed: null,
+      measured: null,
+      armable: true,
+      reason: null,
+      ...fields,
+    };
+    this.pilot.report(/** @type {any} */ (report), this.now);
+  }
+
+  grant(robot, epoch = ++this.epoch) {
+    const holder = { connection: "c1", name: "me" };
+    this.say(robot, { holder, mine: true, epoch, state: "held", doing: "held", armed: this.arming });
+    return epoch;
+  }
+
+  keep(messages) {
+    this.sent.push(...messages);
+    for (const message of messages) {
+      if (this.acking && message.seq !== undefined) this.ack = message.seq;
+    }
+    return messages;
+  }
+
+  press(axes = FORWARD) {
+    this.hands.set("keys", axes, this.now);
+    return this.step(0);
+  }
+
+  letGo() {
+    this.hands.set("keys", null, this.now);
+    return this.step(0);
+  }
+
+  step(dt = 50) {
+    this.now += dt;
+    if (this.ticking && dt > 0) this.loop.receive(++this.tick, this.ack, this.now);
+    return this.keep(this.pilot.step(this.now, this.attentive));
+  }
+
+  run(ms) {
+    const before = this.sent.length;
+    for (let t = 0; t < ms; t += 50) this.step();
+    return this.sent.slice(before);
+  }
+
+  /** Drive r1 forward until it moves. */
+  drive() {
+    this.press();
+    const epoch = this.grant("r1");
+    this.run(600);
+    assert.equal(this.sent.at(-1).x, 1, "the bench drives");
+    return epoch;
+  }
+}

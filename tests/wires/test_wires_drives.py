@@ -1,0 +1,71 @@
+"""Scripted drives go over pipe, sockets and bridges as they did when recorded."""
+
+import json
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from wires_recording import WRITES, compare, difference, recorded
+from wires_scripts import SCRIPTS
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
+PROGRAM = Path(__file__).with_name("wires_scripts.py")
+
+
+def played(folder, names):
+    """Return the recordings of scripts that processes of their own play.
+
+    Two at once, since each waits most of the time.
+    """
+    with ThreadPoolExecutor(2) as both:
+        halves = [names[::2], names[1::2]]
+        found = both.map(played_by_one, (folder / "one", folder / "two"), halves)
+        return {name: text for each in found for name, text in each.items()}
+
+
+def played_by_one(folder, names):
+    """Return what one process recorded."""
+    if not names:
+        return {}
+    folder.mkdir()
+    result = folder / "played.json"
+    mode = "write" if WRITES else "compare"
+    done = subprocess.run(
+        [sys.executable, PROGRAM, result, mode, *names],
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert result.exists(), done.stderr
+    return json.loads(result.read_text("utf-8"))
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory, request):
+    """What each script recorded; one that differs is played a second time.
+
+    A machine that stood still for a moment ends a drive, as it should.
+    """
+    chosen = [
+        name
+        for name in SCRIPTS
+        if any(name in item.name for item in request.session.items)
+    ]
+    found = played(tmp_path_factory.mktemp("wires"), chosen)
+    others = [name for name in chosen if found.get(name) != recorded(name)]
+    if others and not WRITES:
+        for name in others:
+            print(f"played a second time: {difference(name, found.get(name, ''))}")
+        found |= played(tmp_path_factory.mktemp("wires"), others)
+    return found
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_goes_over_the_wires_as_recorded(recordings, name):
+    text = recordings.get(name, "it was not played")
+    assert not text.startswith("it "), text
+    compare(name, text)

@@ -1,0 +1,50 @@
+"""Robots of every source are declared, equipped and written down as when recorded."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from wires_recording import WRITES, compare
+from wires_sources import SOURCES, WRONG
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
+PROGRAM = Path(__file__).with_name("wires_sources.py")
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory, request):
+    """What became of each source."""
+    folder = tmp_path_factory.mktemp("wires")
+    chosen = [
+        name
+        for name in (*SOURCES, *WRONG)
+        if any(f"[{name}]" in item.name for item in request.session.items)
+    ]
+    mode = "write" if WRITES else "compare"
+    done = subprocess.run(
+        [sys.executable, PROGRAM, folder / "played.json", mode, *chosen],
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads((folder / "played.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_robots_of_a_source_are_as_recorded(recordings, name):
+    text = recordings[name]
+    assert not text.startswith("it failed"), text
+    compare(name, text)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said_as_recorded(recordings, name):
+    """A text that is changed on purpose is recorded anew; nothing else is in here."""
+    text = recordings[name]
+    assert "it failed" not in text, text
+    compare(name, text)

@@ -1,0 +1,192 @@
+"""All that a script needs: a display with its gate, pages, robots, and a recorder."""
+
+import asyncio
+import contextlib
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import wires_robots
+from wires_page import Page
+from wires_recording import joined, sections
+from wires_robot import Robot
+from wires_tap import FROM_GATE, Tap, lanes_of, settled
+
+import webmap
+from webmap.core.runtime import runtime
+
+sys.path.append(str(Path(__file__).parents[1] / "server"))
+
+PATIENCE = 10.0
+"""Seconds for which something is waited for."""
+
+CALM = 1.5
+"""Seconds in which nothing new comes, where it is not known what will."""
+
+STILL = 0.3
+"""Seconds in which nothing must follow what was recorded."""
+
+
+NOWHERE = "ws://127.0.0.1:9"
+"""A bridge that nobody answers at."""
+
+
+class Bench:
+    """A display that runs, for one script after the other.
+
+    Args:
+        recordings: What was recorded, by script; nothing of what is recorded now.
+
+    """
+
+    def __init__(self, recordings):
+        self.tap = Tap()
+        self._recordings = recordings
+        self._pages = []
+        self._fresh = True
+        self._open = contextlib.ExitStack()
+
+    def __enter__(self):
+        from server_fakes import running
+
+        from webmap.core.page import Viewer
+
+        def authenticate(scope):
+            headers = dict(scope["headers"])
+            name, role = headers[b"x-name"].decode(), headers[b"x-role"].decode()
+            return Viewer(f"viewer-{name}", name, role)
+
+        @webmap.page("/")
+        def main(page):
+            map = webmap.Map(page.element("webmap_container"))
+            map.add_module("Teleop", 0.125, 1.0)
+
+        self.tap.tap_the_pipe()
+        self.early = wires_robots.of_twist(wires_robots.bridge_to(NOWHERE), "Early")
+        """A robot that was there before WebMap was started."""
+        app = webmap.asgi_app(authenticate=authenticate)
+        self.port = self._open.enter_context(running(app)).port
+        self.until(lambda: "ready" in self.tap.channels()[FROM_GATE], "the gate")
+        return self
+
+    def __exit__(self, *exception):
+        self._open.close()
+
+    def play(self, name, script):
+        """Run a script and return its recording."""
+        if not self._fresh:  # else what was noted since the start belongs to it
+            self.tap.begin()
+        self._fresh = False
+        self._expected = sections(self._recordings(name))
+        self._robots, self._bridges, self._pages = [], {}, []
+        self._reports = {}
+        with contextlib.ExitStack() as self._of_script:
+            try:
+                script(self)
+                expected = joined(self._expected)
+                return settled(self._text, expected, PATIENCE, CALM, STILL)
+            finally:
+                for page in self._pages:
+                    page.close()
+                for robot in self._robots:
+                    self.model(wires_robots.gone, robot)
+                self.until(lambda: not self.tap.reports, "a gate without robots")
+
+    # For scripts.
+
+    def site(self, label="robot", **options):
+        """Return a robot's side of a rosbridge, and the program's bridge to it."""
+        robot = self._of_script.enter_context(Robot(**options))
+        self._bridges[label] = robot
+        self.tap.names.call(f"ws://127.0.0.1:{robot.port}", f"ws://{label}")
+        return robot, self.model(wires_robots.bridge_to, robot.url)
+
+    def robot(self, make, *args, **options):
+        """Return a robot of the program."""
+        robot = self.model(make, *args, **options)
+        self.end_with(robot)
+        return robot
+
+    def end_with(self, robot):
+        """Have a robot end with the script."""
+        self._robots.append(robot)
+
+    def page(self, name, role="operator"):
+        """Return a page that somebody opens."""
+        page = Page(self, name, role)
+        self._pages.append(page)
+        self.until(lambda: page.greeted and page.tick, "the first tick")
+        return page
+
+    def model(self, fn, *args, **options):
+        """Call in the thread of the program, and return what it returns."""
+
+        async def called():
+            return fn(*args, **options)
+
+        return self.run(called())
+
+    def run(self, work):
+        """Run a coroutine in the thread of the program."""
+        loop = runtime._loop
+        return asyncio.run_coroutine_threadsafe(work, loop).result(30)
+
+    def until(self, check, what, seconds=PATIENCE):
+        """Wait until something is so, and return that."""
+        deadline = time.monotonic() + seconds
+        while not (found := check()):
+            if time.monotonic() > deadline:
+                refused = [page.refusals for page in self._pages]
+                raise AssertionError(f"never came: {what}; refused: {refused}")
+            time.sleep(0.01)
+        return found
+
+    def kill_the_gate(self):
+        """End the gate's process without a word."""
+        for child in psutil.Process().children():
+            if "webmap.gate" in child.cmdline():
+                child.kill()
+
+    def tasks_up(self, site, topic):
+        """Wait until the gate can send goals: it has announced a topic of theirs."""
+        self.until(lambda: site.told("advertise", topic), f"the lane of {topic}")
+
+    def shows(self, label, page, robot, check):
+        """Record the report of a robot on a page, once it is so and stays so."""
+
+        def report():
+            return page.report(robot)
+
+        self._note(f"report to {page.name}: {label}", report, check)
+
+    def tells(self, label, robot, check):
+        """Record what the gate last told the display of a robot, likewise."""
+
+        def report():
+            return self.tap.reports.get(robot.id, {})
+
+        self._note(f"report: {label}", report, check)
+
+    def note(self, title, text):
+        """Record something that the script itself found."""
+        self._reports[title] = text
+
+    def _note(self, title, report, check):
+        def words():
+            found = report()
+            return self.tap.report(found) if found else ""
+
+        def so():
+            found = report()
+            return bool(found and check(found))
+
+        self.until(so, title)
+        expected = self._expected.get(title, "")
+        self._reports[title] = settled(words, expected, PATIENCE / 2, CALM / 2, good=so)
+
+    def _text(self):
+        parts = dict(self.tap.channels())
+        for label, robot in self._bridges.items():
+            parts |= lanes_of(self.tap.names, label, robot)
+        return joined({**parts, **self._reports})

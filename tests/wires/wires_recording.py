@@ -1,0 +1,78 @@
+"""Recordings of what goes over the wires, and how a test is compared with one.
+
+A recording is a text of sections. ``WEBMAP_WIRES=write pytest tests/wires`` writes all
+of them anew; the difference that git shows is then what has changed.
+"""
+
+import difflib
+import os
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).with_name("recorded")
+WRITES = os.environ.get("WEBMAP_WIRES") == "write"
+
+MOST_LINES = 60
+"""Lines of a difference that are shown."""
+
+HEAD = "== "
+"""What a section begins with."""
+
+
+def path_of(name: str) -> Path:
+    """Return the file of a recording."""
+    return FOLDER / f"{name}.txt"
+
+
+def recorded(name: str) -> str:
+    """Return a recording; empty if there is none."""
+    file = path_of(name)
+    return file.read_text("utf-8") if file.exists() else ""
+
+
+def compare(name: str, text: str) -> None:
+    """Let a text pass that is the recording of that name, or make it the recording."""
+    if WRITES:
+        FOLDER.mkdir(exist_ok=True)
+        path_of(name).write_text(text, "utf-8")
+    elif text != recorded(name):
+        pytest.fail(difference(name, text), pytrace=False)
+
+
+def difference(name: str, text: str) -> str:
+    """Return in words how a text differs from the recording of that name."""
+    lines = difflib.unified_diff(
+        recorded(name).splitlines(),
+        text.splitlines(),
+        f"recorded/{name}.txt",
+        "this run",
+        lineterm="",
+        n=2,
+    )
+    shown = list(lines)
+    left = len(shown) - MOST_LINES
+    if left > 0:
+        shown[MOST_LINES:] = [f"... and {left} lines more"]
+    return "\n".join(
+        [
+            f"{name}: what went over the wires is not what was recorded.",
+            "If the change is meant: WEBMAP_WIRES=write pytest tests/wires",
+            *shown,
+        ]
+    )
+
+
+def sections(text: str) -> dict[str, str]:
+    """Return the sections of a recording by their titles."""
+    found: dict[str, str] = {}
+    for part in f"\n{text}".split(f"\n{HEAD}")[1:]:
+        title, _, body = part.partition("\n")
+        found[title] = body.strip("\n")
+    return found
+
+
+def joined(parts: dict[str, str]) -> str:
+    """Return sections as one text."""
+    listed = [f"{HEAD}{title}\n{body}\n" for title, body in parts.items()]
+    return "\n".join(listed)

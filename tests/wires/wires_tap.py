@@ -1,0 +1,257 @@
+"""Notes all that passes between page, display, gate and robot, and puts it in words."""
+
+import json
+import re
+import threading
+import time
+from collections.abc import Callable, Iterable
+from textwrap import wrap
+from typing import Any
+
+import msgspec
+from wires_words import ANY, Names, goal_number, is_zero, lines, thinned, tree
+
+from webmap.gate import framing
+from webmap.gate.display.child import Child
+
+PERIODIC = ("drive", "program-twist", "robot", "sent-twist", "tick", "writer-nodes")
+"""What is said again and again: each distinct message is shown once."""
+
+SILENT: tuple[Any, ...] = (None, False, "", [], [0.0] * 6)
+"""Values of a report that say nothing; which fields it has is noted apart."""
+
+HASTY = ("drive", "stop-test")
+"""What may be refused where a robot, or a busy machine, was not ready yet."""
+
+TO_GATE = "display to gate"
+FROM_GATE = "gate to display"
+
+_SECONDS = re.compile(r"\b\d+\.\d+ s\b")
+
+Entry = tuple[str, dict[str, Any]]
+
+
+class Tap:
+    """Notes messages by the channel that they pass; may be told from any thread.
+
+    The pipe is tapped in this process alone: what is noted was packed for the gate, or
+    came packed from it.
+    """
+
+    def __init__(self) -> None:
+        self.names = Names()
+        self.entries: list[Entry] = []
+        self.reports: dict[str, dict[str, Any]] = {}
+        """What the gate last told the display of each robot, by the robot's id."""
+        self.each_declaration = False
+        """Whether each declaration of a robot is shown, or of several in a row only
+        the last: how a program configures a robot, step by step or at once, is its
+        own matter."""
+        self._lock = threading.RLock()
+        self._child_send = Child.send
+        self._unpacker_read = framing.Unpacker._read
+
+    def begin(self) -> None:
+        """Forget what was noted, names too."""
+        with self._lock:
+            self.names = Names()
+            self.entries = []
+            self.reports = {}
+            self.each_declaration = False
+
+    def tap_the_pipe(self) -> None:
+        """Note from now on what goes over the pipe."""
+        tap, send, read = self, self._child_send, self._unpacker_read
+
+        def noted_send(child: Child, *messages: msgspec.Struct) -> None:
+            for message in messages:
+                tap.note(TO_GATE, unpacked(framing.pack(message)[4:]))
+            send(child, *messages)
+
+        def noted_read(unpacker: Any, body: bytes, messages: list[Any]) -> None:
+            tap.note(FROM_GATE, unpacked(body))
+            read(unpacker, body, messages)
+
+        Child.send = noted_send  # type: ignore[method-assign]
+        framing.Unpacker._read = noted_read  # type: ignore[method-assign]
+
+    def note(self, channel: str, message: dict[str, Any]) -> None:
+        """Note a message."""
+        with self._lock:
+            self._learn(message)
+            self.entries.append((channel, message))
+
+    def _learn(self, message: dict[str, Any]) -> None:
+        """Give names to what the message tells."""
+        match message:
+            case {"type": "connect", "connection": connection, "name": name}:
+                self.names.call(connection, f"<{name}>")
+            case {"type": "declare", "id": id, "name": name}:
+                self.names.call(id, f"<{name}>")
+            case {"type": "gone", "robot": robot}:
+                self.reports.pop(robot, None)
+            case {"type": "robot", "robot": robot}:
+                self.reports[robot] = message
+                if message["epoch"] is not None:
+                    self.names.grow("epoch", message["epoch"])
+                if message["stop"] is not None:
+                    self.names.meet("stop", message["stop"]["id"])
+                goal = message["goal"] and goal_number(message["goal"]["id"])
+                if goal is not None:
+                    self.names.grow("goal", goal)
+            case {"type": "program-take", "request": request}:
+                self.names.grow("request", request)
+            case {"type": "take-reply", "epoch": int(epoch)}:
+                self.names.grow("epoch", epoch)
+
+    # In words.
+
+    def channels(self) -> dict[str, str]:
+        """Return what went over each channel."""
+        with self._lock:
+            entries = list(self.entries)
+            names = [TO_GATE, FROM_GATE, *sorted({name for name, _ in entries})]
+            return {
+                name: "\n".join(self._words(name, [m for n, m in entries if n == name]))
+                for name in dict.fromkeys(names)
+            }
+
+    def report(self, report: dict[str, Any]) -> str:
+        """Return a report of a robot in words, as far as it is always the same."""
+        with self._lock:
+            plain = self.names.plain(report)
+        if plain["asker"] is not None:
+            plain["asker"]["left"] = ANY
+        plain["why"] = [why for why in plain["why"] if not why.startswith("slow link")]
+        if plain["test"] is not None:
+            plain["test"]["text"] = _SECONDS.sub(f"{ANY} s", plain["test"]["text"])
+        if plain["stop_source"] == "tested":
+            plain["stop_time"] = plain["stop_date"] = ANY
+        says = {key: value for key, value in plain.items() if value not in SILENT}
+        return tree({key: says[key] for key in says if key not in ("op", "type")})
+
+    def _words(self, channel: str, messages: Iterable[dict[str, Any]]) -> list[str]:
+        said: list[tuple[str, str, str]] = []
+        before: dict[str, Any] = {}
+        for message in messages:
+            kind, text = self._line(message)
+            if text is None:
+                continue
+            stays = "once" if kind in PERIODIC else ""
+            if kind == "sent-twist" and is_zero(message):
+                stays = "last"
+            again = kind == "declare" and message.get("id") == before.get("id")
+            if again and not self.each_declaration:
+                said.pop()
+            said.append((kind, text, stays))
+            before = message
+        if channel == FROM_GATE or channel.startswith("server to page"):
+            # Of words of two kinds it may be chance which come first.
+            said.sort(key=lambda each: each[0])
+        return thinned((text, stays) for _, text, stays in said)
+
+    def _line(self, message: dict[str, Any]) -> tuple[str, str | None]:
+        """Return of which kind a message is, and its line; None if it has none."""
+        fields = dict(message)
+        kind = str(fields.pop("type", None) or fields.pop("op", "?"))
+        match kind:
+            case "beat":
+                return kind, None
+            case "robot":
+                return kind, lines(kind, {"fields": wrap(", ".join(sorted(fields)))})
+            case "refused" if fields["what"] in HASTY:
+                return kind, None
+            case "refused-count":
+                if fields["last"].startswith(HASTY):
+                    return kind, None
+                fields["count"] = ANY
+            case "declare":
+                return kind, self._declared(fields)
+            case "browser":
+                return self._said_by_page(fields)
+        return kind, lines(kind, self.names.plain(fields))
+
+    def _declared(self, fields: dict[str, Any]) -> str:
+        # Its name on the wire is not only told apart, but kept as it is.
+        id = fields.pop("id")
+        return lines("declare", {"id": id, **self.names.plain(fields)})
+
+    def _said_by_page(self, fields: dict[str, Any]) -> tuple[str, str]:
+        try:
+            said = json.loads(fields["text"])
+            op = said.pop("op")
+        except (ValueError, AttributeError, KeyError):
+            return "browser", lines("browser", self.names.plain(fields))
+        who = self.names.text(fields["connection"])
+        return op, lines(f"browser {who}: {op}", self.names.plain(said))
+
+
+def unpacked(body: bytes) -> dict[str, Any]:
+    """Return a message of the pipe as it is there, field by field."""
+    found: dict[str, Any] = msgspec.msgpack.decode(body)
+    return found
+
+
+def lanes_of(names: Names, label: str, robot: Any) -> dict[str, str]:
+    """Return what a robot was told, by the lane that it came over.
+
+    A lane may have been opened again, and a goal goes over a socket of its own.
+    """
+    told: dict[str, list[tuple[str, str]]] = {}
+    for link in list(robot.links):
+        said = told.setdefault(link.lane, [])
+        for message in list(link.told):
+            zero = message["op"] == "publish" and is_zero(message["msg"])
+            text = _operation(names, message, link.lane)
+            if text is not None:
+                said.append((text, "last" if zero else "once"))
+    if "display" in told:
+        told["display"].sort()
+    order = ("control", "witness", "tasks", "call", "display")
+    return {
+        f"bridge {label}: {lane}": "\n".join(thinned(told[lane]))
+        for lane in order
+        if told.get(lane)
+    }
+
+
+def _operation(names: Names, message: dict[str, Any], lane: str) -> str | None:
+    fields = dict(message)
+    op = fields.pop("op")
+    if lane == "display":
+        if op in ("call_service", "unsubscribe"):
+            return None  # these are said when there is time
+        fields.pop("id", None)  # it counts what the process did before
+    return lines(op, names.plain(fields))
+
+
+def settled(
+    words: Callable[[], str],
+    expected: str,
+    seconds: float,
+    calm: float,
+    still: float = 0.0,
+    good: Callable[[], bool] = lambda: True,
+) -> str:
+    """Return what is said in the end.
+
+    Args:
+        words: What is said so far.
+        expected: What was recorded.
+        seconds: How long it is waited for.
+        calm: Seconds for which the words must stay the same if nothing is recorded.
+        still: Seconds for which what was recorded must stay the same.
+        good: Tells whether it can be the end.
+
+    """
+    deadline = time.monotonic() + seconds
+    last, since = words(), time.monotonic()
+    while True:
+        now = time.monotonic()
+        said = words()
+        if said != last or not good():
+            last, since = said, now
+        quiet = still if said == expected else seconds if expected else calm
+        if now > deadline or now - since >= quiet:
+            return said
+        time.sleep(0.02)

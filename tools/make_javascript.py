@@ -1,0 +1,134 @@
+"""Write the tables that the browser shares with Python, or check them.
+
+``python tools/make_javascript.py`` writes the files of ``FILES`` below
+``src/webmap/web``; with ``--check`` it only reports which of them are out of date.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from webmap.console.card_parts import GOALS
+from webmap.core.robot_state import WORDS
+from webmap.modules.map.goal_tool import SPACING
+from webmap.modules.map.route_tool import LONGEST_NAME, MOST_POINTS
+from webmap.ros.messages_log import LEVELS
+from webmap.server.access import CODE, KEY, PROTOCOL
+from webmap.server.html import FOLDER
+from webmap.server.page_socket import BROKEN_RULE, REPLACED
+from webmap.wire.messages import LONGEST_TEXTS, PAGE_ID
+from webmap.wire.opcodes import TABLES, VERSION
+
+WEB = Path(__file__).parent.parent / "src/webmap/web"
+
+_ABOUT = {
+    "OP": "The first byte of each record.",
+    "FLAG": "Flags of a frame and of an event that is listened to.",
+    "PLACE": "Where a child goes: at the end, at the beginning, after id (place - 2).",
+    "VIEW_OPERATIONS": "What a program may do to the view of a map.",
+    "SVG_TAGS": "The SVG tags; the numbers of the HTML tags begin after them.",
+    "HTML_TAGS": "The HTML tags.",
+    "ATTRIBUTES": "The attributes that have a number.",
+    "BOOLEAN_ATTRIBUTES": "Attributes that are there or not there.",
+    "EVENTS": "The events that an element may listen to.",
+}
+
+
+def opcodes_js() -> str:
+    """Return the text of ``opcodes.js``."""
+    parts = [
+        "// Made by tools/make_javascript.py from webmap/wire/opcodes.py: do not edit.",
+        "/** Changes with the tables, so that a page of another version notices. */\n"
+        f"export const VERSION = {VERSION};",
+    ]
+    for name, table in TABLES.items():
+        parts.append(f"/** {_ABOUT[name]} */\nexport const {name} = {_literal(table)};")
+    return "\n\n".join(parts) + "\n"
+
+
+def constants_js() -> str:
+    """Return the text of ``constants.js``."""
+    constants = {
+        "FOLDER": (FOLDER, "Where the server has WebMap's own files and sockets."),
+        "PROTOCOL": (PROTOCOL, "The subprotocol of both sockets."),
+        "CODE": (CODE, "The field of a query that signs in once."),
+        "KEY": (KEY, "The element and the header that carry the secret of a page."),
+        "PAGE_ID": (PAGE_ID, "The pattern of the name that a page chooses for itself."),
+        "LONGEST_TEXTS": (
+            LONGEST_TEXTS,
+            "Characters that texts in messages to the server may have.",
+        ),
+        "FOR_GOOD": (
+            [BROKEN_RULE, REPLACED],
+            "Close codes after which another try would end the same way.",
+        ),
+        "MOST_POINTS": (MOST_POINTS, "Points of a route, at the most."),
+        "LONGEST_NAME": (LONGEST_NAME, "Letters of a route's name, at the most."),
+        "SPACING": (list(SPACING), "Metres between robots that are sent together."),
+        "LEVELS": (list(LEVELS), "The levels of a log, from the least."),
+        "GOALS": (
+            {state: [words, shape] for state, (words, shape, _) in GOALS.items()},
+            "The words and the shape of each state of a goal.",
+        ),
+    }
+    parts = ["// Made by tools/make_javascript.py: do not edit."]
+    for name, (value, about) in constants.items():
+        if isinstance(value, dict):
+            rows = (f"  {json.dumps(key)}: {json.dumps(value[key])}," for key in value)
+            text = "\n".join(["Object.freeze({", *rows, "})"])
+        else:
+            text = json.dumps(value)
+        if isinstance(value, list):
+            text = f"Object.freeze({text})"
+        parts.append(f"/** {about} */\nexport const {name} = {text};")
+    return "\n\n".join(parts) + "\n"
+
+
+def state_words_js() -> str:
+    """Return the text of ``state_words.js``."""
+    rows = "".join(f"  {name}: {json.dumps(text)},\n" for name, text in WORDS.items())
+    return (
+        "// Made by tools/make_javascript.py from webmap/core/robot_state.py: do not "
+        "edit.\n"
+        "\n"
+        "/** What a robot is doing, in words; `{who}` is who holds or drives it. */\n"
+        f"export const WORDS = Object.freeze({{\n{rows}}});\n"
+    )
+
+
+FILES = {
+    "opcodes.js": opcodes_js,
+    "constants.js": constants_js,
+    "motion/state_words.js": state_words_js,
+}
+
+
+def _literal(table: Any) -> str:
+    if isinstance(table, dict):
+        rows = "".join(f"  {key}: {value},\n" for key, value in table.items())
+        return f"Object.freeze({{\n{rows}}})"
+    rows = "".join(f"  {json.dumps(item)},\n" for item in table)
+    return f"Object.freeze([\n{rows}])"
+
+
+def main() -> int:
+    """Write or check; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="only check")
+    check = parser.parse_args().check
+    status = 0
+    for name, made in FILES.items():
+        target, text = WEB / name, made()
+        if not check:
+            target.write_text(text, encoding="utf-8")
+        elif not target.exists() or target.read_text(encoding="utf-8") != text:
+            again = f"run python {Path(__file__).name}"
+            print(f"{target} is out of date: {again}", file=sys.stderr)
+            status = 1
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
