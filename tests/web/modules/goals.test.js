@@ -48,6 +48,19 @@ test("a goal that was over when the page came is not shown", () => {
   shown.report("r1", null, 1);
   shown.gone("r1");
   shown.dismiss("r1");
+  shown.report("r1", goal("failed"), 2);
+  assert.equal(shown.shown(2).size, 0, "nor after the robot was gone");
+});
+
+test("a goal that ended before the page had a report of it is shown", () => {
+  const shown = new ShownGoals();
+  shown.report("r1", null, 0);
+  shown.report("r1", goal("failed"), 1);
+  assert.equal(shown.shown(6000).size, 1, "the robot had no goal before");
+  shown.report("r1", goal("reached", { id: "g2" }), 7000);
+  assert.equal(shown.shown(7000).size, 1, "the robot had another goal before");
+  shown.report("r1", goal("reached", { id: "g2" }), 12_000);
+  assert.equal(shown.shown(12_000).size, 0);
 });
 
 test("one robot goes where it is sent, and two stand beside that", () => {

@@ -45,7 +45,7 @@ const LINGER = 4000;
 /** Decides which goals a page shows. Times are in milliseconds of one clock. */
 export class ShownGoals {
   constructor() {
-    /** @type {Map<string, {goal: GoalWord, endedAt: number | null}>} */
+    /** @type {Map<string, {goal: GoalWord | null, endedAt: number | null}>} */
     this._seen = new Map();
     /** @type {Set<string>} */
     this._dismissed = new Set();
@@ -61,14 +61,15 @@ export class ShownGoals {
   report(robot, goal, now) {
     const known = this._seen.get(robot);
     if (!goal) {
-      this._seen.delete(robot);
+      this._seen.set(robot, { goal: null, endedAt: null });
       return;
     }
+    // A goal that had ended when the page first heard of the robot is no news. A later
+    // goal may end before the page has a report of it under way.
     const { over } = look(goal);
-    const first = known === undefined || known.goal.id !== goal.id;
-    // What was over when the page came is no news to anybody.
-    const ended = over ? (first ? -Infinity : (known.endedAt ?? now)) : null;
-    this._seen.set(robot, { goal, endedAt: ended });
+    const since = known?.goal?.id === goal.id ? (known.endedAt ?? now) : now;
+    const endedAt = over ? (known === undefined ? -Infinity : since) : null;
+    this._seen.set(robot, { goal, endedAt });
   }
 
   /** @param {string} robot */
@@ -83,7 +84,7 @@ export class ShownGoals {
    */
   dismiss(robot) {
     const seen = this._seen.get(robot);
-    if (seen) this._dismissed.add(seen.goal.id);
+    if (seen?.goal) this._dismissed.add(seen.goal.id);
   }
 
   /**
@@ -93,7 +94,7 @@ export class ShownGoals {
   shown(now) {
     const shown = new Map();
     for (const [robot, { goal, endedAt }] of this._seen) {
-      if (this._dismissed.has(goal.id)) continue;
+      if (goal === null || this._dismissed.has(goal.id)) continue;
       const old = endedAt !== null && now - endedAt > LINGER;
       const failed = goal.state === "failed" && endedAt !== -Infinity;
       if (!old || failed) shown.set(robot, goal);
