@@ -67,9 +67,11 @@ def test_anybody_stops_a_robot_that_somebody_else_drives(server, witness, tab, o
 
 
 def test_only_one_of_two_viewers_drives(server, witness, tab, other):
-    open_and_drive(tab, server, witness)
+    # First, as a page that loads may hold up the page that drives.
     other.goto(server.url)
     other.locator("#robots .row button").click()
+    expect(other.locator(".webmap-teleop")).to_have_attribute("data-state", "free")
+    open_and_drive(tab, server, witness)
     expect(other.locator(".webmap-teleop")).to_have_attribute("data-state", "held")
     other.locator("svg.webmap").focus()
     other.keyboard.down("w")

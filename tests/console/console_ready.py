@@ -1,6 +1,5 @@
 """When a page of the console can be used, and what several tests do with one."""
 
-import math
 import re
 import time
 
@@ -26,32 +25,41 @@ def wait_until_ready(page: Page) -> None:
 BESIDE = 30
 """Pixels beside a robot, to the right and down."""
 
-UNCOVERED = f"""([x, y]) =>
-  !!document.elementFromPoint(x + {BESIDE}, y + {BESIDE})?.closest("svg.webmap")"""
-"""Whether the map is to be seen at a place of the window."""
+PLACES = f"""() => {{
+  const place = (robot) => {{
+    const {{ e, f }} = robot.getScreenCTM();
+    return [e + {BESIDE}, f + {BESIDE}];
+  }};
+  const [x, y] = place(document.querySelector(".robot.selected"));
+  return [...document.querySelectorAll(".robot:not(.selected)")]
+    .map(place)
+    .filter((at) => document.elementFromPoint(...at)?.closest("svg.webmap"))
+    .sort(([a, b], [c, d]) => Math.hypot(c - x, d - y) - Math.hypot(a - x, b - y));
+}}"""
+"""Places of the window beside other robots, where the map is to be seen; the farthest
+from the selected robot first."""
 
-GOING = re.compile("Goal (sent|accepted|under way)")
+
+UNDER_WAY = re.compile("Goal under way.*to go")
 
 
 def send_away(page: Page) -> None:
     """Send the selected robot to beside another one, far enough to be seen."""
-    here, *others = page.evaluate(
-        """() => [".robot.selected", ".robot:not(.selected)"].flatMap((kind) =>
-          [...document.querySelectorAll(kind)]
-            .map((robot) => robot.getScreenCTM())
-            .map(({ e, f }) => [e, f]))"""
-    )
-    others.sort(key=lambda place: -math.dist(here, place))
-    for x, y in others:  # a page that is too busy sends nothing
-        if not page.evaluate(UNCOVERED, [x, y]):
-            continue
+    goal = page.locator("#card .goal")
+    refused: set[tuple[int, int]] = set()
+    # A page that is too busy sends nothing, and some places have no path to them.
+    for _ in range(12):
         page.get_by_role("button", name="Send to").click()
-        expect(page.locator(".webmap-goal-word")).not_to_be_empty()
-        page.mouse.click(x + BESIDE, y + BESIDE)
+        expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
+        # Now, as the words have moved the panel, and robots may move too.
+        places = page.evaluate(PLACES)
+        x, y = next(p for p in places if (round(p[0]), round(p[1])) not in refused)
+        page.mouse.click(x, y)
         try:
-            expect(page.locator("#card .goal")).to_contain_text(GOING)
+            expect(goal).to_contain_text(UNDER_WAY, timeout=5_000)
         except AssertionError:
-            page.keyboard.press("g")
+            if "Goal failed" in goal.inner_text():
+                refused.add((round(x), round(y)))
         else:
             return
     raise AssertionError(page.locator("#card").inner_text())

@@ -164,7 +164,7 @@ def test_a_goal_is_called_off_where_it_is_drawn(tab, name, to):
     send(tab, name, to)
     expect(label(tab)).to_contain_text("Goal under way")
     label(tab).get_by_role("button", name="Cancel the goal").click()
-    expect(label(tab)).to_contain_text("Cancelled")
+    expect(label(tab)).to_contain_text("Goal cancelled")
 
 
 def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
@@ -181,7 +181,7 @@ def test_stop_cancels_a_goal_and_says_so(tab):
     send(tab, "Old 0", "Plain 1")
     expect(label(tab)).to_contain_text("Goal under way")
     tab.get_by_role("button", name="Stop all").click()
-    expect(label(tab)).to_contain_text("Cancelled, STOP")
+    expect(label(tab)).to_contain_text("Goal cancelled, STOP")
     reset(tab)
 
 
@@ -317,7 +317,7 @@ def test_several_robots_go_to_places_beside_each_other(tab):
     (x0, y0, *_), (x1, y1, *_) = spots
     assert ((x0 - x1) ** 2 + (y0 - y1) ** 2) ** 0.5 == pytest.approx(metre, rel=0.02)
     tab.locator(".webmap-goal-cancel").click()
-    expect(label(tab)).to_contain_text(re.compile("Cancel"))
+    expect(label(tab)).to_contain_text(re.compile("Goal cancel"))
     pick(tab, "Old 0")
     expect(tab.locator(".robot.marked")).to_have_count(0)
 
