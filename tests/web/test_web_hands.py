@@ -157,7 +157,7 @@ def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
     ann = {"connection": "c9", "name": "Ann"}
     bench.gate.change("r1", holder=ann, epoch=7, state="held")
     bench.select("r1")
-    bench.page.get_by_role("button", name="Ask for Robot r1").click()
+    bench.page.get_by_role("button", name="Ask for it: Robot r1").click()
     bench.until(lambda: bench.gate.of("ask") == [{"op": "ask", "robot": "r1"}])
     words = bench.page.locator(".webmap-teleop-state")
     asked = re.compile(r"yours in (\d) s, unless Ann keeps it")

@@ -136,7 +136,8 @@ export class Panel {
     this._lease.hidden = act === null;
     if (act !== null) {
       say(this._lease, act);
-      set(this._lease, "aria-label", act === ASK ? `Ask for ${name}` : `${act} ${name}`);
+      // It begins with the words on the button, for people who speak to their computer.
+      set(this._lease, "aria-label", act === ASK ? `${ASK}: ${name}` : `${act} ${name}`);
     }
     const stops = report === null ? [] : [stopKey(report)];
     this._reset.show(report !== null && isLatched(report), stops);
