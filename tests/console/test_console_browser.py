@@ -1,7 +1,7 @@
 """What an operator sees of the console and does with it."""
 
 import re
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from console_ready import send_away
@@ -42,9 +42,13 @@ def test_the_list_says_age_battery_and_who_drives(open_console):
 def test_who_holds_a_robot_reads_you_and_others_read_a_name(open_console):
     mine, theirs = open_console(), open_console()
     row(mine, "Robot 2").click()
-    mine.get_by_role("button", name="Take Robot 2").click()
-    expect(mine.locator("#card .state .you")).to_be_visible()
-    expect(mine.locator("#card .state .you")).to_have_text("You hold it")
+    you = mine.locator("#card .state .you:visible")
+    for _ in range(5):  # a page that is too busy is refused
+        mine.get_by_role("button", name="Take Robot 2").click()
+        with suppress(AssertionError):
+            expect(you).to_have_text("You hold it", timeout=3000)
+            break
+    expect(you).to_have_text("You hold it")
     other = theirs.locator('#robots [aria-pressed]:has-text("Robot 2") .holder')
     expect(other).to_contain_text("holds it")
     expect(other).to_be_visible()

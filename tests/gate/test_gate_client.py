@@ -445,7 +445,8 @@ class TestLife:
         eventually(lambda: len(page.of("hello")) == 2, "a new greeting")
         eventually(lambda: page.robot().get("link") == "up", "a new link")
         assert client.pid != pid
-        assert page.robot()["holder"] is None
+        # The last report of the gate that died may be the newest that there is.
+        eventually(lambda: page.robot()["holder"] is None, "a robot without a holder")
         # It was driven, so the new gate's first word is zero.
         eventually(lambda: fake.last_speed == 0, "a zero")
         page.drive_off(fake)
