@@ -39,27 +39,26 @@ PLACES = f"""() => {{
 """Places of the window beside other robots, where the map is to be seen; the farthest
 from the selected robot first."""
 
-
 UNDER_WAY = re.compile("Goal under way.*to go")
 
 
 def send_away(page: Page) -> None:
     """Send the selected robot to beside another one, far enough to be seen."""
     goal = page.locator("#card .goal")
-    refused: set[tuple[int, int]] = set()
+    without_path: set[tuple[float, ...]] = set()
     # A page that is too busy sends nothing, and some places have no path to them.
     for _ in range(12):
         page.get_by_role("button", name="Send to").click()
         expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
         # Now, as the words have moved the panel, and robots may move too.
         places = page.evaluate(PLACES)
-        x, y = next(p for p in places if (round(p[0]), round(p[1])) not in refused)
+        x, y = next(place for place in places if tuple(place) not in without_path)
         page.mouse.click(x, y)
         try:
             expect(goal).to_contain_text(UNDER_WAY, timeout=5_000)
         except AssertionError:
             if "Goal failed" in goal.inner_text():
-                refused.add((round(x), round(y)))
+                without_path.add((x, y))
         else:
             return
     raise AssertionError(page.locator("#card").inner_text())

@@ -4,16 +4,22 @@ import threading
 import time
 
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Route, expect
 
 pytestmark = pytest.mark.browser
 
 READY = """() => {
   const shown = document.querySelector(".getting-ready").checkVisibility();
   const title = document.querySelector(".webmap-teleop-title")?.textContent;
-  return !shown && title === "Free";
+  const now = performance.now();
+  if (shown || title !== "Free") window.notReadyAt = now;
+  return now - (window.notReadyAt ??= now) > 300;
 }"""
-"""Whether the page says that a press drives."""
+"""Whether the page has said for 300 ms that a press drives.
+
+A page that was held up while it loads says so for some 30 ms before it knows that the
+gate's last ticks came late. Nobody reads a word and presses a key in that time.
+"""
 
 
 def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
@@ -46,28 +52,20 @@ def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
     context.close()
 
 
-def first_press_drives(page: Page, url: str) -> bool:
-    """Return whether the first press drives once the page says that it does."""
-    page.goto(url, wait_until="commit")
+@pytest.mark.serial  # a page that is kept waiting for a processor lets go
+def test_the_first_press_drives_as_soon_as_the_page_does_not_say_so(chromium, demo):
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.goto(demo.url, wait_until="commit")
     page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
     page.wait_for_function(READY, polling=10)
     page.keyboard.down("a")
     title = page.locator(".webmap-teleop-title")
-    word, deadline = "", time.monotonic() + 10
-    while word not in ("You drive", "Let go, then press again"):
-        assert time.monotonic() < deadline, word
-        word = title.text_content()
+    seen, deadline = set(), time.monotonic() + 10
+    while "You drive" not in seen:
+        assert time.monotonic() < deadline, seen
+        seen.add(title.text_content())
         page.wait_for_timeout(20)
+    assert "Let go, then press again" not in seen
     page.keyboard.up("a")
-    return word == "You drive"
-
-
-@pytest.mark.serial  # a page that is kept waiting for a processor lets go
-def test_the_first_press_drives_as_soon_as_the_page_does_not_say_so(chromium, demo):
-    for _ in range(4):  # on a busy machine the page may be late just then
-        context = chromium.new_context(viewport={"width": 1280, "height": 800})
-        drives = first_press_drives(context.new_page(), demo.url)
-        context.close()
-        if drives:
-            return
-    raise AssertionError("the page says that a press drives, and it does not")
+    context.close()
