@@ -48,6 +48,7 @@ def same_word(page: Page, word: str | re.Pattern, patience: float = 15.0) -> Non
         expect(where).to_have_text(word, timeout=patience * 1000)
 
 
+@pytest.mark.serial  # a page that is kept waiting for a processor lets go
 def test_the_bar_the_card_and_the_list_have_the_same_words(open_console):
     page = open_console()
     select(page, "Robot 1")
@@ -233,6 +234,7 @@ def test_there_is_one_figure_of_latency_and_it_is_explained(open_console):
     )
 
 
+@pytest.mark.serial  # a page that is kept waiting for a processor lets go
 def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     page = open_console()
     select(page, "Robot 9")
