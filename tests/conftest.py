@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, expect
 
 from real_browser import launched
-from webmap.logs import budgets
+from webmap.base.logs import budgets
 
 # Two noisy cores: how long an example takes says nothing about the code.
 settings.register_profile(

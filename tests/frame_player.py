@@ -23,9 +23,9 @@ import msgspec
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
-from webmap.errors import ConfigError
-from webmap.logs import set_up_logging
-from webmap.outside_text import one_line
+from webmap.base.errors import ConfigError
+from webmap.base.logs import set_up_logging
+from webmap.base.outside_text import one_line
 from webmap.sim.process import signals_set
 
 log = logging.getLogger("webmap.sim")

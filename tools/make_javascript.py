@@ -12,14 +12,14 @@ from typing import Any
 
 from webmap.console.card_parts import GOALS
 from webmap.core.robot_state import WORDS
-from webmap.modules.map.goal_tool import SPACING
-from webmap.modules.map.route_tool import LONGEST_NAME, MOST_POINTS
+from webmap.features.goals.goal_tool import SPACING
+from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.ros.messages_log import LEVELS
 from webmap.server.access import CODE, KEY, PROTOCOL
 from webmap.server.html import FOLDER
 from webmap.server.page_socket import BROKEN_RULE, REPLACED
-from webmap.wire.messages import LONGEST_TEXTS, PAGE_ID
-from webmap.wire.opcodes import TABLES, VERSION
+from webmap.scene.wire.messages import LONGEST_TEXTS, PAGE_ID
+from webmap.scene.wire.opcodes import TABLES, VERSION
 
 WEB = Path(__file__).parent.parent / "src/webmap/web"
 

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from webmap.core.declaration import Declaration, TopicKind, declarations
-from webmap.core.layer_options import LayerOptions
+from webmap.modules.declaration import Declaration, TopicKind, declarations
+from webmap.modules.layer_options import LayerOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "layers.md"
 

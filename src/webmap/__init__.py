@@ -19,30 +19,31 @@ Names are loaded when they are first used, so that importing this costs little.
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from webmap.logs import guard_loggers
+from webmap.base.logs import guard_loggers
 
 guard_loggers()
 
 if TYPE_CHECKING:
-    from webmap import geometry, modules
+    from webmap import modules
+    from webmap.base import geometry
     from webmap.config.robot import RobotConfig
-    from webmap.core import drawing
-    from webmap.core import layer_options as options
-    from webmap.core.alignment import align_bridge
-    from webmap.core.declaration import FoundTopic, TopicKind, layer
+    from webmap.modules import drawing
+    from webmap.modules import layer_options as options
+    from webmap.poses.alignment import align_bridge
+    from webmap.modules.declaration import FoundTopic, TopicKind, layer
     from webmap.core.extendable import Extendable
     from webmap.core.layer import Layer
     from webmap.core.map import Map
-    from webmap.core.map_layer import MapLayer
+    from webmap.modules.map_layer import MapLayer
     from webmap.core.page import Page
     from webmap.core.pictures import Picture
-    from webmap.core.placed import Placed
+    from webmap.modules.placed import Placed
     from webmap.core.refused import refusals
     from webmap.core.registry import Namespace
     from webmap.core.robot import Robot
-    from webmap.core.robot_layer import RobotLayer
-    from webmap.errors import WebMapError
-    from webmap.identifiers import generate_id
+    from webmap.modules.robot_layer import RobotLayer
+    from webmap.base.errors import WebMapError
+    from webmap.base.identifiers import generate_id
     from webmap.ros import messages
     from webmap.ros.bridge import Bridge
     from webmap.scene import html, svg
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
     from webmap.scene.svg import namespace as svg_ns
     from webmap.scene.svg import xlink_namespace as xlink_ns
     from webmap.server.application import asgi_app, call, page, run, start, stop
-    from webmap.tf import Transform
+    from webmap.ros.tf import Transform
 
 __version__ = "0.1.0"
 
@@ -97,31 +98,31 @@ _HOMES = {
     "Bridge": "webmap.ros.bridge:Bridge",
     "Element": "webmap.scene.element:Element",
     "Extendable": "webmap.core.extendable:Extendable",
-    "FoundTopic": "webmap.core.declaration:FoundTopic",
+    "FoundTopic": "webmap.modules.declaration:FoundTopic",
     "Layer": "webmap.core.layer:Layer",
     "Map": "webmap.core.map:Map",
-    "MapLayer": "webmap.core.map_layer:MapLayer",
+    "MapLayer": "webmap.modules.map_layer:MapLayer",
     "Namespace": "webmap.core.registry:Namespace",
     "Page": "webmap.core.page:Page",
     "Picture": "webmap.core.pictures:Picture",
-    "Placed": "webmap.core.placed:Placed",
+    "Placed": "webmap.modules.placed:Placed",
     "Robot": "webmap.core.robot:Robot",
     "RobotConfig": "webmap.config.robot:RobotConfig",
-    "RobotLayer": "webmap.core.robot_layer:RobotLayer",
-    "TopicKind": "webmap.core.declaration:TopicKind",
-    "Transform": "webmap.tf:Transform",
-    "WebMapError": "webmap.errors:WebMapError",
-    "align_bridge": "webmap.core.alignment:align_bridge",
+    "RobotLayer": "webmap.modules.robot_layer:RobotLayer",
+    "TopicKind": "webmap.modules.declaration:TopicKind",
+    "Transform": "webmap.ros.tf:Transform",
+    "WebMapError": "webmap.base.errors:WebMapError",
+    "align_bridge": "webmap.poses.alignment:align_bridge",
     "asgi_app": "webmap.server.application:asgi_app",
     "call": "webmap.server.application:call",
-    "drawing": "webmap.core.drawing",
-    "generate_id": "webmap.identifiers:generate_id",
-    "geometry": "webmap.geometry",
+    "drawing": "webmap.modules.drawing",
+    "generate_id": "webmap.base.identifiers:generate_id",
+    "geometry": "webmap.base.geometry",
     "html": "webmap.scene.html",
-    "layer": "webmap.core.declaration:layer",
+    "layer": "webmap.modules.declaration:layer",
     "messages": "webmap.ros.messages",
     "modules": "webmap.modules",
-    "options": "webmap.core.layer_options",
+    "options": "webmap.modules.layer_options",
     "page": "webmap.server.application:page",
     "refusals": "webmap.core.refused:refusals",
     "run": "webmap.server.application:run",

@@ -11,7 +11,7 @@ import pytest
 from webmap.bags import listening, recorder
 from webmap.bags.listening import Listening
 from webmap.bags.replay import STATUS
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.ros.bridge import Bridge
 from webmap.ros.offload import LARGE
 from webmap.ros.rosbridge.events import Publish

@@ -9,7 +9,7 @@ from rosbags.interfaces import QosDurability
 from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, Made, types_of
 from webmap.bags.bag_file import new_bag
 from webmap.bags.recorder import Recorder
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 RANGE = "sensor_msgs/msg/Range"
 

@@ -10,7 +10,7 @@ from rosbags.rosbag2 import Writer as Writer2
 
 from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, TWIST, Made, types_of
 from webmap.bags.recording import Recording, recording_name
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 @pytest.fixture(scope="module")

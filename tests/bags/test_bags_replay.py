@@ -14,7 +14,7 @@ from webmap.bags.player import Player
 from webmap.bags.recording import Recording
 from webmap.bags.replay import REFUSED, STATUS
 from webmap.bags.times import SECOND
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.session import Session

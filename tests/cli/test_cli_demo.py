@@ -7,7 +7,7 @@ import pytest
 from webmap import Bridge
 from webmap.cli.demo import demo_robot, simulator
 from webmap.discovery import discover
-from webmap.discovery.asking import ask_topics
+from webmap.ros.asking import ask_topics
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])

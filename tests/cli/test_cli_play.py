@@ -11,7 +11,7 @@ import pytest
 from bag_making import ODOMETRY, TWIST, Made
 from webmap.bags import need_rosbags
 from webmap.cli.play import replay
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 COMMAND = [sys.executable, "-m", "webmap", "play", "--no-browser", "--port", "0"]
 

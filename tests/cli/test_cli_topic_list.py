@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from webmap.cli.topic_list import parse_topics
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 TOPICS = "/bob/odom [nav_msgs/msg/Odometry]\n/bob/cmd_vel [geometry_msgs/msg/Twist]\n"
 

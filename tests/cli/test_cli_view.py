@@ -13,11 +13,11 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import Bridge
-from webmap.cli.found_fleet import find_fleet
-from webmap.cli.looking import LookingForLayers
-from webmap.cli.overruling import Overruling, parse_setting
-from webmap.cli.shown import ShownRobots
-from webmap.cli.told import Candidate
+from webmap.fleet.found import find_fleet
+from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.shown import ShownRobots
+from webmap.fleet.stated import Candidate
 from webmap.console import Console, make_robot
 from webmap.core.layer import Layer
 from webmap.discovery import FoundRobot, Guess, discover

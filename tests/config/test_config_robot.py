@@ -10,7 +10,7 @@ from webmap.config.motion import MotionConfig, TwistConfig
 from webmap.config.reading import read
 from webmap.config.robot import CameraConfig, ModuleConfig
 from webmap.core.configure import apply
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate.specs import checked
 
 URL = "ws://robot:9090"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.cli.fleet import prepare
+from webmap.fleet.made import prepare
 from webmap.config.secrets import readable_secret
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "b"\n'

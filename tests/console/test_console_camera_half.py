@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from webmap import Map, Robot
-from webmap.console.cameras import PARTS, CameraPanel, CameraViews, camera_number
-from webmap.core.camera_feed import CameraFeed
+from webmap.features.cameras.camera_panel import PARTS, CameraPanel, CameraViews, camera_number
+from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.session import SceneSession
 
 CONSOLE = Path(__file__).parents[2] / "src" / "webmap" / "console"
 

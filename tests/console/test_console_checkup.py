@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from webmap import Bridge
-from webmap.console.doctor import Checkup, checkup_of, groups
+from webmap.features.doctor.doctor_panel import Checkup, checkup_of, groups
 from webmap.discovery.doctor import Finding, MeantRobot, Observed
 from webmap.ros.rosbridge.checks import LinkFacts
 

@@ -11,8 +11,8 @@ from PIL import Image
 
 from webmap import console
 from webmap.console.floor import COLOURS, load_floor
-from webmap.errors import ConfigError
-from webmap.map_file import MAX_YAML
+from webmap.base.errors import ConfigError
+from webmap.base.map_file import MAX_YAML
 
 WALL, UNKNOWN, FREE = 0, 205, 254
 

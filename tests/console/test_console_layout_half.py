@@ -8,7 +8,7 @@ import pytest
 from webmap import Map, Robot
 from webmap.console.page import MARGIN, Frame, Layout
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.session import SceneSession
 
 
 class Publisher:

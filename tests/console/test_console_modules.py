@@ -6,12 +6,12 @@ import pytest
 
 from webmap import Map, Robot
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.modules.map.follow import Follow
-from webmap.modules.map.goal_tool import GoalTool
-from webmap.modules.map.pointer_readout import PointerReadout
-from webmap.modules.map.scale_bar import ScaleBar
-from webmap.modules.map.stop_button import StopButton
-from webmap.wire.session import SceneSession
+from webmap.features.view.follow import Follow
+from webmap.features.goals.goal_tool import GoalTool
+from webmap.features.view.pointer_readout import PointerReadout
+from webmap.features.view.scale_bar import ScaleBar
+from webmap.features.stop.stop_button import StopButton
+from webmap.scene.wire.session import SceneSession
 
 WEB = Path(__file__).parents[2] / "src" / "webmap" / "web"
 

@@ -9,9 +9,9 @@ from webmap import Bridge, Robot, RobotConfig
 from webmap.console import Console, make_robot, open_console
 from webmap.console.page import build
 from webmap.core.page import Page, PageEntry, Viewer, site
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.scene.element import Element
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.session import SceneSession
 
 
 class Publisher:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from webmap.core.page import Page, PageEntry
-from webmap.errors import ConfigError, WireError
+from webmap.base.errors import ConfigError, WireError
 
 
 @dataclass

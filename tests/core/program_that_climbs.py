@@ -6,7 +6,7 @@ import threading
 import time
 
 import webmap
-from webmap.errors import MotionError, NoLease
+from webmap.base.errors import MotionError, NoLease
 from webmap.testing import Bounds, WitnessRobot, check_invariants
 
 LIMITS = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}

@@ -8,8 +8,8 @@ import threading
 import time
 
 import webmap
-from webmap.errors import NoLease
-from webmap.geometry import Pose, Quaternion, Vector3
+from webmap.base.errors import NoLease
+from webmap.base.geometry import Pose, Quaternion, Vector3
 
 GOAL = "/move_base_simple/goal"
 

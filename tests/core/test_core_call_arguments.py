@@ -3,7 +3,7 @@
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 @pytest.fixture

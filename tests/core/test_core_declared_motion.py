@@ -4,7 +4,7 @@ import pytest
 
 import webmap
 from webmap.config.buttons import ButtonSpec
-from webmap.core.robot_button import declared_motion
+from webmap.features.buttons.robot_button import declared_motion
 
 HALL = "ws://core-buttons:9090"
 
@@ -58,7 +58,7 @@ def test_a_button_that_would_say_where_a_robot_is_is_refused_when_it_is_made():
     try:
         robot.set_initial_pose_topic(bridge, "/bob/here")
         button = {"label": "Here", "topic": "bob/here", "type": "std_msgs/Bool"}
-        with pytest.raises(webmap.errors.ConfigError) as refused:
+        with pytest.raises(webmap.base.errors.ConfigError) as refused:
             robot.add_module("Buttons", bridge, [button])
         assert str(refused.value) == (
             "button 'Here': /bob/here carries an initial pose, and a button may not "

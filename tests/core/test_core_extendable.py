@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from webmap import Extendable, Map, Namespace, Robot
-from webmap.errors import ConfigError, ModuleNotFound
-from webmap.scope import Removal, current_scope, keep
+from webmap.base.errors import ConfigError, ModuleNotFound
+from webmap.base.scope import Removal, current_scope, keep
 
 
 @pytest.fixture

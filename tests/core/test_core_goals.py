@@ -3,7 +3,7 @@
 import pytest
 
 from webmap import Robot
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate.specs import checked
 
 MOVE_BASE = "move_base_msgs/MoveBaseAction"

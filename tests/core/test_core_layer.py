@@ -3,8 +3,8 @@
 import pytest
 
 from webmap import Layer, Map, svg
-from webmap.errors import WireError
-from webmap.scope import Removal, keep
+from webmap.base.errors import WireError
+from webmap.base.scope import Removal, keep
 
 
 class Link:

@@ -7,7 +7,7 @@ import pytest
 
 from webmap import Map
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.session import SceneSession
 
 
 def completed(function, html: Path | None = None) -> tuple[list[str], float]:

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from webmap import Map, Robot, svg
 from webmap.core.view import Rect, apply_operation, initial_view
-from webmap.errors import ConfigError
-from webmap.geometry import Vector3
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Vector3
 
 POINTS = st.floats(-2000, 2000)
 

@@ -11,7 +11,7 @@ import pytest
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.registry import Namespace
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.bridge import Bridge
 
 

@@ -6,12 +6,12 @@ import pytest
 
 from webmap import Map, Robot, html, svg
 from webmap.config.buttons import read_button
-from webmap.core import robot_button
-from webmap.core.robot_button import RobotButton
-from webmap.lifecycle import lifecycle
-from webmap.modules.robot.buttons import ButtonView
+from webmap.features.buttons import robot_button
+from webmap.features.buttons.robot_button import RobotButton
+from webmap.base.lifecycle import lifecycle
+from webmap.features.buttons.buttons import ButtonView
 from webmap.scene.events import Event
-from webmap.scope import Scope
+from webmap.base.scope import Scope
 
 
 def click(page, mount, element):

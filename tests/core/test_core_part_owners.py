@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.modules.robot.diagnostics import PartOwners
-from webmap.scope import Scope
+from webmap.features.layers.diagnostics import PartOwners
+from webmap.base.scope import Scope
 
 
 def owners(*namespaces: str) -> PartOwners:

@@ -7,7 +7,7 @@ import pytest
 
 from webmap import Bridge, Namespace, Robot, svg
 from webmap.core.motion import roads
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 def toml(value) -> str:

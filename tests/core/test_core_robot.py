@@ -9,12 +9,12 @@ import sys
 import pytest
 
 from webmap import Robot, svg
-from webmap.core import type_asking
+from webmap.poses import type_asking
 from webmap.core.runtime import goal_message, twist_message
-from webmap.errors import ConfigError, MotionError
+from webmap.base.errors import ConfigError, MotionError
 from webmap.gate.messages import SentGoal, SentTwist
 from webmap.ros import messages
-from webmap.scope import Removal, Scope
+from webmap.base.scope import Removal, Scope
 
 
 class Link:

@@ -4,7 +4,7 @@ import pytest
 
 from webmap import Map, Robot, svg
 from webmap.core.page import Page
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 @pytest.mark.parametrize("model", ["circle", 5, lambda: None])

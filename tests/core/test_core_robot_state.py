@@ -9,7 +9,7 @@ import pytest
 from webmap.console.words import LOOKS
 from webmap.core.robot_state import WORDS, Facts, state_of
 from webmap.gate.messages.robot_report import Doing
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 MOVES = (0.4, 0.0, 0.0)
 ANN = SimpleNamespace(connection="c2", name="Ann")

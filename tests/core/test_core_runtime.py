@@ -5,8 +5,8 @@ import pytest
 from webmap import Bridge, Robot
 from webmap.core import runtime as runtime_module
 from webmap.core.runtime import Runtime
-from webmap.errors import ConfigError
-from webmap.lifecycle import Lifecycle
+from webmap.base.errors import ConfigError
+from webmap.base.lifecycle import Lifecycle
 
 
 class Gate:

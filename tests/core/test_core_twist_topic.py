@@ -5,9 +5,9 @@ import math
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.errors import ConfigError, MotionError
-from webmap.geometry import Twist
-from webmap.lifecycle import lifecycle
+from webmap.base.errors import ConfigError, MotionError
+from webmap.base.geometry import Twist
+from webmap.base.lifecycle import lifecycle
 
 
 @pytest.fixture

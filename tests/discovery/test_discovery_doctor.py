@@ -18,7 +18,7 @@ from webmap.discovery.doctor.measure import observe
 from webmap.discovery.doctor.observed import Clock, Way
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.ros.rosbridge.checks import LinkFacts, is_loopback, listening_addresses
 from webmap.ros.rosbridge.events import Publish
 

@@ -3,7 +3,7 @@
 import pytest
 
 from webmap import Bridge
-from webmap.core.declaration import declarations
+from webmap.modules.declaration import declarations
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules, robot_modules
 from webmap.discovery.layers import (

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 from webmap.config.checks import same_name
-from webmap.core.declaration import declarations
+from webmap.modules.declaration import declarations
 from webmap.discovery import discover, rules
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.naming import unique_names

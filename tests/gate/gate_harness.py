@@ -9,7 +9,7 @@ from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.lease import Epochs
 from webmap.gate.rules.ticks import Ticks
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 URL = "ws://robot:9090"
 KEY = Key(URL, "/cmd_vel")

@@ -13,7 +13,7 @@ from gate_robot import eventually
 from webmap.gate.display.client import GateClient
 from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 RADIUS = 0.25
 

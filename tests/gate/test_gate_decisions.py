@@ -9,7 +9,7 @@ from gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key
 from webmap.gate.messages import PROGRAM
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 @pytest.fixture

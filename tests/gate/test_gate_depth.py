@@ -7,7 +7,7 @@ import cbor2
 import pytest
 from link_bench import TEXT, Heard, frame, in_loop, raw_bridge, until
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.gate import framing, messages
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import Key

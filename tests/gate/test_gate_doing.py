@@ -6,7 +6,7 @@ from gate_harness import KEY, Bench, spec
 from webmap.gate import events
 from webmap.gate.rules.goals import BRAKES
 from webmap.gate.rules.other_writer import GRACE
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 OTHERS = Twist(0.1, 0.0, -0.2)
 

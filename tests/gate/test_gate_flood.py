@@ -19,7 +19,7 @@ from link_bench import (
     until,
 )
 
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes import attempts as waits
 from webmap.gate.lanes import budget, sockets
 from webmap.gate.lanes.budget import Budget

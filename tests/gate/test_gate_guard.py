@@ -7,13 +7,13 @@ import msgspec
 import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec
 from webmap.gate.rules.assist import free_way, points_of
 from webmap.gate.specs import checked
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 ASSIST = AssistSpec(topic="/scan", footprint=BOX)

@@ -4,7 +4,7 @@ import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.gate import actions, events, messages
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 @pytest.fixture

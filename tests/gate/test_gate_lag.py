@@ -11,7 +11,7 @@ from link_bench import in_loop, noting_bridge, until
 from webmap.gate.clock import now
 from webmap.gate.events import LinkUp, Measured, Scanned
 from webmap.gate.lanes.witness import WitnessLane
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 from webmap.testing import FaultProxy, Shape
 
 STANDING, CREEPING = Twist(), Twist(0.1)

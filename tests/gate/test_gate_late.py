@@ -5,8 +5,8 @@ import time
 
 from gate_robot import eventually
 
-from webmap.errors import NoLease
-from webmap.geometry import Twist
+from webmap.base.errors import NoLease
+from webmap.base.geometry import Twist
 
 
 def test_a_program_that_is_quick_leaves_six_velocities_on_a_stalled_link(

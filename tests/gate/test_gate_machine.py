@@ -42,7 +42,7 @@ from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.lease import Epochs
 from webmap.gate.rules.ticks import Ticks
 from webmap.gate.shell import STEP
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 pytestmark = pytest.mark.slow
 

@@ -20,7 +20,7 @@ from webmap.gate.rules.other_writer import (
     WITHIN,
     OtherWriter,
 )
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 OURS, THEIRS = Twist(0.5, 0.0, 0.25), Twist(0.1, 0.0, -0.2)
 SAID = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)"

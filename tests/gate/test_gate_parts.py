@@ -16,7 +16,7 @@ from webmap.gate.rules.deadman import DEADMAN, NEUTRAL, DeadMan
 from webmap.gate.rules.health import Health, Pulse
 from webmap.gate.rules.lease import Epochs, Lease, check_lease, check_role, check_take
 from webmap.gate.rules.ticks import Ticks
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 axis = st.floats(-1e308, 1e308)
 positive = st.floats(0, 1e6)

@@ -7,7 +7,7 @@ from gate_harness import ZERO, Bench, spec
 
 from webmap.gate import actions, messages
 from webmap.gate.messages import PROGRAM
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 @pytest.fixture

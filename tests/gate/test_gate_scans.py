@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from captured_frames import frame_file
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.gate.lanes.scans import hear_scan, subscribe
 
 

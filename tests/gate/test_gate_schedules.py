@@ -12,7 +12,7 @@ from machine_bench import PacedBench
 
 from webmap.gate import events, messages
 from webmap.gate.events import Press
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 PEOPLE = ("a", "b")
 

@@ -22,7 +22,7 @@ from link_bench import (
 )
 from websockets.asyncio.server import serve
 
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes import sockets
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Socket, open_socket

@@ -5,7 +5,7 @@ from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.gate import actions, events, messages
 from webmap.gate.events import StopRecord
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 class Base:

@@ -8,7 +8,7 @@ from webmap.gate.limits import Speed
 from webmap.gate.rules.ages import Ages
 from webmap.gate.rules.loopage import LoopAge, governed, reaction
 from webmap.gate.rules.obedience import Obedience
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 class TestAlarm:

@@ -8,7 +8,7 @@ from gate_harness import KEY, spec
 
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.lanes import words
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 def said(data):

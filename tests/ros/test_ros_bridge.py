@@ -10,7 +10,7 @@ import pytest
 from fake_rosbridge import FakeRosbridge, bridged, until
 
 from captured_frames import CAPTURED
-from webmap.errors import (
+from webmap.base.errors import (
     BridgeClosed,
     BridgeError,
     ConfigError,
@@ -22,7 +22,7 @@ from webmap.ros import backoff
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
 from webmap.ros.rosbridge import connection
-from webmap.scope import Scope
+from webmap.base.scope import Scope
 
 
 class Text(msgspec.Struct):

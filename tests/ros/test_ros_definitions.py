@@ -4,7 +4,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.definitions import Definitions, UnknownType, shipped, split_texts
 
 FILLER = "structure_needs_at_least_one_member"

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import Definitions, UnknownType, shipped
 from webmap.ros.message_forms import (

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camera_server import BOUNDARY, a_jpeg, part
-from webmap.errors import ConfigError, ProtocolError
+from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import Answer, Multipart
 from webmap.ros.messages_image import MAX_BYTES

@@ -24,7 +24,7 @@ from webmap.ros.rosbridge.wire_subscription import (
     InJson,
     Silence,
 )
-from webmap.scope import Scope
+from webmap.base.scope import Scope
 
 MAP = "nav_msgs/OccupancyGrid"
 LIMIT = 5000

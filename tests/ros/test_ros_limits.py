@@ -27,7 +27,7 @@ from webmap.ros.rosbridge.frame_limits import (
     check_count,
 )
 from webmap.ros.rosbridge.protocol import Protocol
-from webmap.scope import Scope
+from webmap.base.scope import Scope
 
 MIB = 1 << 20
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros import names
 
 

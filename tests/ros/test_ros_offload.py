@@ -7,7 +7,7 @@ import pytest
 from fake_rosbridge import bridged, until
 
 from captured_frames import CAPTURED
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros import offload, worker
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
 from webmap.ros.offload import Offload

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from captured_frames import CAPTURED
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros import messages
 from webmap.ros.rosbridge.events import (
     CallService,

@@ -5,8 +5,8 @@ import asyncio
 import pytest
 from fake_rosbridge import FakeRosbridge, bridged, until
 
-from webmap.errors import BridgeClosed, ConfigError, ServiceError
-from webmap.lifecycle import lifecycle
+from webmap.base.errors import BridgeClosed, ConfigError, ServiceError
+from webmap.base.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge, TemporaryBridge
 
 NODES = {"publishers": ["/base", "/rosbridge_websocket"], "subscribers": ["/webmap"]}

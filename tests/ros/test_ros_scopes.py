@@ -5,12 +5,12 @@ import asyncio
 import pytest
 from fake_rosbridge import FakeRosbridge, bridged, until
 
-from webmap.errors import BridgeClosed
-from webmap.lifecycle import Lifecycle
+from webmap.base.errors import BridgeClosed
+from webmap.base.lifecycle import Lifecycle
 from webmap.ros import bridge as bridge_module
 from webmap.ros.bridge import Bridge
 from webmap.ros.callbacks import Callbacks
-from webmap.scope import Scope
+from webmap.base.scope import Scope
 
 
 def run(scenario):

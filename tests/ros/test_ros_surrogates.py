@@ -8,7 +8,7 @@ import pytest
 from fake_rosbridge import bridged, until
 
 from webmap.discovery import discover
-from webmap.errors import ProtocolError, ServiceError
+from webmap.base.errors import ProtocolError, ServiceError
 from webmap.ros.decoding import decode_json
 from webmap.ros.rosbridge.protocol import Protocol
 

@@ -13,7 +13,7 @@ import os
 import time
 
 import webmap
-import webmap.errors
+import webmap.base.errors
 
 bridge = webmap.Bridge(os.environ["SAFETY_BRIDGE"])
 bob = webmap.Robot("Bob", webmap.svg.circle(cx=0, cy=0, r=0.2, fill="red"))
@@ -38,7 +38,7 @@ def call(message):
     """Call a service that may never answer."""
 
     async def wait():
-        with contextlib.suppress(webmap.errors.WebMapError):
+        with contextlib.suppress(webmap.base.errors.WebMapError):
             await bridge.call_service("/slow", {}, timeout=message["data"])
 
     tasks.append(asyncio.get_running_loop().create_task(wait()))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 from webmap.testing import Bounds, Quiet, Told, check_invariants
 
 

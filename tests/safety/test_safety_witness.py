@@ -6,7 +6,7 @@ import time
 import pytest
 from websockets.sync.client import connect
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 from webmap.ros.rosbridge import ops
 from webmap.testing import Sentinel, WitnessRobot
 

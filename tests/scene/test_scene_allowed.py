@@ -1,6 +1,6 @@
 import pytest
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 from webmap.scene import html, svg
 from webmap.scene.allowed import ATTRIBUTES, EVENTS, HTML_TAGS, SVG_TAGS
 from webmap.scene.element import Element

@@ -1,6 +1,6 @@
 import pytest
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 from webmap.scene import html, svg
 from webmap.scene.bound import Document
 from webmap.scene.fragment import Changed, Fragment

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 from webmap.scene.allowed import format_number, format_value
 
 

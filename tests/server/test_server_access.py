@@ -2,7 +2,7 @@ import pytest
 from server_fakes import TOKEN
 
 from webmap.core.page import Viewer
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.server.access import (
     AccessControl,
     Redirect,

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.server.auth import Attempts, Codes, Token, new_token
 
 SECRET = "s" * 43

@@ -2,7 +2,7 @@ import os
 
 import pytest
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.server.files import NoSuchFile, Published, read_below, read_file
 
 PNG = b"\x89PNG\r\n\x1a\n"

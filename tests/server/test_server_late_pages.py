@@ -7,7 +7,7 @@ import weakref
 from page_loop import make_model, open_page, wait_for
 
 import webmap
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.server import open_pages as host_module
 
 

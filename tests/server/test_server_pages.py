@@ -8,9 +8,9 @@ from page_loop import HELLO, make_model, objects_left, open_page, wait_for
 import webmap
 from webmap.core.layer import Layer
 from webmap.core.page import Viewer
-from webmap.modules.robot.laser_scanner import LaserScanner, SweepMsg
+from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
-from webmap.scope import Removal, keep
+from webmap.base.scope import Removal, keep
 from webmap.server import open_pages as host_module
 from webmap.testing.witness import WitnessRobot
 

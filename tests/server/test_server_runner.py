@@ -15,7 +15,7 @@ import pytest
 from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, sign_in
 from websockets.sync.client import connect
 
-from webmap.errors import ConfigError, WebMapError
+from webmap.base.errors import ConfigError, WebMapError
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
 from webmap.server.runner import announce, check_exposure, listen, serve, url_of

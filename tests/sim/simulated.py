@@ -9,7 +9,7 @@ import sys
 import cbor2
 import numpy as np
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph

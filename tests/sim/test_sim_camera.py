@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder, Publication
 from webmap.ros.rosbridge.server.quirks import POLITE

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from simulated import Bench, room
 
-from webmap.geometry import Pose, Twist
+from webmap.base.geometry import Pose, Twist
 from webmap.sim.feeds.cloud import POINT, cloud_points
 from webmap.sim.feeds.localization import SURE, Belief
 from webmap.sim.feeds.navigation import Costs, distances
@@ -369,7 +369,7 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
 
 
 def test_a_fix_is_where_the_robot_is_on_the_globe():
-    from webmap.core.local_plane import LocalPlane
+    from webmap.base.local_plane import LocalPlane
     from webmap.sim.feeds.localization import DATUM
 
     bench = Bench(robots=1)

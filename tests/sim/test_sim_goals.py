@@ -6,7 +6,7 @@ import math
 import pytest
 from simulated import Bench
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 
 ACTION = "/robot_0/navigate_to_pose"
 ACTION_TYPE = "nav2_msgs/action/NavigateToPose"

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.sim.maps import FLOOR, load_map
 
 SETTINGS = {

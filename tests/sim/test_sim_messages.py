@@ -5,7 +5,7 @@ import sys
 import pytest
 from simulated import Bench
 
-from webmap.geometry import Pose, Quaternion
+from webmap.base.geometry import Pose, Quaternion
 
 
 def as_pose(translation, rotation):

@@ -18,7 +18,7 @@ from websockets.asyncio.client import connect
 
 from captured_frames import PLAYER, frame_file, played
 from frame_player import load_recording
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph

@@ -3,7 +3,7 @@ import math
 import pytest
 from simulated import alone, coast, drive
 
-from webmap.geometry import Pose, Twist
+from webmap.base.geometry import Pose, Twist
 
 
 def test_one_metre_a_second_for_one_second_makes_one_metre():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from simulated import room
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.sim.obstacles import Obstacles, chebyshev_distance
 from webmap.sim.scanner import Scanner, ScannerOptions, cast_rays
 

@@ -7,10 +7,10 @@ import pytest
 from simulated import Bench
 from test_sim_feeds import heard
 
-from webmap.geometry import Quaternion, Vector3
+from webmap.base.geometry import Quaternion, Vector3
 from webmap.sim.feeds.cloud import POINT
 from webmap.sim.feeds.depth import POINT as DEPTH
-from webmap.tf import Transform
+from webmap.ros.tf import Transform
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 

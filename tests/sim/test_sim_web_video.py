@@ -17,9 +17,9 @@ from websockets.sync.client import connect
 
 from webmap import Robot
 from webmap.core.pictures import pictures
-from webmap.errors import ConfigError
-from webmap.lifecycle import Lifecycle
-from webmap.modules.robot import http_camera
+from webmap.base.errors import ConfigError
+from webmap.base.lifecycle import Lifecycle
+from webmap.features.cameras import http_camera
 from webmap.ros.image_pull import Answer
 from webmap.sim import run_simulator
 from webmap.sim.web_video import WebVideoServer, server

@@ -3,8 +3,8 @@ import math
 import pytest
 from simulated import room
 
-from webmap.errors import ConfigError
-from webmap.geometry import Pose, Twist
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Pose, Twist
 from webmap.sim.maps import FLOOR, load_map
 from webmap.sim.navigator import Goal, GoalState
 from webmap.sim.world import World, WorldOptions

@@ -18,8 +18,8 @@ from webmap.scene import svg
 from webmap.scene.bound import Document
 from webmap.scene.fragment import Fragment
 from webmap.server.security import CONTENT_SECURITY_POLICY
-from webmap.wire.messages import Hello, read_message
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.messages import Hello, read_message
+from webmap.scene.wire.session import SceneSession
 
 HERE = Path(__file__).parent
 WEB = HERE.parents[1] / "src" / "webmap" / "web"

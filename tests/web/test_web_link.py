@@ -3,9 +3,9 @@
 import pytest
 from scene_host import wait
 
-from webmap.wire.messages import Trouble, ViewReport
-from webmap.wire.opcodes import VERSION
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.messages import Trouble, ViewReport
+from webmap.scene.wire.opcodes import VERSION
+from webmap.scene.wire.session import SceneSession
 
 pytestmark = pytest.mark.browser
 

@@ -5,7 +5,7 @@ import math
 import pytest
 from scene_host import wait
 
-from webmap.wire.messages import ModuleMessage, ModuleReady, Trouble, ViewReport
+from webmap.scene.wire.messages import ModuleMessage, ModuleReady, Trouble, ViewReport
 
 pytestmark = pytest.mark.browser
 

@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "wire"))
 from wire_picture import f32, histories, play
 
 from real_browser import watched_tab
-from webmap.geometry import Affine
+from webmap.base.geometry import Affine
 from webmap.scene.node import Text
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.session import SceneSession
 
 pytestmark = pytest.mark.browser
 

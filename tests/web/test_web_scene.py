@@ -6,10 +6,10 @@ import struct
 import pytest
 from scene_host import wait
 
-from webmap.geometry import Affine
+from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.fragment import Fragment
-from webmap.wire.messages import ElementEvent, Trouble
+from webmap.scene.wire.messages import ElementEvent, Trouble
 
 pytestmark = pytest.mark.browser
 

@@ -21,8 +21,8 @@ from wires_bench import Bench
 from wires_recording import recorded
 from wires_robot import REST, scan_of
 
-from webmap.errors import MotionError, NoLease
-from webmap.geometry import Quaternion, Vector3
+from webmap.base.errors import MotionError, NoLease
+from webmap.base.geometry import Quaternion, Vector3
 
 STORED_STATE = Path(__file__).parents[1] / "gate" / "stored_state"
 

@@ -48,10 +48,10 @@ from webmap.server import application
 # So that no process of a source has to load them.
 import webmap.cli.check  # isort: skip
 import webmap.cli.discover  # isort: skip
-import webmap.cli.found_fleet  # isort: skip
-import webmap.cli.shown  # isort: skip
+import webmap.fleet.found  # isort: skip
+import webmap.fleet.shown  # isort: skip
 import webmap.cli.run  # isort: skip
-import webmap.cli.fleet  # isort: skip
+import webmap.fleet.made  # isort: skip
 import webmap.cli.view  # isort: skip
 import webmap.modules.robot  # isort: skip
 

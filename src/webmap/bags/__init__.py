@@ -7,7 +7,7 @@ rosbags, which is installed with ``webmap[bags]``.
 
 from importlib.util import find_spec
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 def need_rosbags() -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from webmap.bags.recording import is_latched
 from webmap.bags.types import TypeVersion
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from functools import partial
 
 from webmap.bags.recorder import Incoming, Recorder
 from webmap.bags.replay import STATUS
-from webmap.errors import BridgeError, ConfigError
+from webmap.base.errors import BridgeError, ConfigError
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.received import ReceivedMessage

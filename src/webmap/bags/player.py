@@ -9,7 +9,7 @@ from collections.abc import Callable
 from webmap.bags.recording import Recorded, Recording
 from webmap.bags.replay import Replay
 from webmap.bags.times import SECOND, Pace
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 log = logging.getLogger("webmap.bags")
 

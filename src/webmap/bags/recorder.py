@@ -10,7 +10,7 @@ from typing import Any
 
 from webmap.bags.bag_file import BagFile
 from webmap.bags.types import Types, TypeVersion
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros.conforming import Misfit
 from webmap.ros.received import ReceivedMessage
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from webmap.bags.types import texts_of
-from webmap.errors import ConfigError
-from webmap.plain_files import refuse_special, resolved
+from webmap.base.errors import ConfigError
+from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import OCTETS, TIMES, Definitions, Field, UnknownType
 from webmap.ros.rosbridge.server.dialect import Dialect, DialectName, canonical, resolve
 from webmap.ros.rosbridge.server.schema import DTYPES, Schema

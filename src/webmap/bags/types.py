@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.conforming import Conformer, Misfit, check_size, wrong
 from webmap.ros.definitions import (
     FLOATS,

@@ -7,8 +7,8 @@ from types import FrameType
 import click
 
 import webmap
-from webmap.cli.echo import echo
-from webmap.errors import ConfigError, WebMapError
+from webmap.base.echo import echo
+from webmap.base.errors import ConfigError, WebMapError
 
 COMMANDS = {
     "check": "webmap.cli.check:check",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from webmap.cli.echo import echo
+from webmap.base.echo import echo
 from webmap.cli.options import verbose_option
 
 
@@ -17,7 +17,7 @@ def check(file: Path) -> None:
     No robot is reached. Every mistake is named with its line; the exit code is 2 if
     there is one.
     """
-    from webmap.cli.fleet import prepare
+    from webmap.fleet.made import prepare
 
     ready = prepare(file)
     robots, bridges = len(ready.robots), len(ready.bridges)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from webmap.children import GRACE
-from webmap.cli.beside import beside
+from webmap.base.children import GRACE
+from webmap.base.child_process import beside
 from webmap.cli.options import PORT, simulator_options, web_options
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot

@@ -5,7 +5,7 @@ import sys
 
 import click
 
-from webmap.cli.echo import echo
+from webmap.base.echo import echo
 from webmap.cli.options import verbose_option, wait_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
@@ -28,7 +28,7 @@ def discover(
     webmap discover ws://robot:9090 --toml > fleet.toml
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
-    from webmap.cli.finding import find
+    from webmap.fleet.find import find
     from webmap.discovery.fleet_toml import fleet_toml
     from webmap.discovery.words import report
     from webmap.ros.names import normalise_url

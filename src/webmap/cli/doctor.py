@@ -5,7 +5,7 @@ import sys
 
 import click
 
-from webmap.cli.echo import echo
+from webmap.base.echo import echo
 from webmap.cli.options import Finite, verbose_option, wait_option
 from webmap.cli.topic_list import one_bridge, topics_option
 
@@ -82,10 +82,10 @@ def doctor(
             "and --set"
         )
     if stop_test is not None:
-        from webmap.cli.stop_test import find_out
+        from webmap.discovery.doctor.stop_test import find_out
 
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
-    from webmap.cli.meant import bridges_of
+    from webmap.fleet.diagnose import bridges_of
     from webmap.discovery.doctor import is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
-from webmap.logs import set_up_logging
+from webmap.base.logs import set_up_logging
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from webmap.cli.beside import beside
-from webmap.cli.echo import echo
+from webmap.base.child_process import beside
+from webmap.base.echo import echo
 from webmap.cli.options import PORT, Finite, web_options
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 if TYPE_CHECKING:
     from webmap import Bridge, Map
@@ -74,8 +74,8 @@ def play(
     from webmap.bags import need_rosbags
     from webmap.bags.recording import recording_name
     from webmap.bags.replay import STATUS
-    from webmap.cli.found_fleet import find_fleet
-    from webmap.cli.overruling import Watched
+    from webmap.fleet.found import find_fleet
+    from webmap.fleet.overrides import Watched
 
     need_rosbags()
     name = recording_name(files)

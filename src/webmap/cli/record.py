@@ -7,7 +7,7 @@ import click
 
 from webmap.cli.options import Finite, verbose_option, wait_option
 from webmap.cli.topic_list import topics_option
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 @click.command(short_help="Record what is behind a bridge into a bag.")
@@ -63,7 +63,7 @@ def record(
     import asyncio
 
     from webmap.bags import need_rosbags
-    from webmap.cli.recording_to import record_to, told_types
+    from webmap.bags.record import record_to, told_types
     from webmap.ros.names import normalise_topic, normalise_url
 
     need_rosbags()

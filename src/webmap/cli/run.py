@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from webmap.cli.options import web_options
-from webmap.plain_files import refuse_special
+from webmap.base.plain_files import refuse_special
 
 
 @click.command(short_help="Serve your own pages, or the robots of a fleet file.")
@@ -23,7 +23,7 @@ def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) 
     from webmap.server import application
 
     if file.suffix.lower() == ".toml":
-        from webmap.cli.fleet import open_fleet, prepare
+        from webmap.fleet.made import open_fleet, prepare
 
         open_fleet(prepare(file))
         application.run(

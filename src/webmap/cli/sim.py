@@ -7,8 +7,8 @@ from typing import Literal
 
 import click
 
-from webmap.children import end_with_parent
-from webmap.cli.echo import echo
+from webmap.base.children import end_with_parent
+from webmap.base.echo import echo
 from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 
 

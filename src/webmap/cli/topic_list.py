@@ -6,7 +6,7 @@ from typing import IO
 
 import click
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import is_topic, split_type
 
 LARGEST = 4 << 20

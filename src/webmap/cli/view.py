@@ -2,7 +2,7 @@
 
 import click
 
-from webmap.cli.echo import echo
+from webmap.base.echo import echo
 from webmap.cli.options import Finite, web_options
 from webmap.cli.topic_list import one_bridge, topics_option
 
@@ -99,9 +99,9 @@ def view(
 
     import webmap
     from webmap import console
-    from webmap.cli.found_fleet import FoundFleet, find_fleet, told_fleet
-    from webmap.cli.overruling import Overruling, parse_setting
-    from webmap.cli.told import told_robots
+    from webmap.fleet.found import FoundFleet, find_fleet, told_fleet
+    from webmap.fleet.overrides import Overruling, parse_setting
+    from webmap.fleet.stated import told_robots
 
     one_bridge(url, topics)
     overruling = Overruling([parse_setting(text) for text in settings], stops_within)

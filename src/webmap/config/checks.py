@@ -9,8 +9,8 @@ from datetime import date
 from numbers import Integral, Real
 from typing import Any, TypeAlias
 
-from webmap.errors import ConfigError
-from webmap.outside_text import one_line
+from webmap.base.errors import ConfigError
+from webmap.base.outside_text import one_line
 from webmap.ros.names import normalise_topic, split_type
 
 Way: TypeAlias = tuple[str | int, ...]

@@ -19,8 +19,8 @@ from webmap.config.robot import (
     bridges_of,
     read_robot,
 )
-from webmap.errors import ConfigError
-from webmap.outside_text import escaped
+from webmap.base.errors import ConfigError
+from webmap.base.outside_text import escaped
 from webmap.ros.names import normalise_url
 
 

@@ -27,7 +27,7 @@ import msgspec
 
 from webmap.config import checks
 from webmap.config.checks import Mistakes, Way, checked, did_you_mean, show
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 ONE_OR_MORE = "one or more"
 """Among the annotations of a list: one value may stand for a list of one."""

@@ -14,7 +14,7 @@ from webmap.config.buttons import check_buttons
 from webmap.config.checks import Mistakes, Way
 from webmap.config.motion import MotionConfig, TopicConfig
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import is_topic
 

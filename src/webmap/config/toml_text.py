@@ -11,9 +11,9 @@ import tomllib
 from pathlib import Path
 
 from webmap.config.checks import Mistakes, Way, way_in_words
-from webmap.errors import ConfigError
-from webmap.outside_text import one_line
-from webmap.plain_files import read_file
+from webmap.base.errors import ConfigError
+from webmap.base.outside_text import one_line
+from webmap.base.plain_files import read_file
 
 LARGEST = 1 << 19
 """Bytes that a file may have."""

@@ -1,5 +1,5 @@
 import { listenToActions } from "./card_actions.js";
-import { byId, listenToSheet, nameSheet, say, typing } from "./dom.js";
+import { byId, listenToSheet, nameSheet, say, typing } from "../web/tools/dom.js";
 import { keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import webmap
-from webmap import geometry, svg
+from webmap import svg
+from webmap.base import geometry
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Robot, RobotConfig

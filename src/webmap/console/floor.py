@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from webmap import geometry
-from webmap.map_file import MapImage, read_map
+from webmap.base import geometry
+from webmap.base.map_file import MapImage, read_map
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import webmap
 from webmap.console.bar import BridgeList, RefusedList
-from webmap.console.cameras import CameraPanel
+from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.console.card_parts import RobotHealth
-from webmap.console.doctor import DoctorReports
+from webmap.features.doctor.doctor_panel import DoctorReports
 from webmap.console.fleet import make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.opened import Console
@@ -286,9 +286,9 @@ class Layout:
         self.map = map
         self.half = map.add_browser_half(
             self,
-            "modules/layout_tool.js",
+            "features/layout/layout_tool.js",
             {"of": of, "place": place, "classes": classes, "restore": restore},
-            "modules/layout_tool.css",
+            "features/layout/layout_tool.css",
         )
 
     def on_message(self, message: dict[str, Any]) -> None:

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
-from webmap.console.cameras import CameraViews
+from webmap.features.cameras.camera_panel import CameraViews
 from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.words import UNKNOWN, heading, icon, look_of, number, sentence

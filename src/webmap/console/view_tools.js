@@ -1,4 +1,4 @@
-import { byId } from "./dom.js";
+import { byId } from "../web/tools/dom.js";
 
 /** @typedef {import('../web/view.js').Matrix} Matrix */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */

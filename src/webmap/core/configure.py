@@ -18,14 +18,14 @@ from webmap.config.robot import (
     TfConfig,
     is_link,
 )
-from webmap.core.alignment import numbers
-from webmap.core.frames import frames_of
+from webmap.poses.alignment import numbers
+from webmap.poses.frames import frames_of
 from webmap.core.module_arguments import WrongArgument, WrongArguments
 from webmap.core.robot_model import element_from_dict, element_to_dict
-from webmap.errors import ConfigError, ModuleNotFound, WebMapError
+from webmap.base.errors import ConfigError, ModuleNotFound, WebMapError
 from webmap.ros.bridge import Bridge
 from webmap.scene.element import Element
-from webmap.tf import Buffer
+from webmap.ros.tf import Buffer
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

@@ -12,12 +12,12 @@ from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
 from webmap.core.motion import MotionRoad
 from webmap.core.registry import Namespace
-from webmap.errors import ConfigError, MotionError
+from webmap.base.errors import ConfigError, MotionError
 from webmap.gate.messages import RobotReport
 from webmap.gate.rules.goals import OVER
-from webmap.geometry import Quaternion, Twist
+from webmap.base.geometry import Quaternion, Twist
 from webmap.ros.bridge import Bridge
-from webmap.scope import no_scope
+from webmap.base.scope import no_scope
 
 
 class Driven(Extendable):

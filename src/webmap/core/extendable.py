@@ -8,9 +8,9 @@ from typing import Any
 
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import Namespace
-from webmap.core.tasks import begin
-from webmap.errors import ConfigError
-from webmap.scope import Scope, no_scope
+from webmap.base.tasks import begin
+from webmap.base.errors import ConfigError
+from webmap.base.scope import Scope, no_scope
 
 log = logging.getLogger("webmap.modules")
 

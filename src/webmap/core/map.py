@@ -8,7 +8,7 @@ from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.events import Event
 from webmap.scene.fragment import Fragment
-from webmap.scope import Removal, keep
+from webmap.base.scope import Removal, keep
 
 LAYER_ORDER = 10.0
 ROBOT_ORDER = 100.0

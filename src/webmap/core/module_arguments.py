@@ -26,7 +26,7 @@ from typing import (
 )
 
 from webmap.config.checks import did_you_mean
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import normalise_topic
 
 Way: TypeAlias = tuple[str | int, ...]

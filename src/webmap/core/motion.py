@@ -21,15 +21,15 @@ from webmap.config.motion import (
     TwistConfig,
 )
 from webmap.config.reading import Config, read_part
-from webmap.core.tasks import spawn
-from webmap.core.type_asking import TypeAsking
-from webmap.errors import MotionError
+from webmap.base.tasks import spawn
+from webmap.poses.type_asking import TypeAsking
+from webmap.base.errors import MotionError
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
-from webmap.geometry import Pose, Twist
-from webmap.lifecycle import lifecycle
+from webmap.base.geometry import Pose, Twist
+from webmap.base.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
 from webmap.ros.moving import STOP
 from webmap.ros.names import is_type

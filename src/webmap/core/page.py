@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.pictures import Publisher
-from webmap.core.tasks import begin
+from webmap.base.tasks import begin
 from webmap.core.view import initial_view
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate.messages import Role
-from webmap.plain_files import resolved
+from webmap.base.plain_files import resolved
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.events import Event, Handler, Listener
 from webmap.scene.fragment import Fragment
-from webmap.scope import Removal, Scope, current_scope
-from webmap.wire.session import SceneSession
+from webmap.base.scope import Removal, Scope, current_scope
+from webmap.scene.wire.session import SceneSession
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -355,7 +355,7 @@ class Page:
         """Return the URL of an ES module or a style sheet.
 
         Args:
-            file: The name of one that comes with WebMap, as ``"modules/teleop.js"``,
+            file: The name of one that comes with WebMap, as ``"features/drive/teleop.js"``,
                 or the path of a file.
 
         """

@@ -10,9 +10,9 @@ from collections import deque
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from webmap.geometry import Affine
+from webmap.base.geometry import Affine
 from webmap.scene import svg
-from webmap.scope import Removal, keep
+from webmap.base.scope import Removal, keep
 
 KEPT_FOR = 3.0
 """Seconds for which a picture is served after another took its place."""

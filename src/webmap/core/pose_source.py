@@ -1,6 +1,6 @@
 """Hears where a robot is, by a topic and by frames, and has its poses shown.
 
-What follows from a message is decided in :mod:`webmap.core.pose_pipeline`; here are the
+What follows from a message is decided in :mod:`webmap.poses.pipeline`; here are the
 subscriptions, the clock and the alignment.
 """
 
@@ -10,15 +10,15 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.alignment import HERE, alignments
-from webmap.core.frames import Frames, frames_of
-from webmap.core.odometry import ODOMETRY, OdometryFeed
-from webmap.core.placing import Placing, PoseReading
-from webmap.core.pose_pipeline import PosePipeline, Problem, Step
-from webmap.core.silence import SilenceWatch
-from webmap.geometry import Affine, Pose
+from webmap.poses.alignment import HERE, alignments
+from webmap.poses.frames import Frames, frames_of
+from webmap.poses.odometry import ODOMETRY, OdometryFeed
+from webmap.poses.placing import Placing, PoseReading
+from webmap.poses.pipeline import PosePipeline, Problem, Step
+from webmap.poses.silence import SilenceWatch
+from webmap.base.geometry import Affine, Pose
 from webmap.ros.bridge import Bridge
-from webmap.scope import Removal, no_scope
+from webmap.base.scope import Removal, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

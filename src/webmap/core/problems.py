@@ -9,8 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from webmap.errors import WebMapError
-from webmap.scope import Removal, keep
+from webmap.base.errors import WebMapError
+from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Any, TypeVar
 
-from webmap.errors import ModuleNotFound
+from webmap.base.errors import ModuleNotFound
 
 log = logging.getLogger("webmap.modules")
 

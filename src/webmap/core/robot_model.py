@@ -5,7 +5,7 @@ from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.node import Text

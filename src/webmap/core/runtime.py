@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from webmap.core.motion import MotionRoad, roads
 from webmap.core.refused import refusals
 from webmap.core.robot import robots
-from webmap.core.tasks import spawn
+from webmap.base.tasks import spawn
 from webmap.gate.messages import (
     GateDown,
     RefusedCount,
@@ -25,9 +25,9 @@ from webmap.gate.messages import (
     SentPose,
     SentTwist,
 )
-from webmap.geometry import Quaternion, Twist
-from webmap.lifecycle import lifecycle
-from webmap.scope import Removal
+from webmap.base.geometry import Quaternion, Twist
+from webmap.base.lifecycle import lifecycle
+from webmap.base.scope import Removal
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import GateClient

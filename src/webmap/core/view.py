@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from webmap.geometry import Affine
+from webmap.base.geometry import Affine
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from functools import partial
 
 from webmap.discovery.tf_robots import Trees
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic
-from webmap.scope import no_scope
+from webmap.base.scope import no_scope
 
 SECONDS = 0.8
 """How long it listens: a robot that moves sends its frames ten times a second."""

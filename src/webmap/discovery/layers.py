@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, TypeAlias
 import msgspec
 
 from webmap.config.robot import ModuleConfig, RobotConfig, is_link
-from webmap.core.declaration import Declaration, FoundTopic, TopicKind, declarations
+from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, declarations
 from webmap.discovery.grouping import inside, nearest
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import is_topic, normalise_topic, split_type
 
 TRAIL = ModuleConfig(name="Trail", options={"length": 10.0})

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from webmap.discovery.found import Role
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import split_type
 
 PARTS = (

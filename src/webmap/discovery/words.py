@@ -2,7 +2,7 @@
 
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
 from webmap.discovery.layers import Layers, drawing
-from webmap.outside_text import escaped
+from webmap.base.outside_text import escaped
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from webmap.gate.events import Key, Press
 from webmap.gate.messages import FromGate, RobotSpec, Way
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 @dataclass(frozen=True, slots=True)

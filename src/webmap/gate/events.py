@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 Lane = Literal["control", "witness", "tasks"]
 Outcome = Literal["reached", "failed", "cancelled"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.errors import WireError
+from webmap.base.errors import WireError
 
 log = logging.getLogger("webmap.gate")
 

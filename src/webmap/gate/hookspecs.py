@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import is_type, normalise_topic
 
 PLACES = (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger"))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from webmap.gate.events import StopRecord
 from webmap.gate.messages import RobotSpec
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 Vector = tuple[float, float, float]
 

@@ -1,6 +1,6 @@
 """What is raised when a command is not taken."""
 
-from webmap.errors import MotionError
+from webmap.base.errors import MotionError
 
 
 class Refusal(MotionError):

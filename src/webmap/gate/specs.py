@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate.events import Key
 from webmap.gate.hookspecs import checked_hooks
 from webmap.gate.messages import AssistSpec, RobotSpec

@@ -11,8 +11,8 @@ from typing import Any, Self
 
 import msgspec
 
-from webmap.errors import BridgeClosed, BridgeError
-from webmap.lifecycle import lifecycle
+from webmap.base.errors import BridgeClosed, BridgeError
+from webmap.base.lifecycle import lifecycle
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.definitions import Definitions
 from webmap.ros.fan_out import FanOut
@@ -28,7 +28,7 @@ from webmap.ros.subscriptions import (
     checked,
 )
 from webmap.ros.topic_faults import TopicFaults
-from webmap.scope import Removal, keep, no_scope
+from webmap.base.scope import Removal, keep, no_scope
 
 log = logging.getLogger("webmap.ros")
 

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from webmap.scope import Removal, break_off, current_scope, no_scope
+from webmap.base.scope import Removal, break_off, current_scope, no_scope
 
 log = logging.getLogger("webmap.ros")
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence, Sized
 from dataclasses import replace
 from typing import Any
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field
 
 MAX_TEXT = 10_000

@@ -15,8 +15,8 @@ from typing import Any
 
 import msgspec
 
-from webmap.errors import ProtocolError
-from webmap.nesting import MAX_DEPTH, is_too_deep
+from webmap.base.errors import ProtocolError
+from webmap.base.nesting import MAX_DEPTH, is_too_deep
 from webmap.ros.arrays import dec_hook
 
 _HALF_PAIRS = re.compile("[\ud800-\udfff]")

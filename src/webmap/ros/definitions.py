@@ -18,7 +18,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import split_type
 
 INTEGERS = {

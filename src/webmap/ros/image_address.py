@@ -4,7 +4,7 @@ import base64
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 EXAMPLE = "http://robot.local:8080/stream?topic=/camera/image_raw&type=mjpeg"
 

@@ -6,7 +6,7 @@ import ssl
 from collections.abc import Callable
 from email.message import Message
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros.backoff import Backoff
 from webmap.ros.image_address import Address
 from webmap.ros.messages_image import MAX_BYTES

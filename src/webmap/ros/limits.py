@@ -8,7 +8,7 @@ before any of them is built.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros.names import split_type
 
 MIB = 1 << 20

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.conforming import MAX_TEXT, Conformer, Misfit, expectation, seconds
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Definitions, Field, shipped
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import msgspec
 
-from webmap.errors import ProtocolError
-from webmap.geometry import FARTHEST, Pose, Quaternion, Twist, Vector3
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Pose, Quaternion, Twist, Vector3
 from webmap.ros.arrays import Floats as Floats  # public here
 from webmap.ros.arrays import Int8s as Int8s
 from webmap.ros.arrays import Numbers as Numbers
@@ -77,7 +77,7 @@ class PointMsg(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def vector(self) -> Vector3:
-        """The same numbers as a value of :mod:`webmap.geometry`."""
+        """The same numbers as a value of :mod:`webmap.base.geometry`."""
         return Vector3(self.x, self.y, self.z)
 
 
@@ -91,7 +91,7 @@ class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def quaternion(self) -> Quaternion:
-        """The same numbers as a value of :mod:`webmap.geometry`."""
+        """The same numbers as a value of :mod:`webmap.base.geometry`."""
         return Quaternion(self.x, self.y, self.z, self.w)
 
 

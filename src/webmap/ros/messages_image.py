@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 
 if TYPE_CHECKING:
     import numpy as np

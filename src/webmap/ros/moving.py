@@ -9,7 +9,7 @@ as one that docks, cannot be recognised by its name.
 import re
 from weakref import WeakValueDictionary
 
-from webmap.errors import ConfigError, MotionRefused
+from webmap.base.errors import ConfigError, MotionRefused
 from webmap.ros.names import TypeName, is_type, split_type
 
 STOP = "what STOP says"

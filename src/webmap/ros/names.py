@@ -4,7 +4,7 @@ import re
 from typing import NamedTuple
 from urllib.parse import urlsplit, urlunsplit
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 _TOPIC = re.compile(r"/(?:[A-Za-z_~][A-Za-z0-9_]*)(?:/[A-Za-z0-9_]+)*\Z")
 _TYPE = re.compile(

@@ -5,7 +5,7 @@ from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 
 LinkState: TypeAlias = Literal["new", "connecting", "open", "closed"]
 

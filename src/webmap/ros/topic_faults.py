@@ -9,12 +9,12 @@ import logging
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros.decoding import Unreadable
 from webmap.ros.limits import TooLarge
 from webmap.ros.names import is_type, same_type
 from webmap.ros.subscriptions import Topic
-from webmap.scope import no_scope
+from webmap.base.scope import no_scope
 
 log = logging.getLogger("webmap.ros")
 

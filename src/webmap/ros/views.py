@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-from webmap.errors import ConfigError, ProtocolError
+from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros import messages
 from webmap.ros.decoding import convert
 from webmap.ros.names import split_type

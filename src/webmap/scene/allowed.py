@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 
 
 def _words(text: str) -> tuple[str, ...]:

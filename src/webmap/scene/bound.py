@@ -2,7 +2,7 @@
 
 from typing import Any, Self
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 from webmap.scene.allowed import format_value
 from webmap.scene.element import Child, Element
 

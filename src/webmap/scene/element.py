@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, ClassVar, Self
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 from webmap.scene.allowed import (
     attribute_name,
     check_event,
@@ -16,7 +16,7 @@ from webmap.scene.allowed import (
 from webmap.scene.events import Event, Handler, Listener, Report, Spawn
 from webmap.scene.live import Live, MapPlace
 from webmap.scene.node import Node, Text
-from webmap.scope import Removal, current_scope, keep
+from webmap.base.scope import Removal, current_scope, keep
 
 
 class Classes:

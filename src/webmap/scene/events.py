@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from webmap.scope import Removal, Scope, no_scope
+from webmap.base.scope import Removal, Scope, no_scope
 
 if TYPE_CHECKING:
     from webmap.scene.element import Element

@@ -4,7 +4,7 @@ import itertools
 from collections import deque
 from typing import Any, NamedTuple
 
-from webmap.errors import SceneError
+from webmap.base.errors import SceneError
 from webmap.scene.element import Element
 from webmap.scene.node import Node
 

@@ -4,8 +4,8 @@ import math
 import time
 from typing import NamedTuple
 
-from webmap.errors import SceneError
-from webmap.geometry import Affine
+from webmap.base.errors import SceneError
+from webmap.base.geometry import Affine
 from webmap.scene.node import Node
 
 isfinite = math.isfinite

@@ -2,7 +2,7 @@
 
 The only room that knows the web stack, which is loaded when a program starts to serve:
 ``import webmap`` loads none of it. What a page shows and does is decided below, in
-:mod:`webmap.core` and :mod:`webmap.wire`; what moves a robot, in the gate.
+:mod:`webmap.core` and :mod:`webmap.scene.wire`; what moves a robot, in the gate.
 
 Begin with ``app``, which routes requests: ``security`` and ``access`` let them in,
 ``scene_socket`` and ``drive_socket`` serve a page's sockets, ``open_pages`` has the

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from webmap.core.page import site
 from webmap.core.runtime import runtime
-from webmap.errors import WebMapError
+from webmap.base.errors import WebMapError
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import DriveConnection

@@ -17,7 +17,7 @@ import re
 import secrets
 from collections import OrderedDict, deque
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 _SESSION = re.compile(r"([A-Za-z0-9_-]{22})\.([0-9a-f]{64})")
 # 32 bytes are 43 characters in base64 and 64 in hexadecimal.

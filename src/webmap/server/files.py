@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 from webmap.core import pictures as drawn
 from webmap.core.pictures import Pictures
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 MAX_BYTES = 64 * 1024 * 1024
 

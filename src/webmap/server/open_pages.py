@@ -16,15 +16,15 @@ from webmap.core.page import Page, PageEntry, Viewer
 from webmap.core.pictures import Publisher
 from webmap.core.refused import refusals
 from webmap.core.runtime import Runtime
-from webmap.core.tasks import begin
+from webmap.base.tasks import begin
 from webmap.core.view import Rect
-from webmap.errors import WireError
+from webmap.base.errors import WireError
 from webmap.gate.display.client import DriveConnection
-from webmap.geometry import Affine
+from webmap.base.geometry import Affine
 from webmap.scene.events import Event
-from webmap.scope import Removal
+from webmap.base.scope import Removal
 from webmap.server.page_socket import FAILED, PageSocket
-from webmap.wire.messages import (
+from webmap.scene.wire.messages import (
     ElementEvent,
     Hello,
     ModuleMessage,
@@ -33,7 +33,7 @@ from webmap.wire.messages import (
     Trouble,
     ViewReport,
 )
-from webmap.wire.session import SceneSession
+from webmap.scene.wire.session import SceneSession
 
 log = logging.getLogger("webmap.page")
 

@@ -12,7 +12,7 @@ import socket
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 WILDCARD = frozenset({"", "0.0.0.0", "::"})  # noqa: S104 - to recognise, not to bind

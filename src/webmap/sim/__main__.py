@@ -5,9 +5,9 @@ import asyncio
 import sys
 from typing import Any
 
-from webmap.errors import WebMapError
-from webmap.logs import set_up_logging
-from webmap.outside_text import one_line
+from webmap.base.errors import WebMapError
+from webmap.base.logs import set_up_logging
+from webmap.base.outside_text import one_line
 from webmap.sim.process import end_with_stdin, run_simulator
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.errors import ConfigError
-from webmap.map_file import read_map
+from webmap.base.errors import ConfigError
+from webmap.base.map_file import read_map
 
 FLOOR = Path(__file__).parent / "data" / "floor.yaml"
 """The floor plan that comes with the simulator."""

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.geometry import Pose, Quaternion
+from webmap.base.geometry import Pose, Quaternion
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.sim.maps import FloorPlan
 from webmap.sim.mounts import LASER_HEIGHT, mount
 from webmap.sim.planner import Point
 from webmap.sim.robot import Robot
 from webmap.sim.scanner import ScannerOptions
-from webmap.tf import Transform
+from webmap.ros.tf import Transform
 
 Message = dict[str, Any]
 

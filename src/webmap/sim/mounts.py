@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.geometry import Quaternion, Vector3
-from webmap.tf import Transform
+from webmap.base.geometry import Quaternion, Vector3
+from webmap.ros.tf import Transform
 
 LASER_HEIGHT = 0.2
 """Of the lasers above the floor, in metres."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from random import Random
 
-from webmap.geometry import Pose, Twist, normalize_angle
+from webmap.base.geometry import Pose, Twist, normalize_angle
 from webmap.sim.planner import Planner, Point
 from webmap.sim.robot import Robot
 

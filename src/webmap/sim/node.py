@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from webmap.geometry import Pose, Twist
+from webmap.base.geometry import Pose, Twist
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import Deliver, Graph, Respond
 from webmap.ros.rosbridge.server.quirks import Quirks

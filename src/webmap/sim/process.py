@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from webmap.children import end_with_parent
-from webmap.errors import ConfigError
-from webmap.not_listening import why_not_listening
+from webmap.base.children import end_with_parent
+from webmap.base.errors import ConfigError
+from webmap.base.not_listening import why_not_listening
 
 if TYPE_CHECKING:
     from webmap.sim.node import RobotsNode

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
 
-from webmap.geometry import Pose, Twist, normalize_angle
+from webmap.base.geometry import Pose, Twist, normalize_angle
 
 _HOLD = 0.5
 _STILL = Twist()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.sim.obstacles import Obstacles
 
 _NUDGE = 1e-6

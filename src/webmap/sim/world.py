@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from webmap.errors import ConfigError
-from webmap.geometry import Pose, Twist
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Pose, Twist
 from webmap.sim.maps import FloorPlan
 from webmap.sim.navigator import Goal, Navigator
 from webmap.sim.obstacles import Obstacles

@@ -5,7 +5,7 @@ from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 @dataclass(frozen=True, slots=True)

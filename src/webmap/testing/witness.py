@@ -11,7 +11,7 @@ from typing import Any
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
-from webmap.geometry import Pose, Twist
+from webmap.base.geometry import Pose, Twist
 from webmap.sim.robot import BaseOptions, Robot
 from webmap.testing.log import Heard, Moved, Told, WitnessLog
 from webmap.testing.loop_thread import LoopThread

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from webmap.discovery.found import Findings, FoundRobot, Guess, Role
 from webmap.discovery.naming import free_name
 from webmap.discovery.rules import VELOCITY
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.ros.names import is_type, normalise_topic
-from webmap.tf import Buffer
+from webmap.ros.tf import Buffer
 
 RULE = "as it was said"
 

@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from webmap.children import python_command
-from webmap.errors import WireError
+from webmap.base.children import python_command
+from webmap.base.errors import WireError
 from webmap.gate import framing
 from webmap.gate.messages import FromGate
-from webmap.outside_text import one_line
+from webmap.base.outside_text import one_line
 
 log = logging.getLogger("webmap.gate")
 

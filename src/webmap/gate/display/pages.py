@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import get_args
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate import messages, reports
 from webmap.gate.limits import Cap, page_cap
 from webmap.gate.messages import Role

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from websockets.exceptions import WebSocketException
 
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes.answers import answer_to
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable

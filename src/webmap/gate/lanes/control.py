@@ -8,7 +8,7 @@ from webmap.gate.events import Alive, Echoed, Event, Key, LinkDown, LinkUp
 from webmap.gate.lanes import words
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.unproven import Unproven
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 from webmap.ros.rosbridge import ops
 
 BUSY_PING = 0.05

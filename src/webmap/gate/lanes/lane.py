@@ -8,7 +8,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes.attempts import FIRST_WAIT, Attempts
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Ears, Socket, open_socket

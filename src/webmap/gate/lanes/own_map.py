@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.messages import RobotSpec
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 
 Place = TypeVar("Place", SendGoal, TellPose)
 

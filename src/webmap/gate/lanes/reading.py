@@ -7,8 +7,8 @@ exhausts its stack wherever it is gone through later.
 import json
 from typing import Any
 
-from webmap.errors import ProtocolError
-from webmap.nesting import MAX_DEPTH
+from webmap.base.errors import ProtocolError
+from webmap.base.nesting import MAX_DEPTH
 from webmap.ros.decoding import check_depth
 
 MOST_PARTS = 20_000

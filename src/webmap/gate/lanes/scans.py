@@ -9,7 +9,7 @@ before its numbers are read, and the socket takes no frame of more than a mebiby
 import re
 from typing import Any
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.gate.events import Sweep
 from webmap.gate.rules.folding import folded, too_long
 from webmap.ros.rosbridge import ops

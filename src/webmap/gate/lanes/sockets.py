@@ -25,7 +25,7 @@ from websockets.http11 import Response
 from websockets.protocol import State
 from websockets.uri import parse_uri
 
-from webmap.errors import BridgeClosed, ProtocolError
+from webmap.base.errors import BridgeClosed, ProtocolError
 from webmap.gate.clock import now
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable

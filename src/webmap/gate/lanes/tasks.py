@@ -23,7 +23,7 @@ from webmap.gate.lanes.own_map import in_own_map
 from webmap.gate.lanes.sockets import Ears, Socket
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.goals import is_move_base
-from webmap.identifiers import generate_id
+from webmap.base.identifiers import generate_id
 from webmap.ros.rosbridge import ops
 
 log = logging.getLogger("webmap.gate")

@@ -14,7 +14,7 @@ are written than may lie on the way, and what has arrived is known by two proofs
 
 from collections import deque
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 MOST = 6
 """Moving velocities that may be on their way to one robot at once.

@@ -14,7 +14,7 @@ import msgspec
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.lanes.reading import check_parts, plain, too_deep
 from webmap.gate.messages import RobotSpec
-from webmap.geometry import Quaternion, Twist
+from webmap.base.geometry import Quaternion, Twist
 from webmap.ros.names import is_type
 from webmap.ros.rosbridge import ops
 

@@ -37,7 +37,7 @@ from webmap.gate.rules.sight import Sight
 from webmap.gate.rules.speeds import Speeds
 from webmap.gate.rules.standing import StandingStop
 from webmap.gate.rules.stoptesting import StopTesting
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 OWED_PATIENCE = 60.0
 """Seconds for which a robot that was removed is kept for a zero that it is owed. After

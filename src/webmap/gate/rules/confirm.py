@@ -8,7 +8,7 @@ from webmap.gate.rules.standstill import (
     Standstill,
     moves,
 )
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 PATIENCE = 2.0
 """Seconds after STOP until "not known yet" becomes "not confirmed"."""

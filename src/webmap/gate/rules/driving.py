@@ -8,7 +8,7 @@ from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.robots import Robots
 from webmap.gate.rules.stoptest import CREEP, StopTest
 from webmap.gate.rules.stoptesting import StopTesting
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 class Driving:

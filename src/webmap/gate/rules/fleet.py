@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
 from webmap.gate.messages import (

@@ -8,7 +8,7 @@ from webmap.gate.messages import GoalReport, RobotSpec, Way
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.motion import WAIT_LIMIT
-from webmap.identifiers import generate_id
+from webmap.base.identifiers import generate_id
 from webmap.ros.names import is_type
 
 MOVE_BASE = "move_base_msgs/MoveBaseAction"

@@ -5,7 +5,7 @@ import msgspec
 from webmap.gate.events import Sweep
 from webmap.gate.rules.assist import FREE, Verdict, assist
 from webmap.gate.rules.robots import Robots
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 MIXED = 2.0
 """Seconds for which no scan of a topic counts after its frame was seen to change."""

@@ -3,7 +3,7 @@
 import math
 
 from webmap.gate.rules.standstill import Standstill, moves
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 GRACE = 1.0
 """Seconds after zero until a machine that moves on is said not to obey."""

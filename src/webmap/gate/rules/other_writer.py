@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import astuple
 from itertools import product
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 ECHOES = 2
 """How many echoes one velocity explains: two subscriptions may say it twice."""

@@ -12,7 +12,7 @@ from webmap.gate.rules.fleet import Fleet
 from webmap.gate.rules.lease import check_lease
 from webmap.gate.rules.orders import Orders
 from webmap.gate.rules.people import People
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 Vector = tuple[float, float, float]
 

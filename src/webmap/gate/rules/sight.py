@@ -3,7 +3,7 @@
 from webmap.gate.actions import Emit, Watch
 from webmap.gate.events import Key
 from webmap.gate.rules.standstill import moves
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 BLIND_LIMIT = 1.0
 """The oldest velocity that odometry told, or picture, with which a machine is driven,

@@ -1,6 +1,6 @@
 """Whether a machine stands, as its odometry tells. No I/O."""
 
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 STILL_V = 0.02
 """Metres per second below which a machine stands (S5)."""

@@ -20,7 +20,7 @@ from collections import Counter
 from typing import Literal
 
 from webmap.gate.rules.standstill import Standstill
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 CREEP = Twist(0.1)
 """How fast it creeps."""

@@ -7,7 +7,7 @@ from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.sight import Sight
 from webmap.gate.rules.standstill import moves
 from webmap.gate.rules.stoptest import StopTest
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 
 class StopTesting:

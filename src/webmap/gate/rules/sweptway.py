@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from webmap.gate.messages import Point
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 _STEP = 0.1
 """Metres, or radians of a turn, between two places on the way that are asked for."""

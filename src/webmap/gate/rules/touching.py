@@ -6,7 +6,7 @@ All is in the robot's own frame, where the robot stands and the points move.
 import math
 
 from webmap.gate.messages import Point
-from webmap.geometry import Twist
+from webmap.base.geometry import Twist
 
 _TOUCHING = 1e-9
 

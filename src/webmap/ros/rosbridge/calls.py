@@ -10,8 +10,8 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from webmap.errors import BridgeClosed, ServiceError
-from webmap.identifiers import generate_id
+from webmap.base.errors import BridgeClosed, ServiceError
+from webmap.base.identifiers import generate_id
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.connection import Lane
 from webmap.ros.rosbridge.events import Malformed, ServiceResponse, Status

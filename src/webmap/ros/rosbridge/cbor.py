@@ -5,8 +5,8 @@ from array import array
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from webmap.errors import ProtocolError
-from webmap.nesting import MAX_DEPTH
+from webmap.base.errors import ProtocolError
+from webmap.base.nesting import MAX_DEPTH
 
 # Dates, big numbers, shared references, regular expressions ... : tags that a
 # general decoder follows and that a robot has no reason to send.

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 from urllib.parse import urlsplit
 
-from webmap.errors import BridgeError
+from webmap.base.errors import BridgeError
 from webmap.ros.bridge import Bridge
 from webmap.ros.limits import MAX_FRAME
 from webmap.ros.received import ReceivedMessage

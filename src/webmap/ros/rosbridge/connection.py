@@ -10,7 +10,7 @@ from contextlib import suppress
 from math import inf
 from typing import TYPE_CHECKING
 
-from webmap.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed
 from webmap.ros.backoff import Backoff
 from webmap.ros.limits import LARGE, MAX_FRAME
 from webmap.ros.received import LinkState

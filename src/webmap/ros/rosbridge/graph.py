@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
-from webmap.errors import BridgeError, ProtocolError, ServiceError
+from webmap.base.errors import BridgeError, ProtocolError, ServiceError
 from webmap.ros.decoding import convert
 from webmap.ros.definitions import Definitions
 from webmap.ros.messages import Time

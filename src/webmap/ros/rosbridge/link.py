@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from webmap.errors import BridgeClosed, BridgeError, ProtocolError
-from webmap.identifiers import generate_id
-from webmap.outside_text import one_line
+from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.base.identifiers import generate_id
+from webmap.base.outside_text import one_line
 from webmap.ros.definitions import Definitions
 from webmap.ros.names import split_type
 from webmap.ros.received import BridgeStats, ReceivedMessage

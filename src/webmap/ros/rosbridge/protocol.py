@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.errors import ProtocolError
+from webmap.base.errors import ProtocolError
 from webmap.ros.decoding import check_depth, convert, decode_json
 from webmap.ros.limits import LARGE, MAX_FRAME, MIB
 from webmap.ros.rosbridge import cbor

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.geometry import Pose, normalize_angle
+from webmap.base.geometry import Pose, normalize_angle
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.messages import Message, pose, read_pose

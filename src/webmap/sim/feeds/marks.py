@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, Any
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.messages import Message, pose
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.messages import Message, float32, vector
 from webmap.sim.obstacles import Obstacles

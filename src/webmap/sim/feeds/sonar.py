@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from webmap.geometry import Pose
+from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.messages import Message, float32
 from webmap.sim.scanner import cast_rays, shade

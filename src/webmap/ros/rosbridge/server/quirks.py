@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields, replace
 
-from webmap.errors import ConfigError
+from webmap.base.errors import ConfigError
 
 
 @dataclass(frozen=True, slots=True)

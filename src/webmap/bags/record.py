@@ -1,0 +1,191 @@
+"""One recording from its first question to its last word."""
+
+import asyncio
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import click
+
+from webmap.bags.bag_file import new_bag
+from webmap.bags.listening import Listening
+from webmap.bags.recorder import Recorder
+from webmap.bags.types import Types
+from webmap.base.echo import echo
+from webmap.ros.asking import ask_topics
+from webmap.base.errors import BridgeError, ConfigError, ServiceError
+from webmap.ros.bridge import Bridge
+from webmap.ros.names import split_type
+from webmap.ros.rosbridge.server.dialect import DialectName
+from webmap.sim.process import signals_set
+
+EVERY = 10.0
+"""Seconds between two words of how it goes where they cannot replace each other."""
+
+
+def told_types(
+    names: Sequence[str], types: Sequence[str], topics: Mapping[str, str] | None
+) -> dict[str, str] | None:
+    """Return the types that a person said, by topic; None if nobody said any.
+
+    Args:
+        names: The topics of ``--topic``.
+        types: The types of ``--type``.
+        topics: What ``--topics`` lists.
+
+    Raises:
+        UsageError: If there are not as many types as topics, or something is no type.
+
+    """
+    if not types:
+        return None if topics is None else dict(topics)
+    if len(types) != len(names):
+        raise click.UsageError(
+            f"--type says the type of each --topic, in their order: got {len(types)} "
+            f"types for {len(names)} topics"
+        )
+    for name in types:
+        split_type(name)
+    return {**(topics or {}), **dict(zip(names, types, strict=True))}
+
+
+async def record_to(
+    url: str,
+    out: Path | None,
+    *,
+    only: Sequence[str],
+    told: Mapping[str, str] | None,
+    wait: float,
+    duration: float | None,
+) -> bool:
+    """Record until a signal or for a time; return whether the file failed.
+
+    Args:
+        url: The bridge's address.
+        out: The bag; None for a name with the time in it.
+        only: The topics that are wanted; all if there are none.
+        told: Types by topic, where the bridge cannot be asked for them.
+        wait: How long to wait for a bridge that cannot be reached, in seconds.
+        duration: How long to record at most, in seconds.
+
+    Raises:
+        BridgeError: If the bridge cannot be reached.
+        ConfigError: If there is nothing to record, or nowhere to record to.
+        OSError: If the bag cannot be made.
+
+    """
+    topics = await _topics(url, told, wait)
+    dialect = _dialect(topics)
+    if out is None:
+        out = Path(time.strftime("webmap-%Y-%m-%d-%H-%M-%S"))
+    bag = new_bag(out, dialect)
+    failure: OSError | None = None
+    lasted = 0.0
+    line = ProgressLine()
+    recorder = Recorder(bag, Types(dialect), line.say)
+    try:
+        listening = Listening(Bridge(url), recorder, only=only, told=told, say=line.say)
+        stop = asyncio.Event()
+
+        def ready() -> None:
+            echo(f"Recording {url} to {bag.path}")
+            if listening.missing:
+                line.say(f"Waiting for: {', '.join(listening.missing)}")
+
+        with signals_set(stop):
+            lasted = await listening.run(
+                topics,
+                stop,
+                duration=duration,
+                ready=ready,
+                show=lambda seconds: line.show(seconds, recorder),
+            )
+    except OSError as error:
+        failure = error
+    finally:
+        try:
+            bag.close()
+        except OSError as error:
+            failure = failure or error
+    if failure is not None:
+        line.say(f"Error: {bag.path} cannot be written: {failure}")
+    line.say(
+        f"Recorded {recorder.messages} messages of {recorder.topics} topics in "
+        f"{lasted:.1f} s to {bag.path}: {megabytes(recorder)}, "
+        f"{recorder.dropped} dropped"
+    )
+    return failure is not None
+
+
+class ProgressLine:
+    """How a recording goes, on standard error: one line that is written anew.
+
+    Where standard error is no terminal, it is a line now and then.
+    """
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._shown = 0
+        self._next = EVERY
+
+    def show(self, seconds: float, recorder: Recorder) -> None:
+        """Say how it goes.
+
+        Args:
+            seconds: For how long it has gone on.
+            recorder: What was recorded.
+
+        """
+        text = (
+            f"{seconds:.0f} s, {recorder.messages} messages, {megabytes(recorder)}, "
+            f"{recorder.dropped} dropped"
+        )
+        if self._terminal:
+            click.echo(f"\r{text.ljust(self._shown)}", err=True, nl=False)
+            self._shown = len(text)
+        elif seconds >= self._next:
+            self._next += EVERY
+            echo(text, err=True)
+
+    def say(self, text: str) -> None:
+        """Say something else, on a line of its own."""
+        if self._shown:
+            echo("", err=True)
+        echo(text, err=True)
+        self._shown = 0
+
+
+def megabytes(recorder: Recorder) -> str:
+    """Return how much was recorded, for people."""
+    return f"{recorder.size / 1e6:.1f} MB"
+
+
+async def _topics(
+    url: str, told: Mapping[str, str] | None, wait: float
+) -> dict[str, str]:
+    if told is not None:
+        return dict(told)
+
+    def waiting(why: str) -> None:
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+
+    try:
+        return await ask_topics(url, wait=wait, waiting=waiting)
+    except ServiceError as error:
+        raise BridgeError(
+            f"{url} has no rosapi that says its topics ({error}): name them with "
+            f"--topic and --type, or list them with --topics"
+        ) from None
+
+
+def _dialect(topics: Mapping[str, str]) -> DialectName:
+    slashes = {type_name.count("/") for type_name in topics.values()}
+    if 2 in slashes:
+        return "ros2"
+    if 1 in slashes:
+        return "ros1"
+    raise ConfigError(
+        "there are no topics, so nobody knows which ROS it is and there is nothing to "
+        "record"
+    )

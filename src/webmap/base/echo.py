@@ -1,0 +1,20 @@
+"""What commands print: names and texts of robots must not steer the terminal."""
+
+import click
+
+from webmap.base.outside_text import lines_of, one_line
+
+LONGEST = 10_000
+"""Characters of a line that is printed; a list of topics may be long."""
+
+
+def echo(text: object, *, err: bool = False, lines: bool = False) -> None:
+    """Print a text and a line break; what is not printable is escaped.
+
+    Args:
+        text: The text.
+        err: Whether it goes to standard error.
+        lines: Whether line breaks in it are WebMap's own, and are kept.
+
+    """
+    click.echo((lines_of if lines else one_line)(text, LONGEST), err=err)

@@ -1,0 +1,281 @@
+"""Maps from disk, in the form of ROS's map_server: a YAML file and an image."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import FARTHEST, Pose
+from webmap.base.lined_yaml import LinedYaml
+from webmap.base.plain_files import resolved
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+    from PIL import Image
+
+MAX_YAML = 1 << 14
+"""Bytes of the YAML; a map's own has 200, and reading much of it takes long."""
+
+MAX_PIXELS = 1 << 26
+
+MAX_DECODED = 128 << 20
+"""Bytes of the decoded image; it is decoded as a whole."""
+
+PIECE = 1024
+"""Side of the squares that are made cells at a time, some twenty bytes a pixel."""
+
+_PIXEL = {"1": 1, "L": 1, "P": 1, "I;16": 2, "I;16B": 2, "I;16L": 2}
+"""Bytes of a decoded pixel, by the mode of the image; 4 in other modes."""
+
+FINEST = 1e-4
+"""The least side of a cell, in metres: less is a number in another unit."""
+
+FORMATS = ("PPM", "PNG", "BMP", "JPEG")
+"""What map_server reads, by its magic bytes; PPM includes PGM."""
+
+MAGIC = (b"P", b"\x89PNG", b"BM", b"\xff\xd8")
+"""How files of these formats begin."""
+
+MODES = ("trinary", "scale", "raw")
+TRUTH = {"0": False, "1": True, "false": False, "true": True}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapImage:
+    """A map as ``nav_msgs/OccupancyGrid`` has it."""
+
+    cells: "NDArray[np.int8]"
+    """Of shape (height, width), the lowest row first: 0 to 100, or -1 unknown."""
+
+    resolution: float
+    """The side of a cell, in metres."""
+
+    origin: Pose
+    """The pose of the lower left corner of the first cell."""
+
+    image: Path
+    """The image that it was read from."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Settings:
+    image: Path
+    resolution: float
+    origin: Pose
+    negate: bool
+    occupied: float
+    free: float
+    mode: str
+
+
+def read_map(file: Path) -> MapImage:
+    """Read a map.
+
+    Args:
+        file: The YAML file; its image lies in the same folder or below.
+
+    Raises:
+        ConfigError: If a file cannot be read or makes no sense; it is named, with
+            what was got and what was expected.
+
+    """
+    settings = _settings(file)
+    # An image has its first row at the top, a grid at the bottom.
+    cells = _read_image(file, settings)[::-1]
+    side = max(cells.shape) * settings.resolution
+    if side > FARTHEST:
+        raise ConfigError(
+            f"{file}: a map has sides of {FARTHEST:g} m at the most, got {side:g} m: "
+            f"{max(cells.shape)} cells of {settings.resolution:g} m"
+        )
+    return MapImage(cells, settings.resolution, settings.origin, settings.image)
+
+
+def _settings(file: Path) -> _Settings:
+    size = file.stat().st_size if file.is_file() else 0
+    if size > MAX_YAML:
+        raise ConfigError(
+            f"{file}: {size} bytes are no map's YAML, which has {MAX_YAML} at the most"
+        )
+    said = LinedYaml(file, texts=True)
+    table = said.data
+    if not isinstance(table, dict):
+        got = "a list" if isinstance(table, list) else repr(table)[:60]
+        raise said.wrong(
+            (),
+            "needs image, resolution and origin, each as a line KEY: VALUE, got "
+            + ("nothing" if table is None else got),
+        )
+    resolution = _number(said, table.get("resolution"), ("resolution",))
+    if resolution <= 0:
+        raise said.wrong(
+            ("resolution",), f"resolution must be above 0, got {resolution}"
+        )
+    if resolution < FINEST:
+        raise said.wrong(
+            ("resolution",),
+            f"resolution must be {FINEST:g} m a cell at the least, got {resolution:g}",
+        )
+    origin = table.get("origin")
+    if not isinstance(origin, list) or len(origin) != 3:
+        raise said.wrong(("origin",), f"origin must be [x, y, yaw], got {origin!r}")
+    x, y, yaw = (
+        _number(said, part, ("origin", place)) for place, part in enumerate(origin)
+    )
+    if max(abs(x), abs(y)) > FARTHEST:
+        raise said.wrong(
+            ("origin",),
+            f"origin must be within {FARTHEST:g} m, got ({x:g}, {y:g})",
+        )
+    negate = TRUTH.get(str(table.get("negate", "0")).lower())
+    if negate is None:
+        raise said.wrong(("negate",), f"negate must be 0 or 1, got {table['negate']!r}")
+    occupied = _number(said, table.get("occupied_thresh"), ("occupied_thresh",), "0.65")
+    free = _number(said, table.get("free_thresh"), ("free_thresh",), "0.196")
+    if not 0 <= free < occupied <= 1:
+        raise said.wrong(
+            ("free_thresh",),
+            f"needs 0 <= free_thresh < occupied_thresh <= 1, got {free} and {occupied}",
+        )
+    mode = table.get("mode", "trinary")
+    if mode not in MODES:
+        raise said.wrong(("mode",), f"mode must be {', '.join(MODES)}, got {mode!r}")
+    image = _image_path(said, table.get("image"))
+    pose = Pose(x, y, yaw)
+    return _Settings(image, resolution, pose, negate, occupied, free, mode)
+
+
+def _number(
+    said: LinedYaml, value: object, way: tuple[str | int, ...], default: str = ""
+) -> float:
+    text = default if value is None and default else value
+    try:
+        number = float(text) if isinstance(text, str) else math.nan
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise said.wrong(way, f"{way[0]} must be a finite number, got {text!r}")
+    return number
+
+
+def _image_path(said: LinedYaml, name: object) -> Path:
+    way = ("image",)
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise said.wrong(way, f"image must be the name of a file, got {name!r}")
+    try:
+        folder = resolved(said.file).parent
+        image = resolved(folder / name)
+    except ConfigError as error:
+        raise said.wrong(way, str(error)) from None
+    if Path(name).is_absolute() or not image.is_relative_to(folder):
+        raise said.wrong(
+            way,
+            f"the image {name!r} is not in the folder of the YAML file; put it there "
+            "and write its bare name",
+        )
+    # A pipe or a device would be waited for, or read without an end.
+    if not image.is_file():
+        raise said.wrong(way, f"there is no image file {name!r}")
+    return image
+
+
+def _read_image(file: Path, settings: _Settings) -> "NDArray[np.int8]":
+    """Return the cells of an image, the upper row first."""
+    from PIL import Image, UnidentifiedImageError
+
+    too_many = (Image.DecompressionBombError, Image.DecompressionBombWarning)
+    begins = b""
+    try:
+        with settings.image.open("rb") as stream:
+            begins = stream.read(8)
+        with Image.open(settings.image, formats=FORMATS) as opened:
+            if opened.width * opened.height > MAX_PIXELS:
+                raise ConfigError(
+                    f"{file}: the image has {opened.width} x {opened.height} pixels; "
+                    f"{MAX_PIXELS} in all are the limit"
+                )
+            size = opened.width * opened.height * _PIXEL.get(opened.mode, 4)
+            if size > MAX_DECODED:
+                raise ConfigError(
+                    f"{file}: the image has {opened.width} x {opened.height} pixels, "
+                    f"which take {size >> 20} MiB decoded; {MAX_DECODED >> 20} MiB are "
+                    "the limit: save it in grey, with a byte a pixel"
+                )
+            return _cells_of(opened, settings)
+    except too_many as error:
+        raise ConfigError(f"{file}: the image is too large: {error}") from error
+    except UnidentifiedImageError as error:
+        raise ConfigError(
+            f"{file}: the image must be PGM, PNG, BMP or JPEG, got {_kind(begins)}"
+        ) from error
+    except (OSError, ValueError, SyntaxError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(f"{file}: the image cannot be read: {error}") from error
+
+
+def _cells_of(image: "Image.Image", settings: _Settings) -> "NDArray[np.int8]":
+    """Return the cells of an image, looking at a piece at a time."""
+    import numpy as np
+
+    width, height = image.size
+    cells = np.empty((height, width), np.int8)
+    for top in range(0, height, PIECE):
+        for left in range(0, width, PIECE):
+            right, below = min(width, left + PIECE), min(height, top + PIECE)
+            light = _light(image.crop((left, top, right, below)), settings.mode)
+            cells[top:below, left:right] = _cells(light, settings)
+    return cells
+
+
+def _light(image: "Image.Image", mode: str) -> "NDArray[np.float32]":
+    """Return how light each pixel is, 0 to 1, the upper row first.
+
+    As map_server has it, colours count by their mean. What an alpha channel means
+    hangs on the mode: in ``trinary`` it is one more colour, in ``scale`` whatever is
+    not opaque is unknown, here NaN, and in ``raw`` it is nothing.
+    """
+    import numpy as np
+
+    has_alpha = image.has_transparency_data
+    if image.mode.startswith("I"):
+        return np.asarray(np.asarray(image) / 65535, np.float32)
+    if image.mode == "L" and not has_alpha:
+        return np.asarray(image, np.float32) / np.float32(255)
+    pixels = np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
+    counted = pixels if mode == "trinary" else pixels[..., :3]
+    light: NDArray[np.float32] = counted.mean(axis=2, dtype=np.float32) / 255
+    if has_alpha and mode == "scale":
+        light[pixels[..., 3] < 255] = np.nan
+    return light
+
+
+def _kind(begins: bytes) -> str:
+    """Return what a file is that is no image, by its first bytes."""
+    if not begins:
+        return "an empty file"
+    further = " and makes no sense further on" if begins.startswith(MAGIC) else ""
+    return f"one that begins with {begins!r}{further}"
+
+
+def _cells(light: "NDArray[np.float32]", settings: _Settings) -> "NDArray[np.int8]":
+    import numpy as np
+
+    if settings.mode == "raw":
+        values = np.rint(light * 255)
+        values[values > 100] = -1
+        return values.astype(np.int8)
+    clear = np.isnan(light)
+    light = np.nan_to_num(light)
+    chance = light if settings.negate else 1 - light
+    low, high = settings.free, settings.occupied
+    cells = np.full(light.shape, -1, np.int8)
+    if settings.mode == "scale":
+        between = np.rint(99 * (chance - low) / (high - low)).clip(1, 99)
+        cells[:] = between.astype(np.int8)
+    cells[chance > high] = 100
+    cells[chance < low] = 0
+    cells[clear] = -1
+    return cells

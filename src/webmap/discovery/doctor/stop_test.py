@@ -1,0 +1,260 @@
+"""``webmap doctor URL --stop-test ROBOT``: does the base stop by itself?
+
+The command is one more hand at the gate: it holds the robot's lease and says 20 times a
+second that every input is released. What moves the robot, measures it and keeps the
+result is the gate's own stop test, as behind the button on a robot's card.
+"""
+
+import asyncio
+import json
+import queue
+import time
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, Literal, TypeAlias
+
+import click
+
+from webmap.base.echo import echo
+from webmap.discovery import FoundRobot, discover
+from webmap.ros.asking import ask_topics
+from webmap.discovery.robots import host_name
+from webmap.base.errors import BridgeError, ConfigError
+from webmap.gate.display.client import GateClient
+from webmap.gate.messages import RobotSpec
+from webmap.gate.rules.stoptest import MOVES_ON
+from webmap.base.outside_text import escaped
+from webmap.ros.names import normalise_url
+
+PERIOD = 0.05
+"""Seconds between two signs of life of the hand."""
+
+AGAIN = 1.0
+"""Seconds after which something that was asked for is asked for again."""
+
+PATIENCE = 10.0
+"""Seconds that the gate, the robot and its odometry are waited for at each stage."""
+
+ROBOT = "r1"
+STOPS, GOES_ON, UNKNOWN = 0, 1, 2
+
+Words: TypeAlias = dict[str, Any]
+
+
+class Hand:
+    """What is said to the gate and to the person, stage by stage. No I/O.
+
+    Args:
+        now: The time in seconds.
+
+    """
+
+    def __init__(self, now: float) -> None:
+        self.stage: Literal["coming", "ready", "taking", "testing", "over"] = "coming"
+        self.code = UNKNOWN
+        """The exit status, once it is over."""
+        self.news: list[str] = []
+        """Sentences for the person, the newest last."""
+        self._why = "the gate has not answered"
+        self._since = now
+        self._asked_at = float("-inf")
+        self._report: Words | None = None
+        self._tick: int | None = None
+        self._seq = 0
+
+    def hear(self, words: Words, now: float) -> None:
+        """Take in what the gate says."""
+        match words["op"]:
+            case "tick":
+                self._tick = words["tick"]
+            case "hello" if self._report is not None:
+                self._end("the gate was started anew meanwhile")
+            case "refused" if words["what"] == "lease" and self.stage != "coming":
+                self._end(words["why"])
+            case "refused":
+                self._why = words["why"]
+            case "robot":
+                self._hear_robot(words, now)
+
+    def begin(self, now: float) -> None:
+        """The person agrees."""
+        if self.stage == "ready":
+            self._go_on("taking", now)
+
+    def step(self, now: float) -> list[Words]:
+        """Return what is to be said to the gate now."""
+        if now - self._since > PATIENCE and self.stage not in ("ready", "over"):
+            self._end(self._why)
+        report = self._report
+        if self.stage not in ("taking", "testing") or report is None:
+            return []
+        if not report["mine"]:
+            return [{"op": "take", "robot": ROBOT}] if self._may_ask(now) else []
+        said: list[Words] = []
+        if self._tick is not None:
+            said.append(self._released(report["epoch"], self._tick))
+        if self.stage == "taking" and report["armed"] and self._may_ask(now):
+            said.append({"op": "stop-test", "robot": ROBOT})
+        return said
+
+    def _released(self, epoch: int, tick: int) -> Words:
+        self._seq += 1
+        axes = {"x": 0.0, "y": 0.0, "turn": 0.0}
+        state = {"epoch": epoch, "seq": self._seq, "tick": tick, **axes}
+        return {"op": "drive", "robot": ROBOT, **state}
+
+    def _hear_robot(self, report: Words, now: float) -> None:
+        before, self._report = self._report, report
+        if self.stage == "coming" and report["armable"]:
+            self._go_on("ready", now)
+        elif report["latched"] and self.stage != "over":
+            self._end(report["reason"] or "STOP stands")
+        elif self.stage in ("coming", "taking") and not report["mine"]:
+            self._why = report["reason"] or self._why
+        test = report["test"]
+        if test is None or self.stage not in ("taking", "testing"):
+            return
+        if self.stage == "taking":
+            self._go_on("testing", now)
+            self._why = "the gate did not keep the result"
+        if before is None or test != before["test"]:
+            self.news.append(test["text"])
+        concluded = test["state"] == "done" or test["text"] == MOVES_ON
+        if test["state"] == "failed" and not concluded:
+            self._end(test["text"])
+        elif concluded and _is_result(report, test["text"]):
+            self._conclude(report)
+
+    def _conclude(self, report: Words) -> None:
+        seconds, day = report["stop_time"], report["stop_date"]
+        self.stage = "over"
+        if seconds is None:
+            self.code = GOES_ON
+            self.news.append(
+                f"Result of {day}: it does NOT stop by itself, so it is driven at 0.3 "
+                "m/s at most. Set a timeout of its own on the robot."
+            )
+        else:
+            self.code = STOPS
+            self.news.append(f"Result of {day}: it stops by itself in {seconds:.2f} s.")
+
+    def _may_ask(self, now: float) -> bool:
+        if now < self._asked_at + AGAIN:
+            return False
+        self._asked_at = now
+        return True
+
+    def _go_on(self, stage: Literal["ready", "taking", "testing"], now: float) -> None:
+        self.stage, self._since, self._asked_at = stage, now, float("-inf")
+
+    def _end(self, why: str) -> None:
+        if self.stage != "over":
+            self.stage = "over"
+            self.news.append(f"Nothing was found out: {why}.")
+
+
+def _is_result(report: Words, text: str) -> bool:
+    """Return whether a report tells of this test already, not of the one before."""
+    today = datetime.now().astimezone().date().isoformat()
+    if report["stop_source"] != "tested" or report["stop_date"] != today:
+        return False
+    seconds = report["stop_time"]
+    return (text == MOVES_ON) if seconds is None else f"after {seconds:.2f} s" in text
+
+
+def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
+    """Test whether a robot stops by itself, and return the exit status.
+
+    Args:
+        urls: The address of the robot's rosbridge, and none besides.
+        name: The robot as ``webmap discover`` calls it.
+        wait: How long to wait for a rosbridge that cannot be reached, in seconds.
+        yes: Whether nobody is asked.
+
+    Returns:
+        0 if it stops by itself, 1 if it does not, 2 if that was not found out.
+
+    Raises:
+        click.UsageError: If there is more than one address.
+
+    """
+    if len(urls) > 1:
+        raise click.UsageError(f"--stop-test takes one URL, got {len(urls)}")
+    try:
+        url = normalise_url(urls[0])
+        found = discover(asyncio.run(_topics(url, wait)), host_name(url))
+        spec = _spec(url, name, found.robots)
+    except (BridgeError, ConfigError) as error:
+        echo(f"Nothing was found out: {error}", err=True)
+        return UNKNOWN
+    except KeyboardInterrupt:
+        echo("Ended before anything was found out; nothing was moved.")
+        return UNKNOWN
+    client = GateClient()
+    client.declare(spec)
+    try:
+        client.start()
+        return _lead(client, spec, yes)
+    except (KeyboardInterrupt, click.Abort):
+        echo("Ended before anything was found out; the robot is stopped.")
+        return UNKNOWN
+    finally:
+        client.stop()
+
+
+async def _topics(url: str, wait: float) -> dict[str, str]:
+    def waiting(why: str) -> None:
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+
+    return await ask_topics(url, wait=wait, waiting=waiting)
+
+
+def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
+    """Return the robot as the gate takes it, without a word on how it stops."""
+    robot = next((one for one in robots if one.name == name), None)
+    if robot is None:
+        there = ", ".join(one.name for one in robots) or "no robot at all"
+        raise ConfigError(f"no robot {name!r} behind {url}; there is: {there}")
+    velocity, odometry = robot.first("velocity"), robot.first("odometry")
+    if velocity is None or odometry is None:
+        missing = "velocity topic" if velocity is None else "odometry"
+        raise ConfigError(f"robot {name!r} has no {missing}, so it cannot be tested")
+    return RobotSpec(
+        id=ROBOT,
+        name=name,
+        bridge_url=url,
+        twist_topic=velocity.topic,
+        twist_type=velocity.type,
+        odometry_topic=odometry.topic,
+        odometry_type=odometry.type,
+    )
+
+
+def _lead(client: GateClient, spec: RobotSpec, yes: bool) -> int:
+    """Lead the hand from stage to stage, at 20 Hz."""
+    hand = Hand(time.monotonic())
+    heard: queue.SimpleQueue[str] = queue.SimpleQueue()
+    connection = client.connect("webmap doctor", "operator", heard.put, echo)
+    while hand.stage != "over":
+        time.sleep(PERIOD)
+        while not heard.empty():
+            hand.hear(json.loads(heard.get()), time.monotonic())
+        if hand.stage == "ready":
+            if not yes and not _agrees(spec):
+                echo("Nothing was moved.")
+                return UNKNOWN
+            hand.begin(time.monotonic())
+        for words in hand.step(time.monotonic()):
+            connection.receive(json.dumps(words))
+        for text in hand.news:
+            echo(f"{spec.name}: {text}")
+        hand.news.clear()
+    return hand.code
+
+
+def _agrees(spec: RobotSpec) -> bool:
+    return click.confirm(
+        f"{escaped(spec.name)} ({escaped(spec.twist_topic or '')}) will creep forward "
+        "at 0.1 m/s for up to 5 s. Is half a metre free in front of it?",
+        default=False,
+    )

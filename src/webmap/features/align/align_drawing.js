@@ -1,0 +1,227 @@
+import { apply, multiply, unapply } from "../../web/view.js";
+import { svg } from "../../web/tools/elements.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/view.js').Matrix} Matrix */
+/** @typedef {import('../../web/view.js').Point} Point */
+
+/** Pixels from the robot to the handle that turns. */
+const REACH = 84;
+
+let names = 0;
+
+/** The shadow of what is aligned, where it would be, and the handle that turns it. */
+export class AlignDrawing {
+  /** @param {MapCanvas} map */
+  constructor(map) {
+    this._map = map;
+    /** @type {Element[]} Those that were given a name to be shown twice. */
+    this._named = [];
+    /** What it is turned about, on the common map. @type {Point | null} */
+    this.pivot = null;
+    this._shadow = svg("g", { class: "webmap-align-shadow", "aria-hidden": "true" });
+    this._arm = svg("path", { class: "webmap-align-arm", "aria-hidden": "true" });
+    /** Turns by a drag; takes the keys. */
+    this.handle = svg(
+      "g",
+      {
+        class: "webmap-align-handle",
+        tabindex: "0",
+        role: "slider",
+        "aria-label": "Alignment: arrow keys move, q and e turn, Enter saves",
+        "aria-valuemin": "-180",
+        "aria-valuemax": "180",
+      },
+      svg("circle", { class: "webmap-align-reach", r: "22" }),
+      svg("circle", { class: "webmap-align-knob", r: "13" }),
+      svg("path", { class: "webmap-align-sign", d: "M-6 2a6 6 0 1 0 2-6M-7-7l3 3-3 3" }),
+    );
+    this.element = svg(
+      "svg",
+      { class: "webmap-align-drawing", hidden: "" },
+      this._arm,
+      this.handle,
+    );
+  }
+
+  /**
+   * @param {string[]} robots Who is aligned.
+   * @param {string | null} mark What the layers that go along have as `data-bridge`;
+   *   those that are a robot's own go along with that.
+   */
+  show(robots, mark) {
+    this._unname();
+    const robot = (/** @type {string} */ id) =>
+      `.robot[data-robot="${CSS.escape(id)}"], [data-layer-of="${CSS.escape(id)}"]`;
+    const wanted = [
+      ...(mark === null ? [] : [`[data-bridge="${CSS.escape(mark)}"]`]),
+      ...robots.map(robot),
+    ];
+    const found = wanted.flatMap((one) => [...this._map.world.querySelectorAll(one)]);
+    this._shadow.replaceChildren(...found.map((element) => this._twice(element)));
+    // Within the map's own `<svg>`, as its styles tell how large things are drawn.
+    this._map.overlay.append(this._shadow);
+    this.element.removeAttribute("hidden");
+  }
+
+  hide() {
+    this._unname();
+    this._shadow.replaceChildren();
+    this._shadow.remove();
+    this.element.setAttribute("hidden", "");
+    this.pivot = null;
+  }
+
+  /**
+   * @param {string} robot What it is turned about.
+   * @param {Alignment} before
+   * @param {Alignment} now
+   */
+  draw(robot, before, now) {
+    const there = between(before, now);
+    const onScreen = multiply(this._map.view, there);
+    this._shadow.setAttribute("transform", text(onScreen));
+    const at = this._placeOf(robot) ?? before;
+    this.pivot = this._inSight(apply(there, at.x, at.y));
+    const turn = matrixOf({ x: 0, y: 0, angle: now.angle - before.angle });
+    const up = apply(turn, 0, 1);
+    const center = apply(this._map.view, this.pivot.x, this.pivot.y);
+    const tip = apply(this._map.view, this.pivot.x + up.x, this.pivot.y + up.y);
+    const far = Math.hypot(tip.x - center.x, tip.y - center.y);
+    const x = center.x + ((tip.x - center.x) * REACH) / far;
+    const y = center.y + ((tip.y - center.y) * REACH) / far;
+    this._arm.setAttribute("d", `M${center.x} ${center.y}L${x} ${y}`);
+    this.handle.setAttribute("transform", `translate(${x} ${y})`);
+    this.handle.setAttribute("aria-valuenow", String(now.angle));
+    this.handle.setAttribute(
+      "aria-valuetext",
+      `x ${now.x} metres, y ${now.y} metres, turned by ${now.angle} degrees`,
+    );
+  }
+
+  /**
+   * @param {Point} place On the common map.
+   * @returns {Point} The same, or the middle of what is seen, so that the handle is.
+   */
+  _inSight(place) {
+    const { width, height, view } = this._map;
+    const { x, y } = apply(view, place.x, place.y);
+    const seen = x >= 0 && y >= 0 && x <= width && y <= height;
+    return seen ? place : unapply(view, width / 2, height / 2);
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {Point | null} Where the map shows it.
+   */
+  _placeOf(robot) {
+    const { world } = this._map;
+    const element = world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
+    const onMap = element instanceof SVGGraphicsElement ? element.getCTM() : null;
+    const matrix = onMap && world.getCTM()?.inverse().multiply(onMap);
+    return matrix ? { x: matrix.e, y: matrix.f } : null;
+  }
+
+  /**
+   * @param {Element} element
+   * @returns {SVGUseElement} The same, which goes on changing as it does.
+   */
+  _twice(element) {
+    if (!element.id) {
+      element.id = `webmap-align-${++names}`;
+      this._named.push(element);
+    }
+    return svg("use", { href: `#${element.id}` });
+  }
+
+  _unname() {
+    for (const element of this._named.splice(0)) element.removeAttribute("id");
+  }
+}
+
+/** @param {Matrix} matrix */
+function text({ a, b, c, d, e, f }) {
+  return `matrix(${a} ${b} ${c} ${d} ${e} ${f})`;
+}
+
+/**
+ * Where a map lies on the common one: metres, metres, and degrees counter-clockwise, as
+ * fleet files have it.
+ *
+ * @typedef {{x: number, y: number, angle: number}} Alignment
+ */
+
+
+/**
+ * @param {Alignment} alignment
+ * @returns {Matrix} What takes points of the map to the common one.
+ */
+export function matrixOf({ x, y, angle }) {
+  const yaw = (angle * Math.PI) / 180;
+  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+  return { a: cos, b: sin, c: -sin, d: cos, e: x, f: y };
+}
+
+/**
+ * @param {Alignment} before
+ * @param {Alignment} now
+ * @returns {Matrix} What takes everything from where it is to where it will be.
+ */
+export function between(before, now) {
+  const turn = matrixOf({ x: 0, y: 0, angle: now.angle - before.angle });
+  const { a, b, c, d } = turn;
+  return {
+    ...turn,
+    e: now.x - a * before.x - c * before.y,
+    f: now.y - b * before.x - d * before.y,
+  };
+}
+
+/**
+ * @param {Alignment} alignment
+ * @param {number} dx Metres along the common map's x.
+ * @param {number} dy
+ * @returns {Alignment}
+ */
+export function moved(alignment, dx, dy) {
+  return { ...alignment, x: alignment.x + dx, y: alignment.y + dy };
+}
+
+/**
+ * Turn about a point that stays where it is.
+ *
+ * @param {Alignment} alignment
+ * @param {number} degrees Counter-clockwise.
+ * @param {Point} about On the common map.
+ * @returns {Alignment}
+ */
+export function turned(alignment, degrees, about) {
+  const { a, b, c, d } = matrixOf({ x: 0, y: 0, angle: degrees });
+  const [dx, dy] = [alignment.x - about.x, alignment.y - about.y];
+  return {
+    x: about.x + a * dx + c * dy,
+    y: about.y + b * dx + d * dy,
+    angle: normal(alignment.angle + degrees),
+  };
+}
+
+/**
+ * @param {number} degrees
+ * @returns {number} The same direction, above -180 and up to 180.
+ */
+export function normal(degrees) {
+  const rest = ((degrees % 360) + 360) % 360;
+  return rest > 180 ? rest - 360 : rest;
+}
+
+/**
+ * @param {Alignment} alignment
+ * @returns {Alignment} To the millimetre and the hundredth of a degree, as it is saved.
+ */
+export function rounded({ x, y, angle }) {
+  return {
+    x: Math.round(x * 1000) / 1000 + 0,
+    y: Math.round(y * 1000) / 1000 + 0,
+    angle: Math.round(normal(angle) * 100) / 100 + 0,
+  };
+}

@@ -1,0 +1,173 @@
+import { button, html, say } from "../../web/tools/elements.js";
+
+/** @typedef {import('./align_drawing.js').Alignment} Alignment */
+/** @typedef {import('./align_tool.js').Subject} Subject */
+
+/**
+ * What the panel asks for.
+ *
+ * @typedef {object} Wishes
+ * @property {() => void} toggle
+ * @property {(whole: boolean) => void} choose Whether all of the bridge is aligned.
+ * @property {(now: Alignment) => void} type Numbers were typed.
+ * @property {() => void} save
+ * @property {() => void} cancel
+ */
+
+/** @typedef {'x' | 'y' | 'angle'} Field */
+
+/** @type {readonly [Field, string, string][]} */
+const FIELDS = [
+  ["x", "x in m", "0.01"],
+  ["y", "y in m", "0.01"],
+  ["angle", "angle in °", "0.1"],
+];
+
+/** The button that begins, and what is said and typed while a map is aligned. */
+export class AlignPanel {
+  /** @param {Wishes} wishes */
+  constructor(wishes) {
+    this._wishes = wishes;
+    this._go = button("webmap-align-go", "Align maps", () => wishes.toggle());
+    this._what = html("select", "webmap-align-what", { "aria-label": "What is aligned" });
+    this._what.addEventListener("change", () => wishes.choose(this._what.value === "whole"));
+    /** @type {Map<Field, HTMLInputElement>} */
+    this._inputs = new Map();
+    const fields = FIELDS.map(([name, label, step]) => this._field(name, label, step));
+    this._body = html(
+      "form",
+      "webmap-align-body",
+      { hidden: "" },
+      this._what,
+      html("div", "webmap-align-fields", {}, ...fields),
+      html(
+        "p",
+        "webmap-align-hint",
+        {},
+        "Drag the map to move it, the round handle to turn it. Arrow keys, q and e do the same.",
+      ),
+      html(
+        "div",
+        "webmap-align-ends",
+        {},
+        html("button", "webmap-button webmap-align-save", { type: "submit" }, "Save"),
+        button("webmap-align-cancel", "Cancel", () => wishes.cancel()),
+      ),
+    );
+    this._body.addEventListener("submit", (event) => {
+      event.preventDefault();
+      wishes.save();
+    });
+    this._word = html("span", "webmap-align-word", { role: "status" });
+    this._line = html("code", "webmap-align-line", { hidden: "" });
+    /** The button, and what is said: it shares the room with those of other tools. */
+    this.element = html(
+      "section",
+      "webmap-panel webmap-align",
+      { "aria-label": "Alignment" },
+      this._go,
+    );
+    /** What is open while a map is aligned, and tells what came of it. */
+    this.form = html(
+      "section",
+      "webmap-panel webmap-align-form",
+      { "aria-label": "Alignment in numbers", hidden: "" },
+      this._body,
+      this._word,
+      this._line,
+    );
+  }
+
+  /** @param {string} words */
+  say(words) {
+    say(this._word, words);
+    this._line.toggleAttribute("hidden", true);
+    this._showForm();
+  }
+
+  _showForm() {
+    const empty = this._body.hidden && this._word.textContent === "";
+    this.form.toggleAttribute("hidden", empty);
+    if (empty) return;
+    // Below the buttons, in however many rows they are.
+    const buttons = (this.element.parentElement ?? this.element).getBoundingClientRect();
+    const around = this.form.parentElement?.getBoundingClientRect();
+    if (around) this.form.style.top = `${Math.max(0, buttons.bottom - around.top) + 8}px`;
+  }
+
+  /** @param {Subject} subject */
+  open({ name, bridge, together }) {
+    const number = together.length;
+    const all = `All behind ${bridge} (${number} robot${number === 1 ? "" : "s"})`;
+    this._what.replaceChildren(
+      html("option", "", { value: "whole" }, all),
+      html("option", "", { value: "own" }, `${name} alone`),
+    );
+    this._body.removeAttribute("hidden");
+    this._go.setAttribute("aria-pressed", "true");
+    this.say("");
+  }
+
+  close() {
+    this._body.setAttribute("hidden", "");
+    this._go.setAttribute("aria-pressed", "false");
+    this.say("");
+  }
+
+  /** @param {boolean} whole */
+  choose(whole) {
+    this._what.value = whole ? "whole" : "own";
+  }
+
+  /** @param {Alignment} now */
+  show(now) {
+    for (const [name, input] of this._inputs) input.value = String(now[name]);
+  }
+
+  /** @param {{line: string, lost: string}} saved */
+  tellSaved({ line, lost }) {
+    say(this._word, lost || "Saved. In a fleet file it is this line:");
+    this._line.textContent = line;
+    this._line.toggleAttribute("hidden", false);
+    this._showForm();
+  }
+
+  /**
+   * @param {Field} name
+   * @param {string} label
+   * @param {string} step
+   */
+  _field(name, label, step) {
+    const input = html("input", "webmap-align-field", {
+      type: "number",
+      step: "any",
+      inputmode: "decimal",
+      name,
+    });
+    input.dataset.step = step;
+    input.addEventListener("input", () => this._typed());
+    input.addEventListener("keydown", (event) => this._step(event, input));
+    this._inputs.set(name, input);
+    return html("label", "", {}, html("span", "", {}, label), input);
+  }
+
+  /**
+   * Arrow keys in a field count by its own step; with shift ten times that.
+   *
+   * @param {KeyboardEvent} event
+   * @param {HTMLInputElement} input
+   */
+  _step(event, input) {
+    const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (!sign || !Number.isFinite(input.valueAsNumber)) return;
+    event.preventDefault();
+    const step = Number(input.dataset.step) * (event.shiftKey ? 10 : 1);
+    input.value = String(Math.round((input.valueAsNumber + sign * step) * 1000) / 1000);
+    this._typed();
+  }
+
+  _typed() {
+    const [x, y, angle] = FIELDS.map(([name]) => this._inputs.get(name)?.valueAsNumber ?? NaN);
+    if ([x, y, angle].every(Number.isFinite)) this._wishes.type({ x, y, angle });
+  }
+}

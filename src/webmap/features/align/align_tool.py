@@ -1,0 +1,147 @@
+"""Laying a robot's map onto the common one, by hand."""
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING, Any
+
+from webmap.poses.alignment import (
+    align_bridge,
+    alignment,
+    alignments,
+    numbers,
+    toml_line,
+)
+from webmap.core.alignment_store import name_of, store
+from webmap.base.tasks import spawn
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Pose
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+    from webmap.core.robot import Robot
+
+log = logging.getLogger("webmap.modules.align_tool")
+
+MAY_ALIGN = ("operator", "admin")
+
+MOVING = ("driving", "stopping")
+"""The states of a robot that somebody drives."""
+
+
+class AlignTool:
+    """Lays the map of the selected robot, or of all behind its bridge, onto the map.
+
+    A drag moves what is aligned, a handle turns it, fields take exact numbers, and
+    arrow keys nudge. The page shows where it would be and nothing moves until it is
+    saved; then it holds for everybody, and for goals. It is kept in the state folder,
+    until a program or a fleet file states another alignment.
+    """
+
+    def __init__(self, map: "Map") -> None:
+        self.map = map
+        for robot in map.robots:
+            store.restore(robot)
+        self.half = map.add_browser_half(
+            self, "features/align/align_tool.js", {}, "features/align/align_tool.css"
+        )
+
+    def on_add_robot(self, robot: "Robot") -> None:
+        """Align a robot as it was saved."""
+        store.restore(robot)
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Begin to align a robot, or save what came of it."""
+        begin, save = message.get("begin"), message.get("save")
+        if isinstance(begin, str):
+            self._begin(begin)
+        elif isinstance(save, dict):
+            try:
+                self._save(save)
+            except ConfigError as error:
+                self.half.send({"refused": str(error)})
+        else:
+            log.warning("%r: an unknown message of the page was ignored", self.map)
+
+    def _begin(self, id: str) -> None:
+        robot = self.map.find_robot(id)
+        why = self._barred(robot)
+        if robot is None or why is not None:
+            self.half.send({"refused": why})
+            return
+        bridge = robot.whereabouts.bridge
+        assert bridge is not None  # else it is barred
+        together = [r.id for r in self._together(robot)]
+        self.half.send(
+            {
+                "align": {
+                    "robot": robot.id,
+                    "name": robot.name,
+                    "bridge": getattr(bridge, "name", bridge.url),
+                    "mark": alignments.mark(bridge),
+                    "together": together,
+                    "whole": robot.whereabouts.own_alignment is None,
+                    "own": numbers(robot.whereabouts.alignment),
+                    "common": numbers(alignments.of(bridge)),
+                }
+            }
+        )
+
+    def _save(self, wanted: dict[str, Any]) -> None:
+        robot = self.map.find_robot(wanted.get("robot"))
+        pose = alignment(*(wanted.get(key) for key in ("x", "y", "angle")))  # type: ignore[arg-type]
+        whole = wanted.get("whole") is True
+        why = self._barred(robot, whole=whole)
+        if robot is None or why is not None:
+            raise ConfigError(why or "it is not on this map any more")
+        bridge = robot.whereabouts.bridge
+        assert bridge is not None  # else it is barred
+        before: Pose | None
+        if whole:
+            name, before = name_of(bridge), alignments.stated(bridge)
+            store.forget(name_of(bridge, robot.name))
+            robot.unset_alignment()
+            align_bridge(bridge, *numbers(pose))
+        else:
+            name = name_of(bridge, robot.name)
+            before = robot.whereabouts.own_alignment
+            robot.set_alignment(*numbers(pose))
+        spawn(self._keep(name, before, pose))
+
+    async def _keep(self, name: str, before: Pose | None, pose: Pose) -> None:
+        by = self.map.page.viewer.name
+        try:
+            path = await asyncio.to_thread(store.save, name, before, pose, by)
+        except OSError as error:
+            log.error("%s: the alignment cannot be kept: %s", name, error)
+            lost = f"It holds until WebMap ends, and cannot be kept: {error}."
+        else:
+            log.info("%s is aligned by %s: %s", name, by, path)
+            lost = ""
+        self.half.send({"saved": {"line": toml_line(pose), "lost": lost}})
+
+    def _barred(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
+        """Return why a robot cannot be aligned from here now, None if it can."""
+        if self.map.page.viewer.role not in MAY_ALIGN:
+            return "Only an operator may align maps."
+        if robot is None:
+            return "Select a robot first."
+        if robot.whereabouts.bridge is None:
+            return f"Nothing tells where {robot.name} is, so it cannot be aligned."
+        concerned = self._together(robot) if whole else [robot]
+        for each in concerned:
+            if each.report is not None and each.report.state in MOVING:
+                return f"{each.name} is being driven: align when nobody drives it."
+        return None
+
+    def _together(self, robot: "Robot") -> "list[Robot]":
+        """Return who goes with a robot's bridge, itself among them."""
+        bridge = robot.whereabouts.bridge
+        return [
+            each
+            for each in self.map.robots
+            if each is robot
+            or (
+                each.whereabouts.bridge is bridge
+                and each.whereabouts.own_alignment is None
+            )
+        ]

@@ -1,0 +1,328 @@
+"""One button of a robot: what it does, and how far that is, for everybody who looks."""
+
+import json
+import logging
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from webmap.config.buttons import ButtonSpec, motion_of, value_kind
+from webmap.core.motion import roads
+from webmap.base.errors import MotionRefused, ServiceError, WebMapError
+from webmap.ros.bridge import Bridge
+from webmap.ros.definitions import Field
+from webmap.ros.message_forms import checked, fields_of
+from webmap.ros.names import same_type
+from webmap.base.scope import Removable, Removal, keep
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+log = logging.getLogger("webmap.buttons")
+
+State = Literal["idle", "running", "done", "failed"]
+
+PROGRAM = "this program"
+"""Who presses, where nobody's hand does."""
+
+MAX_WORDS = 300
+"""Characters of what is said of a result."""
+
+
+class RobotButton:
+    """A button, whoever presses it: it runs once at a time, and all see how it goes.
+
+    Args:
+        robot: The robot that it is on.
+        bridge: The link to the robot's ROS system.
+        spec: What it does.
+
+    """
+
+    def __init__(self, robot: "Robot", bridge: Bridge, spec: ButtonSpec) -> None:
+        self.robot = robot
+        self.spec = spec
+        self.state: State = "idle"
+        self.words = ""
+        """What came of the last press; empty before the first."""
+        self.by = ""
+        """Who pressed last."""
+        self.since = 0.0
+        """When that was, in monotonic seconds."""
+        self._bridge = bridge
+        self._fields: Sequence[Field] | None = None
+        self._listeners: list[Callable[[], None]] = []
+
+    def __repr__(self) -> str:
+        return f"<RobotButton {self.spec.label!r} of {self.robot.name!r} {self.state}>"
+
+    @property
+    def barred(self) -> str | None:
+        """Why it cannot be pressed now, in words; None if it can."""
+        if self.state == "running":
+            return f"it runs already, for {self.by}"
+        report = self.robot.report
+        if report is not None and report.latched and not self.spec.during_stop:
+            return "STOP stands: reset it first"
+        return None
+
+    def on_change(self, fn: Callable[[], None]) -> Removable:
+        """Call ``fn`` whenever the state changes, until the current scope ends."""
+        self._listeners.append(fn)
+        return keep(Removal(lambda: self._listeners.remove(fn)))
+
+    def notify(self) -> None:
+        """Tell who looks that something about it is different."""
+        for fn in tuple(self._listeners):
+            fn()
+
+    @property
+    def ros2(self) -> bool:
+        """Whether its type is written as ROS 2 has it."""
+        return (self.spec.type or "").count("/") == 2
+
+    async def press(self, values: Any = None, *, by: str = PROGRAM) -> bool:
+        """Do what the button does; return whether that succeeded.
+
+        Args:
+            values: The fields to send, or the parameter's value; those of the
+                configuration if not given.
+            by: Who presses, for people and for the log.
+
+        """
+        why = self.barred
+        if why is not None:
+            if self.state != "running":
+                self._become("failed", f"Not done: {why}", by)
+            return False
+        self._become("running", "", by)
+        log.info("%s: %s pressed %r", self.robot.name, by, self.spec.label)
+        try:
+            if values is None:
+                values = self._configured()
+            words = await run(self._bridge, self.spec, values)
+        except NotDone as error:
+            words = f"Failed: {error}"
+            log.warning("%s: %s: %s", self.robot.name, self.spec.label, words)
+            self._become("failed", words, by)
+            return False
+        except BaseException:
+            self._become("failed", "Failed: it was broken off", by)
+            raise
+        self._become("done", words, by)
+        return True
+
+    def fields(self) -> Sequence[Field]:
+        """Return the fields of what it sends, for a form.
+
+        Raises:
+            UnknownType: If their definition is not shipped and was not asked for.
+
+        """
+        if self.spec.kind == "parameter":
+            return [_field_of_value(self.spec.value)]
+        if self._fields is None:
+            assert self.spec.type is not None, "a form has a type"
+            self._fields = fields_of(self.spec.type)
+        return self._fields
+
+    async def ask_fields(self) -> None:
+        """Ask the robot for the fields, if it is one of ROS 1.
+
+        Raises:
+            BridgeError: If it may not be asked, or does not tell.
+            ConfigError: If what it tells makes no sense.
+
+        """
+        assert self.spec.type is not None, "a form has a type"
+        kind = "srv" if self.spec.kind == "service" else "msg"
+        known = await self._bridge.definitions(self.spec.type, kind)
+        self._fields = fields_of(self.spec.type, known)
+
+    def _configured(self) -> Any:
+        if self.spec.kind == "parameter":
+            return self.spec.value
+        if self.spec.type is None:
+            return self.spec.values
+        try:
+            fields = self.fields()
+        except ValueError:  # nobody knows its fields: sent as it stands
+            return self.spec.values
+        return checked(fields, self.spec.values, ros2=self.ros2)
+
+    def _become(self, state: State, words: str, by: str) -> None:
+        self.state, self.words, self.by = state, words, by
+        self.since = time.monotonic()
+        self.notify()
+
+
+def values_of(spec: ButtonSpec) -> Mapping[str, Any]:
+    """Return what a form begins with."""
+    return {"value": spec.value} if spec.kind == "parameter" else spec.values
+
+
+def _field_of_value(value: Any) -> Field:
+    for cls, type in (
+        (bool, "bool"),
+        (int, "int64"),
+        (float, "float64"),
+        (str, "string"),
+    ):
+        if isinstance(value, cls):
+            return Field("value", type)
+    raise AssertionError("a form of a parameter has one value")
+
+
+class NotDone(WebMapError):
+    """A button did not do what it is there for; the text says why, to people."""
+
+
+def declared_motion(spec: ButtonSpec, url: str) -> str | None:
+    """Return why a button may not act, by what robots were declared to be moved by.
+
+    Args:
+        spec: What it would do.
+        url: The address of its bridge.
+
+    """
+    if spec.kind == "parameter":
+        return None
+    for road in list(roads):
+        carried = road.writes(url).get(spec.name)
+        if carried is not None:
+            return (
+                f"{spec.name} carries {carried}, and a button may not write that: "
+                "the gate does"
+            )
+    return None
+
+
+async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
+    """Do what a button does.
+
+    Args:
+        bridge: The link.
+        spec: What it does.
+        values: The fields to send, or the parameter's value.
+
+    Returns:
+        What came of it, in words.
+
+    Raises:
+        NotDone: If it failed, was refused, or nobody answered in time.
+
+    """
+    try:
+        await _refuse_motion(bridge, spec)
+        if spec.kind == "service":
+            return await _call(bridge, spec, values)
+        if spec.kind == "topic":
+            bridge.publish(spec.name, values, spec.type)
+            return "Published"
+        if spec.node is None:
+            return await _set_ros1(bridge, spec, values)
+        return await _set_ros2(bridge, spec, values)
+    except NotDone:
+        raise
+    except MotionRefused as error:
+        raise NotDone(f"refused: {error}") from None
+    except (WebMapError, ValueError, TypeError) as error:
+        raise NotDone(shortened(str(error))) from None
+
+
+async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
+    """Look again, now that robots are declared and the robot tells its types.
+
+    Raises:
+        MotionRefused: If it would move a robot.
+        NotDone: If the robot has another type than was said.
+
+    """
+    found = await _type_on_robot(bridge, spec)
+    for type in (spec.type, found):
+        why = motion_of(spec.kind, spec.name, type)
+        if why is not None:
+            raise MotionRefused(why)
+    why = declared_motion(spec, bridge.url)
+    if why is not None:
+        raise MotionRefused(why)
+    if found and spec.type and not same_type(found, spec.type):
+        raise NotDone(f"{spec.name} is of type {found}, not of {spec.type}")
+
+
+async def _type_on_robot(bridge: Bridge, spec: ButtonSpec) -> str | None:
+    if spec.kind == "topic":
+        return await bridge.topic_type(spec.name)
+    if spec.kind == "parameter":
+        return None
+    return await bridge.service_type(spec.name)
+
+
+async def _call(bridge: Bridge, spec: ButtonSpec, values: Mapping[str, Any]) -> str:
+    answer = await bridge.call_service(
+        spec.name, values, type=spec.type, timeout=spec.timeout
+    )
+    return answered(answer)
+
+
+async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
+    name = spec.name
+    now = await bridge.set_parameter(name, value, timeout=spec.timeout)
+    if now != value:
+        raise NotDone(
+            f"{name} was to be {shown(value)}, and the robot says {shown(now)}"
+        )
+    return f"{name} is {shown(value)}"
+
+
+async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
+    number, field = value_kind(value)
+    parameter = {"name": spec.name, "value": {"type": number, field: value}}
+    answer = await bridge.call_service(
+        f"{spec.node}/set_parameters",
+        {"parameters": [parameter]},
+        type="rcl_interfaces/srv/SetParameters",
+        timeout=spec.timeout,
+    )
+    results = answer.get("results") if isinstance(answer, Mapping) else None
+    first = results[0] if isinstance(results, list) and results else None
+    if not isinstance(first, Mapping) or "successful" not in first:
+        raise ServiceError(f"{spec.node}/set_parameters answered nothing to the point")
+    if first["successful"] is not True:
+        reason = str(first.get("reason") or "no reason was given")
+        raise NotDone(shortened(f"{spec.node} refused: {reason}"))
+    return f"{spec.name} is {shown(value)}"
+
+
+def answered(answer: Any) -> str:
+    """Return in words what a service answered.
+
+    Raises:
+        NotDone: If it says ``success: false``.
+
+    """
+    if not isinstance(answer, Mapping):
+        return "Done"
+    said = str(answer.get("message") or answer.get("status_message") or "")
+    if answer.get("success") is False:
+        raise NotDone(shortened(said or "the robot says that it did not succeed"))
+    if said:
+        return shortened(f"Done: {said}")
+    rest = {name: value for name, value in answer.items() if name != "success"}
+    words = ", ".join(f"{name} {shown(value)}" for name, value in rest.items() if value)
+    return shortened(f"Done: {words}") if words else "Done"
+
+
+def shown(value: Any) -> str:
+    """Return a value as people read it."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, str):
+        return value
+    return json.dumps(value, ensure_ascii=False, default=str)
+
+
+def shortened(text: str) -> str:
+    """Return a text without what no screen shows, at most so long."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return plain if len(plain) <= MAX_WORDS else f"{plain[: MAX_WORDS - 3]}..."

@@ -1,0 +1,381 @@
+"""The readiness check on the page: a button for each bridge, and what it finds."""
+
+import asyncio
+import itertools
+import logging
+import math
+import time
+import weakref
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from webmap import html, svg
+from webmap.features.doctor.in_use import in_use
+from webmap.console.words import icon
+from webmap.discovery.doctor import Finding, MeantRobot, Observed, judge
+from webmap.discovery.doctor.measure import TRYING, observe, tried
+from webmap.discovery.doctor.verdict import report as report_text
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Element, Map
+
+WORDS = {"wrong": "Wrong", "warning": "Warning", "note": "Note", "good": "Good"}
+
+SHAPES = {
+    "wrong": ("M8 2.5h8L21.5 8v8L16 21.5H8L2.5 16V8z", "M8 8l8 8M16 8l-8 8"),
+    "warning": ("M12 2.5L22.5 21h-21z", "M12 9v6M12 18v.01"),
+    "note": ("M12 2.5a9.5 9.5 0 1 0 .01 0z", "M12 11v6M12 7v.01"),
+    "good": ("", "M4 12.5l5.5 5.5L20 6.5"),
+}
+"""The outline of each level, which is filled, and what is drawn on it."""
+
+OLD = 3600.0
+"""Seconds after which a report counts as old."""
+
+_numbers = itertools.count(1)
+
+
+class DoctorReports:
+    """What stands in the way of driving, for each bridge; a module of maps.
+
+    Args:
+        map: The map.
+        element: The page's element for the reports; each is a popover of it.
+        bridges: The bridges.
+
+    """
+
+    def __init__(
+        self, map: "Map", element: "Element", bridges: Sequence["Bridge"]
+    ) -> None:
+        self.map = map
+        folder = Path(__file__).parent
+        map.add_browser_half(self, folder / "doctor.js", {}, folder / "doctor.css")
+        self._reports = [Report(bridge, map) for bridge in bridges]
+        self.buttons = [report.opener for report in self._reports]
+        """For each bridge what opens its report, and makes the first."""
+        element.append(*(report.element for report in self._reports))
+
+    def poll(self) -> None:
+        """Look whether there is something new."""
+        for report in self._reports:
+            report.poll()
+
+
+class Report:
+    """The report of one bridge on one page.
+
+    Args:
+        bridge: The bridge.
+        map: The page's map, whose robots it is about.
+
+    """
+
+    def __init__(self, bridge: "Bridge", map: "Map") -> None:
+        self._checkup: Checkup = checkup_of(bridge)
+        self._bridge = bridge
+        self._map = map
+        self._try = TryCall(self._checkup, map.page.viewer.role)
+        self._shown = -1
+        name = bridge.name or bridge.url
+        where = f"doctor-{next(_numbers)}"
+        self.opener: Element = html.button("Check", type="button", class_="button")
+        self.opener.set("popovertarget", where)
+        self.opener.set("aria-label", f"Check {name}: what is in the way of driving")
+        self.opener.on("click", lambda event: self._opened())
+        close = html.button(
+            icon("icon-close"), type="button", class_="button square quiet"
+        )
+        close.set("popovertarget", where).set("aria-label", "Close the report")
+        self._doing = html.span()
+        self._age = html.span(class_="age")
+        self._age.set_age(math.inf, limit=OLD, age_text=True)
+        self._checked = html.span("Checked ", self._age, " ago. ", hidden=True)
+        self._again = html.button("Check again", type="button", class_="button")
+        self._again.on("click", lambda event: self._start())
+        copy = html.button(
+            html.span(text="Copy as text", class_="before"),
+            html.span(text="Copied", class_="after"),
+            type="button",
+            class_="button copy",
+        )
+        self._copy = copy.set("data-copy", "doctor")
+        self._list = html.div(class_="findings")
+        self._text = html.pre(class_="as-text", tabindex="0")
+        status = html.p(self._checked, self._doing, class_="status")
+        status.set("role", "status")
+        self.element: Element = html.section(
+            html.div(html.h2(text=f"Is {name} ready?"), close, class_="doctor-head"),
+            status,
+            html.div(
+                self._again, self._copy, self._try.button, class_="doctor-actions"
+            ),
+            self._try.question,
+            self._list,
+            self._text,
+            class_="doctor",
+            id=where,
+            popover="auto",
+        )
+        self.element.set("aria-label", f"Readiness of {name}")
+        self.poll()
+
+    def poll(self) -> None:
+        """Look whether there is something new."""
+        checkup = self._checkup
+        if self._shown == checkup.version:
+            return
+        self._shown = checkup.version
+        self._try.poll()
+        running, known = checkup.is_running, checkup.ended is not None
+        doing = checkup.doing.removesuffix(".")  # the page puts dots that go on
+        self._doing.text = doing if running or not known else checkup.summary
+        self.element.set("aria-busy", "true" if running else None)
+        self._checked.set(hidden=running or not known)
+        self._again.set(disabled=running)
+        self._copy.set(hidden=running or not known)
+        if running or checkup.ended is None:
+            return
+        self._age.set_age(time.monotonic() - checkup.ended)
+        self._text.text = checkup.text
+        self._list.clear()
+        self._list.append(*groups(checkup.findings))
+
+    def _opened(self) -> None:
+        """Make the first report; one that is there is kept until asked for anew."""
+        if self._checkup.ended is None:
+            self._start()
+
+    def _start(self) -> None:
+        """Look at the robots that are shown now, by the topics that they use now."""
+        made = self._map.module_arguments()
+        self._checkup.start(in_use(self._map.robots, self._bridge, made))
+
+
+def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":
+    """Return the findings under headings: the bridge, then each robot."""
+    for about, each in itertools.groupby(findings, key=lambda one: one.about):
+        yield html.h3(text="The bridge" if about == "bridge" else about)
+        yield html.ul(*map(line, each))
+
+
+def line(finding: "Finding") -> "Element":
+    """Return one finding: a shape, a word, what is so, and what to do."""
+    return entry(
+        finding.level, f"{WORDS[finding.level]}: ", finding.words, finding.advice
+    )
+
+
+def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
+    """Return a line of a list with the shape of its level.
+
+    Args:
+        level: ``"wrong"``, ``"warning"``, ``"note"`` or ``"good"``.
+        word: What stands out.
+        words: What is so.
+        advice: What stands below it, if anything.
+
+    """
+    outline, mark = SHAPES[level]
+    shape = svg.svg(
+        svg.path(d=outline, class_="solid"),
+        svg.path(d=mark, class_="cut"),
+        viewBox="0 0 24 24",
+        class_="icon",
+    )
+    said = html.div(html.p(html.strong(text=word), words))
+    if advice:
+        said.append(html.p(text=advice, class_="advice"))
+    item = html.li(shape.set("aria-hidden", "true"), said, class_="finding")
+    return item.set("data-level", level)
+
+
+log = logging.getLogger("webmap.console")
+
+SECONDS = 3.0
+"""How long topics are listened to."""
+
+PLURAL = {"wrong": "wrong", "warning": "warnings", "note": "notes", "good": "good"}
+
+Observe = Callable[..., Awaitable[Observed]]
+
+
+class Checkup:
+    """The readiness check of one bridge, and what it found last.
+
+    However many viewers ask, there is one at a time, with one socket for listening;
+    the bridge's own links are not touched.
+
+    Args:
+        url: The bridge's address.
+        observe: Looks at a bridge.
+        tried: Takes what was seen, tries a call that hangs, and adds what that tells.
+
+    """
+
+    def __init__(
+        self, url: str, observe: Observe = observe, tried: Observe = tried
+    ) -> None:
+        self.url = url
+        self.version = 0
+        """A number that grows whenever there is something new to show."""
+        self.doing = ""
+        """What is being done, in a sentence; empty if nothing is."""
+        self.findings: Sequence[Finding] = ()
+        """What was found last: the bridge first, then each robot, worst first."""
+        self.ended: float | None = None
+        """When topics were listened to last, on the monotonic clock; None if never."""
+        self._observe = observe
+        self._tried = tried
+        self._seen: Observed | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether somebody's check is under way."""
+        return self._task is not None and not self._task.done()
+
+    @property
+    def can_try(self) -> bool:
+        """Whether a call that hangs can be tried: the bridge was there at the check."""
+        seen = self._seen
+        return seen is not None and not seen.trouble and not self.is_running
+
+    @property
+    def summary(self) -> str:
+        """How many findings of each level there are, in words."""
+        numbers = {level: 0 for level in PLURAL}
+        for finding in self.findings:
+            numbers[finding.level] += 1
+        said = [
+            f"{number} {level if number == 1 else PLURAL[level]}"
+            for level, number in numbers.items()
+            if number
+        ]
+        free = not numbers["wrong"] and not numbers["warning"]
+        return ("Nothing is in the way: " if free else "") + ", ".join(said)
+
+    @property
+    def text(self) -> str:
+        """All findings as plain text."""
+        return report_text(self.url, self.findings)
+
+    def start(self, robots: Sequence[MeantRobot] = ()) -> None:
+        """Look at the bridge, unless somebody has that done already.
+
+        Args:
+            robots: The robots that the page has of it, with the topics in use; those
+                that are found are looked at if there are none.
+
+        """
+        if not self.is_running:
+            self._begin(self._look(robots))
+
+    def try_call(self) -> None:
+        """Try what a call that hangs holds up; the rest of the report stays.
+
+        Nothing is tried while something is done, or if the bridge was away.
+        """
+        if self._seen is not None and self.can_try:
+            self._begin(self._try(self._seen))
+
+    def _begin(self, work: Coroutine[None, None, Observed]) -> None:
+        self._say("Beginning.")
+        self._task = asyncio.get_running_loop().create_task(self._run(work))
+
+    async def _look(self, robots: Sequence[MeantRobot]) -> Observed:
+        try:
+            return await self._observe(
+                self.url, seconds=SECONDS, meant=lambda _: robots, progress=self._say
+            )
+        finally:
+            self.ended = time.monotonic()
+
+    async def _try(self, seen: Observed) -> Observed:
+        self._say(TRYING)
+        return await self._tried(seen)
+
+    async def _run(self, work: Coroutine[None, None, Observed]) -> None:
+        try:
+            self._seen = await work
+            self.findings = judge(self._seen)
+        except Exception as error:
+            log.exception("the readiness check of %s failed", self.url)
+            words = f"The check itself failed: {error!r}."
+            advice = f"Run webmap doctor {self.url} in a terminal, and look at the log."
+            self._seen = None
+            self.findings = [Finding("wrong", "bridge", words, advice)]
+        self._say("")
+
+    def _say(self, doing: str) -> None:
+        self.doing = doing
+        self.version += 1
+
+
+_checkups: "weakref.WeakKeyDictionary[Bridge, Checkup]" = weakref.WeakKeyDictionary()
+
+
+def checkup_of(bridge: "Bridge") -> Checkup:
+    """Return the check of a bridge, which all viewers share."""
+    found = _checkups.get(bridge)
+    if found is None:
+        found = _checkups[bridge] = Checkup(bridge.url)
+    return found
+
+
+MAY_TRY = ("operator", "admin")
+"""Roles of viewers who may try a call."""
+
+TRY_WORDS = (
+    "Does a service that hangs hold up what comes after it on a socket? To find out, "
+    "WebMap offers a service of its own to the ROS system for a moment, under a name "
+    "that nobody else has. It calls that over a link of its own, leaves it unanswered "
+    "for a second, and asks rosapi for the time meanwhile.",
+    "No node of a robot is called, and velocity goes over other links. At the worst "
+    "the bridge keeps everybody waiting for that second: try it while nobody drives.",
+)
+
+
+class TryCall:
+    """A button and the question that it asks, on one page.
+
+    Args:
+        checkup: What tries it, and has the report.
+        role: What the viewer may do.
+
+    """
+
+    def __init__(self, checkup: "Checkup", role: str) -> None:
+        self._checkup = checkup
+        self._may = role in MAY_TRY
+        self.button: Element = html.button("Try a call", type="button", class_="button")
+        self.button.set(hidden=not self._may)
+        self.button.on("click", lambda event: self._ask(True))
+        self._yes = html.button("Try it", type="button", class_="button")
+        self._yes.on("click", lambda event: self._agreed())
+        no = html.button("Not now", type="button", class_="button")
+        no.on("click", lambda event: self._ask(False))
+        self.question: Element = html.div(
+            *(html.p(text=text) for text in TRY_WORDS),
+            html.div(self._yes, no, class_="doctor-answers"),
+            class_="doctor-question",
+            role="group",
+            hidden=True,
+        )
+        self.question.set("aria-label", "Try a call that hangs")
+        self.poll()
+
+    def poll(self) -> None:
+        """Look whether it can be tried now."""
+        for button in (self.button, self._yes):
+            button.set(disabled=not self._checkup.can_try)
+
+    def _ask(self, asked: bool) -> None:
+        self.question.set(hidden=not (asked and self._may))
+
+    def _agreed(self) -> None:
+        self._ask(False)
+        # Whoever may only look has no say, whatever their page sends.
+        if self._may:
+            self._checkup.try_call()

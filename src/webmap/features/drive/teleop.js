@@ -1,0 +1,293 @@
+import { deskOf } from "../../web/inputs/desk.js";
+import { stoppingDistance } from "../../web/motion/figures.js";
+import { heldByAnother, isLatched, mayReach, stopOf } from "../../web/motion/report.js";
+import { describe, inputsOf } from "../../web/motion/status.js";
+import { svg } from "../../web/tools/elements.js";
+import { lay, overlayOf, ownPlace } from "../../web/tools/overlay.js";
+import { Panel, Requests, StickPad } from "./teleop_panel.js";
+
+/** @typedef {import('../../web/drive.js').Drive} Drive */
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/motion/status.js').Description} Description */
+
+/** @typedef {(message: object) => void} Send */
+/** @typedef {{holonomic?: boolean | null, stopPlace?: string}} Options */
+
+/**
+ * Drive the selected robot with keys, an on-screen stick or a gamepad, and show how that
+ * stands.
+ *
+ * Options: `holonomic`, whether Q and E, and the sticks, move the base sideways; null if
+ * each robot's element says so (`data-holonomic`). `stopPlace`, a selector of the page's
+ * own element for the robot's STOP; without it STOP is a part of the panel. Speeds are not
+ * known here: the gate scales. Sends `{active}` when the page's keys start or stop to
+ * belong to this map.
+ *
+ * @param {MapCanvas} map
+ * @param {Options} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const teleop = new Teleop(map, options, send);
+  return { destroy: () => teleop.destroy() };
+}
+
+/** The selected robot, if its base can move sideways. */
+const SELECTED_HOLONOMIC = ".robot.selected[data-holonomic]";
+
+class Teleop {
+  /**
+   * @param {MapCanvas} map
+   * @param {Options} options
+   * @param {Send} send
+   */
+  constructor(map, { holonomic = false, stopPlace = "" }, send) {
+    this._map = map;
+    /** @type {import('../../web/drive.js').Drive} */
+    this._drive = map.drive;
+    this._panel = new Panel({
+      stop: () => this._stop(),
+      lease: () => this._lease(),
+      reset: (stops) => this._reset(stops),
+      stick: () => this._toggleStick(),
+      test: () => this._test(),
+    });
+    this._stick = new StickPad(this._drive);
+    this._halos = new Halos(map);
+    this._requests = new Requests(this._drive);
+    const takes = [
+      lay(map, this._requests.element, "bottom-left"),
+      lay(map, this._panel.element, "bottom-left"),
+      lay(map, this._stick.element, "bottom-right"),
+    ];
+    if (ownPlace(stopPlace)) takes.push(lay(map, this._panel.stop, undefined, stopPlace));
+    this._desk = deskOf(this._drive);
+    this._seat = {
+      map,
+      get holonomic() {
+        return holonomic ?? map.world.querySelector(SELECTED_HOLONOMIC) !== null;
+      },
+      robot: () => map.selected,
+      onActive: (/** @type {boolean} */ active) => {
+        send({ active });
+        // A finger that stays on this map must not drive another map's robot.
+        if (!active) this._stick.release();
+        this._show();
+      },
+    };
+    this._ending = new AbortController();
+    const touched = { capture: true, signal: this._ending.signal };
+    for (const part of [map.svg, overlayOf(map)]) {
+      for (const kind of ["pointerdown", "focusin"]) {
+        part?.addEventListener(kind, () => this._desk.activate(this._seat), touched);
+      }
+    }
+    this._touch = matchMedia("(pointer: coarse)");
+    const show = () => this._show();
+    this._offs = [
+      ...takes,
+      this._desk.sit(this._seat),
+      map.onSelect(() => this._select()),
+      // Who says STOP between the two presses of a button takes the first one back.
+      this._drive.on("stop", () => this._panel.forget()),
+      this._drive.on("step", show),
+      this._drive.on("step", () => this._halos.show()),
+      this._drive.on("state", show),
+      // What there is to say of the others can wait for the next step.
+      this._drive.on("robot", ({ robot }) => robot === map.selected && show()),
+    ];
+    this._show();
+  }
+
+  destroy() {
+    this._ending.abort();
+    this._stick.destroy();
+    this._halos.destroy();
+    for (const off of this._offs) off();
+  }
+
+  get _report() {
+    const robot = this._map.selected;
+    return robot === null ? null : (this._drive.robots.get(robot) ?? null);
+  }
+
+  _select() {
+    if (this._desk.active === this._seat) this._desk.choose();
+    this._show();
+  }
+
+  _stop() {
+    const robot = this._drive.status.driven ?? this._map.selected;
+    if (robot !== null) this._drive.stop(robot);
+  }
+
+  /** @param {readonly string[]} stops */
+  _reset(stops) {
+    for (const each of stops) this._drive.reset(...stopOf(each));
+  }
+
+  _test() {
+    const robot = this._map.selected;
+    if (robot !== null && this._report?.mine) this._drive.stopTest(robot);
+  }
+
+  _lease() {
+    const robot = this._map.selected;
+    if (robot === null) return;
+    const report = this._report;
+    if (report?.mine) this._drive.release(robot);
+    else if (report && heldByAnother(report)) this._drive.ask(robot);
+    else this._drive.take(robot);
+    this._show();
+  }
+
+  _toggleStick() {
+    this._stick.wanted = !this._stick.wanted;
+    this._show();
+  }
+
+  _show() {
+    const active = this._desk.active === this._seat;
+    const status = this._drive.status;
+    if (this._desk.spent) Object.assign(status, { pressed: true, dead: true });
+    const report = this._report;
+    const robot = this._map.selected;
+    const requests = this._drive.requests;
+    const verdict = this._drive.verdicts.find((one) => one.robot === robot);
+    const request = requests.find((one) => one.robot === robot);
+    this._requests.show(requests);
+    const useful = report !== null && ofUse(report);
+    this._stick.holonomic = this._seat.holonomic;
+    this._stick.show(useful, status.pressed && status.dead);
+    const hands = { touch: this._touch.matches, stick: this._stick.wanted };
+    const inputs = inputsOf({ ...hands, gamepad: this._desk.gamepad });
+    const drawn = this._map.world.querySelector(".robot.selected");
+    const seen = drawn?.getAttribute("data-state") ?? "";
+    const since = drawn?.getAttribute("data-since") ?? "";
+    const more = { verdict, request, inputs, seen, since };
+    const words = describe(status, robot, report, active, more);
+    this._panel.showState(withoutKeys(words, hands, inputs), report, status.delay);
+    const asking = request?.by === status.connection;
+    this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);
+    const moving = robot === null ? null : this._drive.motionDelay(robot);
+    // What was heard before the connection was lost says nothing of now.
+    const heard = status.link === "lost" ? null : report;
+    this._panel.showFigures(heard, status.delay, moving);
+  }
+}
+
+/**
+ * @param {import('../../web/motion/report.js').RobotReport} report
+ * @returns {boolean} Whether a stick could drive the robot, without asking a person.
+ */
+function ofUse(report) {
+  return mayReach(report) || (report.mine && !isLatched(report));
+}
+
+/**
+ * Circles around the robots that are driven: as far as each of them can get, at the speed
+ * of now, before it stands.
+ */
+export class Halos {
+  /** @param {MapCanvas} map */
+  constructor(map) {
+    this._map = map;
+    /** @type {Drive} */
+    this._drive = map.drive;
+    /** @type {Map<string, SVGCircleElement>} */
+    this._circles = new Map();
+    this._frame = 0;
+  }
+
+  /** Look again which robots move, and how fast; without a connection nobody knows. */
+  show() {
+    if (this._drive.state === "lost") {
+      this._removeAll();
+      return;
+    }
+    for (const report of this._drive.robots.values()) {
+      const distance = stoppingDistance(report);
+      if (distance === null) this._remove(report.robot);
+      else this._circle(report.robot).setAttribute("r", distance.toFixed(3));
+    }
+    for (const robot of [...this._circles.keys()]) {
+      if (!this._drive.robots.has(robot)) this._remove(robot);
+    }
+    if (this._circles.size > 0 && this._frame === 0) this._follow();
+  }
+
+  destroy() {
+    cancelAnimationFrame(this._frame);
+    this._removeAll();
+  }
+
+  _removeAll() {
+    for (const robot of [...this._circles.keys()]) this._remove(robot);
+  }
+
+  /** @param {string} robot */
+  _circle(robot) {
+    const known = this._circles.get(robot);
+    if (known?.isConnected) return known;
+    const circle = svg("circle", { class: "stopping-halo", "data-halo-of": robot });
+    // Behind the robots, so that it hides none and is in nobody's way.
+    const robots = this._map.world.querySelector(":scope > .robots");
+    this._map.world.insertBefore(circle, robots);
+    this._circles.set(robot, circle);
+    return circle;
+  }
+
+  /** @param {string} robot */
+  _remove(robot) {
+    this._circles.get(robot)?.remove();
+    this._circles.delete(robot);
+  }
+
+  /** Keep every circle with its robot, for as long as there are any. */
+  _follow() {
+    for (const [robot, circle] of this._circles) {
+      const place = placeOf(this._map, robot);
+      circle.style.display = place === null ? "none" : "";
+      if (place === null) continue;
+      circle.setAttribute("cx", `${place.x}`);
+      circle.setAttribute("cy", `${place.y}`);
+    }
+    this._frame = this._circles.size > 0 ? requestAnimationFrame(() => this._follow()) : 0;
+  }
+}
+
+/**
+ * @param {MapCanvas} map
+ * @param {string} robot
+ * @returns {{x: number, y: number} | null} Metres; null where the map does not show it.
+ */
+function placeOf(map, robot) {
+  const element = map.world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
+  if (!(element instanceof SVGGraphicsElement)) return null;
+  if (element.classList.contains("unplaced")) return null;
+  // Read without consolidating: the scene keeps hold of the items of the list.
+  const list = element.transform.baseVal;
+  if (list.numberOfItems === 0) return null;
+  let matrix = list.getItem(0).matrix;
+  for (let i = 1; i < list.numberOfItems; i++) {
+    matrix = matrix.multiply(list.getItem(i).matrix);
+  }
+  return { x: matrix.e, y: matrix.f };
+}
+
+/**
+ * Say without keys what can be said without them, where fingers drive by the stick:
+ * a phone has no Space.
+ *
+ * @param {Description} description
+ * @param {{touch: boolean, stick: boolean}} what Whether fingers are the pointer, and
+ *     whether the stick is there.
+ * @param {string} inputs What there is to drive with.
+ * @returns {Description}
+ */
+export function withoutKeys(description, { touch, stick }, inputs) {
+  if (!touch || !stick || description.state !== "ready") return description;
+  return { ...description, detail: `Hold ${inputs} to drive, let go to stop.` };
+}

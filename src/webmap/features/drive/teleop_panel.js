@@ -1,0 +1,321 @@
+import { Stick } from "../../web/inputs/stick.js";
+import { isTested, motions, ownStop, testWords, timings } from "../../web/motion/figures.js";
+import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
+import { capOf } from "../../web/motion/status.js";
+import { button, html, say, stopButton, TwiceButton } from "../../web/tools/elements.js";
+
+/** @typedef {import('../../web/drive.js').Drive} Drive */
+/** @typedef {import('../../web/motion/asking.js').Request} Request */
+/** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */
+
+/** From this loop age on it is said aloud, in ms. */
+const SLOW = 150;
+
+const ASK = "Ask for it";
+
+/** The words, the shape and the buttons in the corner of the map. */
+export class Panel {
+  /**
+   * @param {Record<'stop' | 'lease' | 'stick' | 'test', () => void> &
+   *     {reset: (stops: readonly string[]) => void}} acts
+   */
+  constructor(acts) {
+    this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
+    this._title = html("strong", "webmap-teleop-title");
+    this._detail = html("span", "webmap-teleop-detail");
+    this._cap = html("p", "webmap-teleop-cap");
+    this._own = html("p", "webmap-teleop-own");
+    this._test = html("p", "webmap-teleop-test", { role: "status" });
+    this._figures = html("dl", "webmap-teleop-figures");
+    /** @type {Map<string, HTMLElement>} */
+    this._values = new Map();
+    /** In this panel, unless the page has a place of its own for it. */
+    this.stop = stopButton("webmap-teleop-stop", "Stop", acts.stop);
+    this._lease = button("webmap-teleop-lease", "Take", acts.lease);
+    this._reset = new TwiceButton(
+      "webmap-reset",
+      "Reset",
+      "Press again to reset",
+      acts.reset,
+    );
+    this._tester = new TwiceButton(
+      "webmap-stop-test",
+      "Test its stop",
+      "It will creep: press again",
+      acts.test,
+    );
+    this._tester.element.title = "Creeps, sends nothing any more, and sees when it stands";
+    this._stick = button("webmap-teleop-stick", "Stick", acts.stick);
+    this._stick.title = "A stick on the screen to drive with";
+    const state = html(
+      "p",
+      "webmap-teleop-state",
+      { role: "status" },
+      this._title,
+      " ",
+      this._detail,
+    );
+    const twice = [this._reset.element, this._tester.element];
+    const buttons = [this._lease, ...twice, this._stick];
+    this.element = html(
+      "section",
+      "webmap-panel webmap-teleop",
+      { "aria-label": "Driving" },
+      this._mark,
+      html("div", "webmap-teleop-words", {}, state, this._test, this._cap, this._own),
+      html("div", "webmap-teleop-acts", {}, ...buttons),
+      this.stop,
+      this._figures,
+    );
+  }
+
+  /**
+   * @param {import('../../web/motion/status.js').Description} description
+   * @param {RobotReport | null} report
+   * @param {number | null} delay
+   */
+  showState({ state, title, detail }, report, delay) {
+    if (this.element.dataset.state !== state) this.element.dataset.state = state;
+    say(this._title, title);
+    say(this._detail, detail);
+    const told = report?.why.some((why) => why.startsWith("slow link"));
+    const age = report?.age ?? delay;
+    say(this._cap, report ? capOf(report) + (told ? "" : slowness(age)) : "");
+  }
+
+  /**
+   * @param {RobotReport | null} report
+   * @param {number | null} loop
+   * @param {number | null} moving
+   */
+  showFigures(report, loop, moving) {
+    say(this._own, report ? ownStop(report) : "");
+    say(this._test, report ? testWords(report) : "");
+    this._figures.hidden = report === null || isLatched(report);
+    this._figures.classList.toggle("idle", !report?.mine);
+    if (report === null) return;
+    const all = [...motions(report), ...timings(report, loop, moving)];
+    for (const { name, kind, text, more = "", title = "" } of all) {
+      const figure = this._figure(name, kind);
+      set(figure, "title", title);
+      const [value, rest] = figure.querySelectorAll("dd > span");
+      say(value, text);
+      say(rest, more);
+    }
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} kind
+   */
+  _figure(name, kind) {
+    const known = this._values.get(name);
+    if (known) return known;
+    const value = html("dd", "", {}, html("span", ""), html("span", "more"));
+    const figure = html("div", kind, {}, html("dt", "", {}, name), value);
+    this._figures.append(figure);
+    this._values.set(name, figure);
+    return figure;
+  }
+
+  /** Forget the first presses of what takes two. */
+  forget() {
+    this._reset.forget();
+    this._tester.forget();
+  }
+
+  /**
+   * @param {RobotReport | null} report
+   * @param {boolean} asking Whether this page has asked for the robot.
+   * @param {boolean | null} stick Whether the stick is wanted; null when it is no use.
+   */
+  showButtons(report, asking, stick) {
+    const name = report?.name ?? "";
+    const robots = report === null ? [] : [report.robot];
+    const act = actOf(report, asking);
+    this._lease.hidden = act === null;
+    if (act !== null) {
+      say(this._lease, act);
+      // It begins with the words on the button, for people who speak to their computer.
+      set(this._lease, "aria-label", act === ASK ? `${ASK}: ${name}` : `${act} ${name}`);
+    }
+    const stops = report === null ? [] : [stopKey(report)];
+    this._reset.show(report !== null && isLatched(report), stops);
+    this._tester.show(report !== null && mayTest(report), robots);
+    const known = report?.stop_time != null;
+    this._tester.element.classList.toggle("known", known);
+    this._stick.hidden = stick === null;
+    set(this._stick, "aria-pressed", String(stick === true));
+    set(this.stop, "aria-label", name ? `Stop ${name}` : "Stop the selected robot");
+    // Off only when there is nothing to stop, never because of doubt.
+    set(this.stop, "data-robot", name);
+    this.stop.disabled = report === null;
+  }
+}
+
+/**
+ * Return what the operator can do about a robot's lease.
+ *
+ * @param {RobotReport | null} report
+ * @param {boolean} asking Whether this page has asked for it.
+ * @returns {string | null}
+ */
+function actOf(report, asking) {
+  if (report === null || report.changing) return null;
+  if (report.mine) return "Hand back";
+  if (!report.armable || isLatched(report)) return null;
+  if (report.holder === null) return "Take";
+  return heldByProgram(report) || asking ? null : ASK;
+}
+
+/**
+ * @param {RobotReport} report
+ * @returns {boolean} Whether this page may find out that the robot stops by itself: also
+ *     of one of which that is stated, or that was tested before.
+ */
+function mayTest(report) {
+  return report.mine && !isTested(report);
+}
+
+/** @param {number | null} delay */
+function slowness(delay) {
+  return delay !== null && delay >= SLOW ? `. Slow: ${Math.round(delay)} ms` : "";
+}
+
+/**
+ * @param {Element} element
+ * @param {string} name
+ * @param {string} value
+ */
+function set(element, name, value) {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
+
+/**
+ * The on-screen stick: there from the start where fingers are the pointer, and wherever
+ * it is asked for.
+ */
+export class StickPad {
+  /** @param {Drive} drive */
+  constructor(drive) {
+    this._sideways = false;
+    /** Whether the operator wants it. */
+    this.wanted = matchMedia("(pointer: coarse)").matches;
+    const knob = html("div", "webmap-stick-knob");
+    this._pad = html(
+      "div",
+      "webmap-stick",
+      { role: "img", "aria-label": "Stick: hold the knob and move it to drive" },
+      knob,
+    );
+    this._mode = button("webmap-panel webmap-stick-mode", "Sideways", () => {
+      this._stick.release();
+      this._sideways = !this._sideways;
+      this._mode.setAttribute("aria-pressed", String(this._sideways));
+    });
+    this._mode.title = "Left and right move the robot sideways and do not turn it";
+    this._mode.setAttribute("aria-pressed", "false");
+    this._mode.hidden = true;
+    this.element = html("div", "webmap-stick-place", {}, this._mode, this._pad);
+    this._stick = new Stick(drive, this._pad, () => this._sideways && !this._mode.hidden);
+    this.show(false, false);
+  }
+
+  /** Whether the base that it drives moves sideways, too. */
+  set holonomic(/** @type {boolean} */ holonomic) {
+    if (this._mode.hidden !== holonomic) return;
+    // What is held would mean something else from one moment to the next.
+    this._stick.release();
+    this._mode.hidden = !holonomic;
+  }
+
+  /** Let go. */
+  release() {
+    this._stick.release();
+  }
+
+  /**
+   * @param {boolean} useful Whether there is a robot that it could drive.
+   * @param {boolean} dead Whether what is held now does nothing.
+   */
+  show(useful, dead) {
+    const visible = useful && this.wanted;
+    if (!visible) this._stick.release();
+    this.element.hidden = !visible;
+    this._pad.classList.toggle("dead", dead);
+  }
+
+  destroy() {
+    this._stick.destroy();
+  }
+}
+
+/** Who asks the operator for robots, each with the two answers there are. */
+export class Requests {
+  /** @param {Drive} drive */
+  constructor(drive) {
+    this._drive = drive;
+    /** @type {Map<string, {item: HTMLElement, left: HTMLElement}>} */
+    this._items = new Map();
+    this.element = html("ul", "webmap-requests");
+    this.element.hidden = true;
+  }
+
+  /** @param {Request[]} requests */
+  show(requests) {
+    const asked = requests.filter(({ mine }) => mine);
+    const keys = new Set(asked.map(keyOf));
+    for (const [key, { item }] of this._items) {
+      if (keys.has(key)) continue;
+      item.remove();
+      this._items.delete(key);
+    }
+    for (const request of asked) {
+      const { left } = this._items.get(keyOf(request)) ?? this._add(request);
+      say(left, `(${request.left} s)`);
+    }
+    this.element.hidden = asked.length === 0;
+  }
+
+  /** @param {Request} request */
+  _add(request) {
+    const { robot, name, who } = request;
+    const left = html("span", "webmap-request-left", { role: "timer" });
+    const words = html(
+      "p",
+      "webmap-request-words",
+      {},
+      html("strong", "", { role: "alert" }, `${who} asks for ${name}`),
+      " ",
+      left,
+    );
+    const item = html(
+      "li",
+      "webmap-panel webmap-request",
+      {},
+      words,
+      answer("Hand over", name, () => this._drive.grant(robot)),
+      answer("Keep", name, () => this._drive.deny(robot)),
+    );
+    this.element.append(item);
+    const made = { item, left };
+    this._items.set(keyOf(request), made);
+    return made;
+  }
+}
+
+/**
+ * @param {string} label
+ * @param {string} name The robot's.
+ * @param {() => void} act
+ */
+function answer(label, name, act) {
+  const element = button("webmap-request-answer", label, act);
+  element.setAttribute("aria-label", `${label} ${name}`);
+  return element;
+}
+
+/** @param {Request} request */
+function keyOf({ robot, by, who, name }) {
+  return JSON.stringify([robot, by, who, name]);
+}

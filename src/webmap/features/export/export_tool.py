@@ -1,0 +1,43 @@
+"""What a viewer sees of a map, saved as a picture."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+MAX_WORDS = 200
+
+
+class ExportTool:
+    """Saves what is seen of the map as SVG or PNG, on the viewer's own machine.
+
+    The file has all that it needs in it: styles are written onto the elements, images
+    are embedded, and there is nothing that runs.
+
+    Args:
+        map: The map.
+        place: A CSS selector of the page's element that the button goes into; over the
+            map if not given.
+        classes: What the button is styled by there.
+
+    """
+
+    def __init__(self, map: "Map", *, place: str = "", classes: str = "") -> None:
+        self.map = map
+        self.half = map.add_browser_half(
+            self,
+            "features/export/export_tool.js",
+            {"place": place, "classes": classes},
+            "features/export/export_tool.css",
+        )
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Say what the page could not save."""
+        failed, missing = message.get("failed"), message.get("missing")
+        if isinstance(failed, str):
+            self.map.report_error(f"the view was not saved: {failed[:MAX_WORDS]}")
+        elif isinstance(missing, int):
+            self.map.report_error(
+                f"the view was saved without {missing} of its images: the display "
+                "does not have them any more"
+            )

@@ -1,0 +1,193 @@
+import { onScreen } from "../../web/tools/aim.js";
+import { button, html, say, svg } from "../../web/tools/elements.js";
+import { look } from "../../web/tools/goal_words.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/tools/aim.js').Pose} Pose */
+/** @typedef {import('../../web/motion/report.js').GoalWord} GoalWord */
+
+/** Points along x, 44 pixels long, with a ring around the place itself. */
+const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
+
+/** What stands in the ring besides a colour, by the shape of the goal's look. */
+/** @type {Readonly<Record<string, string>>} */
+const SIGNS = {
+  sent: "",
+  way: "M-3 0h6M0-3v6",
+  unknown: "M-2-2a2 2 0 1 1 2 3v1M0 4v.1",
+  reached: "M-3 0-1 3 4-3",
+  failed: "M-3-3 3 3M-3 3 3-3",
+  cancelled: "M-3 0h6",
+};
+
+/**
+ * @typedef {object} Mark
+ * @property {SVGGElement} group
+ * @property {SVGPathElement} arrow
+ * @property {SVGPathElement} sign
+ * @property {HTMLElement} label
+ * @property {HTMLElement} words
+ * @property {HTMLButtonElement} end
+ * @property {Pose} pose
+ */
+
+/**
+ * Goals over a map: an arrow where each robot goes, and in words how it stands with it.
+ */
+export class GoalMarks {
+  /**
+   * @param {MapCanvas} map
+   * @param {(robot: string) => void} onEnd The button at a goal was pressed.
+   */
+  constructor(map, onEnd) {
+    this._map = map;
+    this._onEnd = onEnd;
+    /** @type {Map<string, Mark>} */
+    this._marks = new Map();
+    this._drawing = svg("svg", { class: "webmap-aim-drawing", "aria-hidden": "true" });
+    this._labels = html("div", "webmap-goal-labels");
+    this._elsewhere = new SentElsewhere(map.svg);
+    this._offs = [
+      () => this._elsewhere.destroy(),
+      lay(map, this._drawing),
+      lay(map, this._labels),
+      map.onView(() => this._place()),
+    ];
+  }
+
+  destroy() {
+    for (const off of this._offs) off();
+  }
+
+  /**
+   * @param {Map<string, {pose: Pose, state?: string, goal?: GoalWord, name?: string,
+   *     mine?: boolean, cancels?: boolean}>} goals By robot. `state`: aimed, asked or
+   *     sent, for what the gate does not tell of yet. `mine`: the robot is selected.
+   */
+  show(goals) {
+    for (const [robot, mark] of this._marks) {
+      if (goals.has(robot)) continue;
+      mark.group.remove();
+      mark.label.remove();
+      this._marks.delete(robot);
+    }
+    for (const [robot, told] of goals) this._update(robot, told);
+    this._elsewhere.hideFor(new Set(goals.keys()));
+    this._place();
+  }
+
+  /**
+   * @param {string} robot
+   * @param {{pose: Pose, state?: string, goal?: GoalWord, name?: string, mine?: boolean,
+   *     cancels?: boolean}} told
+   */
+  _update(robot, { pose, state = "", goal, name = "", mine = false, cancels = false }) {
+    const mark = this._marks.get(robot) ?? this._make(robot);
+    mark.pose = pose;
+    const seen = goal ? look(goal) : null;
+    const kind = seen ? seen.shape : state;
+    mark.group.setAttribute("class", mine ? "webmap-goal-mark mine" : "webmap-goal-mark");
+    mark.arrow.setAttribute("class", `webmap-goal-arrow ${kind}`);
+    mark.sign.setAttribute("d", seen ? SIGNS[seen.shape] : "");
+    mark.label.hidden = seen === null;
+    if (seen === null) return;
+    mark.label.className = `webmap-goal-label ${kind}${mine ? " mine" : ""}`;
+    say(mark.words, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
+    mark.end.hidden = !mine || (!seen.over && !cancels) || goal?.state === "cancelling";
+    const does = seen.over ? "Show this goal no more" : "Cancel the goal";
+    mark.end.setAttribute("aria-label", does);
+    mark.end.title = does;
+  }
+
+  /** @param {string} robot */
+  _make(robot) {
+    const arrow = svg("path", { d: ARROW });
+    const sign = svg("path", { class: "webmap-goal-sign" });
+    const group = svg("g", { "data-goal-of": robot }, arrow, sign);
+    const words = html("span", "webmap-goal-words");
+    const end = button("webmap-goal-end", "×", () => this._onEnd(robot));
+    const label = html("div", "webmap-goal-label", { "data-goal-of": robot }, words, end);
+    this._drawing.append(group);
+    this._labels.append(label);
+    const mark = { group, arrow, sign, label, words, end, pose: { x: 0, y: 0, yaw: 0 } };
+    this._marks.set(robot, mark);
+    return mark;
+  }
+
+  _place() {
+    const { view, width, height } = this._map;
+    for (const { arrow, sign, label, pose } of this._marks.values()) {
+      const { x, y, degrees } = onScreen(view, pose);
+      arrow.setAttribute("transform", `translate(${x} ${y}) rotate(${degrees})`);
+      sign.setAttribute("transform", `translate(${x} ${y})`);
+      const inside = x >= 0 && y >= 0 && x <= width && y <= height;
+      label.classList.toggle("outside", !inside);
+      // Beside the arrow and not on it: what is selected to the right, so that the words
+      // of a group do not hide each other, and inside the map.
+      const tip = x + 44 * Math.cos((degrees * Math.PI) / 180);
+      const room = label.classList.contains("mine") && x < 0.55 * width;
+      const at = room ? Math.max(x, tip) + 12 : Math.min(x, tip) - 12;
+      label.style.transform = `translate(${at}px, ${y}px) translate(${room ? 0 : -100}%, -50%)`;
+    }
+  }
+}
+
+/**
+ * Hides the goals that robots' own topics tell of, where the goal tool shows a goal: it is
+ * the same one. What it has shown stays hidden afterwards, until the topic tells of
+ * another.
+ */
+class SentElsewhere {
+  /** @param {SVGSVGElement} mapSvg The map's. */
+  constructor(mapSvg) {
+    this._svg = mapSvg;
+    /** @type {Set<string>} */
+    this._robots = new Set();
+    /** Poses that were shown, by robot.
+     * @type {Map<string, string[]>} */
+    this._seen = new Map();
+    this._sheet = new CSSStyleSheet();
+    document.adoptedStyleSheets.push(this._sheet);
+  }
+
+  destroy() {
+    const sheets = document.adoptedStyleSheets;
+    document.adoptedStyleSheets = sheets.filter((sheet) => sheet !== this._sheet);
+  }
+
+  /** @param {Set<string>} robots Those of which the goal tool shows a goal. */
+  hideFor(robots) {
+    const same = robots.size === this._robots.size;
+    if (same && [...robots].every((robot) => this._robots.has(robot))) return;
+    for (const robot of this._robots) {
+      if (!robots.has(robot)) this._seen.set(robot, this._poses(robot));
+    }
+    this._robots = robots;
+    this._sheet.replaceSync(hidden(robots, this._seen));
+  }
+
+  /** @param {string} robot @returns {string[]} */
+  _poses(robot) {
+    const drawn = this._svg.querySelectorAll(selector(robot));
+    return [...drawn].map((goal) => goal.getAttribute("data-pose") ?? "").filter(Boolean);
+  }
+}
+
+/** @param {string} robot @returns {string} */
+const selector = (robot) => `[data-robot=${JSON.stringify(robot)}] .posestamped.goal`;
+
+/**
+ * @param {Iterable<string>} robots Of which the goal tool shows a goal now.
+ * @param {Iterable<[string, string[]]>} seen What it showed before, by robot.
+ * @returns {string} The style sheet.
+ */
+export function hidden(robots, seen) {
+  const rules = [...robots].map(selector);
+  for (const [robot, poses] of seen) {
+    for (const pose of poses) {
+      rules.push(`${selector(robot)}[data-pose=${JSON.stringify(pose)}]`);
+    }
+  }
+  return rules.map((rule) => `${rule} { display: none; }`).join("\n");
+}

@@ -1,0 +1,434 @@
+import { SPACING } from "../../web/constants.js";
+import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
+import { button, html, say } from "../../web/tools/elements.js";
+import { GoalMarks } from "./goal_marks.js";
+import { look, sendGoal, ShownGoals } from "../../web/tools/goal_words.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/tools/aim.js').Pose} Pose */
+/** @typedef {import('../../web/view.js').Point} Point */
+
+/** @typedef {(message: object) => void} Send */
+/** @typedef {{button?: boolean, key?: string, spacing?: number}} Options */
+
+/**
+ * Send the selected robots to a place: press there, drag for the heading, release.
+ *
+ * Begins by its button, by `g`, or by a message `{active: true}`; Escape leaves. Asks
+ * for the lease where it needs it. A message `{reached: id}` takes away the goal of a
+ * robot. Sends `{goal: {robot, x, y, yaw}}` when the gate has accepted one,
+ * `{cancel: robot}`, and `{mark: robot}` when a robot was pressed for long.
+ *
+ * Options: `button` (true), whether there are buttons; `key` ("g"); `spacing` (1), how
+ * far from each other several robots are sent, in metres.
+ *
+ * @param {MapCanvas} map
+ * @param {Options} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const tool = new GoalTool(map, options, send);
+  return {
+    receive: (message) => tool.receive(message),
+    destroy: () => tool.destroy(),
+  };
+}
+
+class GoalTool {
+  /**
+   * @param {MapCanvas} map
+   * @param {Options} options
+   * @param {Send} send
+   */
+  constructor(map, { button: buttons = true, key = "g", spacing = 1 }, send) {
+    this._map = map;
+    /** @type {import('../../web/drive.js').Drive} */
+    this._drive = map.drive;
+    this._send = send;
+    /**
+     * Where robots are to go, until the gate tells of it.
+     * @type {Map<string, {pose: Pose, state: 'aimed' | 'asked' | 'sent'}>}
+     */
+    this._goals = new Map();
+    this._shown = new ShownGoals();
+    this._aim = new PressAim(map, key, {
+      mayBegin: () => map.selected !== null,
+      changed: (active) => this._changed(active),
+      preview: (pose) => this._preview(pose),
+      done: (pose) => this._done(pose),
+    });
+    this._wanted = false;
+    this._go = button("webmap-aim-go webmap-goal-go", "Send to a place", () => this._toggle());
+    this._go.title = `Key ${key}`;
+    this._cancel = button("webmap-goal-cancel", "Cancel the goal", () => this._callOff());
+    this._word = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
+    this._spacing = html("input", "webmap-goal-spacing-value", {
+      type: "number",
+      min: `${SPACING[0]}`,
+      max: `${SPACING[1]}`,
+      step: "0.1",
+      value: `${spacing}`,
+    });
+    this._apart = html(
+      "label",
+      "webmap-goal-spacing",
+      {},
+      "apart, in m ",
+      this._spacing,
+    );
+    this._panel = html(
+      "section",
+      "webmap-panel webmap-aim webmap-goal",
+      { "aria-label": "Goals" },
+      this._go,
+      this._apart,
+      this._cancel,
+      this._word,
+    );
+    this._marks = new GoalMarks(map, (robot) => this._end(robot));
+    this._marking = new Marking(map, (robot) => send({ mark: robot }));
+    this._offs = [
+      ...(buttons ? [lay(map, this._panel, "top-left")] : []),
+      map.onSelect(() => this._selected()),
+      this._drive.on("stop", (robot) => this._stopped(robot)),
+      this._drive.on("robot", ({ robot, goal }) => this._hear(robot, goal)),
+      this._drive.on("gone", (robot) => this._shown.gone(robot)),
+      this._drive.on("refused", ({ robot, what, why }) => this._refused(robot, what, why)),
+    ];
+    // Goals that have ended leave by themselves, and marks come with the scene.
+    this._timer = setInterval(() => this._show(), 250);
+    for (const { robot, goal } of this._drive.robots.values()) this._hear(robot, goal);
+    this._show();
+  }
+
+  destroy() {
+    clearInterval(this._timer);
+    this._aim.destroy();
+    this._marks.destroy();
+    this._marking.destroy();
+    for (const off of this._offs) off();
+  }
+
+  /** @param {any} message */
+  receive(message) {
+    if (typeof message?.active === "boolean") {
+      this._wanted = message.active;
+      this._aim.activate(message.active);
+    }
+    if (typeof message?.reached === "string") this._forget(message.reached);
+  }
+
+  _toggle() {
+    this._wanted = !this._aim.active;
+    this._aim.toggle();
+  }
+
+  /** @param {boolean} active */
+  _changed(active) {
+    if (this._wanted && !active && this._map.selected === null) {
+      say(this._word, "Select a robot first.");
+    } else {
+      say(this._word, active ? "Press on the map, drag for the heading." : "");
+    }
+    this._wanted = false;
+    this._show();
+  }
+
+  /**
+   * @param {Pose} pose
+   * @returns {[string, Pose][]} Where each of the selected robots goes.
+   */
+  _places(pose) {
+    const robots = chosen(this._map);
+    const apart = Number(this._spacing.value);
+    const [least, most] = SPACING;
+    const spacing = Number.isFinite(apart) && apart >= least ? Math.min(apart, most) : 1;
+    const places = formation(pose, robots.length, spacing);
+    const from = robots.map((robot) => poseOf(this._map, robot) ?? pose);
+    return assign(from, places).map((place, i) => [robots[i], place]);
+  }
+
+  /** @param {Pose | null} pose */
+  _preview(pose) {
+    for (const [robot, { state }] of this._goals) {
+      if (state === "aimed") this._goals.delete(robot);
+    }
+    for (const [robot, place] of pose ? this._places(pose) : []) {
+      this._goals.set(robot, { pose: place, state: "aimed" });
+    }
+    this._show();
+  }
+
+  /** @param {Pose} pose */
+  _done(pose) {
+    const places = this._places(pose);
+    this._aim.activate(false);
+    void this._ask(places);
+  }
+
+  /** @param {[string, Pose][]} places */
+  async _ask(places) {
+    /** @type {string[]} */
+    const problems = [];
+    const asked = places.map(([robot, pose]) => {
+      const goal = { pose, state: /** @type {'asked' | 'sent'} */ ("asked") };
+      this._goals.set(robot, goal);
+      return { robot, pose, goal };
+    });
+    this._show();
+    for (const { robot, pose, goal } of asked) {
+      // A STOP, or another goal, that came meanwhile.
+      if (this._goals.get(robot) !== goal) continue;
+      try {
+        const accepted = await sendGoal(
+          () => this._drive.goal(robot, pose),
+          () => this._goals.get(robot) === goal,
+        );
+        if (!accepted) throw new Error("called off");
+        if (this._goals.get(robot) === goal) goal.state = "sent";
+        if (this._drive.robots.get(robot)?.goal) this._goals.delete(robot);
+        this._send({ goal: { robot, ...pose } });
+      } catch (error) {
+        if (this._goals.get(robot) === goal) this._goals.delete(robot);
+        const why = error instanceof Error ? error.message : String(error);
+        const name = this._drive.robots.get(robot)?.name ?? robot;
+        problems.push(places.length > 1 ? `${name}: ${why}` : why);
+      }
+      this._show();
+    }
+    if (problems.length > 0) say(this._word, `Not sent: ${problems.join("; ")}`);
+  }
+
+  _callOff() {
+    for (const robot of chosen(this._map)) this._cancelOne(robot);
+  }
+
+  /** @param {string} robot */
+  _cancelOne(robot) {
+    if (!this._runs(robot)) return;
+    this._drive.cancel(robot);
+    this._send({ cancel: robot });
+    this._goals.delete(robot);
+    this._show();
+  }
+
+  /** @param {string} robot */
+  _end(robot) {
+    if (this._runs(robot)) this._cancelOne(robot);
+    else this._forget(robot);
+  }
+
+  /**
+   * @param {string} robot
+   * @param {import('../../web/motion/report.js').GoalWord | null | undefined} goal
+   */
+  _hear(robot, goal) {
+    this._shown.report(robot, goal, performance.now());
+    if (goal && this._goals.get(robot)?.state === "sent") this._goals.delete(robot);
+    this._show();
+  }
+
+  /**
+   * @param {string | null} robot
+   * @param {string} what
+   * @param {string} why
+   */
+  _refused(robot, what, why) {
+    if (what === "cancel" && robot !== null) say(this._word, `Not cancelled: ${why}`);
+  }
+
+  /** @param {string} robot */
+  _stopped(robot) {
+    if (robot === "*") this._goals.clear();
+    this._aim.leave();
+    this._goals.delete(robot);
+    this._show();
+  }
+
+  /** @param {string} robot */
+  _forget(robot) {
+    this._goals.delete(robot);
+    this._shown.dismiss(robot);
+    this._show();
+  }
+
+  _selected() {
+    // What is aimed was meant for the robots that were selected then.
+    this._aim.leave();
+    say(this._word, "");
+    this._show();
+  }
+
+  /** @param {string} robot */
+  _runs(robot) {
+    if (this._goals.get(robot)?.state === "sent") return true;
+    const goal = this._drive.robots.get(robot)?.goal;
+    return goal !== undefined && goal !== null && !look(goal).over;
+  }
+
+  /** @param {string} robot */
+  _mayCancel(robot) {
+    const report = this._drive.robots.get(robot);
+    const asked = report?.goal?.state === "cancelling" && !this._goals.has(robot);
+    return this._runs(robot) && report?.cancels !== false && !asked;
+  }
+
+  _show() {
+    const robots = chosen(this._map);
+    const way = robots.some((robot) => this._drive.robots.get(robot)?.way !== null);
+    this._go.disabled = robots.length === 0 || !way;
+    const words = robots.length > 1 ? `Send ${robots.length} to a place` : "Send to a place";
+    say(this._go, words);
+    this._go.setAttribute("aria-pressed", String(this._aim.active));
+    this._apart.hidden = robots.length < 2;
+    this._cancel.hidden = !robots.some((robot) => this._mayCancel(robot));
+    this._draw(robots);
+  }
+
+  /** @param {string[]} robots The selected ones. */
+  _draw(robots) {
+    /** @type {Parameters<GoalMarks['show']>[0]} */
+    const goals = new Map();
+    for (const [robot, goal] of this._shown.shown(performance.now())) {
+      if (poseOf(this._map, robot) === null) continue;
+      const report = this._drive.robots.get(robot);
+      const mine = robot === this._map.selected;
+      const { name = "", cancels = true } = report ?? {};
+      goals.set(robot, { pose: goal, goal, name, mine, cancels });
+    }
+    for (const [robot, { pose, state }] of this._goals) {
+      if (robots.includes(robot)) goals.set(robot, { pose, state, mine: true });
+    }
+    this._marks.show(goals);
+  }
+}
+
+/** For how long a finger rests on a robot until that means something, in ms. */
+const LONG = 500;
+/** How far it may move meanwhile, in pixels. */
+const STILL = 10;
+
+/** A long press on a robot, which is to a finger what Shift is to a mouse. */
+class Marking {
+  /**
+   * @param {MapCanvas} map
+   * @param {(robot: string) => void} mark
+   */
+  constructor(map, mark) {
+    this._map = map;
+    this._mark = mark;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this._timer = undefined;
+    this._from = { x: 0, y: 0 };
+    this._marked = false;
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    const { svg } = map;
+    svg.addEventListener("pointerdown", (event) => this._down(event), { signal });
+    svg.addEventListener("pointermove", (event) => this._move(event), { signal });
+    for (const end of ["pointerup", "pointercancel"]) {
+      svg.addEventListener(end, () => this._up(), { signal });
+    }
+    // A browser's own menu would take the press away from us.
+    svg.addEventListener("contextmenu", (event) => this._noMenu(event), { signal });
+  }
+
+  destroy() {
+    clearTimeout(this._timer);
+    this._ending.abort();
+  }
+
+  /** @param {PointerEvent} event */
+  _down(event) {
+    clearTimeout(this._timer);
+    if (event.pointerType !== "touch" || !event.isPrimary) return;
+    const robot = robotAt(event);
+    if (robot === null) return;
+    this._from = { x: event.clientX, y: event.clientY };
+    this._timer = setTimeout(() => {
+      this._marked = true;
+      this._mark(robot);
+    }, LONG);
+  }
+
+  _up() {
+    clearTimeout(this._timer);
+    if (!this._marked) return;
+    this._marked = false;
+    this._map.suppressNextClick();
+  }
+
+  /** @param {PointerEvent} event */
+  _move(event) {
+    const { x, y } = this._from;
+    if (Math.hypot(event.clientX - x, event.clientY - y) > STILL) clearTimeout(this._timer);
+  }
+
+  /** @param {MouseEvent} event */
+  _noMenu(event) {
+    if (robotAt(event) !== null) event.preventDefault();
+  }
+}
+
+/** @param {MouseEvent} event */
+function robotAt({ target }) {
+  const robot = target instanceof Element ? target.closest(".robot") : null;
+  return robot?.getAttribute("data-robot") ?? null;
+}
+
+/** So many robots at most stand in one line; more stand in a grid. */
+const LONGEST_LINE = 4;
+
+/**
+ * Return places for several robots around a pose: a line across the heading, or a grid.
+ *
+ * The middle of the first line is the pose, and every other line is behind it.
+ *
+ * @param {Pose} pose
+ * @param {number} count
+ * @param {number} spacing Metres between neighbours.
+ * @returns {Pose[]}
+ */
+export function formation({ x, y, yaw }, count, spacing) {
+  const lines = Math.ceil(count / LONGEST_LINE);
+  const across = Math.ceil(count / lines);
+  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+  return Array.from({ length: count }, (_, n) => {
+    const line = Math.floor(n / across);
+    const inLine = Math.min(across, count - line * across);
+    const left = ((inLine - 1) / 2 - (n % across)) * spacing;
+    const ahead = -line * spacing;
+    return { x: x + cos * ahead - sin * left, y: y + sin * ahead + cos * left, yaw };
+  });
+}
+
+/**
+ * Match robots to places so that their straight ways are short all together; ways that
+ * cross could be made shorter by exchanging their ends, so none do.
+ *
+ * @param {Point[]} robots
+ * @param {Pose[]} places As many as there are robots.
+ * @returns {Pose[]} The place of each robot.
+ */
+export function assign(robots, places) {
+  const assigned = [...places];
+  /** @param {number} robot @param {number} place */
+  const way = (robot, place) =>
+    Math.hypot(robots[robot].x - assigned[place].x, robots[robot].y - assigned[place].y);
+  let better = true;
+  while (better) {
+    better = false;
+    for (let i = 0; i < robots.length; i++) {
+      for (let j = i + 1; j < robots.length; j++) {
+        if (way(i, j) + way(j, i) < way(i, i) + way(j, j) - 1e-9) {
+          [assigned[i], assigned[j]] = [assigned[j], assigned[i]];
+          better = true;
+        }
+      }
+    }
+  }
+  return assigned;
+}

@@ -1,0 +1,267 @@
+import { scaleOf } from "../../web/view.js";
+import { onScreen, PressAim } from "../../web/tools/aim.js";
+import { button, html, say, svg } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/tools/aim.js').Pose} Pose */
+/** @typedef {import('../../web/view.js').Matrix} Matrix */
+
+const SENT = "Pose sent.";
+
+/** @typedef {(message: object) => void} Send */
+
+/** A robot's outline with its nose along x, and the way that it looks. */
+const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
+
+/**
+ * Tell the selected robot where it is: press there, drag for the heading, release.
+ *
+ * Begins by its button, by `i`, or by a message `{active: true}`; Escape leaves. Sends
+ * `{told: {robot, x, y, yaw}}` when the gate has taken it. Asks by `{doubt: robot}` what
+ * the robot is told of how sure that is; the answer is `{doubt: {robot, x, y, yaw,
+ * turn}}` with variances in m² and rad², or null, and how far the axes of the robot's own
+ * map are turned on this one, in radians.
+ *
+ * Options: `button` (true), whether there is a button; `key` ("i").
+ *
+ * @param {MapCanvas} map
+ * @param {{button?: boolean, key?: string}} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const tool = new InitialPoseTool(map, options, send);
+  return {
+    receive: (message) => tool.receive(message),
+    destroy: () => tool.destroy(),
+  };
+}
+
+class InitialPoseTool {
+  /**
+   * @param {MapCanvas} map
+   * @param {{button?: boolean, key?: string}} options
+   * @param {Send} send
+   */
+  constructor(map, { button: buttons = true, key = "i" }, send) {
+    this._map = map;
+    /** @type {import('../../web/drive.js').Drive} */
+    this._drive = map.drive;
+    this._send = send;
+    /** @type {Pose | null} */
+    this._pose = null;
+    this._aim = new PressAim(map, key, {
+      mayBegin: () => this._may(),
+      changed: (active) => this._changed(active),
+      preview: (pose) => this._preview(pose),
+      done: (pose) => this._done(pose),
+    });
+    this._go = button("webmap-aim-go webmap-locate-go", "Set its pose", () => this._aim.toggle());
+    this._go.title = `Key ${key}`;
+    this._word = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
+    this._panel = html(
+      "section",
+      "webmap-panel webmap-aim webmap-locate",
+      { "aria-label": "Initial pose" },
+      this._go,
+      this._word,
+    );
+    this._doubt = new Doubt();
+    this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
+    this._drawing = svg(
+      "svg",
+      { class: "webmap-aim-drawing", "aria-hidden": "true" },
+      this._doubt.element,
+      this._outline,
+    );
+    this._offs = [
+      lay(map, this._drawing),
+      ...(buttons ? [lay(map, this._panel, "top-left")] : []),
+      map.onSelect(() => this._selected()),
+      map.onView(() => this._draw()),
+      this._drive.on("stop", () => this._aim.leave()),
+      this._drive.on("robot", () => this._show()),
+    ];
+    this._show();
+  }
+
+  destroy() {
+    this._aim.destroy();
+    for (const off of this._offs) off();
+  }
+
+  /** @param {any} message */
+  receive(message) {
+    if (message && "doubt" in message) {
+      const { doubt } = message;
+      this._doubt.know(doubt?.robot === this._map.selected ? doubt : null);
+      this._explain();
+      this._draw();
+    }
+    if (typeof message?.active !== "boolean") return;
+    this._aim.activate(message.active);
+    if (message.active && !this._aim.active) {
+      say(this._word, "This robot cannot be told where it is.");
+    }
+  }
+
+  _may() {
+    const { selected } = this._map;
+    return selected !== null && this._drive.robots.get(selected)?.locates === true;
+  }
+
+  /** @param {boolean} active */
+  _changed(active) {
+    if (active) this._send({ doubt: this._map.selected });
+    if (!active) say(this._word, "");
+    this._explain();
+    this._show();
+  }
+
+  _explain() {
+    if (!this._aim.active) return;
+    const sure = this._doubt.words;
+    const words = "Press where the robot is, drag which way it looks";
+    say(this._word, sure === "" ? `${words}.` : `${words} (${sure}).`);
+  }
+
+  /** @param {Pose | null} pose */
+  _preview(pose) {
+    this._pose = pose;
+    this._draw();
+  }
+
+  /** @param {Pose} pose */
+  _done(pose) {
+    const { selected: robot } = this._map;
+    this._aim.activate(false);
+    if (robot !== null) void this._tell(robot, pose);
+  }
+
+  /**
+   * @param {string} robot
+   * @param {Pose} pose
+   */
+  async _tell(robot, pose) {
+    try {
+      await this._drive.locate(robot, pose);
+      say(this._word, SENT);
+      setTimeout(() => this._word.textContent === SENT && say(this._word, ""), 4000);
+      this._send({ told: { robot, ...pose } });
+    } catch (error) {
+      const why = error instanceof Error ? error.message : String(error);
+      say(this._word, `Not sent: ${why}`);
+    }
+    this._preview(null);
+  }
+
+  _selected() {
+    this._doubt.know(null);
+    this._aim.leave();
+    say(this._word, "");
+    this._show();
+  }
+
+  _show() {
+    this._go.disabled = !this._may();
+    this._go.setAttribute("aria-pressed", String(this._aim.active));
+    this._draw();
+  }
+
+  _draw() {
+    this._doubt.draw(this._map.view, this._pose);
+    this._outline.toggleAttribute("hidden", this._pose === null);
+    if (this._pose === null) return;
+    const { x, y, degrees } = onScreen(this._map.view, this._pose);
+    this._outline.setAttribute("transform", `translate(${x} ${y}) rotate(${degrees})`);
+  }
+}
+
+/**
+ * How sure a pose is that a robot is told: variances of x and y in m² along the axes of
+ * the robot's own map, of yaw in rad², and how far those axes are turned on this map.
+ *
+ * @typedef {{x: number, y: number, yaw: number, turn: number}} Variances
+ */
+
+/** Standard deviations that are drawn and said, as those of a robot's own doubt are. */
+const DEVIATIONS = 2;
+
+/** Pixels that a wedge is long at least, so that it is seen beyond the outline. */
+const WEDGE = 64;
+
+/** The ellipse and the wedge of a pose that is aimed. */
+export class Doubt {
+  constructor() {
+    this._ellipse = svg("ellipse", { class: "webmap-locate-ellipse" });
+    this._wedge = svg("path", { class: "webmap-locate-wedge" });
+    this.element = svg("g", {}, this._ellipse, this._wedge);
+    /** @type {Variances | null} */
+    this._variances = null;
+    this.draw(null, null);
+  }
+
+  /** @param {Variances | null} variances */
+  know(variances) {
+    this._variances = variances;
+  }
+
+  /** What is drawn, in words; empty while it is not known. */
+  get words() {
+    if (!this._variances) return "";
+    const { x, y, yaw } = this._variances;
+    const [along, across] = [x, y].map((variance) => metres(deviation(variance)));
+    const degrees = Math.round(Math.min(180, (deviation(yaw) * 180) / Math.PI));
+    const places = along === across ? [along] : [along, across];
+    // No line ends between a number and its unit.
+    return [...places, `${degrees}°`].map((each) => `±\u00a0${each}`).join(", ");
+  }
+
+  /**
+   * @param {Matrix | null} view
+   * @param {Pose | null} pose
+   */
+  draw(view, pose) {
+    const variances = this._variances;
+    this.element.toggleAttribute("hidden", !view || !pose || !variances);
+    if (!view || !pose || !variances) return;
+    const scale = scaleOf(view);
+    const [rx, ry] = [variances.x, variances.y].map((v) => deviation(v) * scale);
+    const own = onScreen(view, { ...pose, yaw: variances.turn });
+    this._ellipse.setAttribute("rx", rx.toFixed(2));
+    this._ellipse.setAttribute("ry", ry.toFixed(2));
+    this._ellipse.setAttribute("transform", transform(own));
+    const half = Math.min(deviation(variances.yaw), Math.PI - 1e-3);
+    this._wedge.setAttribute("d", sector(Math.max(WEDGE, rx, ry), half));
+    this._wedge.setAttribute("transform", transform(onScreen(view, pose)));
+  }
+}
+
+/** @param {number} variance */
+function deviation(variance) {
+  return DEVIATIONS * Math.sqrt(variance);
+}
+
+/** @param {number} length In metres. */
+function metres(length) {
+  return `${length.toFixed(length < 0.995 ? 2 : 1)}\u00a0m`;
+}
+
+/** @param {{x: number, y: number, degrees: number}} place */
+function transform({ x, y, degrees }) {
+  return `translate(${x} ${y}) rotate(${degrees})`;
+}
+
+/**
+ * @param {number} radius In pixels.
+ * @param {number} half Half its angle, in radians.
+ * @returns {string} The path of a sector about x.
+ */
+function sector(radius, half) {
+  const [x, y] = [radius * Math.cos(half), radius * Math.sin(half)].map((n) => n.toFixed(2));
+  const [low, far] = [`${x} -${y}`, `${x} ${y}`];
+  const large = half > Math.PI / 2 ? 1 : 0;
+  return `M0 0L${low}A${radius} ${radius} 0 ${large} 1 ${far}z`;
+}

@@ -1,0 +1,366 @@
+import { deskOf } from "../../web/inputs/desk.js";
+import { attentive } from "../../web/motion/attention.js";
+import { scaleOf, unapply } from "../../web/view.js";
+import { button, html, say } from "../../web/tools/elements.js";
+import { LabelMove } from "./labels_move.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+
+/** @typedef {{editable?: boolean, key?: string, icons?: string[], longest?: number}} Options */
+/** @typedef {(message: Record<string, unknown>) => void} Send */
+
+/**
+ * Labels: kept upright, pressed to send a robot there, added, moved and taken away.
+ *
+ * Options: `editable`, whether this viewer may; `key`, which begins to add one; `icons`
+ * to choose from; `longest`, characters of a name.
+ *
+ * @param {MapCanvas} map
+ * @param {Options} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const labels = new Labels(map, options, send);
+  return {
+    receive: (message) => labels.receive(message),
+    destroy: () => labels.destroy(),
+  };
+}
+
+class Labels {
+  /**
+   * @param {MapCanvas} map
+   * @param {Options} options
+   * @param {Send} send
+   */
+  constructor(map, { editable = false, key = "l", icons = ["pin"], longest = 60 }, send) {
+    this._map = map;
+    this._send = send;
+    this._editable = editable;
+    this._key = key;
+    this._icons = icons;
+    this._longest = longest;
+    this._active = false;
+    /** @type {SVGGraphicsElement | null} The label whose sheet is open. */
+    this._chosen = null;
+    /** @type {LabelMove | null} */
+    this._move = null;
+    this._go = button("webmap-labels-go", "Label", () => this._activate(!this._active));
+    this._go.title = `Key ${key}`;
+    this._go.hidden = !editable;
+    this._word = html("span", "webmap-labels-word", { role: "status" });
+    this._sheet = html("div", "webmap-labels-sheet");
+    this._panel = html(
+      "section",
+      "webmap-panel webmap-labels",
+      { "aria-label": "Labels" },
+      this._go,
+      this._word,
+      this._sheet,
+    );
+    this._ending = new AbortController();
+    this._listen();
+    this._offs = [
+      keepLabels(map),
+      lay(map, this._panel, "top-left"),
+      deskOf(map.drive).claimEscape(() => this._leave()),
+      map.onSelect(() => this._refresh()),
+    ];
+    this._activate(false);
+  }
+
+  destroy() {
+    this._map.svg.classList.remove("webmap-labelling");
+    this._close("");
+    this._ending.abort();
+    for (const off of this._offs) off();
+  }
+
+  /** @param {{done?: boolean, refused?: string}} message */
+  receive({ done, refused }) {
+    if (done) {
+      this._move?.accepted();
+      this._close("");
+    }
+    if (typeof refused === "string") say(this._word, refused);
+    this._fit();
+  }
+
+  _listen() {
+    const { signal } = this._ending;
+    const first = { signal, capture: true };
+    const { svg: root } = this._map;
+    // Before the map hears of it, which would select no robot.
+    root.addEventListener("click", (event) => this._clicked(event), first);
+    root.addEventListener("keydown", (event) => this._pressed(event), first);
+    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+    this._panel.addEventListener("keydown", (event) => this._inPanel(event), { signal });
+  }
+
+  /** @param {KeyboardEvent} event */
+  _keyDown(event) {
+    if (event.key !== this._key || event.repeat || event.isComposing) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
+    const { active } = deskOf(this._map.drive);
+    if (!this._editable || (active !== null && active.map !== this._map)) return;
+    this._activate(!this._active);
+  }
+
+  /** @param {KeyboardEvent} event */
+  _inPanel(event) {
+    if (event.key === "Escape") this._leave();
+  }
+
+  /** @param {KeyboardEvent} event Enter, on a label that has the focus. */
+  _pressed(event) {
+    const label = labelOf(event.target);
+    if (!label || event.key !== "Enter") return;
+    event.stopPropagation();
+    this._open(label);
+  }
+
+  /** @param {MouseEvent} event */
+  _clicked(event) {
+    const label = labelOf(event.target);
+    if (this._active) {
+      event.stopPropagation();
+      const { x, y } = this._map.pointOf(event);
+      this._openNew(unapply(this._map.view, x, y));
+    } else if (label) {
+      event.stopPropagation();
+      this._open(label);
+    }
+  }
+
+  /** @param {boolean} active */
+  _activate(active) {
+    this._close("");
+    this._active = active && this._editable;
+    this._go.setAttribute("aria-pressed", String(this._active));
+    this._map.svg.classList.toggle("webmap-labelling", this._active);
+    say(this._word, this._active ? "Press where the label is to be." : "");
+    this._fit();
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  _leave() {
+    if (!this._active && this._sheet.hidden) return false;
+    this._activate(false);
+    return true;
+  }
+
+  /** @param {string} words */
+  _close(words) {
+    this._move?.destroy();
+    this._move = null;
+    this._chosen?.classList.remove("chosen");
+    this._chosen = null;
+    this._sheet.replaceChildren();
+    this._sheet.hidden = true;
+    say(this._word, words);
+    this._fit();
+  }
+
+  /** Take no room on the map while there is nothing in the panel. */
+  _fit() {
+    this._panel.hidden =
+      Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._word.textContent;
+  }
+
+  /** @param {SVGGraphicsElement} label */
+  _open(label) {
+    this._close("");
+    this._chosen = label;
+    label.classList.add("chosen");
+    this._sheet.hidden = false;
+    this._refresh();
+    this._fit();
+    this._sheet.querySelector("button")?.focus({ preventScroll: true });
+  }
+
+  /** Show what can be done with the label that is chosen. */
+  _refresh() {
+    const label = this._chosen;
+    if (!label || this._move) return;
+    const title = html("p", "title wide", {}, label.dataset.name ?? "");
+    const send = button("webmap-labels-send wide", "Send the robot here", () => {
+      void this._sendRobot(label);
+    });
+    const { selected } = this._map;
+    send.disabled = selected === null;
+    if (selected === null) send.textContent = "Select a robot to send it here";
+    const close = button("webmap-labels-close", "Close", () => this._close(""));
+    const remove = button("webmap-labels-remove", "Delete", () => {
+      this._send({ remove: label.dataset.label ?? "" });
+    });
+    const move = button("webmap-labels-move wide", "Move", () => this._openMove(label));
+    remove.hidden = !this._editable || label.dataset.kept !== "true";
+    move.hidden = remove.hidden;
+    this._sheet.replaceChildren(title, send, move, close, remove);
+  }
+
+  /** @param {SVGGraphicsElement} label */
+  _openMove(label) {
+    const place = placeOf(label);
+    if (!place) return;
+    say(this._word, "Drag it on the map, or say where it is.");
+    this._move = new LabelMove(this._map, label, place, (to) => {
+      if (to) this._send({ move: label.dataset.label ?? "", to });
+      else this._close("");
+    });
+    const title = html("p", "title wide", {}, label.dataset.name ?? "");
+    this._sheet.replaceChildren(title, ...this._move.fields);
+    this._fit();
+    this._move.focus();
+  }
+
+  /** @param {{x: number, y: number}} place In metres. */
+  _openNew(place) {
+    this._activate(false);
+    const name = html("input", "", {
+      type: "text",
+      maxlength: String(this._longest),
+      autocomplete: "off",
+    });
+    const icon = html("select", "");
+    for (const each of this._icons) icon.append(html("option", "", { value: each }, each));
+    const save = () => {
+      const add = { name: name.value, icon: icon.value, x: place.x, y: place.y };
+      if (name.value.trim()) this._send({ add });
+      else say(this._word, "A label needs a name.");
+    };
+    name.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && !event.isComposing) save();
+    });
+    const cancel = button("webmap-labels-cancel", "Cancel", () => this._close(""));
+    const keep = button("webmap-labels-save", "Save", save);
+    this._sheet.hidden = false;
+    this._sheet.replaceChildren(
+      html("label", "", {}, "Name", name),
+      html("label", "", {}, "Icon", icon),
+      cancel,
+      keep,
+    );
+    this._fit();
+    name.focus({ preventScroll: true });
+  }
+
+  /** @param {SVGGraphicsElement} label */
+  async _sendRobot(label) {
+    const robot = this._map.selected;
+    const place = placeOf(label);
+    if (robot === null || !place) return;
+    const given = Number.parseFloat(label.dataset.yaw ?? "");
+    const yaw = Number.isFinite(given) ? given : this._wayTo(robot, place);
+    try {
+      await this._map.drive.goal(robot, { ...place, yaw });
+      this._send({ goal: { robot, ...place, yaw } });
+      this._close(`Sent to ${label.dataset.name ?? "the label"}.`);
+    } catch (error) {
+      say(this._word, `Not sent: ${error instanceof Error ? error.message : error}`);
+      this._fit();
+    }
+  }
+
+  /**
+   * @param {string} robot
+   * @param {{x: number, y: number}} place
+   * @returns {number} The direction in which the robot comes there.
+   */
+  _wayTo(robot, place) {
+    const element = this._map.world.querySelector(`[data-robot="${CSS.escape(robot)}"]`);
+    const from = element instanceof SVGGraphicsElement ? placeOf(element) : null;
+    return from ? Math.atan2(place.y - from.y, place.x - from.x) : 0;
+  }
+}
+
+/**
+ * @param {EventTarget | null} target
+ * @returns {SVGGraphicsElement | null}
+ */
+function labelOf(target) {
+  const label = target instanceof Element ? target.closest(".labels > .label") : null;
+  return label instanceof SVGGraphicsElement ? label : null;
+}
+
+/**
+ * @param {SVGGraphicsElement} element Of the world.
+ * @returns {{x: number, y: number} | null} Where it is, in metres.
+ */
+function placeOf(element) {
+  const list = element.transform.baseVal;
+  const matrix = list.numberOfItems > 0 ? list.getItem(0).matrix : null;
+  return matrix && { x: matrix.e, y: matrix.f };
+}
+
+/** @typedef {{x: number, y: number, across: number}} Name */
+
+/** Half of what a name and its spot take up and down, in pixels. */
+const HEIGHT = 46;
+
+/**
+ * Choose whose names are shown, so that none lies on another.
+ *
+ * @param {Name[]} names Where they are on the screen, and how wide, in pixels; the first
+ *     comes first.
+ * @returns {boolean[]} For each whether there is no room for it.
+ */
+export function crowded(names) {
+  /** @type {Name[]} */
+  const shown = [];
+  return names.map((name) => {
+    const hit = shown.some(
+      (other) =>
+        Math.abs(name.x - other.x) < (name.across + other.across) / 2 + 4 &&
+        Math.abs(name.y - other.y) < HEIGHT,
+    );
+    if (!hit) shown.push(name);
+    return hit;
+  });
+}
+
+/**
+ * Keep labels upright and as large, whatever the view, and names from lying on others.
+ *
+ * @param {MapCanvas} map
+ * @returns {() => void} Ends it.
+ */
+function keepLabels(map) {
+  let frame = 0;
+  const look = () => {
+    frame = 0;
+    const { a, b } = map.view;
+    const { style } = map.svg;
+    style.setProperty("--label-size", (1 / scaleOf(map.view)).toPrecision(6));
+    style.setProperty("--label-turn", `${Math.atan2(b, a).toFixed(5)}rad`);
+    const labels = [...map.world.querySelectorAll(".labels > .label")];
+    const names = labels.map((label) => {
+      const m = label instanceof SVGGraphicsElement ? label.getCTM() : null;
+      const text = label.querySelector(".name");
+      const across = text instanceof SVGTextElement ? text.getComputedTextLength() : 0;
+      return { x: m?.e ?? 0, y: m?.f ?? 0, across: Math.max(across, 30) };
+    });
+    crowded(names).forEach((hit, i) => labels[i].classList.toggle("crowded", hit));
+  };
+  const soon = () => {
+    if (frame === 0) frame = requestAnimationFrame(look);
+  };
+  const off = map.onView(soon);
+  const observer = new MutationObserver((records) => {
+    const among = (/** @type {Node} */ node) =>
+      node instanceof Element && node.closest(".labels") !== null;
+    if (records.some(({ target }) => among(target))) soon();
+  });
+  observer.observe(map.world, { childList: true, subtree: true });
+  look();
+  return () => {
+    cancelAnimationFrame(frame);
+    observer.disconnect();
+    off();
+    map.svg.style.removeProperty("--label-size");
+    map.svg.style.removeProperty("--label-turn");
+  };
+}

@@ -1,0 +1,339 @@
+"""Points of interest, by their names."""
+
+import asyncio
+import logging
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from webmap.core.given_pose import robot_and_pose
+from webmap.features.labels.label_store import (
+    ICONS,
+    MAX_LABELS,
+    MAX_NAME,
+    Label,
+    LabelStore,
+    label_file,
+    moved_label,
+    new_label,
+    read_labels,
+)
+from webmap.core.layer import Layer
+from webmap.base.tasks import spawn
+from webmap.base.errors import ConfigError
+from webmap.gate.kept.locks import state_folder
+from webmap.scene import svg
+from webmap.scene.element import Element
+from webmap.base.scope import Removal, keep
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+log = logging.getLogger("webmap.modules.labels")
+
+
+class LabelLayer(Layer):
+    """The labels of a configuration, and those added on pages under one name.
+
+    Args:
+        name: Of the file that keeps those that are added.
+        configured: Labels that nobody can take away on a page.
+
+    """
+
+    def __init__(self, name: str, configured: tuple[Label, ...]) -> None:
+        super().__init__()
+        self.configured = {label.id: label for label in configured}
+        self.added = AddedLabels.of(name)
+        self._drawn: dict[str, Element] = {}
+        self.svg.classes.add("labels")
+
+    def start(self) -> None:
+        """Draw what is configured, and what was added before."""
+        for label in self.configured.values():
+            self.draw(label)
+        self.added.show_on(self)
+
+    def add(self, label: Label) -> None:
+        """Show one more, and keep it.
+
+        Raises:
+            ConfigError: If it cannot be kept.
+
+        """
+        if len(self._drawn) >= MAX_LABELS:
+            raise ConfigError(f"{MAX_LABELS} labels are the most")
+        self.added.add(label)
+
+    def remove(self, id: str) -> None:
+        """Take one away that was added on a page.
+
+        Raises:
+            ConfigError: If it is in the configuration, or there is none.
+
+        """
+        self._check_added(id)
+        self.added.remove(id)
+
+    def move(self, id: str, place: Any) -> None:
+        """Put one elsewhere that was added on a page.
+
+        Args:
+            id: Which one.
+            place: A table with ``x`` and ``y`` in metres.
+
+        Raises:
+            ConfigError: If it is in the configuration, there is none, or the place
+                makes no sense.
+
+        """
+        self._check_added(id)
+        self.added.move(id, place)
+
+    def _check_added(self, id: str) -> None:
+        label = self.configured.get(id)
+        if label is not None:
+            raise ConfigError(f"{label.name} is in the configuration and stays")
+
+    def erase(self, id: str) -> None:
+        """Draw a label no more."""
+        self._drawn.pop(id).remove()
+
+    def draw(self, label: Label) -> None:
+        """Draw a label, also one that is drawn already and is elsewhere now."""
+        if label.id in self._drawn:
+            self._drawn[label.id].set_pose(label.x, label.y, 0.0)
+            return
+        name = svg.text(text=label.name, class_="name", y=26)
+        icon = svg.path(d=ICONS[label.icon], class_="icon")
+        icon.set(transform="translate(-9 -9) scale(0.75)")
+        upright = svg.g(svg.circle(r=14, class_="spot"), icon, name, class_="upright")
+        title = svg.title(text=label.name)
+        drawn = svg.g(title, upright, class_=f"label {label.icon} {label.kind}".strip())
+        drawn.set("data-label", label.id).set("data-name", label.name)
+        drawn.set("data-kept", "true" if label.kept else None)
+        drawn.set("data-yaw", None if label.yaw is None else f"{label.yaw:.6f}")
+        drawn.set("tabindex", 0).set("role", "button").set("aria-label", label.name)
+        drawn.set_pose(label.x, label.y, 0.0)
+        self._drawn[label.id] = drawn
+        self.svg.append(drawn)
+
+
+class AddedLabels:
+    """The added labels of one file: the same object for everybody who shows them.
+
+    So none of them writes the file without what others added. It is read whenever
+    somebody shows its labels and nobody did before.
+
+    Args:
+        store: The file.
+
+    """
+
+    _of: ClassVar[dict[Path, "AddedLabels"]] = {}
+
+    def __init__(self, store: LabelStore) -> None:
+        self.store = store
+        self.labels: dict[str, Label] = {}
+        self.readable = True
+        """Whether the file was read, so that it may be written again."""
+        self._problem = ""
+        self._shown_by: list[LabelLayer] = []
+        self._unsaved = False
+        self._saving: asyncio.Task[None] | None = None
+
+    @classmethod
+    def of(cls, name: str) -> "AddedLabels":
+        """Return those that the state folder keeps under a name.
+
+        Raises:
+            ConfigError: If the name cannot be a file's.
+
+        """
+        store = LabelStore(state_folder(), name)
+        return cls._of.setdefault(store.file, cls(store))
+
+    def show_on(self, layer: LabelLayer) -> Removal:
+        """Draw them on a layer, now and as they change, until the removal."""
+        if not self._shown_by and self._saving is None:
+            self._load()
+        self._shown_by.append(layer)
+        for label in self.labels.values():
+            layer.draw(label)
+        if self._problem:
+            layer.set_problem(self, self._problem)
+        return keep(Removal(lambda: self._shown_by.remove(layer)))
+
+    def add(self, label: Label) -> None:
+        """Show one more, and keep it.
+
+        Raises:
+            ConfigError: If it cannot be kept.
+
+        """
+        self._check_writable()
+        self._draw(label)
+
+    def remove(self, id: str) -> None:
+        """Take one away.
+
+        Raises:
+            ConfigError: If there is none, or that cannot be kept.
+
+        """
+        del self.labels[self._found(id).id]
+        for layer in self._shown_by:
+            layer.erase(id)
+        self._save()
+
+    def move(self, id: str, place: Any) -> None:
+        """Put one elsewhere.
+
+        Args:
+            id: Which one.
+            place: A table with ``x`` and ``y`` in metres.
+
+        Raises:
+            ConfigError: If there is none, that cannot be kept, or the place makes no
+                sense.
+
+        """
+        self._draw(moved_label(self._found(id), place))
+
+    def _found(self, id: str) -> Label:
+        self._check_writable()
+        label = self.labels.get(id)
+        if label is None:
+            raise ConfigError("this label is gone already")
+        return label
+
+    def _draw(self, label: Label) -> None:
+        self.labels[label.id] = label
+        for layer in self._shown_by:
+            layer.draw(label)
+        self._save()
+
+    def _check_writable(self) -> None:
+        if not self.readable:
+            raise ConfigError(
+                f"{self.store.file} could not be read and is left alone: mend or "
+                "remove it, and start again"
+            )
+
+    def _load(self) -> None:
+        try:
+            self.labels = {label.id: label for label in self.store.load()}
+            self.readable, self._problem = True, ""
+        except ConfigError as error:
+            self.labels, self.readable = {}, False
+            self._problem = f"added labels are not shown: {error}"
+
+    def _save(self) -> None:
+        self._unsaved = True
+        if self._saving is None:
+            self._saving = spawn(self._save_on())
+
+    async def _save_on(self) -> None:
+        try:
+            while self._unsaved:
+                self._unsaved = False
+                try:
+                    await asyncio.to_thread(self.store.save, list(self.labels.values()))
+                    self._say("")
+                except OSError as error:
+                    file, why = self.store.file, error.strerror
+                    self._say(f"labels are not kept: {file}: {why}")
+        finally:
+            self._saving = None
+
+    def _say(self, problem: str) -> None:
+        self._problem = problem
+        for layer in self._shown_by:
+            if problem:
+                layer.set_problem(self, problem)
+            else:
+                layer.clear_problem(self)
+
+
+ORDER = 90.0
+"""Under the robots, over everything else."""
+
+MAY_ADD = ("operator", "admin")
+"""Roles of viewers who may."""
+
+
+class Labels:
+    """Shows places with their names, upright and as large at every zoom.
+
+    They come from the program, from a file, and from the page, where people add them;
+    those are kept on this machine and are on every page that has labels of that name.
+    A press on a label offers to send the selected robot there.
+
+    Style them by CSS: ``.label``, with the icon's name and ``kind`` as further classes.
+
+    Args:
+        map: The map.
+        labels: Tables with ``name``, ``x`` and ``y`` in metres, and if wanted ``icon``,
+            ``kind`` (a class) and ``yaw`` in radians.
+        file: A YAML or JSON file with such a list.
+        name: Which file of the state folder keeps those that are added.
+        editable: Whether they can be added, moved and taken away on the page.
+        key: The key that begins to add one.
+
+    Raises:
+        ConfigError: If a label makes no sense; it is named by its number and its key.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        labels: Iterable[Mapping[str, Any] | Label] = (),
+        *,
+        file: str | Path | None = None,
+        name: str = "labels",
+        editable: bool = True,
+        key: str = "l",
+    ) -> None:
+        if len(key) != 1:
+            raise ConfigError(f"Labels: key must be one character, got {key!r}")
+        LabelStore(Path(), name)
+        configured = read_labels(labels, "labels")
+        if file is not None:
+            configured = read_labels((*configured, *label_file(file)), "labels")
+        self.map = map
+        self.may_edit = editable and map.page.viewer.role in MAY_ADD
+        self.layer = LabelLayer.shared(name, configured)
+        self.layer.show_on(map, order=ORDER)
+        self.half = map.add_browser_half(
+            self,
+            "features/labels/labels.js",
+            {
+                "editable": self.may_edit,
+                "key": key,
+                "icons": list(ICONS),
+                "longest": MAX_NAME,
+            },
+            "features/labels/labels.css",
+        )
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Add a label, move or take one away, or note where a robot was sent."""
+        try:
+            if "goal" in message:
+                sent = robot_and_pose(self.map, message["goal"])
+                if sent is not None:
+                    self.map.notify_modules("on_goal_sent", *sent)
+            elif not self.may_edit:
+                raise ConfigError("only an operator adds, moves and deletes labels")
+            elif "add" in message:
+                self.layer.add(new_label(message["add"]))
+                self.half.send({"done": True})
+            elif "move" in message:
+                self.layer.move(str(message["move"]), message.get("to"))
+                self.half.send({"done": True})
+            elif "remove" in message:
+                self.layer.remove(str(message["remove"]))
+                self.half.send({"done": True})
+        except ConfigError as error:
+            self.half.send({"refused": str(error)})

@@ -1,0 +1,76 @@
+"""The charge of a robot's battery."""
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages import BatteryStateMsg
+from webmap.base.scope import Removal, keep
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+FULL = 1.2
+"""What a full battery may say at the most: gauges that are not calibrated say more."""
+
+
+class Battery:
+    """Follows a ``sensor_msgs/BatteryState`` and fires ``on_battery_update``.
+
+    Some drivers publish a percentage of 0 to 100, where the message has 0 to 1. Once
+    one has been seen above 1.2, that driver is taken to count so.
+
+    Args:
+        robot: The robot that runs on the battery.
+        bridge: The link to the ROS system that has the topic.
+        topic: The topic.
+        throttle: The least time between two messages, in milliseconds.
+
+    """
+
+    def __init__(
+        self, robot: "Robot", bridge: Bridge, topic: str, throttle: int = 1000
+    ) -> None:
+        self.robot = robot
+        self.charge: float | None = None
+        """Between 0 and 1; None if the robot does not know."""
+        self.voltage: float | None = None
+        """In volts; None if the robot does not know."""
+        self.stamp: float | None = None
+        """When the newest message was sent, in monotonic seconds."""
+        self._topic = topic
+        self._hundredths = False
+        self._bridge = bridge
+        keep(Removal(lambda: robot.clear_problem(self)))
+        bridge.subscribe(
+            topic,
+            self.on_message,
+            "sensor_msgs/BatteryState",
+            throttle=throttle,
+            decode=BatteryStateMsg,
+        )
+
+    def on_message(self, message: BatteryStateMsg) -> None:
+        """Take the newest charge; what is not a number is unknown."""
+        voltage = message.voltage
+        self.charge = self._charge_of(message.percentage)
+        self.voltage = voltage if math.isfinite(voltage) else None
+        self.stamp = time.monotonic() - self._bridge.lag
+        self.robot.notify_modules("on_battery_update", self)
+
+    def _charge_of(self, percentage: float) -> float | None:
+        """Return a charge of 0 to 1; None if it is not known, or cannot be."""
+        if math.isnan(percentage):  # as the message has it for "not measured"
+            self.robot.clear_problem(self)
+            return None
+        if not 0 <= percentage <= 100:
+            self.robot.set_problem(
+                self,
+                f"{self._topic}: a battery has a percentage of 0 to 1, or of 0 to 100, "
+                f"got {percentage:g}; the charge is not known",
+            )
+            return None
+        self.robot.clear_problem(self)
+        self._hundredths |= percentage > FULL
+        return percentage / 100 if self._hundredths else min(percentage, 1.0)

@@ -1,0 +1,82 @@
+"""Maps from disk."""
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from webmap.features.layers.grid_picture import Palette, check_palette, draw_aside, place_grid
+from webmap.core.layer import Layer
+from webmap.core.pictures import Picture
+from webmap.base.tasks import spawn
+from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.map_file import MapImage, read_map
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class MapFile:
+    """Draws a map that ROS's map_server would serve: a YAML file and its image.
+
+    The thresholds, ``negate`` and the mode of the file count as map_server has them.
+    It is read beside the model; a file that makes no sense is said on the pages.
+
+    Style it by CSS: ``.map-file``.
+
+    Args:
+        map: The map.
+        file: The YAML file; its image lies in the same folder or below.
+        palette: ``"map"``, ``"costmap"`` or ``"raw"``, as for ``OccupancyGrid``.
+        order: What lies over what: greater is nearer; a topic's map has 10.
+
+    Raises:
+        ConfigError: If there is no such palette.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        file: str | Path,
+        *,
+        palette: Palette = "map",
+        order: float = 5.0,
+    ) -> None:
+        check_palette(palette)
+        self.map = map
+        self.layer = FileLayer.shared(str(Path(file).absolute()), palette)
+        self.layer.show_on(map, order=order)
+
+
+class FileLayer(Layer):
+    """One map from disk, for all maps that show it."""
+
+    def __init__(self, file: str, palette: str) -> None:
+        super().__init__()
+        self.file = Path(file)
+        self.palette = palette
+        self.image: MapImage | None = None
+        """What was read, once it is."""
+        self.svg.classes.add("map-file")
+        self.svg.set(pointer_events="none")
+
+    def start(self) -> None:
+        """Begin to read."""
+        self.picture = Picture()
+        self.svg.append(self.picture.element)
+        spawn(self._read())
+
+    async def _read(self) -> None:
+        try:
+            image = await asyncio.to_thread(read_map, self.file)
+            png = await draw_aside(image.cells, self.palette)
+        except (ConfigError, ProtocolError, MemoryError) as error:
+            self.set_problem(self, f"map {error}")
+            return
+        if self.scope.closed:
+            return
+        self.image = image
+        height, width = (cells * image.resolution for cells in image.cells.shape)
+        self.picture.show(
+            png, place_grid(image.origin, height), width, height, image.resolution
+        )

@@ -1,0 +1,349 @@
+"""What each type of ``visualization_msgs/Marker`` looks like from above."""
+
+import math
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import Any
+
+from webmap.modules.drawing import (
+    Point,
+    box,
+    check_finite,
+    cylinder,
+    ellipsoid,
+    flat,
+    in_space,
+    rounded,
+)
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Affine, Vector3
+from webmap.features.layers.markers import messages as kinds
+from webmap.features.layers.markers.messages import ColorMsg, MarkerMsg
+from webmap.scene import svg
+from webmap.scene.element import Element
+from webmap.ros.tf import Transform
+
+SHADES = 16
+"""How finely the colours of single points are told apart, from 0 to 1."""
+
+
+def filled(colour: ColorMsg) -> dict[str, Any]:
+    """Return the attributes of an area of a colour."""
+    return {"fill": _rgb(colour), "fill_opacity": _alpha(colour)}
+
+
+def drawn(colour: ColorMsg, width: float) -> dict[str, Any]:
+    """Return the attributes of a line of a colour, with its width in metres."""
+    return {
+        "stroke": _rgb(colour),
+        "stroke_opacity": _alpha(colour),
+        "stroke_width": width,
+        "stroke_linejoin": "round",
+    }
+
+
+def colours(marker: MarkerMsg) -> list[ColorMsg]:
+    """Return the colour of each point."""
+    return marker.colors or [marker.color] * len(marker.points)
+
+
+def by_colour(
+    parts: Iterable[tuple[str, ColorMsg]],
+    style: Callable[[ColorMsg], dict[str, Any]],
+) -> Iterable[Element]:
+    """Return one path for each colour, whatever their number of parts."""
+    paths: dict[tuple[float, ...], list[str]] = {}
+    for path, colour in parts:
+        key = (_shade(colour.r), _shade(colour.g), _shade(colour.b), _shade(colour.a))
+        paths.setdefault(key, []).append(path)
+    for shades, together in paths.items():
+        colour = ColorMsg(*(part / (SHADES - 1) for part in shades))
+        yield svg.path(d="".join(together), **style(colour))
+
+
+def _shade(part: float) -> int:
+    return round(_share(part) * (SHADES - 1))
+
+
+def _share(part: float) -> float:
+    """Return a part of a colour that is one; what is not a number is nothing."""
+    return min(1.0, max(0.0, part)) if math.isfinite(part) else 0.0
+
+
+def _rgb(colour: ColorMsg) -> str:
+    parts = (round(255 * _share(part)) for part in (colour.r, colour.g, colour.b))
+    return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+def _alpha(colour: ColorMsg) -> float:
+    return round(_share(colour.a), 3)
+
+
+MAX_TEXT = 500
+"""The most characters that are shown of a text."""
+
+LETTERS = 16.0
+"""The size of letters before they are scaled: browsers round what is below 1."""
+
+CLASSES = {
+    kinds.ARROW: "arrow",
+    kinds.CUBE: "cube",
+    kinds.SPHERE: "sphere",
+    kinds.CYLINDER: "cylinder",
+    kinds.LINE_STRIP: "line-strip",
+    kinds.LINE_LIST: "line-list",
+    kinds.CUBE_LIST: "cube-list",
+    kinds.SPHERE_LIST: "sphere-list",
+    kinds.POINTS: "points",
+    kinds.TEXT_VIEW_FACING: "text",
+    kinds.TRIANGLE_LIST: "triangle-list",
+}
+"""The class of each type that can be drawn."""
+
+
+def draw(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    """Return what a marker consists of, in the coordinates of its place.
+
+    Args:
+        marker: The marker, of a type in :data:`CLASSES`.
+        tilt: How it is turned there besides its heading.
+
+    Raises:
+        ProtocolError: If a number makes no sense.
+
+    """
+    return _DRAWN[marker.type](marker, tilt)
+
+
+def sizes(marker: MarkerMsg, *axes: str) -> list[float]:
+    """Return sizes of a marker along axes, in metres.
+
+    Raises:
+        ProtocolError: If one of them is not above 0, or larger than anything.
+
+    """
+    found = [getattr(marker.scale, axis) for axis in axes]
+    for axis, size in zip(axes, found, strict=True):
+        if not (math.isfinite(size) and size > 0):
+            raise ProtocolError(f"scale.{axis} must be metres above 0, got {size}")
+        _check_size(axis, size)
+    return found
+
+
+def _check_size(axis: str, size: float) -> None:
+    if size > FARTHEST:
+        raise ProtocolError(
+            f"scale.{axis} must be {FARTHEST:g} m at the most, got {size:g}"
+        )
+
+
+def _text(marker: MarkerMsg, _: Transform) -> Iterable[Element]:
+    text = svg.text(
+        text=marker.text[:MAX_TEXT],
+        font_size=LETTERS,
+        font_family="sans-serif",
+        text_anchor="middle",
+        dominant_baseline="central",
+        text_rendering="geometricPrecision",
+        **filled(marker.color),
+    )
+    return (text,)
+
+
+def _arrow(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    if not marker.points:
+        length, shaft = sizes(marker, "x", "y")
+        ends = [Vector3(), Vector3(length)]
+        head, wide = 0.23 * length, 2 * shaft
+    elif len(marker.points) == 2:
+        _check(marker)
+        ends = in_space(marker.points)
+        length = math.dist(*((end.x, end.y, end.z) for end in ends))
+        shaft, wide = sizes(marker, "x", "y")
+        given = marker.scale.z
+        head = min(length, given if given > 0 else 0.23 * length)
+    else:
+        raise ProtocolError(
+            f"an arrow has no points, or two of them, got {len(marker.points)}"
+        )
+    start, end = flat(ends, tilt)
+    seen = math.dist(start, end)
+    if seen == 0:
+        return ()
+    yaw = math.atan2(end[1] - start[1], end[0] - start[0])
+    turn = Affine.translation(*start) @ Affine.rotation(yaw)
+    neck = seen - head * seen / length
+    corners = [(0, shaft), (neck, shaft), (neck, wide), (seen, 0)]
+    corners += [(neck, -wide), (neck, -shaft), (0, -shaft)]
+    outline = [turn.apply(along, side / 2) for along, side in corners]
+    return (svg.polygon(points=_rounded(outline), **filled(marker.color)),)
+
+
+def _cube(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    x, y, z = *sizes(marker, "x", "y"), _height(marker)
+    style = filled(marker.color)
+    if tilt.upright:
+        return (svg.rect(x=-x / 2, y=-y / 2, width=x, height=y, **style),)
+    outline = box((x, y, z), tilt)
+    return (svg.polygon(points=_rounded(outline), **style),)
+
+
+def _sphere(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    x, y, z = *sizes(marker, "x", "y"), _height(marker)
+    style = filled(marker.color)
+    if tilt.upright:
+        return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
+    rx, ry, yaw = ellipsoid((x, y, z), tilt)
+    ellipse = svg.ellipse(rx=rounded(rx), ry=rounded(ry), **style)
+    ellipse.set_pose(0.0, 0.0, yaw)
+    return (ellipse,)
+
+
+def _cylinder(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    x, y, z = *sizes(marker, "x", "y"), _height(marker)
+    style = filled(marker.color)
+    if tilt.upright:
+        return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
+    outline = cylinder((x, y, z), tilt)
+    return (svg.polygon(points=_rounded(outline), **style),)
+
+
+def _line_strip(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    (width,) = sizes(marker, "x")
+    points = _points(marker, tilt)
+    if not marker.colors:
+        yield svg.polyline(
+            points=_rounded(points), fill="none", **drawn(marker.color, width)
+        )
+        return
+    parts = (
+        (_line(one, other), colour)
+        for (one, other), colour in zip(pairwise(points), marker.colors, strict=False)
+    )
+    yield from by_colour(parts, lambda colour: drawn(colour, width))
+
+
+def _line_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    (width,) = sizes(marker, "x")
+    points = _points(marker, tilt)
+    if len(points) % 2:
+        raise ProtocolError(f"a list of lines has {len(points)} ends, which is odd")
+    each = colours(marker)
+    parts = (
+        (_line(points[i], points[i + 1]), each[i]) for i in range(0, len(points), 2)
+    )
+    return by_colour(parts, lambda colour: drawn(colour, width))
+
+
+def _triangle_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    points = _points(marker, tilt)
+    if len(points) % 3:
+        raise ProtocolError(
+            f"a list of triangles has {len(points)} corners, not three for each"
+        )
+    each = colours(marker)
+    parts = (
+        (_closed(points[i : i + 3]), colour)
+        for i, colour in zip(range(0, len(points), 3), each[::3], strict=True)
+    )
+    return by_colour(parts, filled)
+
+
+def _square_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    """Return points, which face whoever looks."""
+    wide, high = sizes(marker, "x", "y")
+    square = f"h{wide:.3f}v{high:.3f}h{-wide:.3f}z"
+    parts = (
+        (f"M{x - wide / 2:.3f} {y - high / 2:.3f}{square}", colour)
+        for (x, y), colour in zip(_points(marker, tilt), colours(marker), strict=True)
+    )
+    return by_colour(parts, filled)
+
+
+def _cube_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    size = (*sizes(marker, "x", "y"), _height(marker))
+    if tilt.upright:
+        return _square_list(marker, tilt)
+    outline = box(size, tilt)
+    return _repeated(outline, marker, tilt)
+
+
+def _sphere_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
+    wide, high, z = *sizes(marker, "x", "y"), _height(marker)
+    if not tilt.upright:
+        rx, ry, yaw = ellipsoid((wide, high, z), tilt)
+        turn = Affine.rotation(yaw)
+        turns = (math.tau * number / 24 for number in range(24))
+        outline = [turn.apply(rx * math.cos(a), ry * math.sin(a)) for a in turns]
+        return _repeated(outline, marker, tilt)
+    rx, ry = wide / 2, high / 2
+    half = f"a{rx:.3f} {ry:.3f} 0 1 0 "
+    circle = f"{half}{wide:.3f} 0{half}{-wide:.3f} 0z"
+    parts = (
+        (f"M{x - rx:.3f} {y:.3f}{circle}", colour)
+        for (x, y), colour in zip(_points(marker, tilt), colours(marker), strict=True)
+    )
+    return by_colour(parts, filled)
+
+
+def _repeated(
+    outline: list[Point], marker: MarkerMsg, tilt: Transform
+) -> Iterable[Element]:
+    """Return an outline at each of a marker's points."""
+    parts = (
+        (_closed([(x + dx, y + dy) for dx, dy in outline]), colour)
+        for (x, y), colour in zip(_points(marker, tilt), colours(marker), strict=True)
+    )
+    return by_colour(parts, filled)
+
+
+def _height(marker: MarkerMsg) -> float:
+    """Return how high a marker is.
+
+    It only shows where the marker is tilted; and what lies flat may be tilted later.
+
+    Raises:
+        ProtocolError: If it is higher than anything.
+
+    """
+    height = marker.scale.z
+    if not (math.isfinite(height) and height > 0):
+        return 0.0
+    _check_size("z", height)
+    return height
+
+
+def _check(marker: MarkerMsg) -> None:
+    check_finite([(point.x, point.y) for point in marker.points], "points")
+
+
+def _points(marker: MarkerMsg, tilt: Transform) -> list[Point]:
+    _check(marker)
+    return flat(in_space(marker.points), tilt)
+
+
+def _rounded(points: list[Point]) -> list[Point]:
+    return [(rounded(x), rounded(y)) for x, y in points]
+
+
+def _line(one: Point, other: Point) -> str:
+    return f"M{one[0]:.3f} {one[1]:.3f}L{other[0]:.3f} {other[1]:.3f}"
+
+
+def _closed(points: list[Point]) -> str:
+    return "M" + "L".join(f"{x:.3f} {y:.3f}" for x, y in points) + "z"
+
+
+_DRAWN: dict[int, Callable[[MarkerMsg, Transform], Iterable[Element]]] = {
+    kinds.ARROW: _arrow,
+    kinds.CUBE: _cube,
+    kinds.SPHERE: _sphere,
+    kinds.CYLINDER: _cylinder,
+    kinds.LINE_STRIP: _line_strip,
+    kinds.LINE_LIST: _line_list,
+    kinds.CUBE_LIST: _cube_list,
+    kinds.SPHERE_LIST: _sphere_list,
+    kinds.POINTS: _square_list,
+    kinds.TEXT_VIEW_FACING: _text,
+    kinds.TRIANGLE_LIST: _triangle_list,
+}

@@ -1,0 +1,382 @@
+"""Markers: what ROS programs draw to show what they think."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.layer_frames import LayerFrames, not_known
+from webmap.modules.map_layer import MapLayer
+from webmap.base.errors import ProtocolError, WebMapError
+from webmap.base.geometry import Pose
+from webmap.features.layers.markers.messages import (
+    ADD,
+    DELETE,
+    DELETE_ALL,
+    MarkerArrayMsg,
+    MarkerMsg,
+)
+from webmap.features.layers.markers.shapes import lies_unturned, look_of, place, shape_of
+from webmap.scene.element import Element
+from webmap.base.scope import Removal, keep
+from webmap.ros.tf import Transform, TransformError
+
+log = logging.getLogger("webmap.modules")
+
+Put = Callable[[Transform], object]
+"""Puts a marker where its frame is now."""
+
+
+@dataclass(slots=True)
+class _Moving:
+    frame: str
+    stamp: float
+    locked: bool
+    put: Put
+
+
+class MarkerFrames(LayerFrames):
+    """Tells where the frames of markers are on the map, and which of them move."""
+
+    def _begin(self) -> None:
+        self._moving: dict[object, _Moving] = {}
+        self._lost: dict[str, str] = {}
+
+    def place(
+        self, key: object, frame_id: str, stamp: float, locked: bool, put: Put
+    ) -> Transform:
+        """Return what takes coordinates of a marker's frame to those of the map.
+
+        Args:
+            key: Of the marker.
+            frame_id: Its frame; empty if it does not say.
+            stamp: When the frame is meant, in seconds of the robot's clock; 0 for now.
+            locked: Whether the marker goes on moving with the frame.
+            put: Called when the frame has moved, or is known at last.
+
+        """
+        self._moving.pop(key, None)
+        source = self._source(frame_id)
+        if source is None:
+            return Transform()
+        stamp = 0.0 if locked else stamp
+        found, settled = self._find(source, stamp)
+        if locked or not settled:
+            self._moving[key] = _Moving(source, stamp, locked, put)
+        return found
+
+    def forget(self, key: object) -> None:
+        """Forget a marker that is gone."""
+        self._moving.pop(key, None)
+
+    def say(self) -> None:
+        """Say which frames nobody tells of, or take that back."""
+        needed = {moving.frame for moving in self._moving.values()}
+        self._lost = {f: words for f, words in self._lost.items() if f in needed}
+        words = ""
+        if self._lost:
+            frame, why = next(iter(self._lost.items()))
+            more = len(self._lost) - 1
+            words = not_known(frame, why) + f" (and {more} more)" * bool(more)
+        self._say(words)
+
+    def _news(self) -> None:
+        if not self._moving:
+            return
+        places: dict[tuple[str, float], tuple[Transform, bool]] = {}
+        for key, each in tuple(self._moving.items()):
+            asked = (each.frame, each.stamp)
+            if asked not in places:
+                places[asked] = self._find(*asked)
+            found, settled = places[asked]
+            each.put(found)
+            if settled and not each.locked:
+                self.forget(key)
+        self.say()
+
+    def _find(self, source: str, stamp: float) -> tuple[Transform, bool]:
+        """Return where a frame is, and whether news would not change that."""
+        try:
+            found = self._look(source, stamp)
+        except TransformError as error:
+            if source not in self._lost:
+                self._lost[source] = str(error)
+            return Transform(), False
+        self._lost.pop(source, None)
+        return found
+
+    def _align(self, aligned: Pose) -> None:
+        self._layer.svg.set_pose(aligned.x, aligned.y, aligned.yaw)
+
+
+MAX_MARKERS = 5000
+"""The most markers that one topic may show."""
+
+
+MarkerType: TypeAlias = Literal[
+    "visualization_msgs/MarkerArray",
+    "visualization_msgs/Marker",
+    "visualization_msgs/msg/MarkerArray",
+    "visualization_msgs/msg/Marker",
+]
+"""The types that have markers, in either dialect."""
+
+VIEWS: dict[str, type[MarkerMsg] | type[MarkerArrayMsg]] = {
+    "visualization_msgs/MarkerArray": MarkerArrayMsg,
+    "visualization_msgs/Marker": MarkerMsg,
+}
+
+Key = tuple[str, int]
+
+LONGEST_NAME = 256
+"""Characters of a marker's namespace."""
+
+MOST_COUNTED = 100_000
+"""Markers that are counted of those that are left out."""
+
+SETTLED = 0.5
+"""Seconds after the first that is left out until their number is said."""
+
+_LEFT_OUT = "left out"
+"""The problem of markers that are too many."""
+
+_MOVED = "moved"
+"""The problem of markers that cannot be drawn where their frames have got to."""
+
+
+@layer(
+    *VIEWS,
+    view=VIEWS,
+    kinds=[TopicKind("markers")],
+    switch="Markers",
+    rank=120,
+)
+class Markers(MapLayer):
+    """What ROS programs draw to show what they think, as it looks from above.
+
+    Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and
+    texts are drawn, with their colours; meshes are not. A marker that makes no sense
+    is left out by itself, and said. A sphere, a list of them or points with a
+    quaternion of zeros are drawn unturned, and that is logged once.
+
+    Each is drawn where its own frame was at its stamp, and one that is ``frame_locked``
+    goes on moving with the frame. One whose frame nobody tells of is drawn as it comes,
+    and that is said until somebody does. What is tilted, or lies on its side, is drawn
+    as its outline looks from above.
+
+    Style it by CSS: ``.markers > .marker``, with the type as a further class
+    (``arrow``, ``cube``, ``line-strip``, ``text`` and so on) and the namespace in
+    ``data-ns``: ``.marker[data-ns="goals"] { display: none }``.
+    """
+
+    # Every message counts: one may take away what another has put there.
+    queue_length = 100
+
+    type: MarkerType = "visualization_msgs/MarkerArray"
+    """``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``."""
+
+    def lay(self) -> None:
+        """Lay the layer onto the common map, and each marker where its frame is."""
+        self.frames = MarkerFrames(
+            self, self.bridge, self.map_frame, self.namespace, self.robot
+        )
+
+    def build(self) -> None:
+        """Make ready; there are no markers yet."""
+        self.shapes: dict[Key, Element] = {}
+        """What is drawn, by namespace and number."""
+        self._looks: dict[Key, tuple[object, ...]] = {}
+        self._ends: dict[Key, float] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self._said_unturned = False
+        self._left_out: set[Key] = set()
+        """Markers that would be beyond :data:`MAX_MARKERS`."""
+        self._count_timer: asyncio.TimerHandle | None = None
+        keep(Removal(self._forget_timer))
+        keep(Removal(self._forget_count))
+        keep(Removal(lambda: self.clear_problem(_MOVED)))
+        keep(Removal(lambda: self.clear_problem(_LEFT_OUT)))
+
+    def take(self, message: MarkerArrayMsg | MarkerMsg) -> None:
+        """Add, change and delete as the markers say.
+
+        Raises:
+            ProtocolError: If there is one that makes no sense; the others are drawn.
+
+        """
+        single = isinstance(message, MarkerMsg)
+        markers = [message] if isinstance(message, MarkerMsg) else message.markers
+        wrong: list[str] = []
+        self.clear_problem(_MOVED)
+        for marker in markers:
+            try:
+                self._take(marker)
+            except WebMapError as error:
+                wrong.append(_wrong(marker, error))
+        self.frames.say()
+        self._set_timer()
+        self.be_new()
+        if wrong:
+            more = "" if single else f" ({len(wrong)} of {len(markers)} are left out)"
+            raise ProtocolError(wrong[0] + more)
+
+    def _take(self, marker: MarkerMsg) -> None:
+        key = (marker.ns, marker.id)
+        if len(marker.ns) > LONGEST_NAME:
+            raise ProtocolError(
+                f"a namespace of {len(marker.ns)} characters; {LONGEST_NAME} are the "
+                "limit"
+            )
+        if marker.action == ADD:
+            self._put(key, marker)
+        elif marker.action == DELETE:
+            self._forget_left_out({key})
+            self._drop(key)
+        elif marker.action == DELETE_ALL:
+            self._forget_left_out(set(self._left_out))
+            for each in tuple(self.shapes):
+                self._drop(each)
+        else:
+            raise ProtocolError(
+                f"an action is 0 (add or modify), 2 (delete) or 3 (delete all), got "
+                f"{marker.action}"
+            )
+
+    def _put(self, key: Key, marker: MarkerMsg) -> None:
+        if key not in self.shapes and len(self.shapes) >= MAX_MARKERS:
+            self._leave_out(key)
+            return
+        self._forget_left_out({key})
+        lifetime = marker.lifetime.seconds
+        frame = self.frames.place(
+            key,
+            marker.frame_id,
+            marker.stamp,
+            marker.frame_locked,
+            lambda frame: self._move(key, marker, frame),
+        )
+        try:
+            self._show(key, marker, frame)
+        except WebMapError:
+            self.frames.forget(key)
+            raise
+        self._say_unturned(marker)
+        self._ends.pop(key, None)
+        if lifetime > 0:
+            self._ends[key] = time.monotonic() + lifetime
+
+    def _forget_left_out(self, keys: set[Key]) -> None:
+        if self._left_out:
+            self._left_out -= keys
+            if not self._left_out:
+                self.clear_problem(_LEFT_OUT)
+
+    def _leave_out(self, key: Key) -> None:
+        """Count a marker that has no room; that is said when no more come."""
+        if len(self._left_out) < MOST_COUNTED:
+            self._left_out.add(key)
+        if self._count_timer is None:
+            loop = asyncio.get_running_loop()
+            self._count_timer = loop.call_later(SETTLED, self._say_left_out)
+
+    def _say_left_out(self) -> None:
+        self._count_timer = None
+        count = len(self._left_out)
+        if count:
+            more = " or more" * (count == MOST_COUNTED)
+            self.set_problem(
+                _LEFT_OUT,
+                f"{self.topic}: {count}{more} markers are left out: {MAX_MARKERS} are "
+                "drawn at the most",
+            )
+        else:
+            self.clear_problem(_LEFT_OUT)
+
+    def _move(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
+        """Put a marker where its frame is by now.
+
+        One that cannot be drawn there is left out, as it is not where it was, and the
+        first is said until the next message.
+        """
+        try:
+            self._show(key, marker, frame)
+        except WebMapError as error:
+            self._drop(key)
+            if _MOVED not in self.problems:
+                self.set_problem(_MOVED, f"{self.topic}: {_wrong(marker, error)}")
+
+    def _say_unturned(self, marker: MarkerMsg) -> None:
+        """Say once that somebody leaves orientations out; they are drawn as RViz does.
+
+        It stays no problem: nothing looks otherwise for it.
+        """
+        if not self._said_unturned and lies_unturned(marker):
+            self._said_unturned = True
+            log.warning(
+                "%s: %s: marker %d of %r has a quaternion of zeros and is drawn "
+                "unturned, as all such markers are",
+                self.bridge.url,
+                self.topic,
+                marker.id,
+                marker.ns,
+            )
+
+    def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
+        """Put a marker where it is, drawn anew if it looks otherwise from above."""
+        before, look = self.shapes.get(key), look_of(marker, frame)
+        if before is not None and self._looks[key] == look:
+            place(before, marker, frame)
+        else:
+            self._draw(key, before, shape_of(marker, frame), marker)
+            self._looks[key] = look
+
+    def _draw(
+        self, key: Key, before: Element | None, shape: Element, marker: MarkerMsg
+    ) -> None:
+        shape.set("data-ns", marker.ns)
+        shape.set("data-id", str(marker.id))
+        if before is None:
+            self.svg.append(shape)
+        else:
+            self.svg.insert(self.svg.children.index(before), shape)
+            before.remove()
+        self.shapes[key] = shape
+
+    def _drop(self, key: Key) -> None:
+        shape = self.shapes.pop(key, None)
+        self._looks.pop(key, None)
+        self._ends.pop(key, None)
+        self.frames.forget(key)
+        if shape is not None:
+            shape.remove()
+
+    def _set_timer(self) -> None:
+        """Come back when the next marker's time is over."""
+        self._forget_timer()
+        if self._ends:
+            wait = max(0.0, min(self._ends.values()) - time.monotonic())
+            loop = asyncio.get_running_loop()
+            self._timer = loop.call_later(wait, self._end_some)
+
+    def _end_some(self) -> None:
+        now = time.monotonic()
+        for key in [key for key, end in self._ends.items() if end <= now]:
+            self._drop(key)
+        self._set_timer()
+
+    def _forget_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _forget_count(self) -> None:
+        if self._count_timer is not None:
+            self._count_timer.cancel()
+            self._count_timer = None
+
+
+def _wrong(marker: MarkerMsg, error: WebMapError) -> str:
+    return f"marker {marker.id} of {marker.ns[:LONGEST_NAME]!r}: {error}"

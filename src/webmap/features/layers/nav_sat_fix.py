@@ -1,0 +1,198 @@
+"""Where satellites have a robot."""
+
+import math
+import time
+
+import msgspec
+
+from webmap.modules.declaration import TopicKind, layer
+from webmap.base.local_plane import LocalPlane
+from webmap.modules.robot_layer import RobotLayer
+from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.geometry import FARTHEST
+from webmap.ros.messages import Stamped
+from webmap.scene import svg
+
+
+class NavSatStatusMsg(msgspec.Struct, frozen=True):
+    """``sensor_msgs/NavSatStatus``."""
+
+    status: int = -1
+    """-1 no fix, 0 a fix, above a fix with corrections."""
+
+
+class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
+    """``sensor_msgs/NavSatFix``, and what a ``GPSFix`` says of the same."""
+
+    latitude: float
+    """Degrees, north positive."""
+
+    longitude: float
+    """Degrees, east positive."""
+
+    status: NavSatStatusMsg = NavSatStatusMsg()
+    position_covariance: list[float] = msgspec.field(default_factory=list)
+    """Nine numbers in square metres: east, north and up."""
+
+    position_covariance_type: int = 0
+    """0 if nobody knows it."""
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Latitude and longitude, in degrees.
+
+        Raises:
+            ProtocolError: If they are on no globe.
+
+        """
+        lat, lon = self.latitude, self.longitude
+        if not (-90 <= lat <= 90 and -360 <= lon <= 360):
+            raise ProtocolError(
+                "a fix has a latitude of -90 to 90 degrees and a longitude, got "
+                f"{lat} and {lon}"
+            )
+        return lat, lon
+
+    @property
+    def deviation(self) -> float | None:
+        """The standard deviation in the plane, in metres; None if it is not known."""
+        c = self.position_covariance
+        if self.position_covariance_type == 0 or len(c) != 9:
+            return None
+        variance = max(c[0], c[4])
+        known = math.isfinite(c[0] + c[4]) and variance >= 0
+        return math.sqrt(variance) if known else None
+
+
+@layer(
+    "sensor_msgs/NavSatFix",
+    "gps_msgs/GPSFix",
+    "gps_common/GPSFix",
+    view=NavSatFixMsg,
+    kinds=[
+        TopicKind("fix", {r"/fix\Z": "the usual name", "": "its type alone"}, most=1),
+    ],
+    switch="Satellite fixes",
+    rank=130,
+)
+class NavSatFix(RobotLayer):
+    """A cross where satellites have a robot, with a circle of one standard deviation.
+
+    A fix is put on the map as on a plane that touches the globe at a datum: lengths are
+    right to 4 mm at 10 km from there, and to 0.5 m at 50 km. ``TileLayer`` with the
+    same datum puts its tiles there too. Without a fix the last one stays and ages, with
+    the class ``lost``.
+
+    Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .doubt`` and
+    ``.navsatfix.lost``.
+    """
+
+    topic: str = "/fix"
+
+    datum: tuple[float, float] | None = None
+    """Latitude and longitude of the map's origin, in degrees. If not given, the first
+    fix is taken to be where the robot is on the map then; fixes before it has a place
+    there are not drawn. A robot with frames and no map, which is quiet about that, is
+    taken to be where its odometry has it, until there is a map."""
+
+    east: float = 0.0
+    """How far the map's x is turned from east, in degrees, counter-clockwise from
+    above."""
+
+    throttle: int = 500
+    age_limit: float = 5.0
+
+    type: str = "sensor_msgs/NavSatFix"
+    """``sensor_msgs/NavSatFix``, or a ``GPSFix`` of ``gps_msgs`` or ``gps_common``,
+    which says the same in the same words."""
+
+    def build(self) -> None:
+        """Make the cross and the circle.
+
+        Raises:
+            ConfigError: If the datum is on no globe, or ``east`` is not finite.
+
+        """
+        if self.datum is not None and len(self.datum) != 2:
+            raise ConfigError(
+                f"datum is a latitude and a longitude in degrees, got {self.datum!r}"
+            )
+        # Fixes are switched together: a robot has one place.
+        self.svg.unset("data-layer")
+        self._plane = LocalPlane(*(self.datum or (0.0, 0.0)), self.east)
+        self.position: tuple[float, float] | None = None
+        """The last fix on the map, in metres."""
+        self._origin = (0.0, 0.0)
+        self._waiting = self.datum is None
+        self.doubt = self.add(
+            svg.circle(class_="doubt", fill="#3b82c4", fill_opacity=0.2, r=0)
+        )
+        self.cross = self.add(
+            svg.path(
+                class_="cross",
+                d="M-0.15 0H0.15M0 -0.15V0.15",
+                stroke="#1f5f99",
+                stroke_width=2,
+                vector_effect="non-scaling-stroke",
+                visibility="hidden",
+            )
+        )
+
+    def take(self, message: NavSatFixMsg) -> None:
+        """Draw a fix in place of the one before; it is on the globe, not in a frame.
+
+        Raises:
+            ProtocolError: If it claims to be one and is on no globe.
+
+        """
+        lost = message.status.status < 0
+        if not lost:
+            _ = message.place
+        self.svg.classes.toggle("lost", lost)
+        if not lost:
+            self._go(message)
+
+    def _go(self, fix: NavSatFixMsg) -> None:
+        place = fix.place
+        if self._waiting:
+            self._anchor(place)
+        if self.datum is None:
+            return
+        x, y = self._plane.from_globe(*place)
+        x, y = x + self._origin[0], y + self._origin[1]
+        self.position = (x, y)
+        for element in (self.doubt, self.cross):
+            element.set_pose(x, y, 0.0)
+        doubt = fix.deviation or 0.0
+        self.doubt.set(r=doubt if doubt <= FARTHEST else 0.0)
+        self.cross.unset("visibility")
+        self.svg.set_age(self.bridge.lag, limit=self.age_limit)
+        if doubt > FARTHEST:
+            self.complain(
+                f"a fix has a doubt of {FARTHEST:g} m at the most, got {doubt:g} m, "
+                "which is not drawn"
+            )
+
+    def _anchor(self, place: tuple[float, float]) -> None:
+        """Take a place on the globe for the robot's, as soon as that has one."""
+        if not self.robot.valid:
+            return
+        on_map = self._is_on_map()
+        if on_map is None:
+            return
+        # Where it is by odometry alone is good until it is known on the map.
+        if on_map or self.datum is None:
+            at = self.robot.position
+            self.datum, self._origin = place, (at.x, at.y)
+            self._plane = LocalPlane(*place, self.east)
+        self._waiting = not on_map
+
+    def _is_on_map(self) -> bool | None:
+        """Return whether the robot's pose is one of the map; None if it may yet be."""
+        tf, pose = self.robot.tf, self.robot.whereabouts.newest
+        if tf is None or pose is None or pose.frame_id in ("", tf["map_frame"]):
+            return True
+        # Many robots have frames and no map, and that is no mistake if it is quiet.
+        frames = self.robot.whereabouts.frames
+        missing = frames is not None and time.monotonic() >= frames.complete_from
+        return False if tf["quiet"] and missing else None

@@ -1,0 +1,281 @@
+"""Maps and costmaps, as images."""
+
+import asyncio
+import math
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from webmap.modules.declaration import FoundTopic, TopicKind, layer
+from webmap.features.layers.grid_picture import (
+    Palette,
+    check_palette,
+    draw_aside,
+    grid_png,
+    place_grid,
+)
+from webmap.modules.map_layer import MapLayer
+from webmap.core.pictures import Picture
+from webmap.core.problems import refusing
+from webmap.base.tasks import spawn
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST
+from webmap.ros.messages import (
+    Int8s,
+    MapMetaDataMsg,
+    OccupancyGridMsg,
+    Stamped,
+    cells_of,
+)
+from webmap.ros.tf import Transform
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Found: TypeAlias = tuple[MapMetaDataMsg, NDArray[np.int8]]
+
+SMALL = 1 << 18
+"""Cells up to which a grid is drawn at once; a larger one in the worker process."""
+
+
+class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
+    """``map_msgs/OccupancyGridUpdate``: a rectangle of a grid."""
+
+    x: int
+    """The first column."""
+
+    y: int
+    """The first row."""
+
+    width: int
+    height: int
+    data: Int8s
+
+    @property
+    def cells(self) -> "NDArray[np.int8]":
+        """The cells, of shape (height, width), read-only.
+
+        Raises:
+            ProtocolError: If there are more or fewer than the size says.
+
+        """
+        return cells_of(self.data, self.width, self.height)
+
+
+@layer(
+    "nav_msgs/OccupancyGrid",
+    view=OccupancyGridMsg,
+    kinds=[
+        TopicKind(
+            "costmap",
+            {
+                r"local_costmap/costmap\Z": "a local costmap",
+                r"(?<!global_)costmap/costmap\Z": "a costmap",
+                r"\A(?!.*global_costmap/costmap\Z).*costmap": "named a costmap",
+            },
+            most=1,
+            options={"palette": "costmap", "throttle": 500},
+            role="costmap",
+        ),
+        TopicKind(
+            "global costmap",
+            {r"global_costmap/costmap\Z": "a global costmap"},
+            most=1,
+            # All of the map, under the local one: it is large, and changes slowly.
+            options={"palette": "costmap", "throttle": 5000, "order": 15.0},
+            role="costmap",
+        ),
+        TopicKind(
+            "map",
+            {r"/map\Z": "the usual name", r"map[^/]*\Z": "named a map"},
+            most=4,
+            shared=True,
+            role="map",
+        ),
+        TopicKind(
+            "grid", most=2, options={"palette": "costmap"}, shared=True, role="map"
+        ),
+    ],
+    switch={
+        "Maps": ".occupancy-grid:not(.costmap)",
+        "Costmaps": ".occupancy-grid.costmap",
+    },
+    css="occupancy-grid",
+    rank=10,
+)
+class OccupancyGrid(MapLayer):
+    """A map or a costmap as an image that all viewers share.
+
+    The topic has a ``nav_msgs/OccupancyGrid``, and the same with ``_updates`` behind it
+    a ``map_msgs/OccupancyGridUpdate``. What is unknown is transparent. Cells must be -1
+    to 100; other values are refused, unless the palette is ``"raw"``.
+
+    Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
+    ``.occupancy-grid.costmap { opacity: 0.4 }``.
+    """
+
+    topic: str = "/map"
+
+    palette: Palette = "map"
+    """``"map"``: free is white and occupied black. ``"costmap"``: free is transparent,
+    then blue to red, inscribed cyan and lethal purple. ``"raw"``: the 256 values of a
+    byte from white to black."""
+
+    throttle: int = 0
+    """The least time between two whole grids, in milliseconds."""
+
+    map_frame: str | None = None
+    """The map's frame, for data that is in another, such as a local costmap in
+    ``odom``: it is taken there by the ``/tf`` of the bridge. If not given, data is
+    drawn as it comes."""
+
+    order: float | None = None
+    """What lies over what: greater is nearer; robots have 100. If not given, it is 20
+    for a costmap and 10 for any other."""
+
+    @classmethod
+    def options_for(cls, found: FoundTopic) -> dict[str, Any]:
+        """Return the options of a grid; a robot's own is not drawn too often."""
+        options = super().options_for(found)
+        if found.kind.name == "grid" and found.own:
+            options["throttle"] = 500
+        return options
+
+    def build(self) -> None:
+        """Make the image.
+
+        Raises:
+            ConfigError: If there is no such palette.
+
+        """
+        check_palette(self.palette)
+        self.usual_order = 20.0 if self.palette == "costmap" else 10.0
+        self.info: MapMetaDataMsg | None = None
+        """Size and place of what came last."""
+        self.cells: NDArray[np.int8] | None = None
+        """What came last, of shape (height, width), the lowest row first."""
+        self._drawing: asyncio.Task[None] | None = None
+        self._undrawn = False
+        self.svg.classes.add(self.palette)
+        # Each of several maps is switched by itself.
+        self.svg.set("data-layer", self.topic)
+        if self.palette == "costmap":
+            self.svg.set("data-layer", None).set(opacity=0.7)
+        self.picture = Picture()
+        self.svg.append(self.picture.element)
+
+    def start(self) -> None:
+        """Make the image, and subscribe to the grid and to its updates."""
+        super().start()
+        updates = self.topic.rstrip("/") + "_updates"
+        # Every update counts, so none may be held back or replaced by the next.
+        self.bridge.subscribe(
+            updates,
+            refusing(self, updates, self.on_update),
+            "map_msgs/OccupancyGridUpdate",
+            decode=OccupancyGridUpdateMsg,
+            encoding="binary",
+            queue_length=100,
+        )
+
+    def read(self, message: OccupancyGridMsg) -> "Found":
+        """Return size and place of a grid, and its cells.
+
+        Raises:
+            ProtocolError: If its size, its place or a cell makes no sense.
+
+        """
+        info = message.info
+        resolution = info.resolution
+        if not (math.isfinite(resolution) and resolution > 0):
+            raise ProtocolError(
+                f"a cell must be a number of metres above 0, got {resolution}"
+            )
+        _ = info.origin.usable
+        cells = message.cells
+        side = resolution * max(info.width, info.height)
+        if side > FARTHEST:
+            raise ProtocolError(
+                f"a grid has sides of {FARTHEST:g} m at the most, got "
+                f"{info.width} x {info.height} cells of {resolution:g} m"
+            )
+        check_values(cells, self.palette)
+        return info, cells
+
+    def draw(self, found: "Found", at: Transform) -> None:
+        """Draw the grid."""
+        self.info, self.cells = found
+        self._draw()
+
+    def on_update(self, update: OccupancyGridUpdateMsg) -> None:
+        """Change a rectangle of the grid; without a grid there is nothing to change.
+
+        Raises:
+            ProtocolError: If it reaches out of the grid, or a cell makes no sense.
+
+        """
+        if self.cells is None:
+            return
+        x, y, patch = update.x, update.y, update.cells
+        height, width = self.cells.shape
+        if not (0 <= x <= width - update.width and 0 <= y <= height - update.height):
+            raise ProtocolError(
+                f"an update of {update.width} x {update.height} cells at column {x}, "
+                f"row {y} reaches out of a grid of {width} x {height}"
+            )
+        check_values(patch, self.palette)
+        if not self.cells.flags.writeable:
+            self.cells = self.cells.copy()
+        self.cells[y : y + update.height, x : x + update.width] = patch
+        self._draw()
+        self.be_new()
+
+    def _draw(self) -> None:
+        if self.cells is not None and self.cells.size <= SMALL:
+            self._show(grid_png(self.cells, self.palette), self.info)
+            return
+        self._undrawn = True
+        if self._drawing is None:
+            self._drawing = spawn(self._draw_on())
+
+    async def _draw_on(self) -> None:
+        """Draw what is newest until that is drawn."""
+        try:
+            while self._undrawn and self.cells is not None and not self.scope.closed:
+                self._undrawn = False
+                cells, info = self.cells, self.info
+                # An update meanwhile may be half drawn; it has it drawn again.
+                try:
+                    png = await draw_aside(cells, self.palette)
+                except ProtocolError as error:
+                    self.set_problem(self, f"{self.topic}: {error}")
+                    continue
+                self.clear_problem(self)
+                self._show(png, info)
+        finally:
+            self._drawing = None
+
+    def _show(self, png: bytes, info: MapMetaDataMsg | None) -> None:
+        if info is None or self.scope.closed:
+            return
+        size = (info.width * info.resolution, info.height * info.resolution)
+        self.picture.show(
+            png, place_grid(info.origin.planar, size[1]), *size, info.resolution
+        )
+
+
+def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
+    """Let cells pass that the palette has a colour for.
+
+    Raises:
+        ProtocolError: If there are others; one of them is named.
+
+    """
+    if palette == "raw":
+        return
+    low, high = int(cells.min()), int(cells.max())
+    if low < -1 or high > 100:
+        wrong = low if low < -1 else high
+        count = int(((cells < -1) | (cells > 100)).sum())
+        raise ProtocolError(
+            f"cells are -1 to 100, but {count} of {cells.size} are not: one is {wrong}"
+        )

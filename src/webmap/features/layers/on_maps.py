@@ -1,0 +1,67 @@
+"""What a robot brings along to every map that shows it."""
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+from webmap.core.module_arguments import check_arguments
+from webmap.core.registry import map_modules
+from webmap.base.errors import ModuleNotFound, WebMapError
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+    from webmap.core.robot import Robot
+
+
+class OnMaps:
+    """Gives every map that shows the robot a module, as long as it shows it.
+
+    So a robot has its costmap and its markers with it, which are drawn by modules of
+    maps: ``robot.add_module("OnMaps", "Markers", bridge, "/bob/markers")``. They lie
+    on the common map as the robot is aligned: a module that takes a ``robot`` gets this
+    one, unless another is told.
+
+    Args:
+        robot: The robot.
+        module: The name of a map module.
+        *args: What its constructor gets after the map.
+        **options: Its arguments by name.
+
+    Raises:
+        ModuleNotFound: If there is no map module of that name.
+        ConfigError: If it takes no such arguments.
+
+    """
+
+    def __init__(
+        self, robot: "Robot", /, module: str, *args: Any, **options: Any
+    ) -> None:
+        factory = map_modules[module]
+        check_arguments(factory, args, options, first=1)
+        if "robot" in inspect.signature(factory).parameters:
+            options.setdefault("robot", robot)
+        self.robot = robot
+        self.module = module
+        self._arguments = (args, options)
+        self._made: dict[Map, Any] = {}
+        for map in robot.maps:
+            self.on_map(map, True)
+
+    def destroy(self) -> None:
+        """Take the modules away."""
+        for map in list(self._made):
+            self.on_map(map, False)
+
+    def on_map(self, map: "Map", shown: bool) -> None:
+        """Add the module to a map that shows the robot now, or take it away."""
+        if not shown:
+            module = self._made.pop(map, None)
+            if module is not None and module in map.modules:
+                map.remove_module(module)
+            return
+        args, options = self._arguments
+        try:
+            self._made[map] = map.add_module(self.module, *args, **options)
+        except ModuleNotFound:
+            raise
+        except WebMapError as error:
+            map.report_error(f"{self.robot.name}: {self.module}: {error}")

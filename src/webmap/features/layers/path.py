@@ -1,0 +1,114 @@
+"""The way that a robot's planner has in mind."""
+
+import math
+from itertools import pairwise
+from typing import Annotated
+
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.drawing import check_finite, flat, in_space, rounded, thinned
+from webmap.modules.layer_options import Limit
+from webmap.modules.robot_layer import RobotLayer
+from webmap.base.geometry import Vector3
+from webmap.ros.messages import PathMsg
+from webmap.scene import svg
+from webmap.ros.tf import Transform
+
+
+@layer(
+    "nav_msgs/Path",
+    view=PathMsg,
+    kinds=[
+        TopicKind(
+            "local plan",
+            {r"/local_plan\Z": "the usual name"},
+            most=1,
+            options={"name": "local"},
+        ),
+        TopicKind(
+            "path",
+            {
+                r"/plan\Z": "the usual name",
+                r"plan|path|trajectory": "named a way to go",
+                "": "its type alone",
+            },
+            most=6,
+            role="plan",
+        ),
+    ],
+    switch="Plans",
+    rank=40,
+)
+class Path(RobotLayer):
+    """A line that stays in place on the map while the robot goes along.
+
+    Fires ``on_path_update``. The poses are in the map's frame, or in the frame that the
+    message names if the robot knows frames. A path without poses takes the line away.
+
+    Style it by CSS: ``.path > polyline``, and one of several by its name:
+    ``.path.local > polyline``.
+    """
+
+    topic: str = "/plan"
+
+    max_points: Annotated[int, Limit("at least 2", lambda value: value >= 2)] = 500
+    """How many poses are drawn at the most, evenly chosen."""
+
+    throttle: int = 500
+    age_limit: float = 5.0
+
+    def build(self) -> None:
+        """Make the line."""
+        self._message: PathMsg | None = None
+        self.line = self.add(
+            svg.polyline(
+                fill="none",
+                stroke="#12805c",
+                stroke_width=2,
+                stroke_linejoin="round",
+                vector_effect="non-scaling-stroke",
+            )
+        )
+
+    @property
+    def points(self) -> list[tuple[float, float]]:
+        """The newest path, all of it, in metres in the map's frame.
+
+        Only the positions that are drawn are known to be finite.
+        """
+        poses = self._message.poses if self._message is not None else []
+        return [(p.pose.position.x, p.pose.position.y) for p in poses]
+
+    @property
+    def length(self) -> float:
+        """How long the path is, in metres; 0 if there is none."""
+        return sum(math.dist(one, next) for one, next in pairwise(self.points))
+
+    def take(self, message: PathMsg) -> None:
+        """Draw a path in place of the one before, and fire ``on_path_update``.
+
+        Raises:
+            ProtocolError: If it cannot be drawn.
+
+        """
+        super().take(message)
+        self._message = message
+        self.robot.notify_modules("on_path_update", self)
+
+    def read(self, message: PathMsg) -> list[Vector3]:
+        """Return the positions that are to be drawn.
+
+        Raises:
+            ProtocolError: If one of them is not finite, or farther away than anything
+                can be.
+
+        """
+        # Only these are looked at, so that a long path does not hold up other robots.
+        kept = thinned(len(message.poses), self.max_points)
+        chosen = [message.poses[index].pose.position for index in kept]
+        check_finite([(place.x, place.y) for place in chosen], "a path")
+        return in_space(chosen)
+
+    def draw(self, found: list[Vector3], at: Transform) -> None:
+        """Draw the line as it looks from above."""
+        line = flat(found, at)
+        self.line.set(points=[(rounded(x), rounded(y)) for x, y in line])

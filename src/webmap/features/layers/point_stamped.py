@@ -1,0 +1,105 @@
+"""A point that somebody publishes, such as what a controller steers to."""
+
+import math
+
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.drawing import flat, rounded
+from webmap.modules.layer_options import Frame, Metres
+from webmap.modules.robot_layer import RobotLayer
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Vector3
+from webmap.ros.messages import PointMsg, Stamped
+from webmap.scene import svg
+from webmap.ros.tf import Transform
+
+
+class PointStampedMsg(Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/PointStamped``."""
+
+    point: PointMsg
+
+
+@layer(
+    "geometry_msgs/PointStamped",
+    view=PointStampedMsg,
+    kinds=[
+        TopicKind(
+            "lookahead",
+            {r"/lookahead_point\Z": "what a controller steers to"},
+            most=1,
+            # A controller gives it in the frame of the base, also where no frames are
+            # told.
+            options={"name": "lookahead", "frame": "robot", "age_limit": 2.0},
+        ),
+        TopicKind("point"),
+    ],
+    switch="Points",
+    rank=90,
+)
+class PointStamped(RobotLayer):
+    """A spot at a point, such as ``/clicked_point`` of RViz.
+
+    What Nav2's regulated pure pursuit steers to, ``/lookahead_point``, is given in the
+    robot's frame: with ``frame="robot"`` it is in place also where the robot has no
+    frames. The console shows a point of the class ``lookahead`` only as long as it is
+    not old, since nobody steers to it later.
+
+    Style it by CSS: ``.pointstamped > .point``, and one of several by its name:
+    ``.pointstamped.lookahead > .point``.
+    """
+
+    frame: Frame = "map"
+    """``"robot"`` for a point in the robot's own frame, as Nav2's controllers give
+    it."""
+
+    radius: Metres = 0.1
+    """How large the spot is, in metres."""
+
+    def build(self) -> None:
+        """Make the spot, hidden until there is a point."""
+        self.point: Vector3 | None = None
+        """The newest point, as the message has it, in metres."""
+        self.spot = self.add(
+            svg.circle(
+                class_="point",
+                r=self.radius,
+                fill="#0a58ca",
+                stroke="#ffffff",
+                stroke_width=1.5,
+                paint_order="stroke",
+                vector_effect="non-scaling-stroke",
+            )
+        )
+        self.svg.set(visibility="hidden")
+
+    def read(self, message: PointStampedMsg) -> Vector3:
+        """Return a point that is somewhere; without a height it is in the plane.
+
+        Raises:
+            ProtocolError: If it is not finite, or farther away than anything can be.
+
+        """
+        p = message.point
+        if not (math.isfinite(p.x) and math.isfinite(p.y)):
+            raise ProtocolError(
+                f"a point must be of finite numbers, got ({p.x}, {p.y})"
+            )
+        height = p.z if math.isfinite(p.z) else 0.0
+        if max(abs(p.x), abs(p.y)) > FARTHEST:
+            raise ProtocolError(
+                f"a point must be within {FARTHEST:g} m of the origin, got "
+                f"({p.x:g}, {p.y:g})"
+            )
+        if abs(height) > FARTHEST:
+            raise ProtocolError(
+                f"a point must be within {FARTHEST:g} m of the plane, got a height of "
+                f"{height:g}"
+            )
+        return Vector3(p.x, p.y, height)
+
+    def draw(self, found: Vector3, at: Transform) -> None:
+        """Put the spot where the point is seen from above."""
+        self.point = found
+        ((x, y),) = flat([found], at)
+        self.spot.set_pose(rounded(x), rounded(y), 0.0)
+        self.svg.set(visibility=None)

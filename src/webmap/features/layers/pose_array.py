@@ -1,0 +1,144 @@
+"""Many poses at once, such as the particles of a localisation."""
+
+import math
+
+import msgspec
+
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.drawing import thinned
+from webmap.modules.layer_options import Count, Frame, Metres
+from webmap.modules.robot_layer import RobotLayer
+from webmap.base.geometry import Pose
+from webmap.ros.messages import PoseMsg, Stamped
+from webmap.scene import svg
+from webmap.ros.tf import Transform
+
+
+class PoseArrayMsg(Stamped, frozen=True, kw_only=True):
+    """``geometry_msgs/PoseArray``."""
+
+    poses: list[PoseMsg]
+
+
+class ParticleMsg(msgspec.Struct, frozen=True, gc=False):
+    """``nav2_msgs/Particle``."""
+
+    pose: PoseMsg
+    weight: float = 0.0
+
+
+class ParticleCloudMsg(Stamped, frozen=True, kw_only=True):
+    """``nav2_msgs/ParticleCloud``."""
+
+    particles: list[ParticleMsg]
+
+    @property
+    def poses(self) -> list[PoseMsg]:
+        """The poses, as in ``geometry_msgs/PoseArray``."""
+        return [particle.pose for particle in self.particles]
+
+
+POSES, PARTICLES = "geometry_msgs/PoseArray", "nav2_msgs/ParticleCloud"
+
+
+@layer(
+    POSES,
+    PARTICLES,
+    view={POSES: PoseArrayMsg, PARTICLES: ParticleCloudMsg},
+    kinds=[
+        TopicKind("particles", most=1, types=(PARTICLES,)),
+        TopicKind(
+            "particles",
+            {r"particle_?cloud\Z": "the usual name"},
+            most=1,
+            types=(POSES,),
+        ),
+        TopicKind("poses", types=(POSES,)),
+    ],
+    switch="Poses",
+    rank=50,
+)
+class PoseArray(RobotLayer):
+    """An arrow for each of many poses, such as ``/particlecloud`` of AMCL in ROS 1.
+
+    Poses with a quaternion of zeros are left out, and how many is said.
+
+    Style them by CSS: ``.posearray > .arrow``.
+    """
+
+    in_plane = True
+
+    type: str = POSES
+    """``geometry_msgs/PoseArray`` or ``nav2_msgs/ParticleCloud``, which is
+    ``/particle_cloud`` of Nav2."""
+
+    frame: Frame = "map"
+    """``"robot"`` for poses in the robot's own frame."""
+
+    length: Metres = 0.2
+    """How long an arrow is, in metres."""
+
+    max_poses: Count = 500
+    """How many are drawn at the most, evenly chosen."""
+
+    throttle: int = 500
+    age_limit: float = 10.0
+
+    def build(self) -> None:
+        """Make the path of all arrows."""
+        self._message: PoseArrayMsg | ParticleCloudMsg | None = None
+        self.arrows = self.add(
+            svg.path(class_="arrow", fill="#d03a7c", fill_opacity=0.7)
+        )
+
+    @property
+    def poses(self) -> list[Pose]:
+        """The newest poses, all of them but those that turn nowhere.
+
+        Raises:
+            ProtocolError: If one of them is not finite, which only those that are drawn
+                are known to be.
+
+        """
+        given = self._message.poses if self._message is not None else []
+        return [pose.usable for pose in given if not pose.turns_nowhere]
+
+    def read(
+        self, message: PoseArrayMsg | ParticleCloudMsg
+    ) -> tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]]:
+        """Return the message and those of its poses that are to be drawn.
+
+        Raises:
+            ProtocolError: If one of them is not finite.
+
+        """
+        given = message.poses
+        # Only these are looked at: 20,000 would hold up the other robots for 0.1 s.
+        chosen = [given[index] for index in thinned(len(given), self.max_poses)]
+        poses = [pose.usable for pose in chosen if not pose.turns_nowhere]
+        missing = len(chosen) - len(poses)
+        if missing:
+            self.complain(
+                f"{missing} of {len(chosen)} poses have a quaternion of zeros, which "
+                "turns nowhere, and are left out"
+            )
+        return message, poses
+
+    def draw(
+        self, found: tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]], at: Transform
+    ) -> None:
+        """Draw the arrows; no poses draw nothing."""
+        self._message, poses = found
+        self.arrows.set(d="".join(arrow(pose, self.length) for pose in poses) or None)
+
+
+def arrow(pose: Pose, length: float) -> str:
+    """Return the path of a narrow triangle that begins at a pose and points along."""
+    cos, sin = math.cos(pose.yaw) * length, math.sin(pose.yaw) * length
+    # From one corner of its base to the tip, and back to the other corner.
+    x, y = pose.x - 0.12 * sin, pose.y + 0.12 * cos
+    to_tip = (cos + 0.12 * sin, sin - 0.12 * cos)
+    back = (-cos + 0.12 * sin, -sin - 0.12 * cos)
+    return (
+        f"M{x:.3f} {y:.3f}l{to_tip[0]:.3f} {to_tip[1]:.3f}{back[0]:+.3f}{back[1]:+.3f}z"
+    )

@@ -1,0 +1,115 @@
+"""A pose that somebody publishes, such as a goal, as an arrow."""
+
+import math
+
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.layer_options import Frame, Metres
+from webmap.modules.robot_layer import RobotLayer
+from webmap.base.geometry import Pose
+from webmap.ros.messages import PoseStampedMsg
+from webmap.scene import svg
+from webmap.ros.tf import Transform
+
+
+@layer(
+    "geometry_msgs/PoseStamped",
+    view=PoseStampedMsg,
+    kinds=[
+        TopicKind(
+            "goal",
+            {
+                r"/current_goal\Z": "where move_base says that it goes",
+                r"/goal_pose\Z": "where RViz sends Nav2",
+                r"/move_base_simple/goal\Z": "where RViz sends move_base",
+            },
+            most=1,
+            options={"name": "goal"},
+        ),
+        TopicKind("pose"),
+    ],
+    switch="Poses",
+    rank=80,
+)
+class PoseStamped(RobotLayer):
+    """An arrow that points along x of a pose, such as ``/goal_pose``.
+
+    With ``name="goal"`` it is where the robot is sent: it is hidden as long as the goal
+    tool shows a goal of the robot, so that nothing is drawn twice, and it goes when the
+    robot gets there.
+
+    Style it by CSS: ``.posestamped > .arrow``, and one of several by its name:
+    ``.posestamped.goal > .arrow``.
+    """
+
+    in_plane = True
+
+    frame: Frame = "map"
+    """``"robot"`` for a pose in the robot's own frame."""
+
+    length: Metres = 0.6
+    """How long the arrow is, in metres."""
+
+    reached: Metres = 0.4
+    """How near the robot is, in metres, when it got to a pose named ``goal``."""
+
+    def build(self) -> None:
+        """Make the arrow, hidden until there is a pose."""
+        self.pose: Pose | None = None
+        """The newest pose, as the message has it."""
+        self.arrow = self.add(
+            svg.path(class_="arrow", fill="#b3261e", fill_opacity=0.85)
+        )
+        self.arrow.set(d=arrow(self.length))
+        self.svg.set(visibility="hidden")
+        self._ends = self.name == "goal" and self.frame == "map"
+        self._goes_to: Pose | None = None
+        """What is drawn until the robot gets there."""
+        self._count = 0
+
+    def read(self, message: PoseStampedMsg) -> tuple[Pose, str]:
+        """Return a pose that can be drawn, and its frame.
+
+        Raises:
+            ProtocolError: If it is not finite or turns nowhere.
+
+        """
+        return message.pose.usable, message.frame_id
+
+    def draw(self, found: tuple[Pose, str], at: Transform) -> None:
+        """Put the arrow there."""
+        self.pose, frame_id = pose, _ = found
+        self._goes_to = pose if self._ends and self._in_map(frame_id) else None
+        self.arrow.set_pose(pose.x, pose.y, pose.yaw)
+        self._count += 1
+        # By this the page knows one that the goal tool has shown already.
+        self.svg.set("data-pose", f"{self.topic} {self._count}")
+        self.svg.set(visibility=None)
+
+    def on_odometry_update(self) -> None:
+        """Hide a goal when the robot gets there."""
+        if self._goes_to is not None and self._is_there(self._goes_to):
+            self._goes_to = None
+            self.svg.set(visibility="hidden")
+
+    def _is_there(self, pose: Pose) -> bool:
+        x, y = self.robot.whereabouts.common_from_own.apply(pose.x, pose.y)
+        at = self.robot.position
+        return math.dist((x, y), (at.x, at.y)) < self.reached
+
+    def _in_map(self, frame_id: str) -> bool:
+        """Tell whether a frame is that of the robot's poses, so that both compare."""
+        tf, frames = self.robot.tf, self.robot.whereabouts.frames
+        if tf is None or frames is None:
+            return frame_id.strip("/") in ("", "map")
+        name = frames.buffer.name(frame_id, tf["namespace"])
+        return name in ("", tf["map_frame"])
+
+
+def arrow(length: float) -> str:
+    """Return the path of an arrow along x, whose head is a third of it."""
+    shaft, half = length * 2 / 3, length / 20
+    wide = length / 6
+    return (
+        f"M0 {half:.3f}L{shaft:.3f} {half:.3f}L{shaft:.3f} {wide:.3f}L{length:.3f} 0"
+        f"L{shaft:.3f} {-wide:.3f}L{shaft:.3f} {-half:.3f}L0 {-half:.3f}z"
+    )

@@ -1,0 +1,140 @@
+"""The way that a robot has come."""
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING
+
+from webmap.modules.drawing import rounded
+from webmap.modules.placed import Placed
+from webmap.base.errors import ConfigError
+from webmap.scene import svg
+from webmap.scene.element import Element
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+PIECE = 50
+"""Points after which a piece of the trail is done with and never sent again."""
+
+
+class Trail:
+    """Draws where the robot was, as a line behind it.
+
+    A jump, as when it is localised anew, breaks the line.
+
+    Style it by CSS: ``.trail > polyline``.
+
+    Args:
+        robot: The robot; its odometry topic says where it is.
+        length: How much of its way is kept, in metres.
+        step: How far it has to go for another point, in metres.
+        jump: From how far on, in metres, two poses have no way between them.
+
+    Raises:
+        ConfigError: If ``length``, ``step`` or ``jump`` is not a number above 0.
+
+    """
+
+    def __init__(
+        self,
+        robot: "Robot",
+        *,
+        length: float = 20.0,
+        step: float = 0.05,
+        jump: float = 1.0,
+    ) -> None:
+        for name, value in (("length", length), ("step", step), ("jump", jump)):
+            if not (math.isfinite(value) and value > 0):
+                raise ConfigError(f"{name} must be metres above 0, got {value}")
+        self.robot = robot
+        self.length = length
+        self.step = step
+        self.jump = jump
+        self._pieces: deque[_Piece] = deque()
+        self._last: tuple[float, float] | None = None
+        self._placed = Placed(robot, class_="trail")
+        self.svg = self._placed.svg
+        if robot.valid:
+            self.on_odometry_update()
+
+    @property
+    def points(self) -> list[list[tuple[float, float]]]:
+        """The trail, oldest first, in pieces that go on from one another or not."""
+        return [list(piece.points) for piece in self._pieces]
+
+    def clear(self) -> None:
+        """Forget the way so far."""
+        self.svg.clear()
+        self._pieces.clear()
+        self._last = None
+
+    def on_odometry_update(self) -> None:
+        """Go on to where the robot is now."""
+        at = (self.robot.position.x, self.robot.position.y)
+        far = math.inf if self._last is None else math.dist(self._last, at)
+        if far < self.step:
+            return
+        if far > self.jump or self._last is None:
+            self._begin(at)
+        else:
+            if len(self._pieces[-1].points) > PIECE:
+                self._begin(self._last)
+            self._pieces[-1].go(at, far)
+            self._forget_old()
+        self._last = at
+
+    def _begin(self, at: tuple[float, float]) -> None:
+        if self._pieces and len(self._pieces[-1].points) < 2:
+            self._pieces.pop().line.remove()
+        piece = _Piece(at)
+        self._pieces.append(piece)
+        self.svg.append(piece.line)
+
+    def _forget_old(self) -> None:
+        """Keep as many pieces as the length takes, and shorten the oldest of them."""
+        surplus = sum(piece.length for piece in self._pieces) - self.length
+        while surplus >= self._pieces[0].length and len(self._pieces) > 1:
+            old = self._pieces.popleft()
+            old.line.remove()
+            surplus -= old.length
+        if surplus > 0:
+            self._pieces[0].shorten(surplus)
+
+
+class _Piece:
+    """A part of the trail that is one line."""
+
+    def __init__(self, start: tuple[float, float]) -> None:
+        self.points: deque[tuple[float, float]] = deque([start])
+        self.length = 0.0
+        self.line: Element = svg.polyline(
+            fill="none",
+            stroke="#6b7f94",
+            stroke_opacity=0.8,
+            stroke_width=2,
+            stroke_linejoin="round",
+            vector_effect="non-scaling-stroke",
+        )
+
+    def go(self, at: tuple[float, float], far: float) -> None:
+        """Go on to a point, which is so far from the last."""
+        self.points.append(at)
+        self.length += far
+        self._draw()
+
+    def shorten(self, surplus: float) -> None:
+        """Drop points at the beginning as long as what is left is long enough."""
+        changed = False
+        while len(self.points) > 2:
+            first = math.dist(self.points[0], self.points[1])
+            if first > surplus:
+                break
+            self.points.popleft()
+            self.length -= first
+            surplus -= first
+            changed = True
+        if changed:
+            self._draw()
+
+    def _draw(self) -> None:
+        self.line.set(points=[(rounded(x), rounded(y)) for x, y in self.points])

@@ -1,0 +1,204 @@
+import {
+  asPlace,
+  checkSize,
+  keepView,
+  keptView,
+  LayoutRefused,
+  placeOf,
+  readLayout,
+  viewOf,
+  writeLayout,
+} from "../../web/layout.js";
+import { button, html, say } from "../../web/tools/elements.js";
+import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/layout.js').Place} Place */
+/** @typedef {import('../../web/tools/save_menu.js').Where} Where */
+/** @typedef {Where & {of?: string, restore?: boolean}} Options */
+/** @typedef {(message: Record<string, unknown>) => void} Send */
+
+const FILE = "webmap-layout.json";
+
+/** @type {Place} */
+const ORIGIN = { x: 0, y: 0, pixels_per_metre: 1, turn_rad: 0 };
+
+/** Milliseconds after which a view that changed is kept, at the latest. */
+const KEEP_WITHIN = 500;
+
+/**
+ * The viewer's layout of the page: saved to a file, loaded, and as it was found; and the
+ * last view of this address, which is there again when the page opens.
+ *
+ * Options: `place` and `classes`, as of the export tool, with which it shares a button;
+ * `of`, what the page shows, so that a view is kept for that alone; `restore`, whether
+ * the page opens with the last view, which `?layout=found` in its address forbids.
+ *
+ * Sends `{own: true}` when it has shown the last view, and hears it back, behind
+ * whatever the display may have said of the view meanwhile. Sends `{found: true}` to
+ * have the view that the page begins with.
+ *
+ * @param {MapCanvas} map
+ * @param {Options} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const views = new LastView(map, options, send);
+  const tool = new LayoutTool(map, options, views, send);
+  return {
+    receive: () => views.restoreAgain(),
+    destroy: () => {
+      tool.destroy();
+      views.destroy();
+    },
+  };
+}
+
+/** Keeps the view that hands chose for this address, and shows it again. */
+class LastView {
+  /**
+   * @param {MapCanvas} map
+   * @param {Options} options
+   * @param {Send} send
+   */
+  constructor(map, { of = "", restore = true }, send) {
+    this._map = map;
+    this._address = `${location.pathname}${location.search}#${map.element?.id ?? ""} ${of}`;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this._timer = undefined;
+    const asked = new URLSearchParams(location.search).get("layout");
+    this._place = keptView(this._address);
+    // After a reload, or a break of the link, the page knows better itself.
+    if (map.restored) map.byHand ||= this._place !== null;
+    else if (this._place && restore && asked !== "found") {
+      this._show(this._place);
+      map.byHand = false;
+      send({ own: true });
+    }
+    this._off = map.onView(() => {
+      this._timer ??= setTimeout(() => this._keep(), KEEP_WITHIN);
+    });
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    addEventListener("pagehide", () => this._keep(), { signal });
+  }
+
+  destroy() {
+    this._ending.abort();
+    this._off();
+    this._keep();
+  }
+
+  /** What the display said of the view before it knew is undone, if no hand came first. */
+  restoreAgain() {
+    if (this._map.byHand || !this._place) return;
+    this._show(this._place);
+    // It was chosen by hand, if not now.
+    this._map.byHand = true;
+  }
+
+  /** @param {Place} place */
+  _show(place) {
+    this._map.follow(0);
+    this._map.setView(viewOf(place, this._map));
+  }
+
+  /**
+   * Keep nothing until hands move the view again. The view is straight then, as a page
+   * begins with it; how large it is and where, the display says.
+   */
+  forget() {
+    const seen = placeOf(this._map.view, this._map);
+    this._show({ ...(seen ?? ORIGIN), turn_rad: 0 });
+    clearTimeout(this._timer);
+    this._timer = undefined;
+    this._map.byHand = false;
+    this._place = null;
+    keepView(this._address, null);
+  }
+
+  _keep() {
+    clearTimeout(this._timer);
+    this._timer = undefined;
+    const place = asPlace(this._map.byHand && placeOf(this._map.view, this._map));
+    if (place) keepView(this._address, place);
+  }
+}
+
+class LayoutTool {
+  /**
+   * @param {MapCanvas} map
+   * @param {Where} where
+   * @param {LastView} views
+   * @param {Send} send
+   */
+  constructor(map, where, views, send) {
+    this._map = map;
+    this._views = views;
+    this._send = send;
+    this._file = html("input", "", { type: "file", accept: ".json,application/json" });
+    this._file.hidden = true;
+    this._file.addEventListener("change", () => void this._load());
+    this._word = html("p", "webmap-layout-word", { role: "status" });
+    const content = html(
+      "div",
+      "webmap-layout",
+      { role: "group", "aria-label": "Layout of this page" },
+      button("webmap-layout-save", "Save", () => this._save()),
+      button("webmap-layout-load", "Load", () => this._file.click()),
+      button("webmap-layout-reset", "As it was found", () => this._reset()),
+      this._file,
+      this._word,
+    );
+    const title = "Save or load the layout";
+    const group = { order: 2, title, heading: "Layout", content };
+    this.destroy = joinSaveMenu(map, where, group).leave;
+  }
+
+  _save() {
+    const view = asPlace(placeOf(this._map.view, this._map));
+    const parts = this._map.layout.read();
+    const text = writeLayout(view ? { view, ...parts } : parts);
+    offer(new Blob([text], { type: "application/json" }), FILE);
+    this._say(view ? `Saved as ${FILE}.` : `Saved as ${FILE}, without the view, which no file can say.`);
+  }
+
+  async _load() {
+    const file = this._file.files?.[0];
+    if (!file) return;
+    try {
+      checkSize(file.size);
+      const layout = readLayout(await file.text());
+      this._map.layout.write(layout);
+      if (layout.view) {
+        this._map.follow(0);
+        this._map.setView(viewOf(layout.view, this._map));
+      }
+      this._say(`Loaded ${file.name}. No robot was told anything.`);
+    } catch (error) {
+      const why = error instanceof LayoutRefused ? error.message : `It cannot be read: ${error}.`;
+      this._say(`${why} Nothing was changed.`, true);
+    } finally {
+      this._file.value = ""; // the same file can be chosen again
+    }
+  }
+
+  _reset() {
+    this._map.layout.reset();
+    this._views.forget();
+    this._send({ found: true });
+    this._say("The page is as it was found.");
+  }
+
+  /**
+   * @param {string} text
+   * @param {boolean} [bad]
+   */
+  _say(text, bad = false) {
+    this._word.classList.toggle("bad", bad);
+    say(this._word, text);
+    this._word.scrollIntoView({ block: "nearest" });
+  }
+}

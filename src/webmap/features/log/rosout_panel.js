@@ -1,0 +1,269 @@
+import { html, say, svg } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {(message: Record<string, unknown>) => void} Send */
+
+/**
+ * @typedef {object} Options
+ * @property {string[]} [bridges] Their names.
+ * @property {string[]} [levels] From the least on.
+ * @property {string} [level] From which on lines are shown at first.
+ * @property {number} [lines] How many of each bridge are shown.
+ */
+
+/** @typedef {[number, string, string, string, number, number]} Said Number, level, node,
+ *     text, how many times in a row, and when, in seconds of the display's clock. */
+
+/** Where the choice is kept in this browser. */
+const KEPT = "webmap.rosout";
+
+/** How often ages are counted on, in milliseconds. */
+const PERIOD = 1000;
+
+/** What people call a level; its outline, which is filled, and what is drawn on it. */
+const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
+  debug: ["Debug", "", "M5 12h.1M12 12h.1M19 12h.1"],
+  info: ["Info", "M12 2.5a9.5 9.5 0 1 0 .01 0z", "M12 11v6M12 7v.1"],
+  warn: ["Warning", "M12 2.5L22.5 21h-21z", "M12 9v6M12 18v.1"],
+  error: ["Error", "M8 2.5h8L21.5 8v8L16 21.5H8L2.5 16V8z", "M8 8l8 8M16 8l-8 8"],
+  fatal: ["Fatal", "M2.5 2.500h19v19h-19z", "M12 6.500v7M12 17.500v.1"],
+});
+
+/**
+ * The newest lines that nodes log, in a panel that unfolds. Only while it is unfolded
+ * the display listens: sends `{open: true}` and `{open: false}`; hears `{bridge, said,
+ * total, state}` with the lines that are new or said again.
+ *
+ * @param {MapCanvas} map
+ * @param {Options} options
+ * @param {Send} send
+ * @returns {Half}
+ */
+export default function attach(map, options, send) {
+  const panel = new RosoutPanel(map, options, send);
+  return {
+    receive: (message) => panel.receive(message),
+    destroy: () => panel.destroy(),
+  };
+}
+
+/**
+ * @param {number} seconds
+ * @returns {string} How long ago, as people say it.
+ */
+export function ago(seconds) {
+  if (seconds < 60) return `${Math.max(0, Math.floor(seconds))} s`;
+  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
+  return `${Math.floor(seconds / 3600)} h`;
+}
+
+class RosoutPanel {
+  /**
+   * @param {MapCanvas} map
+   * @param {Options} options
+   * @param {Send} send
+   */
+  constructor(map, { bridges = [], levels = [], level = "info", lines = 100 }, send) {
+    this._map = map;
+    this._send = send;
+    this._levels = levels;
+    this._most = lines;
+    const { open, least } = kept();
+    this._books = bridges.map((name) => new Book(name, bridges.length > 1));
+    this._choice = html("select", "");
+    for (const each of levels) {
+      const words = `${LOOKS[each]?.[0] ?? each}${each === levels.at(-1) ? "" : " and worse"}`;
+      this._choice.append(html("option", "", { value: each }, words));
+    }
+    this._choice.value = levels.includes(least) ? least : level;
+    this._leave = map.layout.add("log", {
+      read: () => ({ open: this._details.open, least: this._choice.value }),
+      write: (log) => this._lay(log.open, log.least),
+      reset: () => this._lay(false, level),
+    });
+    this._choice.addEventListener("change", () => {
+      this._filter();
+      this._keep();
+    });
+    this._count = html("p", "webmap-rosout-count", { role: "status" });
+    this._badge = html("span", "webmap-rosout-badge");
+    this._details = html(
+      "details",
+      "webmap-panel webmap-rosout",
+      { "data-webmap-menu": "" },
+      html("summary", "", {}, "Log", this._badge),
+      html("label", "webmap-rosout-level", {}, "Show", this._choice),
+      this._count,
+      ...this._books.map(({ element }) => element),
+    );
+    this._details.open = open;
+    this._details.addEventListener("toggle", () => this._toggled());
+    this._timer = setInterval(() => this._age(), PERIOD);
+    this._take = lay(map, this._details, "top-left");
+    this._filter();
+    if (open) send({ open: true });
+  }
+
+  destroy() {
+    clearInterval(this._timer);
+    this._leave();
+    this._take();
+  }
+
+  /** @param {any} message */
+  receive({ bridge, said, total, state }) {
+    const book = this._books[bridge];
+    if (!book) return;
+    book.take(said, total, state, this._most);
+    this._filter();
+    this._age();
+  }
+
+  /**
+   * @param {boolean} unfolded
+   * @param {string} least
+   */
+  _lay(unfolded, least) {
+    if (this._levels.includes(least)) this._choice.value = least;
+    this._details.open = unfolded;
+    this._filter();
+    this._keep();
+  }
+
+  _toggled() {
+    this._keep();
+    this._send({ open: this._details.open });
+  }
+
+  _filter() {
+    const least = this._levels.indexOf(this._choice.value);
+    let [shown, bad] = [0, 0];
+    for (const book of this._books) {
+      for (const { row, level } of book.rows.values()) {
+        row.hidden = this._levels.indexOf(level) < least;
+        if (!row.hidden) shown += 1;
+        if (level === "error" || level === "fatal") bad += 1;
+      }
+      book.say();
+    }
+    say(this._badge, bad > 0 ? `${bad}` : "");
+    this._badge.title = bad > 0 ? `${bad} errors among the newest lines` : "";
+    const total = this._books.reduce((sum, book) => sum + book.total, 0);
+    const lines = (/** @type {number} */ n) =>
+      `${n.toLocaleString("en")} ${n === 1 ? "line" : "lines"}`;
+    say(
+      this._count,
+      total === 0 ? "Nothing was said yet." : `${lines(shown)} shown of ${lines(total)} heard.`,
+    );
+  }
+
+  _age() {
+    const now = this._map.clock;
+    if (!this._details.open || now === null) return;
+    for (const { rows } of this._books) {
+      for (const { age, heard } of rows.values()) say(age, ago(now - heard));
+    }
+  }
+
+  _keep() {
+    const choice = { open: this._details.open, least: this._choice.value };
+    try {
+      localStorage.setItem(KEPT, JSON.stringify(choice));
+    } catch {
+      // A browser that keeps nothing starts folded the next time.
+    }
+  }
+}
+
+/** The lines of one bridge, the newest on top. */
+class Book {
+  /**
+   * @param {string} name
+   * @param {boolean} named Whether there are others.
+   */
+  constructor(name, named) {
+    this.total = 0;
+    this._state = "";
+    /**
+     * @type {Map<number, {row: HTMLElement, level: string, times: HTMLElement,
+     *     age: HTMLElement, heard: number}>}
+     */
+    this.rows = new Map();
+    this._list = html("ol", "webmap-rosout-lines", { "aria-label": `Log of ${name}` });
+    this._note = html("p", "webmap-rosout-note");
+    const head = html("h3", "", {}, name);
+    head.hidden = !named;
+    this.element = html("section", "webmap-rosout-book", {}, head, this._note, this._list);
+  }
+
+  /**
+   * @param {Said[]} said
+   * @param {number} total
+   * @param {string} state Of the bridge.
+   * @param {number} most
+   */
+  take(said, total, state, most) {
+    this.total = total;
+    this._state = state;
+    for (const [number, level, name, text, count, heard] of said) {
+      const known = this.rows.get(number) ?? this._add(number, level, name, text);
+      known.heard = heard;
+      say(known.times, count > 1 ? `× ${count.toLocaleString("en")}` : "");
+    }
+    for (const [number, { row }] of this.rows) {
+      if (this.rows.size <= most) break;
+      row.remove();
+      this.rows.delete(number);
+    }
+  }
+
+  say() {
+    const away = this._state !== "" && this._state !== "open";
+    say(this._note, away ? "This bridge is not open: nothing comes from it." : "");
+  }
+
+  /**
+   * @param {number} number
+   * @param {string} level
+   * @param {string} name
+   * @param {string} text
+   */
+  _add(number, level, name, text) {
+    const [word, outline, mark] = LOOKS[level] ?? LOOKS.info;
+    const shape = svg(
+      "svg",
+      { viewBox: "0 0 24 24", class: "webmap-rosout-shape", "aria-hidden": "true" },
+      svg("path", { d: outline, class: "solid" }),
+      svg("path", { d: mark, class: "mark" }),
+    );
+    const times = html("span", "webmap-rosout-times");
+    const age = html("span", "webmap-rosout-age");
+    const row = html(
+      "li",
+      "webmap-rosout-line",
+      { "data-level": level },
+      shape,
+      html("strong", "", {}, word),
+      html("span", "webmap-rosout-name", {}, name),
+      times,
+      age,
+      html("span", "webmap-rosout-text", {}, text),
+    );
+    this._list.prepend(row);
+    const known = { row, level, times, age, heard: 0 };
+    this.rows.set(number, known);
+    return known;
+  }
+}
+
+/** @returns {{open: boolean, least: string}} */
+function kept() {
+  try {
+    const { open, least } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    return { open: open === true, least: String(least) };
+  } catch {
+    return { open: false, least: "" };
+  }
+}

@@ -1,0 +1,218 @@
+"""What the nodes behind bridges log, in a panel over the map."""
+
+import asyncio
+import itertools
+import time
+import weakref
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from webmap.base.errors import ConfigError
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages_log import LEVELS, LogMsg
+from webmap.base.scope import Removable, Removal, keep, no_scope
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+TOPIC = "/rosout"
+
+MOST = 200
+"""Lines that are kept of one bridge."""
+
+LONGEST = 500
+"""Characters of a line that are kept."""
+
+
+@dataclass(slots=True)
+class Said:
+    """One thing that a node said, once or several times in a row."""
+
+    number: int
+    level: str
+    """``"debug"``, ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``."""
+
+    name: str
+    """The node's or the logger's."""
+
+    text: str
+    count: int
+    heard: float
+    """When it came last, in monotonic seconds."""
+
+    version: int
+    """Grows with every change of any line."""
+
+
+class BridgeLog:
+    """The newest lines of one bridge; the same for all who look.
+
+    The topic is subscribed to while somebody looks and no longer: logs are many. What
+    was heard until then is kept.
+    """
+
+    def __init__(self, bridge: Bridge) -> None:
+        self.lines: deque[Said] = deque(maxlen=MOST)
+        """What was said, the newest last."""
+        self.total = 0
+        """Messages that were heard in all."""
+        self.version = 0
+        self._bridge = weakref.ref(bridge)
+        self._numbers = itertools.count(1)
+        self._watchers = 0
+        self._subscription: Removable | None = None
+
+    def watch(self) -> Removal:
+        """Listen; the removal of what is returned ends it, unless others look."""
+        self._watchers += 1
+        bridge = self._bridge()
+        if self._subscription is None and bridge is not None:
+            with no_scope():
+                # The type is another in each dialect, and the topic is always there.
+                self._subscription = bridge.subscribe(
+                    TOPIC, self.on_log, decode=LogMsg, queue_length=100
+                )
+        return Removal(self._leave)
+
+    def on_log(self, message: LogMsg) -> None:
+        """Keep a line; one that is said again and again is counted."""
+        self.total += 1
+        self.version += 1
+        level, name = message.level_name, message.name[:LONGEST]
+        text, now = message.msg[:LONGEST], time.monotonic()
+        last = self.lines[-1] if self.lines else None
+        if last is not None and (last.level, last.name, last.text) == (
+            level,
+            name,
+            text,
+        ):
+            last.count += 1
+            last.heard, last.version = now, self.version
+            return
+        number = next(self._numbers)
+        self.lines.append(Said(number, level, name, text, 1, now, self.version))
+
+    def since(self, version: int) -> list[Said]:
+        """Return the lines that changed after a version, the newest last."""
+        return [line for line in self.lines if line.version > version]
+
+    def _leave(self) -> None:
+        self._watchers -= 1
+        if self._watchers == 0 and self._subscription is not None:
+            self._subscription.remove()
+            self._subscription = None
+
+
+_logs: "weakref.WeakKeyDictionary[Bridge, BridgeLog]" = weakref.WeakKeyDictionary()
+
+
+def log_of(bridge: Bridge) -> BridgeLog:
+    """Return the log of a bridge, which all pages share."""
+    found = _logs.get(bridge)
+    if found is None:
+        found = _logs[bridge] = BridgeLog(bridge)
+    return found
+
+
+PERIOD = 0.25
+"""Seconds between two looks for new lines, while the panel is open."""
+
+
+class RosoutPanel:
+    """A panel that unfolds into the newest lines of ``/rosout``, of each bridge.
+
+    It hears ``rosgraph_msgs/Log`` of ROS 1 and ``rcl_interfaces/Log`` of ROS 2, while
+    somebody has it open. What is said again and again is counted, and each viewer
+    chooses from which level on lines are shown.
+
+    Style it by CSS: ``.webmap-rosout-line[data-level="error"]``.
+
+    Args:
+        map: The map.
+        bridges: The links to the ROS systems.
+        level: The least level that is shown until the viewer chooses: ``"debug"``,
+            ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``.
+        lines: How many lines of each bridge are shown.
+
+    Raises:
+        ConfigError: If there is no such level, or no line is to be shown.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        bridges: Iterable["Bridge"],
+        *,
+        level: str = "info",
+        lines: int = 100,
+    ) -> None:
+        if level not in LEVELS:
+            raise ConfigError(f"level is one of {', '.join(LEVELS)}, got {level!r}")
+        if not 1 <= lines <= 200:
+            raise ConfigError(f"lines must be 1 to 200, got {lines}")
+        self.map = map
+        self._bridges = list(bridges)
+        self._lines = lines
+        self._logs: list[BridgeLog] = [log_of(bridge) for bridge in self._bridges]
+        self._told: list[tuple[int, str]] = []
+        self._watching: list[Removal] = []
+        self._task: asyncio.Task[None] | None = None
+        self.half = map.add_browser_half(
+            self,
+            "features/log/rosout_panel.js",
+            {
+                "bridges": [bridge.name or bridge.url for bridge in self._bridges],
+                "level": level,
+                "levels": list(LEVELS),
+                "lines": lines,
+            },
+            "features/log/rosout_panel.css",
+        )
+        keep(Removal(self._close))
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Listen while the viewer has the panel open."""
+        if message.get("open") is True:
+            self._open()
+        elif message.get("open") is False:
+            self._close()
+
+    def tell(self) -> None:
+        """Send the page what is new."""
+        for number, log in enumerate(self._logs):
+            state = self._bridges[number].state
+            version, told = self._told[number]
+            if (log.version, state) == (version, told):
+                continue
+            self._told[number] = (log.version, state)
+            said = [
+                [line.number, line.level, line.name, line.text, line.count, line.heard]
+                for line in log.since(version)[-self._lines :]
+            ]
+            self.half.send(
+                {"bridge": number, "said": said, "total": log.total, "state": state}
+            )
+
+    def _open(self) -> None:
+        # A page that was loaded anew knows nothing of what was said before.
+        self._told = [(0, "") for _ in self._logs]
+        if not self._watching:
+            self._watching = [log.watch() for log in self._logs]
+        if self._task is None:
+            self._task = asyncio.get_running_loop().create_task(self._tell_on())
+
+    def _close(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            self._task = None
+        for watching in self._watching:
+            watching.remove()
+        self._watching = []
+
+    async def _tell_on(self) -> None:
+        while True:
+            self.tell()
+            await asyncio.sleep(PERIOD)

@@ -1,0 +1,172 @@
+import { deskOf } from "../../web/inputs/desk.js";
+import { attentive } from "../../web/motion/attention.js";
+import { apply, unapply } from "../../web/view.js";
+import { button, html, say, svg } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/view.js').Point} Point */
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+
+/**
+ * Measure on the map: press where it begins, drag, release. What was measured stays
+ * until the next press, or until the tool is left.
+ *
+ * Begins by its button or by `m`; Escape leaves.
+ *
+ * Options: `key` ("m").
+ *
+ * @param {MapCanvas} map
+ * @param {{key?: string}} options
+ * @returns {Half}
+ */
+export default function attach(map, options) {
+  const tool = new MeasureTool(map, options);
+  return { destroy: () => tool.destroy() };
+}
+
+/**
+ * @param {Point} from In metres.
+ * @param {Point} to
+ * @returns {string} How far it is, and in which direction from x.
+ */
+export function measured(from, to) {
+  const [dx, dy] = [to.x - from.x, to.y - from.y];
+  const degrees = Math.round((Math.atan2(dy, dx) * 180) / Math.PI + 360) % 360;
+  return `${Math.hypot(dx, dy).toFixed(2)} m, ${degrees}°`;
+}
+
+class MeasureTool {
+  /**
+   * @param {MapCanvas} map
+   * @param {{key?: string}} options
+   */
+  constructor(map, { key = "m" }) {
+    this._map = map;
+    this._key = key;
+    this._active = false;
+    /** @type {number | null} */
+    this._pointer = null;
+    /** What is measured, in metres. @type {{from: Point, to: Point} | null} */
+    this._line = null;
+    this._button = button("webmap-measure-go", "Measure", () => this._toggle());
+    this._button.title = `Key ${key}`;
+    this._word = html("span", "webmap-measure-word", { role: "status" });
+    const panel = html(
+      "section",
+      "webmap-panel webmap-measure",
+      { "aria-label": "Measure" },
+      this._button,
+      this._word,
+    );
+    this._path = svg("path", { class: "webmap-measure-line" });
+    this._drawing = svg(
+      "svg",
+      { class: "webmap-measure-drawing", "aria-hidden": "true" },
+      this._path,
+    );
+    this._ending = new AbortController();
+    this._listen();
+    this._offs = [
+      lay(map, this._drawing),
+      lay(map, panel, "top-left"),
+      deskOf(map.drive).claimEscape(() => this._leave()),
+      map.onView(() => this._draw()),
+    ];
+    this._activate(false);
+  }
+
+  destroy() {
+    this._activate(false);
+    this._ending.abort();
+    for (const off of this._offs) off();
+  }
+
+  _listen() {
+    const { signal } = this._ending;
+    const { svg: root } = this._map;
+    // Before anybody else, so that a press that measures neither moves nor selects.
+    const first = { signal, capture: true };
+    root.addEventListener("pointerdown", (event) => this._down(event), first);
+    root.addEventListener("pointermove", (event) => this._move(event), first);
+    root.addEventListener("pointerup", (event) => this._up(event), first);
+    root.addEventListener("pointercancel", () => (this._pointer = null), first);
+    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+  }
+
+  /** @param {KeyboardEvent} event */
+  _keyDown(event) {
+    if (event.key !== this._key || event.repeat || event.isComposing) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
+    const { active } = deskOf(this._map.drive);
+    if (active !== null && active.map !== this._map) return;
+    this._toggle();
+  }
+
+  _toggle() {
+    this._activate(!this._active);
+  }
+
+  /** @param {boolean} active */
+  _activate(active) {
+    this._active = active;
+    this._pointer = this._line = null;
+    this._button.setAttribute("aria-pressed", String(active));
+    this._map.svg.classList.toggle("webmap-measuring", active);
+    say(this._word, active ? "Press on the map and drag." : "");
+    this._draw();
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  _leave() {
+    if (!this._active) return false;
+    this._activate(false);
+    return true;
+  }
+
+  /** @param {PointerEvent} event */
+  _down(event) {
+    if (!this._active || event.button !== 0) return;
+    event.stopImmediatePropagation();
+    event.preventDefault();
+    if (this._pointer !== null) return;
+    this._pointer = event.pointerId;
+    this._map.svg.setPointerCapture(event.pointerId);
+    const from = this._place(event);
+    this._line = { from, to: from };
+    this._draw();
+  }
+
+  /** @param {PointerEvent} event */
+  _move(event) {
+    if (!this._active) return;
+    event.stopImmediatePropagation();
+    if (event.pointerId !== this._pointer || !this._line) return;
+    this._line.to = this._place(event);
+    this._draw();
+  }
+
+  /** @param {PointerEvent} event */
+  _up(event) {
+    if (!this._active || event.pointerId !== this._pointer) return;
+    event.stopImmediatePropagation();
+    this._map.suppressNextClick();
+    this._pointer = null;
+  }
+
+  /** @param {PointerEvent} event */
+  _place(event) {
+    const { x, y } = this._map.pointOf(event);
+    return unapply(this._map.view, x, y);
+  }
+
+  _draw() {
+    const line = this._line;
+    this._drawing.toggleAttribute("hidden", line === null);
+    if (line === null) return;
+    const from = apply(this._map.view, line.from.x, line.from.y);
+    const to = apply(this._map.view, line.to.x, line.to.y);
+    this._path.setAttribute("d", `M${from.x} ${from.y}L${to.x} ${to.y}`);
+    say(this._word, measured(line.from, line.to));
+  }
+}

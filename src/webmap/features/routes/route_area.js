@@ -1,0 +1,420 @@
+import { deskOf } from "../../web/inputs/desk.js";
+import { attentive } from "../../web/motion/attention.js";
+import { apply } from "../../web/view.js";
+import { button, html, svg } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+import { cleaned, MOST_CORNERS, problemOf } from "./polygon.js";
+import { PressAim } from "../../web/tools/aim.js";
+import { planSweeps, SPACING } from "./sweeps.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/tools/aim.js').Pose} Pose */
+/** @typedef {import('./sweeps.js').Plan} Plan */
+/** @typedef {import('../../web/view.js').Point} Point */
+
+/**
+ * What an area asks of the route that it is for.
+ *
+ * @typedef {object} Route
+ * @property {() => boolean} mayBegin Whether the route is in sight.
+ * @property {() => number} room How many points it can take.
+ * @property {() => Pose | null} here Where the selected robot stands.
+ * @property {(points: Pose[]) => void} take Puts points behind those there are.
+ * @property {() => void} changed What is to be seen is another.
+ */
+
+/** So near to the first corner a press closes the area, in pixels: a finger's width. */
+const NEAR = 20;
+
+/** So near to the last corner it is the second half of a double press, in pixels. */
+const TWICE = 4;
+
+/** @type {Plan} */
+const NO_SWEEPS = { problem: "", points: [], sweeps: [] };
+
+/** What has a use for Enter itself. */
+const PRESSED_BY_KEY = "button, summary, a[href], input, select, textarea, [tabindex]";
+
+/**
+ * An area that becomes points of a route: its corners are pressed on the map, and sweeps
+ * that go over it back and forth are shown until they are taken or left.
+ *
+ * The corners end with the first one pressed again, Enter or Done; Escape leaves. It
+ * sends nothing to any robot: whoever runs the route does.
+ */
+export class RouteArea {
+  /** @param {MapCanvas} map @param {Route} route */
+  constructor(map, route) {
+    this._map = map;
+    this._route = route;
+    /** @type {Point[]} */
+    this._corners = [];
+    /** @type {Point | null} A corner that is being pressed. */
+    this._aimed = null;
+    this._closed = false;
+    /** Why the area could not be closed, in a sentence. */
+    this._refused = "";
+    this._plan = NO_SWEEPS;
+    this._drawing = new AreaDrawing(map);
+    this._panel = new AreaPanel({
+      begin: () => this._begin(),
+      close: () => this._close(),
+      undo: () => this._set(this._corners.slice(0, -1)),
+      here: () => this._addHere(),
+      changed: () => this._show(),
+      take: () => this._take(),
+      leave: () => this.leave(),
+    });
+    /** Begins an area. */
+    this.button = this._panel.begin;
+    /** What is pressed and set; it is hidden where there is no area. */
+    this.element = this._panel.element;
+    this._aim = new PressAim(map, "", {
+      mayBegin: () => route.mayBegin(),
+      changed: (active) => this._aimChanged(active),
+      preview: (pose) => this._preview(pose),
+      done: (pose) => this._press(pose),
+      lasting: true,
+    });
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+    // While corners are pressed the aim has it.
+    this._offEscape = deskOf(map.drive).claimEscape(() => this._closed && this.leave());
+    this._draw();
+  }
+
+  destroy() {
+    this._ending.abort();
+    this._offEscape();
+    this._aim.destroy();
+    this._drawing.destroy();
+  }
+
+  /** Whether corners are pressed, or will be when another tool has aimed. */
+  get draws() {
+    return this._aim.active || this._aim.waits;
+  }
+
+  /** Whether there is an area, or one is begun. */
+  get active() {
+    return this.draws || this._closed;
+  }
+
+  /** @returns {string} What there is to say; empty where there is no area. */
+  get words() {
+    if (this._aim.waits) return "More corners afterwards.";
+    if (this.draws) return this._refused || this._drawingWords();
+    if (!this._closed) return "";
+    const { problem, points, sweeps } = this._plan;
+    return problem || `${points.length} points, ${sweeps.length} sweeps.`;
+  }
+
+  /** Whether what it says is why something cannot be done. */
+  get refused() {
+    return this.draws ? this._refused !== "" : this._plan.problem !== "";
+  }
+
+  /** Look again where the robot is. */
+  look() {
+    this._panel.showHere(this._route.here() !== null);
+  }
+
+  /** @returns {boolean} Whether there was something to leave. */
+  leave() {
+    if (!this.active) return false;
+    this._closed = false;
+    if (!this._aim.leave()) this._drop();
+    return true;
+  }
+
+  _begin() {
+    this._aim.activate(true);
+    this._panel.focus();
+  }
+
+  _drawingWords() {
+    const count = this._corners.length;
+    if (count < 3) return "Press each corner of the area on the map.";
+    return `${count} corners. Press the first again, or Done.`;
+  }
+
+  /** @param {boolean} active */
+  _aimChanged(active) {
+    if (active || this._aim.waits || this._closed) this._show();
+    else this._drop();
+  }
+
+  _drop() {
+    const { focused } = this._panel;
+    this._set([]);
+    if (focused) this._panel.focus();
+  }
+
+  /** @param {Point[]} corners */
+  _set(corners) {
+    this._corners = corners;
+    this._aimed = null;
+    this._refused = "";
+    this._show();
+  }
+
+  /** @param {Pose | null} pose */
+  _preview(pose) {
+    this._aimed = pose && !this._near(pose, 0, NEAR) ? pose : null;
+    this._show();
+  }
+
+  /** @param {Pose} pose */
+  _press(pose) {
+    const last = this._corners.length - 1;
+    this._aimed = null;
+    if (last > 0 && this._near(pose, 0, NEAR)) this._close();
+    else if (this._near(pose, last, TWICE)) this._show();
+    else this._add(pose);
+  }
+
+  _addHere() {
+    const pose = this._route.here();
+    if (pose) this._add(pose);
+  }
+
+  /** @param {Point} corner */
+  _add({ x, y }) {
+    const count = this._corners.length + 1;
+    if (count <= MOST_CORNERS) this._set([...this._corners, { x, y }]);
+    else this._refuse(`Got ${count} corners: an area has ${MOST_CORNERS} at most.`);
+  }
+
+  /** @param {Point} place @param {number} index @param {number} pixels */
+  _near(place, index, pixels) {
+    const corner = this._corners[index];
+    if (!corner) return false;
+    const [p, q] = [corner, place].map(({ x, y }) => apply(this._map.view, x, y));
+    return Math.hypot(p.x - q.x, p.y - q.y) <= pixels;
+  }
+
+  /** @param {KeyboardEvent} event */
+  _keyDown(event) {
+    if (event.key !== "Enter" || event.repeat || event.isComposing) return;
+    if (!this._aim.active || !attentive()) return;
+    if (document.activeElement?.matches(PRESSED_BY_KEY)) return;
+    event.preventDefault();
+    this._close();
+  }
+
+  _close() {
+    const problem = problemOf(cleaned(this._corners));
+    if (problem) {
+      this._refuse(problem);
+      return;
+    }
+    const { focused } = this._panel;
+    this._closed = true;
+    this._aim.leave();
+    if (focused) this._panel.focus();
+  }
+
+  /** @param {string} why */
+  _refuse(why) {
+    this._refused = why;
+    this._show();
+  }
+
+  _take() {
+    // The route may have other points than when it was drawn.
+    this._draw();
+    const { points } = this._plan;
+    if (points.length === 0) return;
+    this.leave();
+    this._route.take(points);
+  }
+
+  _show() {
+    this._draw();
+    this._route.changed();
+  }
+
+  _draw() {
+    const corners = this._aimed ? [...this._corners, this._aimed] : this._corners;
+    const { spacing, across } = this._panel;
+    this._plan =
+      corners.length < 3
+        ? NO_SWEEPS
+        : planSweeps(corners, { spacing, across, room: this._route.room() });
+    const { active, _closed: closed } = this;
+    this._drawing.show(corners, { closed, ...this._plan });
+    const ready = this._plan.points.length > 0;
+    this._panel.show({ active, closed, corners: this._corners.length, ready });
+  }
+}
+
+/**
+ * What can be done with an area.
+ *
+ * @typedef {object} Acts
+ * @property {() => void} begin
+ * @property {() => void} close No further corner is pressed.
+ * @property {() => void} undo The last corner is taken away.
+ * @property {() => void} here The robot's place becomes a corner.
+ * @property {() => void} changed The sweeps are wanted another way.
+ * @property {() => void} take
+ * @property {() => void} leave
+ */
+
+/** The buttons and the field with which an area is made into sweeps. */
+class AreaPanel {
+  /** @param {Acts} acts */
+  constructor(acts) {
+    /** Whether sweeps go across the longest side. */
+    this.across = false;
+    /** Begins an area. */
+    this.begin = button("webmap-area-begin", "Area", acts.begin);
+    this.begin.title = "Sweep back and forth over an area";
+    this._done = button("webmap-area-done", "Done", acts.close);
+    this._done.title = "Or press the first corner again";
+    this._undo = button("webmap-area-undo", "Undo", acts.undo);
+    this._undo.title = "Take the last corner away";
+    this._here = button("webmap-area-here", "Its place", acts.here);
+    this._here.title = "Add the place of the selected robot";
+    this._spacing = html("input", "webmap-area-spacing", {
+      type: "number",
+      min: `${SPACING.least}`,
+      max: `${SPACING.most}`,
+      step: "0.1",
+      value: `${SPACING.usual}`,
+    });
+    this._spacing.addEventListener("input", acts.changed);
+    this._spacing.addEventListener("keydown", ({ key }) => {
+      // The page leaves Escape to a field, and this one has no use for it.
+      if (key === "Escape") acts.leave();
+    });
+    this._turn = button("webmap-area-across", "Across", () => {
+      this.across = !this.across;
+      acts.changed();
+    });
+    this._turn.title = "Sweep across the longest side, not along it";
+    this._take = button("webmap-area-take", "Add to route", acts.take);
+    this._leave = button("webmap-area-leave", "Leave", acts.leave);
+    const label = html("label", "webmap-area-apart", {}, "Apart, in m ", this._spacing);
+    this._how = html("div", "webmap-route-row", {}, label, this._turn);
+    this.element = html(
+      "div",
+      "webmap-area",
+      { role: "group", "aria-label": "Area" },
+      this._how,
+      html(
+        "div",
+        "webmap-route-row",
+        {},
+        ...[this._done, this._undo, this._here, this._take, this._leave],
+      ),
+    );
+  }
+
+  /** The metres between sweeps; NaN where there is no number. */
+  get spacing() {
+    return this._spacing.value === "" ? NaN : Number(this._spacing.value);
+  }
+
+  /**
+   * @param {object} area
+   * @param {boolean} area.active Whether there is one.
+   * @param {boolean} area.closed
+   * @param {number} area.corners How many there are.
+   * @param {boolean} area.ready Whether there are sweeps to take.
+   */
+  show({ active, closed, corners, ready }) {
+    this._turn.setAttribute("aria-pressed", String(this.across));
+    this._how.hidden = this._take.hidden = !closed;
+    for (const each of [this._done, this._undo, this._here]) each.hidden = closed;
+    this._undo.disabled = corners === 0;
+    this._take.disabled = !ready;
+    this.element.hidden = !active;
+  }
+
+  /** @param {boolean} possible Whether a robot's place can be added. */
+  showHere(possible) {
+    this._here.disabled = !possible;
+  }
+
+  /** Whether the keys are with the buttons of an area. */
+  get focused() {
+    return this.element.contains(document.activeElement);
+  }
+
+  /** Let the keys go on with what is there now: a button that is gone has no next one. */
+  focus() {
+    const next = [this._done, this._take, this._turn, this.begin];
+    next.find((each) => !each.disabled && each.offsetParent !== null)?.focus();
+  }
+}
+
+/** An area over a map, its corners, and the sweeps that would go over it. */
+class AreaDrawing {
+  /** @param {MapCanvas} map */
+  constructor(map) {
+    this._map = map;
+    /** @type {Point[]} */
+    this._corners = [];
+    this._outline = svg("path", { class: "webmap-area-outline" });
+    this._ways = svg("path", { class: "webmap-area-ways" });
+    this._sweeps = svg("path", { class: "webmap-area-sweeps" });
+    // In metres, as the plan is: only the view moves it.
+    this._world = svg("g", {}, this._outline, this._ways, this._sweeps);
+    this._marks = svg("g", {});
+    this._drawing = svg(
+      "svg",
+      { class: "webmap-route-drawing webmap-area-drawing", "aria-hidden": "true" },
+      this._world,
+      this._marks,
+    );
+    this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
+    this._place();
+  }
+
+  destroy() {
+    for (const off of this._offs) off();
+  }
+
+  /**
+   * @param {Point[]} corners In metres.
+   * @param {object} how
+   * @param {boolean} how.closed Whether no further corner is pressed.
+   * @param {Point[]} how.points What the robot would go to, in this order.
+   * @param {[Point, Point][]} how.sweeps
+   */
+  show(corners, { closed, points, sweeps }) {
+    const shut = corners.length > 0 && (closed || points.length > 0);
+    this._corners = closed ? [] : corners;
+    this._outline.setAttribute("d", path(corners) + (shut ? "Z" : ""));
+    this._ways.setAttribute("d", path(points));
+    this._sweeps.setAttribute("d", sweeps.map(path).join(""));
+    while (this._marks.childElementCount > this._corners.length) {
+      this._marks.lastChild?.remove();
+    }
+    while (this._marks.childElementCount < this._corners.length) {
+      this._marks.append(svg("circle", { class: "webmap-area-corner" }));
+    }
+    this._place();
+  }
+
+  _place() {
+    const { a, b, c, d, e, f } = this._map.view;
+    this._world.setAttribute("transform", `matrix(${a} ${b} ${c} ${d} ${e} ${f})`);
+    for (const [i, { x, y }] of this._corners.entries()) {
+      const place = apply(this._map.view, x, y);
+      const mark = this._marks.children[i];
+      mark.setAttribute("cx", `${place.x}`);
+      mark.setAttribute("cy", `${place.y}`);
+      // The first is pressed again to close the area.
+      mark.setAttribute("r", i === 0 ? "10" : "6");
+    }
+  }
+}
+
+/** @param {Point[]} points */
+function path(points) {
+  const places = points.map(({ x, y }) => `${x} ${y}`);
+  return places.length > 0 ? `M${places.join("L")}` : "";
+}

@@ -1,0 +1,348 @@
+import { deskOf } from "../../web/inputs/desk.js";
+import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
+import { Obedience, standingStops } from "../../web/motion/stopping.js";
+import { button, html, say, stopButton, TwiceButton } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/drive.js').Drive} Drive */
+/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/motion/stopping.js').Verdict} Verdict */
+
+/**
+ * So many robots one reset is for, at most: a page that says more than 120 things at once
+ * loses its connection. The others stay stopped until the next.
+ */
+const RESET_AT_ONCE = 60;
+
+/**
+ * A button that stops all robots, always in sight, and what became of every STOP.
+ *
+ * Also covers the page with an alarm when a robot moves on although it was given zero.
+ * Space and Escape stop the robot that is driven or selected, all while there is none,
+ * and Shift and Escape all, whether or not the map has a `Teleop`.
+ *
+ * Options: `place`, a selector of the page's own element for the button; without a place
+ * it lies over the map.
+ *
+ * @param {MapCanvas} map
+ * @param {{place?: string}} options
+ * @returns {Half}
+ */
+export default function attach(map, options) {
+  const stop = new Stop(map, options);
+  return { destroy: () => stop.destroy() };
+}
+
+class Stop {
+  /**
+   * @param {MapCanvas} map
+   * @param {{place?: string}} options
+   */
+  constructor(map, { place }) {
+    /** @type {Drive} */
+    this._drive = map.drive;
+    this._obedience = new Obedience();
+    /**
+     * Why the gate refused the last reset, by robot.
+     * @type {Map<string, string>}
+     */
+    this._refused = new Map();
+    this._alarm = new Alarm(() => this._drive.stop("*"));
+    this._verdicts = html("div", "webmap-stop-verdicts", { role: "status" });
+    this._close = button("webmap-stop-close", "Close", () => {
+      this._drive.dismissVerdicts();
+      this._show();
+    });
+    this._standing = html("p", "webmap-stop-standing", { role: "status" });
+    this._reset = new TwiceButton(
+      "webmap-reset",
+      "Reset",
+      "Press again to reset",
+      (stops) => {
+        this._refused.clear();
+        for (const each of stops.slice(0, RESET_AT_ONCE)) this._drive.reset(...stopOf(each));
+      },
+    );
+    const all = stopButton("webmap-stop-all", "Stop all", () => {
+      this._drive.stop("*");
+    });
+    all.title = "Key Shift and Escape";
+    this._list = html(
+      "div",
+      "webmap-stop-list",
+      { role: "group", "aria-label": "What became of STOP" },
+      this._verdicts,
+      html("div", "webmap-stop-row", {}, this._standing, this._reset.element, this._close),
+    );
+    this._list.hidden = true;
+    const panel = html(
+      "section",
+      "webmap-panel webmap-stop",
+      { "aria-label": "Emergency stop" },
+      all,
+      this._list,
+    );
+    this._shown = "";
+    const drive = this._drive;
+    this._offs = [
+      lay(map, panel, "top-right", place),
+      deskOf(drive).open(),
+      drive.on("stop", () => this._stopped()),
+      drive.on("robot", (report) => this._report(report)),
+      drive.on("goal", (robot) => this._obedience.excuse(robot)),
+      drive.on("gone", (robot) => this._gone(robot)),
+      drive.on("refused", ({ robot, what, why }) => {
+        if (what === "reset" && robot !== null) this._refused.set(robot, why);
+      }),
+      drive.on("step", () => this._show()),
+    ];
+  }
+
+  destroy() {
+    for (const off of this._offs) off();
+    this._alarm.destroy();
+  }
+
+  /** @param {import('../../web/motion/report.js').RobotReport} report */
+  _report(report) {
+    this._obedience.report(report, performance.now());
+    if (!isLatched(report)) this._refused.delete(report.robot);
+  }
+
+  /** @param {string} robot */
+  _gone(robot) {
+    this._obedience.excuse(robot);
+    this._refused.delete(robot);
+  }
+
+  _stopped() {
+    // Who says STOP between the two presses takes the first one back.
+    this._reset.forget();
+    this._show();
+  }
+
+  _show() {
+    this._alarm.show(this._alarms());
+    const { robots, verdicts } = this._drive;
+    const standing = standingStops(robots.values());
+    say(this._standing, [standing, ...this._refusals()].join(" "));
+    const latched = [...robots.values()].filter(isLatched).map(stopKey);
+    const reset = latched.length > 1 ? "Reset all" : "Reset";
+    this._reset.show(latched.length > 0, latched, reset);
+    this._close.hidden = verdicts.length === 0;
+    this._list.hidden = verdicts.length === 0 && standing === "";
+    this._showVerdicts(verdicts.sort(byName));
+  }
+
+  /** @returns {string[]} Which resets the gate refused, and why. */
+  _refusals() {
+    const { robots } = this._drive;
+    return [...this._refused].map(
+      ([robot, why]) => `${robots.get(robot)?.name ?? robot} was not reset: ${why}.`,
+    );
+  }
+
+  /**
+   * The gate's own alarms, and what is seen here where the gate raises none.
+   *
+   * @returns {Map<string, string>} What there is to say of each robot.
+   */
+  _alarms() {
+    const alarms = new Map();
+    for (const { robot, name, alarm } of this._obedience.disobeying(performance.now())) {
+      if (alarm === undefined) alarms.set(robot, name);
+    }
+    for (const { robot, name, alarm, other_writer } of this._drive.robots.values()) {
+      const words = [alarm, other_writer].filter(Boolean).join("; ");
+      if (alarm) alarms.set(robot, `${name}: ${words}`);
+    }
+    return alarms;
+  }
+
+  /** @param {Verdict[]} verdicts */
+  _showVerdicts(verdicts) {
+    const shown = JSON.stringify(verdicts);
+    if (shown === this._shown) return;
+    this._shown = shown;
+    this._verdicts.replaceChildren(
+      ...verdicts.map(({ name, state, text }) => {
+        const item = html("p", "webmap-stop-verdict", {}, `${name}: ${text}`);
+        item.dataset.state = state;
+        return item;
+      }),
+    );
+  }
+}
+
+/**
+ * @param {Verdict} one
+ * @param {Verdict} other
+ */
+function byName(one, other) {
+  return one.name.localeCompare(other.name, undefined, { numeric: true });
+}
+
+/** Covers the page: a robot does not do what it is told. */
+class Alarm {
+  /** @param {() => void} stopAll Where no button of the page that does is in sight. */
+  constructor(stopAll) {
+    // Figures change several times a second, which nobody wants to have read out.
+    this._names = html("p", "webmap-alarm-names", { "aria-live": "off" });
+    /** @type {Set<string>} */
+    this._seen = new Set();
+    /** @type {ReadonlyMap<string, string>} */
+    this._current = new Map();
+    this._ending = new AbortController();
+    this._stop = stopButton("webmap-alarm-stop", "Stop all", stopAll);
+    // A hand that knows where STOP is on the page finds it there.
+    this._twins = new StopTwins();
+    this._element = html(
+      "div",
+      "webmap-alarm",
+      { role: "alert", "aria-atomic": "false", popover: "manual" },
+      this._twins.element,
+      html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
+      html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
+      this._names,
+      this._stop,
+      button("webmap-alarm-seen", "I have seen this", () => {
+        this._seen = new Set(this._current.keys());
+        this.show(this._current);
+      }),
+    );
+  }
+
+  destroy() {
+    this._ending.abort();
+    this._element.remove();
+  }
+
+  /** @param {ReadonlyMap<string, string>} alarms By robot. */
+  show(alarms) {
+    this._current = alarms;
+    for (const robot of this._seen) if (!alarms.has(robot)) this._seen.delete(robot);
+    const news = [...alarms].filter(([robot]) => !this._seen.has(robot));
+    say(this._names, news.map(([, words]) => words).join(", "));
+    if (news.length === 0) this.destroy();
+    else {
+      if (!this._element.isConnected) this._begin();
+      this._place();
+    }
+  }
+
+  /** Have STOP where it is on the page, and everything else beside it. */
+  _place() {
+    const { all, top, bottom } = this._twins.place();
+    this._stop.hidden = all;
+    this._element.style.paddingBlock = `${Math.max(top, 24)}px ${Math.max(bottom, 24)}px`;
+  }
+
+  _begin() {
+    document.body.append(this._element);
+    this._raise();
+    this._ending.abort();
+    this._ending = new AbortController();
+    const options = { capture: true, signal: this._ending.signal };
+    const raise = (/** @type {Event} */ event) => {
+      if (coversAnew(event)) this._raise();
+    };
+    document.addEventListener("toggle", raise, options);
+    document.addEventListener("fullscreenchange", () => this._raise(), options);
+    window.addEventListener("resize", () => this._place(), options);
+  }
+
+  /**
+   * Lie over popovers and dialogs as well: what opened last is on top, whatever its
+   * z-index. A browser that knows no popovers has the alarm over all but its dialogs.
+   */
+  _raise() {
+    if (!("popover" in HTMLElement.prototype)) return;
+    this._element.hidePopover();
+    this._element.showPopover();
+  }
+}
+
+/**
+ * @param {Event} event Something was opened or closed.
+ * @returns {boolean} Whether it may lie over the alarm now; that of another map does not
+ *     count, or the two would rise above each other for ever.
+ */
+function coversAnew({ target }) {
+  const covers = "dialog, [popover]:not(.webmap-alarm)";
+  return target instanceof Element && target.matches(covers);
+}
+
+/** The STOP buttons of the page that can be pressed, but for those of an alarm. */
+const ORIGINALS = ".webmap-stop-button:enabled:not(.webmap-alarm *)";
+
+/** Pixels between a twin and what lies beside it. */
+const GAP = 16;
+
+/**
+ * Copies of the page's STOP buttons, each at the place of its original.
+ *
+ * Something that covers the page contains them, so that STOP is where it always is.
+ */
+class StopTwins {
+  constructor() {
+    this.element = html("div", "webmap-stop-twins");
+    /** @type {Map<HTMLButtonElement, HTMLButtonElement>} */
+    this._twins = new Map();
+  }
+
+  /**
+   * Follow the originals: which there are, where they are and what they say.
+   *
+   * @returns {{all: boolean, top: number, bottom: number}} `all`: whether one of them
+   *     stops all robots. `top` and `bottom`: pixels that the twins need there.
+   */
+  place() {
+    const originals = [...document.querySelectorAll(ORIGINALS)].filter(isInSight);
+    for (const [original, twin] of this._twins) {
+      if (originals.includes(original)) continue;
+      this._twins.delete(original);
+      twin.remove();
+    }
+    const room = { all: false, top: 0, bottom: 0 };
+    for (const original of originals) {
+      const { left, top, right, bottom } = original.getBoundingClientRect();
+      this._twinOf(original).style.inset = [
+        `${top}px`,
+        `${innerWidth - right}px`,
+        `${innerHeight - bottom}px`,
+        `${left}px`,
+      ].join(" ");
+      room.all ||= original.matches(".webmap-stop-all");
+      if (top + bottom < innerHeight) room.top = Math.max(room.top, bottom + GAP);
+      else room.bottom = Math.max(room.bottom, innerHeight - top + GAP);
+    }
+    return room;
+  }
+
+  /** @param {HTMLButtonElement} original */
+  _twinOf(original) {
+    const known = this._twins.get(original);
+    const twin = known ?? stopButton("webmap-stop-twin", "", () => original.click());
+    say(twin, original.textContent ?? "");
+    twin.dataset.robot = original.dataset.robot ?? "";
+    const label = original.getAttribute("aria-label") ?? "";
+    if (twin.ariaLabel !== label && label) twin.ariaLabel = label;
+    if (!known) {
+      this._twins.set(original, twin);
+      this.element.append(twin);
+    }
+    return twin;
+  }
+}
+
+/**
+ * @param {Element} element
+ * @returns {element is HTMLButtonElement} Whether its middle is on the screen.
+ */
+function isInSight(element) {
+  if (!(element instanceof HTMLButtonElement)) return false;
+  const { left, top, width, height } = element.getBoundingClientRect();
+  const [x, y] = [left + width / 2, top + height / 2];
+  return width > 0 && x > 0 && x < innerWidth && y > 0 && y < innerHeight;
+}

@@ -1,0 +1,25 @@
+"""STOP, always in sight."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class StopButton:
+    """A large red button that stops robots, whoever drives them.
+
+    It needs no lease, and the page sends it to the gate by itself.
+
+    Args:
+        map: The map.
+        place: A CSS selector of the page's element that the button goes into; over the
+            map if not given.
+
+    """
+
+    def __init__(self, map: "Map", *, place: str = "") -> None:
+        self.map = map
+        self.half = map.add_browser_half(
+            self, "features/stop/stop_button.js", {"place": place}, "features/stop/stop_button.css"
+        )

@@ -1,0 +1,21 @@
+import { html } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+
+/**
+ * Say whose the tiles of a map are.
+ *
+ * Options: `attribution`, the words; nothing is shown without any.
+ *
+ * @param {MapCanvas} map
+ * @param {{attribution?: string}} options
+ * @returns {Half}
+ */
+export default function attach(map, { attribution = "" }) {
+  if (!attribution) return { destroy() {} };
+  const words = html("p", "webmap-panel webmap-attribution", {}, attribution);
+  const take = lay(map, words, "bottom-right");
+  return { destroy: take };
+}

@@ -1,0 +1,182 @@
+"""Tiles of a map from this machine's disk, under everything else."""
+
+import asyncio
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from webmap.base.local_plane import LocalPlane
+from webmap.core.pictures import pictures
+from webmap.base.tasks import spawn
+from webmap.features.tiles.tile_grid import OVERLAP, Tile, TileGrid
+from webmap.features.tiles.tile_source import open_tiles
+from webmap.base.errors import ConfigError
+from webmap.scene import svg
+from webmap.scene.element import Element
+from webmap.scene.fragment import Fragment
+from webmap.base.scope import Removal, keep
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+ORDER = -1.0
+"""Under the images of the map."""
+
+PAUSE = 0.1
+"""Least seconds between two looks at which tiles the view needs."""
+
+MOST = 256
+"""Tiles that anybody may want at once."""
+
+
+class _Shown(NamedTuple):
+    element: Element
+    url: str
+
+
+class TileLayer:
+    """Draws satellite or street tiles from a folder or an MBTiles file.
+
+    The level follows the zoom, and only what is seen is loaded. A tile that is not
+    there leaves its place empty. They lie where ``NavSatFix`` with the same datum puts
+    its fixes.
+
+    Style it by CSS: ``.tiles`` and ``.webmap-attribution``.
+
+    Args:
+        map: The map.
+        source: A folder with ``z/x/y.png``, or an MBTiles file; never another host.
+        datum: Latitude and longitude of the map's origin, in degrees.
+        east: How far the map's x is turned from east, in degrees, counter-clockwise
+            from above: 90 if x points north.
+        attribution: Whose the tiles are, which most licences want to be shown; what
+            the file says, if not given.
+        tile_size: Pixels on a side, 256 or 512.
+        most: Tiles that are loaded at once for a viewer.
+        opacity: From 0 to 1.
+
+    Raises:
+        ConfigError: If there are no such tiles, or the datum is on no globe.
+
+    """
+
+    def __init__(
+        self,
+        map: "Map",
+        source: str | Path,
+        datum: tuple[float, float],
+        *,
+        east: float = 0.0,
+        attribution: str | None = None,
+        tile_size: int = 256,
+        most: int = 64,
+        opacity: float = 1.0,
+    ) -> None:
+        if len(datum) != 2:
+            raise ConfigError(
+                f"datum is a latitude and a longitude in degrees, got {datum!r}"
+            )
+        if tile_size not in (256, 512):
+            raise ConfigError(f"tile_size is 256 or 512, got {tile_size!r}")
+        if not 1 <= most <= MOST:
+            raise ConfigError(f"most is a number of tiles up to {MOST}, got {most!r}")
+        if not (0 <= opacity <= 1):
+            raise ConfigError(f"opacity is from 0 to 1, got {opacity!r}")
+        plane = LocalPlane(*datum, east)
+        self.map = map
+        self.source = open_tiles(source)
+        self.grid = TileGrid(plane, self.source.zooms, size=tile_size, most=most)
+        self.shown: dict[Tile, _Shown | None] = {}
+        """What is on the map; None where there is no tile."""
+        self.svg: Element = svg.g(class_="tiles", pointer_events="none")
+        self.svg.set(opacity=None if math.isclose(opacity, 1) else opacity)
+        self._fragment = Fragment(self.svg)
+        self._said = False
+        self._closed = False
+        self._dirty = False
+        self._looking: asyncio.Task[None] | None = None
+        map.mount(self._fragment, order=ORDER)
+        keep(Removal(self._end))
+        words = self.source.attribution if attribution is None else attribution
+        self.half = map.add_browser_half(
+            self,
+            "features/tiles/tile_layer.js",
+            {"attribution": words},
+            "features/tiles/tile_layer.css",
+        )
+        self.on_view()
+
+    def on_view(self) -> None:
+        """Look which tiles the view needs now."""
+        self._dirty = True
+        if self._looking is None and not self._closed:
+            self._looking = spawn(self._look_on())
+
+    def _end(self) -> None:
+        self._closed = True
+        for tile in list(self.shown):
+            self._drop(tile)
+        self.map.unmount(self._fragment)
+        close = getattr(self.source, "close", None)
+        if close is not None:
+            # In a thread, for it waits for one that reads a tile just now.
+            asyncio.get_running_loop().run_in_executor(None, close)
+
+    async def _look_on(self) -> None:
+        try:
+            while self._dirty and not self._closed:
+                self._dirty = False
+                await self._look()
+                await asyncio.sleep(PAUSE)
+        finally:
+            self._looking = None
+
+    async def _look(self) -> None:
+        map = self.map
+        wanted = self.grid.wanted(map.world.tf, map.canvas_width, map.canvas_height)
+        for tile in wanted:
+            if self._dirty or self._closed:  # the view is another already
+                return
+            if tile not in self.shown:
+                self._make_room(wanted)
+                await self._load(tile)
+        # Only now, so that no hole is seen while a level changes.
+        for tile in self.shown.keys() - set(wanted):
+            self._drop(tile)
+
+    def _make_room(self, wanted: list[Tile]) -> None:
+        """Let no more than the most be there with the one that comes."""
+        spare = (tile for tile in list(self.shown) if tile not in wanted)
+        while len(self.shown) >= self.grid.most:
+            self._drop(next(spare))
+
+    async def _load(self, tile: Tile) -> None:
+        try:
+            found = await asyncio.to_thread(self.source.read, tile)
+        except (ConfigError, OSError, MemoryError) as error:
+            found = None
+            if not self._closed:
+                self._complain(str(error))
+        if self._closed:
+            return
+        if found is None:
+            self.shown[tile] = None
+            return
+        url = pictures.publish(*found)
+        image = svg.image(preserveAspectRatio="none", class_="tile", href=url)
+        image.set(width=1 + OVERLAP, height=1 + OVERLAP)
+        image.set("data-tile", f"{tile.z}/{tile.x}/{tile.y}")
+        image.set_matrix(self.grid.place(tile))
+        self.svg.append(image)
+        self.shown[tile] = _Shown(image, url)
+
+    def _drop(self, tile: Tile) -> None:
+        shown = self.shown.pop(tile)
+        if shown is not None:
+            shown.element.remove()
+            pictures.withdraw(shown.url)
+
+    def _complain(self, text: str) -> None:
+        if not self._said:
+            self._said = True
+            self.map.report_error(f"a tile is not shown: {text}")

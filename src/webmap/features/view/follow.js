@@ -1,0 +1,44 @@
+import { button } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+
+/**
+ * A button that keeps the selected robot where it is on the screen, until the view is
+ * moved by hand.
+ *
+ * Sends `{follow: id}` with the gate's id of the robot, or `{follow: null}`.
+ *
+ * @param {MapCanvas} map
+ * @param {object} _options
+ * @param {(message: object) => void} send
+ * @returns {Half}
+ */
+export default function attach(map, _options, send) {
+  const toggle = button("webmap-panel webmap-follow", "Follow", () => {
+    send({ follow: map.following ? null : map.selected });
+  });
+  const show = () => {
+    const following = String(Boolean(map.following));
+    if (toggle.getAttribute("aria-pressed") !== following) {
+      toggle.setAttribute("aria-pressed", following);
+    }
+    toggle.disabled = !map.following && map.selected === null;
+  };
+  toggle.title = "Keep the selected robot where it is on the screen";
+  /** @type {import('../../web/drive.js').Drive} */
+  const drive = map.drive;
+  // The view does not tell when it begins to follow; it is looked at instead.
+  const offs = [
+    lay(map, toggle, "bottom-right"),
+    map.onSelect(show),
+    drive.on("step", show),
+  ];
+  show();
+  return {
+    destroy() {
+      for (const off of offs) off();
+    },
+  };
+}

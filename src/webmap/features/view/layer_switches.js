@@ -1,0 +1,221 @@
+import { html, say } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+
+/** Where the choice is kept in this browser. */
+const KEPT = "webmap.layers";
+
+/** What parts a layer's name from that of one of its drawings, in what is kept. */
+const OF = "\n";
+
+/** How many drawings of a layer are listed; more of them are switched together only. */
+const MOST = 16;
+
+/** How often an open list looks what there is, in milliseconds. */
+const PERIOD = 1000;
+
+/** Puts the layers of robot_2 before those of robot_10. */
+const order = new Intl.Collator("en", { numeric: true });
+
+let maps = 0;
+
+/**
+ * A list of what the map shows, each to be switched on and off.
+ *
+ * Options: `layers`, names with their CSS selectors; `off`, the names of those that are
+ * off at first.
+ *
+ * @param {MapCanvas} map
+ * @param {{layers?: [string, string][], off?: string[]}} options
+ * @returns {Half}
+ */
+export default function attach(map, options) {
+  const switches = new LayerSwitches(map, options);
+  return { destroy: () => switches.destroy() };
+}
+
+/**
+ * @param {[string, string][]} layers
+ * @param {Record<string, boolean>} shown
+ * @param {string} scope A selector of what the layers are in.
+ * @returns {string} The style sheet that hides what is not shown.
+ */
+export function hiding(layers, shown, scope) {
+  const rules = [];
+  for (const [name, selector] of layers) {
+    if (shown[name] === false) rules.push(`${scope} :is(${selector}) { display: none; }`);
+    for (const key of Object.keys(shown)) {
+      if (!key.startsWith(name + OF) || shown[key] !== false) continue;
+      const one = JSON.stringify(key.slice(name.length + OF.length));
+      rules.push(`${scope} :is(${selector})[data-layer=${one}] { display: none; }`);
+    }
+  }
+  return rules.join("\n");
+}
+
+/**
+ * @param {Iterable<{dataset: DOMStringMap}>} drawings What a layer draws at the moment.
+ * @returns {string[]} What of it can be switched by itself, in natural order; nothing if
+ *     it is one thing.
+ */
+export function several(drawings) {
+  const found = new Set();
+  for (const { dataset } of drawings) if (dataset.layer) found.add(dataset.layer);
+  const names = [...found].sort(order.compare);
+  return names.length > 1 ? names : [];
+}
+
+class LayerSwitches {
+  /**
+   * @param {MapCanvas} map
+   * @param {{layers?: [string, string][], off?: string[]}} options
+   */
+  constructor(map, { layers = [], off = [] }) {
+    this._map = map;
+    this._layers = layers;
+    this._found = Object.fromEntries(off.map((name) => [name, false]));
+    this._shown = { ...this._found, ...kept() };
+    this._number = `${++maps}`;
+    map.svg.dataset.layers = this._number;
+    this._sheet = new CSSStyleSheet();
+    document.adoptedStyleSheets.push(this._sheet);
+    this._list = html("div", "webmap-layers-list", { role: "group" });
+    this._list.setAttribute("aria-label", "Layers");
+    this._none = html("p", "webmap-layers-none");
+    this._details = html(
+      "details",
+      "webmap-panel webmap-layers",
+      { "data-webmap-menu": "" },
+      html("summary", "", {}, "Layers"),
+      this._list,
+      this._none,
+    );
+    this._details.addEventListener("toggle", () => this._look());
+    this._timer = setInterval(() => this._look(), PERIOD);
+    this._take = lay(map, this._details, "top-left");
+    /** @type {Map<string, HTMLElement>} */
+    this._rows = new Map();
+    /** For each layer the line with the number of drawings that have no switch. */
+    /** @type {Map<string, HTMLElement>} */
+    this._notes = new Map();
+    this._leave = map.layout.add("layers", {
+      read: () => ({ open: this._details.open, shown: { ...this._shown } }),
+      write: ({ open, shown }) => this._lay(open, shown),
+      reset: () => this._lay(false, this._found),
+    });
+    this._apply();
+  }
+
+  destroy() {
+    clearInterval(this._timer);
+    this._leave();
+    this._take();
+    delete this._map.svg.dataset.layers;
+    const sheets = document.adoptedStyleSheets;
+    document.adoptedStyleSheets = sheets.filter((sheet) => sheet !== this._sheet);
+  }
+
+  /** List what is on the map at the moment. */
+  _look() {
+    if (!this._details.open) return;
+    const there = new Set();
+    for (const [name, selector] of this._layers) {
+      /** @type {NodeListOf<SVGElement>} */
+      const drawings = this._map.world.querySelectorAll(selector);
+      if (drawings.length === 0) continue;
+      there.add(name);
+      const names = several(drawings);
+      for (const one of names.slice(0, MOST)) there.add(name + OF + one);
+      this._note(name, names.length - MOST);
+    }
+    for (const key of there) if (!this._rows.has(key)) this._add(key);
+    for (const [key, row] of this._rows) row.hidden = !there.has(key);
+    say(this._none, there.size > 0 ? "" : "There is nothing to switch.");
+  }
+
+  /** @param {string} key A layer, or one of its drawings. */
+  _add(key) {
+    const [name, one = ""] = key.split(OF);
+    const box = html("input", "", { type: "checkbox" });
+    box.checked = this._shown[key] !== false;
+    box.addEventListener("change", () => {
+      this._shown[key] = box.checked;
+      keep(this._shown);
+      this._apply();
+    });
+    const kind = one ? "webmap-layers-row one" : "webmap-layers-row";
+    const row = html("label", kind, {}, box, html("span", "", {}, one || name));
+    if (one) row.title = `${name}: ${one}`;
+    this._rows.set(key, row);
+    this._arrange();
+  }
+
+  /**
+   * Show that more is drawn than there are switches for.
+   *
+   * @param {string} name Of the layer.
+   * @param {number} more
+   */
+  _note(name, more) {
+    const known = this._notes.get(name);
+    if (more <= 0 && !known) return;
+    const note = known ?? html("p", "webmap-layers-row one");
+    say(note, `${more} more: the switch “${name}” is for all of them`);
+    note.hidden = more <= 0;
+    if (known) return;
+    this._notes.set(name, note);
+    this._arrange();
+  }
+
+  /** Sort the rows: each layer, then the drawings of that layer, then its note. */
+  _arrange() {
+    const rows = this._layers.flatMap(([name]) => {
+      const keys = [...this._rows.keys()].filter((key) => key.split(OF)[0] === name);
+      const found = keys.sort(order.compare).map((key) => this._rows.get(key));
+      return [...found, this._notes.get(name)].filter((row) => row !== undefined);
+    });
+    this._list.replaceChildren(...rows);
+  }
+
+  /**
+   * @param {boolean} open Whether the list is unfolded.
+   * @param {Record<string, boolean>} shown
+   */
+  _lay(open, shown) {
+    this._shown = { ...shown };
+    keep(this._shown);
+    for (const [key, row] of this._rows) {
+      const box = row.querySelector("input");
+      if (box) box.checked = this._shown[key] !== false;
+    }
+    this._details.open = open;
+    this._apply();
+  }
+
+  _apply() {
+    const scope = `[data-layers="${this._number}"]`;
+    this._sheet.replaceSync(hiding(this._layers, this._shown, scope));
+  }
+}
+
+/** @returns {Record<string, boolean>} What was chosen before in this browser. */
+function kept() {
+  try {
+    const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    const choices = Object.entries(value).filter(([, on]) => typeof on === "boolean");
+    return Object.fromEntries(choices);
+  } catch {
+    return {}; // storage may be forbidden, or hold what is not ours
+  }
+}
+
+/** @param {Record<string, boolean>} shown */
+function keep(shown) {
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(shown));
+  } catch {
+    // Then it is chosen again next time.
+  }
+}

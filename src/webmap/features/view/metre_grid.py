@@ -1,0 +1,30 @@
+"""Lines under the map, to see distances and motion by."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class MetreGrid:
+    """Draws quiet lines under the map, a round number of metres apart.
+
+    The distance between two lines follows the zoom: it is the least of 1, 2, 5, 10 and
+    so on that has room. Pages that WebMap makes have this module.
+
+    Args:
+        map: The map.
+        least: The least distance between two lines, in pixels.
+
+    Raises:
+        ValueError: If ``least`` is less than 4.
+
+    """
+
+    def __init__(self, map: "Map", least: int = 32) -> None:
+        if least < 4:
+            raise ValueError(f"MetreGrid: least must be at least 4 pixels, got {least}")
+        self.map = map
+        self.half = map.add_browser_half(
+            self, "features/view/metre_grid.js", {"least": least}, "features/view/metre_grid.css"
+        )

@@ -1,0 +1,22 @@
+"""Mouse, wheel and touch change the view."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class MouseViewControl:
+    """Drag moves the view, the wheel zooms, shift and the wheel turn.
+
+    On a touch screen two fingers zoom and turn. The click that ends a drag is not a
+    click. It runs in the browser, which owns the view.
+    """
+
+    def __init__(self, map: "Map") -> None:
+        self.map = map
+        self.half = map.add_browser_half(
+            self,
+            "features/view/mouse_view_control.js",
+            style="features/view/mouse_view_control.css",
+        )

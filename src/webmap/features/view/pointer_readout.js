@@ -1,0 +1,62 @@
+import { html, say } from "../../web/tools/elements.js";
+import { lay } from "../../web/tools/overlay.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/halves.js').Half} Half */
+
+/**
+ * Show where the pointer is, in metres of the map.
+ *
+ * Options: `digits` after the point.
+ *
+ * @param {MapCanvas} map
+ * @param {{digits?: number}} options
+ * @returns {Half}
+ */
+export default function attach(map, { digits = 2 }) {
+  const output = html("output", "webmap-panel webmap-pointer-readout", {
+    "aria-label": "Pointer position in metres",
+  });
+  output.hidden = true;
+  const take = lay(map, output, "bottom-right");
+
+  /** @type {{x: number, y: number} | null} */
+  let pointer = null;
+  const show = () => {
+    output.hidden = pointer === null;
+    if (pointer === null) return;
+    const { x, y } = map.toWorld(pointer.x, pointer.y);
+    say(output, `x ${metres(x, digits)}  y ${metres(y, digits)} m`);
+  };
+
+  const ending = new AbortController();
+  const { signal } = ending;
+  const move = (/** @type {PointerEvent} */ event) => {
+    pointer = map.pointOf(event);
+    show();
+  };
+  const leave = () => {
+    pointer = null;
+    show();
+  };
+  map.svg.addEventListener("pointermove", move, { signal });
+  map.svg.addEventListener("pointerleave", leave, { signal });
+  const off = map.onView(show);
+  return {
+    destroy() {
+      ending.abort();
+      off();
+      take();
+    },
+  };
+}
+
+/**
+ * @param {number} value
+ * @param {number} digits
+ */
+function metres(value, digits) {
+  const text = value.toFixed(digits);
+  // What rounds to zero has no sign.
+  return Number(text) === 0 ? (0).toFixed(digits) : text.replace("-", "\u2212");
+}

@@ -1,0 +1,30 @@
+"""Where the pointer is."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class PointerReadout:
+    """Shows the world coordinates under the pointer, in metres.
+
+    Args:
+        map: The map.
+        digits: How many digits are shown after the point.
+
+    Raises:
+        ValueError: If ``digits`` is not in 0 to 6.
+
+    """
+
+    def __init__(self, map: "Map", digits: int = 2) -> None:
+        if not 0 <= digits <= 6:
+            raise ValueError(f"PointerReadout: digits must be 0 to 6, got {digits}")
+        self.map = map
+        self.half = map.add_browser_half(
+            self,
+            "features/view/pointer_readout.js",
+            {"digits": digits},
+            "features/view/pointer_readout.css",
+        )

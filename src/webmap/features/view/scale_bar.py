@@ -1,0 +1,27 @@
+"""A length to compare with, on the map."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+
+
+class ScaleBar:
+    """Shows how long a round number of metres is at the current zoom.
+
+    Args:
+        map: The map.
+        width: The longest that the bar may be, in pixels.
+
+    Raises:
+        ValueError: If ``width`` is less than 20.
+
+    """
+
+    def __init__(self, map: "Map", width: int = 120) -> None:
+        if width < 20:
+            raise ValueError(f"ScaleBar: width must be at least 20 pixels, got {width}")
+        self.map = map
+        self.half = map.add_browser_half(
+            self, "features/view/scale_bar.js", {"width": width}, "features/view/scale_bar.css"
+        )

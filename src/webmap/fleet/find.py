@@ -1,0 +1,105 @@
+"""What is behind several bridges, asked all at once."""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+from webmap.base.echo import echo
+from webmap.discovery import Findings, discover
+from webmap.ros.asking import ask_topics
+from webmap.discovery.hearing import hear_frames
+from webmap.discovery.naming import free_name, unique_names
+from webmap.discovery.robots import host_name
+from webmap.base.errors import BridgeClosed, BridgeError
+
+TELL = (
+    "Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN, "
+    "as in --robot Bob:/odom:/cmd_vel:/scan; "
+    "or give webmap discover a list of the topics with --topics"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What is behind one bridge, or why nobody knows."""
+
+    url: str
+    label: str
+    """A short name for the bridge, unlike all others."""
+
+    findings: Findings
+    trouble: BridgeError | None = None
+    topics: Mapping[str, str] = field(default_factory=dict)
+    """Types by topic, if the bridge said them or somebody else did."""
+
+    @property
+    def why(self) -> str:
+        """Why no robot was found, and what to do, for people; empty if some were."""
+        if self.findings.robots:
+            return ""
+        if isinstance(self.trouble, BridgeClosed):
+            return f"{self.trouble}."
+        if self.trouble is not None:
+            reason = f"it has no rosapi that says its topics: {self.trouble}"
+        else:
+            reason = " ".join(self.findings.notes).rstrip(".")
+        return f"{self.url}: {reason}. {TELL}"
+
+
+async def find(
+    urls: Sequence[str], *, wait: float, topics: Mapping[str, str] | None = None
+) -> list[Found]:
+    """Return what is behind each bridge; no two robots have one name.
+
+    Says on standard error that a bridge is waited for.
+
+    Args:
+        urls: The bridges' addresses.
+        wait: How long to wait for one that cannot be reached, in seconds.
+        topics: Types by topic, where a bridge cannot be asked for them.
+
+    """
+    if topics is None:
+        asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
+    else:
+        asked = [(await _behind(url, topics), topics, None) for url in urls]
+    names = labels(urls)
+    named = unique_names(
+        [(name, one) for name, (one, _, _) in zip(names, asked, strict=True)]
+    )
+    return [
+        Found(url, label, findings, trouble, said)
+        for url, label, findings, (_, said, trouble) in zip(
+            urls, names, named, asked, strict=True
+        )
+    ]
+
+
+def labels(urls: Sequence[str]) -> list[str]:
+    """Return a name for each bridge: its host, with the port if others have it too."""
+    parts = [urlsplit(url) for url in urls]
+    hosts = [part.hostname or "robot" for part in parts]
+    names = [
+        host if hosts.count(host) == 1 or part.port is None else f"{host}:{part.port}"
+        for host, part in zip(hosts, parts, strict=True)
+    ]
+    taken: set[str] = set()
+    return [free_name(name, taken) for name in names]
+
+
+async def _ask(
+    url: str, wait: float
+) -> tuple[Findings, Mapping[str, str], BridgeError | None]:
+    def waiting(why: str) -> None:
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+
+    try:
+        topics = await ask_topics(url, wait=wait, waiting=waiting)
+    except BridgeError as error:
+        return Findings(), {}, error
+    return await _behind(url, topics), topics, None
+
+
+async def _behind(url: str, topics: Mapping[str, str]) -> Findings:
+    return discover(topics, host_name(url), await hear_frames(url, topics))

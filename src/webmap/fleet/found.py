@@ -1,0 +1,208 @@
+"""The robots behind bridges, found or told, as the console takes them."""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from webmap.base.echo import echo
+from webmap.fleet.find import Found, find
+from webmap.fleet.watch import LookingForLayers, LookingForRobots, on_page
+from webmap.fleet.overrides import TOLD, Overruling
+from webmap.fleet.shown import ShownRobot, ShownRobots
+from webmap.fleet.stated import Candidate, offer, set_twice
+from webmap.config.checks import same_name
+from webmap.discovery import FoundRobot
+from webmap.discovery.naming import free_name
+from webmap.discovery.rules import VELOCITY
+from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
+from webmap.base.errors import BridgeClosed
+from webmap.base.outside_text import escaped
+from webmap.ros.names import is_topic, is_type, normalise_topic
+
+if TYPE_CHECKING:
+    from webmap import Bridge
+    from webmap.console import Console
+
+
+@dataclass(slots=True)
+class FoundFleet:
+    """The robots that were found, and what is known when it is looked again."""
+
+    told: list[Candidate]
+    """Robots that were told by hand; the console has them already."""
+
+    robots: list[Candidate] = field(default_factory=list)
+    """Robots that were found."""
+
+    behind: "dict[Bridge, Found]" = field(default_factory=dict)
+    """What was found behind each bridge, before anybody said anything."""
+
+    overruling: Overruling = field(default_factory=Overruling)
+    """What was said of robots."""
+
+    def table(self, *, grid: bool, as_told: bool) -> str:
+        """Return what the page would use and draw, and why, for people.
+
+        Args:
+            grid: Whether the robots' own maps are shown under them.
+            as_told: Whether only the given topics of robots given by hand are drawn.
+
+        """
+        lines: list[str] = []
+        taken: set[tuple[Bridge, str]] = set()
+        for bridge, told in self.told:
+            lines += ["", f"{told.name} (told with --robot)", *_told_table(told)]
+            found = self.behind.get(bridge)
+            if found is None or as_told:
+                continue
+            there = offer(told, found.topics, found.findings)
+            if (bridge, there.namespace) not in taken:  # it is drawn once
+                taken.add((bridge, there.namespace))
+                lines += drawn_table(there.namespace, on_page(there.layers, grid))
+        for bridge, robot in self.robots:
+            lines += ["", f"behind {bridge.url}:", *robot_table(robot)]
+            findings = self.behind[bridge].findings
+            space = robot.namespace
+            guessed = next(r for r in findings.robots if r.namespace == space)
+            layers = self.overruling.layers(bridge.url, findings, guessed)
+            lines += drawn_table(space, on_page(layers, grid))
+        if self.robots:
+            lines += ["", OVERRULE]
+        return "\n".join(map(escaped, lines)).lstrip("\n") or "No robot is known."
+
+    def show(
+        self,
+        console: "Console",
+        *,
+        grid: bool = True,
+        as_told: bool = False,
+        topics: Mapping[str, str] | None = None,
+    ) -> None:
+        """Show what was found, what comes later, and all that can be drawn of it.
+
+        Args:
+            console: The console, which has been opened with the robots that were told.
+            grid: Whether the robots' own maps are shown under them.
+            as_told: Whether only the given topics of robots given by hand are drawn.
+            topics: Types by topic, where a bridge cannot be asked for them.
+
+        """
+        shown = ShownRobots(console, self.overruling, told=self.told, grid=grid)
+        for robot in self.robots:
+            shown.add(robot)
+        for bridge, one in self.behind.items():
+            robots = one.findings.robots
+            _services.append(LookingForRobots(bridge, robots, shown.came))
+        config = self.overruling.config
+        told = [
+            ShownRobot(bridge, found, made, config(bridge.url, found))
+            for (bridge, found), made in zip(self.told, console.told, strict=True)
+            if not as_told
+        ]
+        bridges = dict.fromkeys([*self.behind, *(robot.bridge for robot in told)])
+        for bridge in bridges:
+            looking = LookingForLayers(bridge, shown, told=told, topics=topics)
+            _services.append(looking)
+
+
+_services: list[object] = []
+"""What runs as long as the process does; nobody else holds it."""
+
+
+def find_fleet(
+    bridges: Sequence["Bridge"],
+    told: Sequence[Candidate],
+    *,
+    wait: float,
+    topics: Mapping[str, str] | None = None,
+    overruling: Overruling | None = None,
+) -> FoundFleet:
+    """Return the robots behind bridges, and say on standard error what was found.
+
+    Args:
+        bridges: The bridges.
+        told: Robots that were told by hand; each takes the place of one found.
+        wait: How long to wait for a bridge that cannot be reached, in seconds.
+        topics: Types by topic, where the bridge cannot be asked for them.
+        overruling: What was said of robots.
+
+    Raises:
+        ConfigError: If something was said of a robot that there is not, or a person
+            gave it the name of another.
+
+    """
+    overruling = overruling or Overruling()
+    found = asyncio.run(
+        find([bridge.url for bridge in bridges], wait=wait, topics=topics)
+    )
+    names = [robot.name for one in found for robot in one.findings.robots]
+    missing = any(isinstance(one.trouble, BridgeClosed) for one in found)
+    names += [robot.found.name for robot in told]
+    for sentence in overruling.check(names, all_known=not missing):
+        echo(sentence, err=True)
+    fleet = FoundFleet([], overruling=overruling)
+    behind = {bridge: one.topics for bridge, one in zip(bridges, found, strict=True)}
+    for bridge, robot in overruling.tell(told):
+        fleet.told.append(Candidate(bridge, _typed(robot, behind[bridge])))
+    taken = {same_name(other.found.name) for other in fleet.told}
+    for bridge, one in zip(bridges, found, strict=True):
+        if one.why:
+            echo(one.why, err=True)
+        for robot in overruling.findings(bridge.url, one.findings).robots:
+            robot = _typed(robot, one.topics)
+            if any(o.is_also(Candidate(bridge, robot)) for o in fleet.told):
+                continue
+            if same_name(robot.name) in taken and overruling.names(robot.name):
+                raise set_twice(robot.name)
+            robot = replace(robot, name=free_name(robot.name, taken))
+            echo(f"Found {in_one_line(robot)}", err=True)
+            fleet.robots.append(Candidate(bridge, robot))
+        fleet.behind[bridge] = one
+    return fleet
+
+
+def told_fleet(
+    bridges: Sequence["Bridge"], told: Sequence[Candidate], *, wait: float
+) -> FoundFleet:
+    """Return robots that were told, with what is behind their bridges besides.
+
+    Says on standard error if a bridge does not tell that.
+
+    Args:
+        bridges: The bridges.
+        told: The robots.
+        wait: How long to wait for a bridge that cannot be reached, in seconds.
+
+    """
+    found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
+    for one in found:
+        if one.trouble is not None:
+            echo(
+                f"{one.url}: {one.trouble}. No more is known of what can be drawn "
+                f"than was told with --robot.",
+                err=True,
+            )
+    return FoundFleet([*told], behind=dict(zip(bridges, found, strict=True)))
+
+
+def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:
+    """Return a robot with the type of its velocity, if the topics behind it tell it."""
+    velocity = robot.first("velocity")
+    if velocity is None or velocity.type or not is_topic(velocity.topic):
+        return robot
+    type = topics.get(normalise_topic(velocity.topic), "").strip()
+    if not is_type(type, *VELOCITY):
+        return robot
+    others = robot.guesses["velocity"][1:]
+    typed = (replace(velocity, type=type), *others)
+    return replace(robot, guesses={**robot.guesses, "velocity": typed})
+
+
+def _told_table(robot: FoundRobot) -> list[str]:
+    """Return what was said of a robot, one topic a line."""
+    said = [(role, guess) for role in TOLD for guess in robot.guesses.get(role, ())]
+    return [
+        f"  {role:<11} {guess.topic}{f'  {guess.type}' if guess.type else ''}"
+        for role, guess in said
+    ]

@@ -1,0 +1,238 @@
+"""Robots, maps and modules of a fleet file: made, checked and shown."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import webmap
+from webmap import console
+from webmap.fleet.files import (
+    check_floor,
+    check_images,
+    label_options,
+    publish_picture,
+    tile_options,
+)
+from webmap.config.checks import Mistakes, Way, WrongConfig
+from webmap.config.fleet import FleetConfig, read_fleet
+from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
+from webmap.config.secrets import readable_secret
+from webmap.config.toml_text import read_text
+from webmap.poses.alignment import align_bridge
+from webmap.core.alignment_store import store
+from webmap.core.configure import module_call, wrong_argument
+from webmap.core.module_arguments import WrongArguments, check_arguments
+from webmap.core.registry import map_modules
+from webmap.base.errors import ConfigError, WebMapError
+from webmap.base.map_file import read_map
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+
+log = logging.getLogger("webmap.cli")
+
+
+class MapModule(NamedTuple):
+    """A module of the map, with what it gets."""
+
+    name: str
+    args: tuple[Any, ...]
+    options: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadyFleet:
+    """A file that is right, with everything in it made."""
+
+    fleet: FleetConfig
+    bridges: dict[str, "Bridge"]
+    robots: list["Robot"]
+    floor: Path | None
+    modules: dict[str, dict[str, Any]]
+    """Modules of the map with their arguments, by their names."""
+    images: list[tuple[str, float, float, float, float]]
+    """Pictures as ``Map.add_image`` takes them."""
+    others: list[MapModule]
+    """The modules of the map that the file names."""
+
+
+def prepare(file: Path) -> ReadyFleet:
+    """Make everything that a file says; no link is opened yet.
+
+    Logs a warning if other users can read a password in it.
+
+    Raises:
+        ConfigError: If anything in it is wrong; every mistake is named with its line.
+        OSError: If it cannot be read.
+
+    """
+    text, mistakes = read_text(file), Mistakes()
+    fleet = read_fleet(text.data, mistakes)
+    wrong = {way[:1] for way in mistakes.wrong}
+    if ("bridges",) in wrong:
+        text.refuse(mistakes)
+    warning = readable_secret(file, text.data)
+    if warning is not None:
+        log.warning("%s", warning)
+    bridges = make_bridges(fleet)
+    robots = make_robots(fleet, bridges, file.parent, mistakes)
+    floor = file.parent / fleet.floor if fleet.floor else None
+    if floor is not None:
+        check_floor(floor, mistakes)
+    modules, images, others = {}, [], []
+    if fleet.tiles is not None and ("tiles",) not in wrong:
+        modules["TileLayer"] = tile_options(fleet.tiles, file.parent, mistakes)
+    if fleet.labels:
+        modules["Labels"] = label_options(fleet.labels, file.parent, mistakes)
+    if ("image",) not in wrong:
+        images = check_images(fleet.image, file.parent, mistakes)
+    if ("modules",) not in wrong:
+        others = check_modules(fleet.modules, bridges, file.parent, mistakes)
+    try:
+        text.refuse(mistakes)
+    except ConfigError:
+        for robot in robots:
+            robot.destroy()
+        raise
+    return ReadyFleet(fleet, bridges, robots, floor, modules, images, others)
+
+
+def make_bridges(fleet: FleetConfig) -> dict[str, "Bridge"]:
+    """Return the bridges of a file, by name."""
+    bridges = {}
+    for name, config in fleet.bridges.items():
+        bridges[name] = webmap.Bridge(config.url, name=name)
+        if config.alignment is not None:
+            align_bridge(bridges[name], *config.alignment)
+    return bridges
+
+
+def make_robots(
+    fleet: FleetConfig,
+    bridges: Mapping[str, "Bridge"],
+    folder: Path,
+    mistakes: Mistakes,
+) -> list["Robot"]:
+    """Return the robots of a file; what a robot or a module refuses is noted.
+
+    Args:
+        fleet: What the file says.
+        bridges: Its bridges, by name.
+        folder: The file's own, in which the robots' pictures are looked for.
+        mistakes: Where what is wrong goes. Parts of robots that were wrong before are
+            left out, so that mistakes in other parts are found too.
+
+    """
+    wrong: dict[object, list[Way]] = {}
+    for each in mistakes.wrong:
+        if each[:1] == ("robots",) and len(each) > 1:
+            wrong.setdefault(each[1], []).append(each)
+    robots = []
+    for index, made in enumerate(fleet.robots):
+        way: Way = ("robots", index)
+        config = _without(made, wrong.get(index, []))
+        if config is None:
+            continue
+        picture = ""
+        if config.picture is not None:
+            where = (*way, "picture")
+            picture = publish_picture(config.picture, folder, where, mistakes)
+        try:
+            robots.append(console.make_robot(config, bridges, picture))
+        except WrongConfig as error:
+            mistakes.take(way, error.mistakes)
+    return robots
+
+
+def _without(config: RobotConfig, wrong: list[Way]) -> RobotConfig | None:
+    """Return a robot without its wrong parts; None if no robot can be made of it."""
+    plain = RobotConfig(name=config.name)
+    for way in wrong:
+        key = str(way[2]) if len(way) > 2 else "name"
+        if key in ("name", "bridge"):
+            return None
+        if hasattr(plain, key) or key in MOTION:  # else there is no such key
+            config = config.with_part(key, plain.part(key))
+    return config
+
+
+def check_modules(
+    modules: list[ModuleConfig],
+    bridges: Mapping[str, "Bridge"],
+    folder: Path,
+    mistakes: Mistakes,
+) -> list[MapModule]:
+    """Return the modules of the map; what one does not take is noted.
+
+    Args:
+        modules: What the file says.
+        bridges: Its bridges, by name.
+        folder: The file's own, in which the maps of ``MapFile`` are looked for.
+        mistakes: Where what is wrong goes.
+
+    """
+    found = []
+    for index, module in enumerate(modules):
+        way: Way = ("modules", index)
+        name, args, options = module_call(module, bridges.__getitem__)
+        try:
+            check_arguments(map_modules[name], args, options)
+        except WrongArguments as error:
+            for wrong in error.wrong:
+                mistakes.add((*way, *wrong.way), wrong_argument(module, wrong))
+        except WebMapError as error:
+            mistakes.add((*way, "name"), str(error))
+        else:
+            if name == "MapFile":
+                args, options = _map_file(module, folder, way, mistakes)
+            found.append(MapModule(name, args, options))
+    return found
+
+
+def _map_file(
+    module: ModuleConfig, folder: Path, way: Way, mistakes: Mistakes
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Return the arguments of a map from disk, which is read to see that it is one."""
+    options = dict(module.options)
+    name, *others = [options.pop("file")] if "file" in options else module.args
+    inner: Way = ("options", "file") if "file" in module.options else ("args", 0)
+    file = (folder / name).absolute()
+    try:
+        read_map(file)
+    except (ConfigError, OSError) as error:
+        mistakes.add((*way, *inner), str(error))
+    return (str(file), *others), options
+
+
+def open_fleet(ready: ReadyFleet) -> None:
+    """Make the console with these robots the page at ``/``."""
+    options = {"title": ready.fleet.title} if ready.fleet.title else {}
+    bridges = list(ready.bridges.values())
+    shown = console.open_console(bridges, [], floor=ready.floor, **options)
+    for name, arguments in ready.modules.items():
+        shown.set_module(name, **arguments)
+    show_scenery(shown, ready)
+    restore(ready.robots)
+    for robot in ready.robots:
+        shown.add(robot)
+
+
+def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
+    """Show on a console what lies under its robots."""
+    for image in ready.images:
+        shown.add_image(*image)
+    for grid in ready.fleet.map:
+        said = {"palette": grid.palette, "order": grid.order}
+        chosen = {key: value for key, value in said.items() if value is not None}
+        shown.add_grid(ready.bridges[grid.bridge], grid.topic, **chosen)
+    for module in ready.others:
+        shown.add_module(module.name, *module.args, **module.options)
+
+
+def restore(robots: "list[Robot]") -> None:
+    """Align robots as people did on a page, where the file says nothing newer."""
+    for robot in robots:
+        store.restore(robot)

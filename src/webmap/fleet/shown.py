@@ -1,0 +1,269 @@
+"""The robots that ``webmap view`` shows, and how they change by what is found."""
+
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import msgspec
+
+from webmap.fleet.watch import say
+from webmap.fleet.overrides import Overruling, shared_map
+from webmap.fleet.stated import Candidate
+from webmap.config.checks import Mistakes, same_name
+from webmap.config.robot import RobotConfig, TfConfig
+from webmap.console import Console, make_robot
+from webmap.core.alignment_store import store
+from webmap.core.configure import apply
+from webmap.discovery import FoundRobot
+from webmap.discovery.found import Role
+from webmap.discovery.layers import (
+    TRAIL,
+    FoundLayer,
+    drawing,
+    topic_of,
+    with_layers,
+)
+from webmap.discovery.naming import free_name
+from webmap.discovery.newcomers import News
+from webmap.discovery.words import in_one_line
+from webmap.base.errors import WebMapError
+from webmap.base.scope import no_scope
+
+if TYPE_CHECKING:
+    from webmap import Bridge, Robot
+
+log = logging.getLogger("webmap.cli")
+
+PARTS: Mapping[Role, str] = {
+    "odometry": "odometry",
+    "pose": "odometry",
+    "velocity": "twist",
+    "goal": "move",
+    "action": "move",
+    "initialpose": "initial_pose",
+    "scan": "scan",
+    "battery": "battery",
+    "plan": "modules",
+    "camera": "cameras",
+    "tf": "tf",
+}
+"""Roles that a robot which is shown takes up, and the part of the configuration."""
+
+
+@dataclass(slots=True, eq=False)
+class ShownRobot:
+    """A robot that is shown, whether it was found or told."""
+
+    bridge: "Bridge"
+    found: FoundRobot
+    robot: "Robot"
+    config: RobotConfig
+    """What it is configured with by now."""
+
+    topics: set[str] = field(default_factory=set)
+    """What was drawn of it, or was said not to be drawn."""
+
+    def change(self, config: RobotConfig) -> Mistakes:
+        """Configure the robot anew by what differs; return what is wrong."""
+        old, self.config = self.config, config
+        with no_scope():
+            return apply(self.robot, old, config, {self.bridge.url: self.bridge})
+
+    def use(self, config: RobotConfig) -> set[Any]:
+        """Change the robot, and log and return the keys that cannot be used."""
+        mistakes = self.change(config).found
+        for way, words in mistakes:
+            log.error("%s: its %s is not used: %s", self.robot.name, way[0], words)
+        return {way[0] for way, _ in mistakes}
+
+    def news_of_topics(self, topics: Iterable[str]) -> list[str]:
+        """Return the topics that are named for the first time."""
+        new = [topic for topic in topics if topic not in self.topics]
+        self.topics.update(new)
+        return new
+
+    def move(self, tf: TfConfig | None, frame: str) -> str:
+        """Draw the robot in the frames that are known of it now.
+
+        Args:
+            tf: The frames that it is drawn by.
+            frame: The frame of its map, in which goals and its place are told.
+
+        Returns:
+            What is new, in a sentence for people; empty if all was so already.
+
+        """
+        config, before = self.config, self.robot.tf
+        news = told = []
+        if tf is not None:
+            config = config.with_part("tf", tf)
+        for key in ("initial_pose", "move"):
+            part = config.part(key)
+            if part is not None and part.frame != frame:
+                part = msgspec.structs.replace(part, frame=frame)
+                config = config.with_part(key, part)
+                told = [f"told goals and its place in {frame}"]
+        self.use(config)
+        now = self.robot.tf
+        if before and now and {**before, "quiet": now["quiet"]} != now:
+            news = [f"drawn where {now['map_frame']} has {now['base_frame']}"]
+        said = " and ".join([*news, *told])
+        return f"{self.robot.name} is {said} from now on" if said else ""
+
+
+class ShownRobots:
+    """Robots that are found, made and shown as they come.
+
+    Args:
+        console: Where they are shown.
+        overruling: What was said of robots better than it is guessed.
+        told: Robots that were told by hand; each takes the place of one found.
+        grid: Whether the robots' own maps are shown under them.
+
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        overruling: Overruling | None = None,
+        *,
+        told: Sequence[Candidate] = (),
+        grid: bool = True,
+    ) -> None:
+        self.overruling = overruling or Overruling()
+        self.grid = grid
+        self._console = console
+        self._told = told
+        self._names = {same_name(robot.found.name) for robot in told}
+        self._places: dict[tuple[Bridge, str], ShownRobot] = {}
+
+    @property
+    def robots(self) -> "list[Robot]":
+        """The robots that were made."""
+        return [shown.robot for shown in self._places.values()]
+
+    def get(self, bridge: "Bridge", namespace: str) -> ShownRobot | None:
+        """Return the robot that was found in a namespace behind a bridge."""
+        return self._places.get((bridge, namespace))
+
+    def add(self, robot: Candidate) -> None:
+        """Make one more robot, with what was found of it, and show it."""
+        bridge, found = robot
+        self._show_map(robot)
+        self._names.add(same_name(found.name))
+        config = self.overruling.config(bridge.url, found)
+        with no_scope():
+            made = make_robot(config, [bridge])
+            store.restore(made)
+        shown = ShownRobot(bridge, found, made, config)
+        self._places[bridge, found.namespace] = shown
+        self._console.add(made)
+
+    def came(self, news: News, bridge: "Bridge") -> None:
+        """Show news, and say so on standard error.
+
+        A newcomer whose name is taken has its bridge behind the name. A robot that was
+        told by hand is no news.
+
+        Args:
+            news: What is new.
+            bridge: The bridge that it is behind.
+
+        """
+        robot = Candidate(bridge, self.overruling.apply(bridge.url, news.robot))
+        self._show_map(robot)
+        if news.roles or news.moved:
+            shown = self.get(bridge, robot.found.namespace)
+            if shown is not None:  # else it was told by hand, with all that it has
+                for sentence in self._update(shown, robot.found, news):
+                    say(sentence)
+            return
+        if any(other.is_also(robot) for other in self._told):
+            return
+        wanted = robot.found.name
+        if same_name(wanted) in self._names:
+            wanted = f"{wanted} ({urlsplit(bridge.url).netloc})"
+        named = replace(robot.found, name=free_name(wanted, self._names))
+        self.add(Candidate(bridge, named))
+        say(f"A robot appeared behind {bridge.url}: {in_one_line(named)}")
+
+    def draw(
+        self, shown: ShownRobot, layers: Iterable[FoundLayer], namespace: str
+    ) -> None:
+        """Draw what is new among the topics of a robot, and its trail.
+
+        What robots share is drawn once for all. What cannot be drawn is logged.
+
+        Args:
+            shown: The robot.
+            layers: What is drawn of it.
+            namespace: The one that its own topics are in.
+
+        """
+        found = {layer.topic: layer for layer in layers}
+        fresh = [found[topic] for topic in shown.news_of_topics(found)]
+        wrong: list[tuple[str, object]] = []
+        for layer in fresh:
+            try:
+                self._show_shared(shown.bridge, layer, namespace)
+            except WebMapError as error:
+                wrong.append((layer.topic, error))
+        config = with_layers(shown.config, fresh, namespace)
+        if TRAIL not in config.modules:
+            config = config.with_part("modules", [*config.modules, TRAIL])
+        topics = {layer.way: topic_of(layer.module) for layer in config.layers()}
+        mistakes = shown.change(config).found
+        for topic, why in [*wrong, *((topics[way[:2]], why) for way, why in mistakes)]:
+            log.warning("%s: %s is not drawn: %s", shown.robot.name, topic, why)
+
+    def _show_shared(self, bridge: "Bridge", layer: FoundLayer, namespace: str) -> None:
+        drawn = drawing(layer, namespace, None)
+        if not drawn.shared:
+            return
+        if drawn.module == "OccupancyGrid":
+            self._console.add_grid(bridge, layer.topic, **drawn.options)
+        else:
+            made = (drawn.module, bridge, layer.topic)
+            self._console.add_module_once(*made, **drawn.options)
+
+    def _show_map(self, robot: Candidate) -> None:
+        """Show a map that robots share under them, before anything else of a robot."""
+        topic = shared_map(robot.found)
+        if self.grid and topic:
+            self._console.add_grid(robot.bridge, topic)
+
+    def _update(self, shown: ShownRobot, found: FoundRobot, news: News) -> list[str]:
+        """Change a robot by what is found of it now, and return what is new of it.
+
+        What is drawn already as one of its layers is not drawn once more. All else
+        stays as it is: a change of what moves the robot would end its lease.
+        """
+        bridge = shown.bridge
+        fixed = self.overruling.fixed(bridge.url, news.robot)
+        wanted = self.overruling.config(bridge.url, found)
+        drawn = {topic_of(layer.module) for layer in shown.config.layers()}
+        new, used = shown.config, []
+        for role in news.roles:
+            if role in fixed or role not in PARTS:
+                continue
+            key = PARTS[role]
+            old, part, topics = new.part(key), wanted.part(key), [found.topic(role)]
+            if isinstance(part, list):
+                own = [layer for layer in wanted.layers() if layer.way[0] == key]
+                more = {
+                    topic_of(layer.module): each
+                    for layer, each in zip(own, part, strict=True)
+                    if topic_of(layer.module) not in drawn
+                }
+                part, topics = [*old, *more.values()], list(more)
+            if part != shown.config.part(key):
+                used += [(key, f"{role} {topic}") for topic in topics]
+            new = new.with_part(key, part)
+        wrong = shown.use(new)
+        words = ", ".join(said for key, said in used if key not in wrong)
+        sentences = [f"{shown.robot.name} has more now: {words}"] if words else []
+        if news.moved and "tf" not in fixed:
+            sentences.append(shown.move(wanted.tf, found.map_frame))
+        return [sentence for sentence in sentences if sentence]

@@ -1,0 +1,217 @@
+"""Robots that are told by hand, and what else they have behind their bridges."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from webmap.config.checks import LONGEST_NAME, is_name, same_name
+from webmap.discovery import Findings, FoundRobot, Guess
+from webmap.discovery.found import Role
+from webmap.discovery.layers import Layers, find_layers
+from webmap.discovery.rules import PARTS
+from webmap.base.errors import ConfigError
+from webmap.ros.names import normalise_topic
+
+if TYPE_CHECKING:
+    from webmap import Bridge
+
+FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
+
+APART = "names differ by more than case and Unicode form"
+
+TOLD: tuple[Role, ...] = ("odometry", "velocity", "scan")
+"""What the form has a place for."""
+
+WHERE: tuple[Role, ...] = ("odometry", "pose")
+
+_PART = re.compile(PARTS)
+
+
+class Candidate(NamedTuple):
+    """A robot, found or told, and the bridge that it is behind."""
+
+    bridge: "Bridge"
+    found: FoundRobot
+
+    def is_also(self, other: "Candidate") -> bool:
+        """Return whether two candidates are one robot.
+
+        They are if they have a name, an odometry topic or a velocity topic in common.
+        """
+        if self.bridge is not other.bridge:
+            return False
+        mine, others = self.found, other.found
+        return (
+            mine.name == others.name
+            or _where(mine) in ({_where(others)} - {""})
+            or mine.topic("velocity") in ({others.topic("velocity")} - {""})
+        )
+
+
+def parse_robot(text: str, bridges: Sequence["Bridge"]) -> Candidate:
+    """Read a robot as a person writes it on the command line.
+
+    Args:
+        text: ``NAME:ODOM:CMD_VEL:SCAN``; topics may be empty, and empty ones at the
+            end left out. ``2@`` before the name says that the robot is behind the
+            second bridge.
+        bridges: The bridges there are.
+
+    Raises:
+        ConfigError: If the text is not of that form, or there is no such bridge.
+
+    """
+    number, _, rest = (
+        text.rpartition("@") if "@" in text.partition(":")[0] else ("1", "", text)
+    )
+    if not (number.isascii() and number.isdigit() and 0 < int(number) <= len(bridges)):
+        raise ConfigError(
+            f"robot {text!r}: {number!r} is no bridge's number; there are "
+            f"{len(bridges)}, counted from 1"
+        )
+    name, *topics = (part.strip() for part in rest.split(":"))
+    if not name or len(topics) > len(TOLD) or not any(topics):
+        raise ConfigError(f"robot {text!r} is not of the form {FORM}")
+    said = zip(TOLD, topics, strict=False)
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in said if topic}
+    return Candidate(bridges[int(number) - 1], FoundRobot(name, "", guesses))
+
+
+def check_name(name: str, where: str) -> None:
+    """Refuse a name that cannot stand in a list.
+
+    Raises:
+        ConfigError: If it has more than a line, or is very long.
+
+    """
+    if not is_name(name):
+        raise ConfigError(
+            f"{where}: a name is one line of {LONGEST_NAME} characters at the most"
+        )
+
+
+def set_twice(name: str) -> ConfigError:
+    """Return the refusal of a ``--set`` by which two robots would have one name."""
+    return ConfigError(f"--set: two robots would be called {name!r}; {APART}")
+
+
+def told_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candidate]:
+    """Return the robots of ``--robot``.
+
+    Args:
+        texts: As they were written.
+        bridges: The bridges there are.
+
+    Raises:
+        ConfigError: If one is not of the right form, or two are taken for one: by
+            their names, or by what they are driven with.
+
+    """
+    told: list[Candidate] = []
+    for text in texts:
+        robot = parse_robot(text, bridges)
+        check_name(robot.found.name, f"robot {text!r}")
+        for topic in _said(robot.found):
+            try:
+                normalise_topic(topic)
+            except ConfigError as error:
+                raise ConfigError(f"robot {text!r}: {error}") from None
+        for other in told:
+            _differ(robot, other, text)
+        told.append(robot)
+    return told
+
+
+def _differ(robot: Candidate, other: Candidate, text: str) -> None:
+    name, drives = other.found.name, robot.found.topic("velocity")
+    if same_name(robot.found.name) == same_name(name):
+        raise ConfigError(f"robot {text!r}: there is a robot {name!r} already; {APART}")
+    same = drives and _plain(drives) == _plain(other.found.topic("velocity") or "-")
+    if same and robot.bridge.url == other.bridge.url:
+        raise ConfigError(
+            f"robot {text!r}: {drives} drives {name!r} already; each robot has its own"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What can be drawn of a robot that was told."""
+
+    found: FoundRobot | None
+    """The same robot as discovery has it, if it does."""
+
+    namespace: str
+    layers: Layers
+
+
+def offer(told: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Offer:
+    """Return what can be drawn of a robot that was told.
+
+    Scans are as they were said, so no other one is among it.
+
+    Args:
+        told: The robot.
+        topics: Types by topic, behind its bridge.
+        findings: What discovery makes of those.
+
+    """
+    found = same_robot(told, findings.robots)
+    space = namespace_of(told) if found is None else found.namespace
+    layers = findings.layers.get(space)
+    if layers is None:
+        layers = find_layers(topics, {*findings.layers, space})[space]
+    kept = [[layer for layer in each if layer.kind != "scan"] for each in layers]
+    return Offer(found, space, Layers(*map(tuple, kept)))
+
+
+def same_robot(told: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | None:
+    """Return the found robot that is the one given by hand.
+
+    One of its topics says so, also one that is not the best of its role; else its name.
+    """
+    there = tuple(robots)
+    for robot in there:
+        if _has(robot, WHERE, told.topic("odometry")) or _has(
+            robot, ("velocity",), told.topic("velocity")
+        ):
+            return robot
+    return next((robot for robot in there if robot.name == told.name), None)
+
+
+def namespace_of(told: FoundRobot) -> str:
+    """Return the namespace that the topics of a robot have in common.
+
+    Names of parts of a robot at its end belong to the part.
+    """
+    spaces = [_plain(topic).split("/")[1:-1] for topic in _said(told)]
+    common: list[str] = []
+    for names in zip(*spaces, strict=False):
+        if len(set(names)) > 1:
+            break
+        common.append(names[0])
+    while common and _PART.fullmatch(common[-1]):
+        common.pop()
+    return "".join(f"/{name}" for name in common)
+
+
+def _said(told: FoundRobot) -> list[str]:
+    return [told.topic(role) for role in TOLD if told.topic(role)]
+
+
+def _where(robot: FoundRobot) -> str:
+    return robot.topic("odometry") or robot.topic("pose")
+
+
+def _has(robot: FoundRobot, roles: tuple[Role, ...], topic: str) -> bool:
+    plain = _plain(topic) if topic else ""
+    return plain != "" and any(
+        guess.topic == plain for role in roles for guess in robot.guesses.get(role, ())
+    )
+
+
+def _plain(topic: str) -> str:
+    try:
+        return normalise_topic(topic)
+    except ConfigError:  # the robot itself will say so
+        return topic

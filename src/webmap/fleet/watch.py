@@ -1,0 +1,266 @@
+"""Looking again and again what is behind a bridge: robots and what is drawn of them."""
+
+import asyncio
+import contextlib
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from webmap.base.echo import echo
+from webmap.fleet.overrides import MOST_CAMERAS
+from webmap.fleet.stated import Offer, offer
+from webmap.discovery import Findings, FoundRobot, discover
+from webmap.discovery.hearing import late_frames
+from webmap.discovery.layers import Layers, role_of
+from webmap.discovery.newcomers import Newcomers, News, leads_further
+from webmap.discovery.robots import host_name
+from webmap.base.errors import BridgeError
+from webmap.base.lifecycle import lifecycle
+from webmap.base.logs import budgets
+
+if TYPE_CHECKING:
+    from webmap import Bridge
+    from webmap.fleet.shown import ShownRobot, ShownRobots
+
+log = logging.getLogger("webmap.cli")
+
+PERIOD = 5.0
+"""Seconds between two looks for robots."""
+
+SOON, LATER = 1.0, 15.0
+"""Seconds between two looks for what is drawn: until something was found, and from then
+on."""
+
+LONGEST = 60.0
+"""Seconds between two looks at a bridge that does not answer: each costs a call."""
+
+
+class Looking(ABC):
+    """Takes the topics behind a bridge now and then; a service of the process.
+
+    Args:
+        bridge: The bridge.
+        topics: Types by topic, where the bridge cannot be asked for them.
+
+    """
+
+    def __init__(
+        self, bridge: "Bridge", topics: Mapping[str, str] | None = None
+    ) -> None:
+        self.bridge = bridge
+        self._told_topics = topics
+        self._task: asyncio.Task[None] | None = None
+        lifecycle.add(self)
+
+    @property
+    @abstractmethod
+    def period(self) -> float:
+        """Seconds between two looks from now on."""
+
+    @abstractmethod
+    async def take(self, topics: dict[str, str]) -> None:
+        """Make something of the types by topic."""
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to look."""
+        self._task = loop.create_task(self._look_on())
+
+    async def stop(self) -> None:
+        """Look no more."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+
+    async def _look_on(self) -> None:
+        pause = self.period
+        while True:
+            if self.bridge.state != "open":
+                pause = self.period
+            else:
+                try:
+                    await self.take(await self._topics())
+                    pause = self.period
+                except BridgeError as error:
+                    log.debug("%s: %s", self.bridge.url, error)
+                    pause = min(2 * pause, LONGEST)
+                except Exception:
+                    log.exception("%s: a look at the topics failed", self.bridge.url)
+                    pause = min(2 * pause, LONGEST)
+            await asyncio.sleep(pause)
+
+    async def _topics(self) -> dict[str, str]:
+        if self._told_topics is not None:
+            return dict(self._told_topics)
+        return await self.bridge.topics()
+
+
+def say(text: str) -> None:
+    """Print a line on standard error; that nobody reads it is no reason to stop.
+
+    Robots that appear cause such lines, so there is a limit as for a log.
+    """
+    added = budgets.note(("say",), "")
+    if added is None:
+        return
+    with contextlib.suppress(OSError, ValueError):  # a full disk, nobody at the pipe
+        echo(f"{text}{added}", err=True)
+
+
+class LookingForRobots(Looking):
+    """Looks again and again which robots are behind a bridge.
+
+    Their topics tell, and the frames that are heard for a moment at each look.
+
+    Args:
+        bridge: The bridge.
+        known: The robots that are shown already.
+        came: Called with what is new.
+
+    """
+
+    period = PERIOD
+
+    def __init__(
+        self,
+        bridge: "Bridge",
+        known: Iterable[FoundRobot],
+        came: Callable[[News, "Bridge"], object],
+    ) -> None:
+        super().__init__(bridge)
+        self._newcomers = Newcomers(known)
+        self._came = came
+
+    async def take(self, topics: dict[str, str]) -> None:
+        """Tell what is new among the robots."""
+        trees = await late_frames(self.bridge).listen(topics)
+        found = discover(topics, host_name(self.bridge.url), trees)
+        for news in self._newcomers.look(found):
+            try:
+                self._came(news, self.bridge)
+            except Exception:  # the others are news now and never again
+                log.exception(
+                    "%s: what is new of %s is not shown",
+                    self.bridge.url,
+                    news.robot.name,
+                )
+
+
+class LookingForLayers(Looking):
+    """Looks again and again what can be drawn of the robots behind a bridge.
+
+    Args:
+        bridge: The bridge.
+        shown: The robots that are found and shown; more may come.
+        told: Those that were told by hand, of which more is drawn than was told.
+        topics: Types by topic, where the bridge cannot be asked for them.
+
+    """
+
+    def __init__(
+        self,
+        bridge: "Bridge",
+        shown: "ShownRobots",
+        *,
+        told: "Sequence[ShownRobot]" = (),
+        topics: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(bridge, topics)
+        self._shown = shown
+        self._told = [robot for robot in told if robot.bridge is bridge]
+        self._placed: dict[ShownRobot, FoundRobot] = {}
+        self._has_drawn = False
+
+    @property
+    def period(self) -> float:
+        """Seconds between two looks from now on."""
+        return LATER if self._has_drawn else SOON
+
+    async def take(self, topics: dict[str, str]) -> None:
+        """Draw what is new among the topics behind the bridge."""
+        frames = late_frames(self.bridge)
+        if self._told:  # they hear them anyway, once they are drawn by them
+            await frames.listen(topics)
+        url, said = self.bridge.url, self._shown.overruling
+        behind = discover(topics, host_name(url), frames.trees)
+        self._take_told(topics, behind)
+        for guessed in behind.robots:
+            space = guessed.namespace
+            robot = self._shown.get(self.bridge, space)
+            if robot is None:
+                continue
+            one = said.apply(url, guessed, behind.dialect)
+            layers = said.layers(url, behind, guessed)
+            self._draw(robot, layers, space, _cameras_left_out(robot, one))
+
+    def _take_told(self, topics: dict[str, str], behind: Findings) -> None:
+        """Draw what is new of the robots that were told by hand."""
+        taken: set[str] = set()
+        for robot in self._told:
+            offered = offer(robot.found, topics, behind)
+            if offered.namespace in taken:  # what is in it is drawn once
+                self._draw(robot, Layers(), offered.namespace)
+                continue
+            taken.add(offered.namespace)
+            self._place(robot, offered)
+            self._draw(robot, offered.layers, offered.namespace)
+
+    def _place(self, robot: "ShownRobot", offered: Offer) -> None:
+        """Draw a robot in the frame of the map, as one that was found is."""
+        found, known = offered.found, self._placed.get(robot)
+        if (
+            found is None
+            or found.tf is None
+            or not robot.found.topic("odometry")
+            or (known is not None and not leads_further(found, known))
+        ):
+            return
+        self._placed[robot] = found
+        frame = found.map_frame
+        tf = msgspec.structs.replace(found.tf, quiet=True, map_frame=frame)
+        moved = robot.move(tf, frame)
+        if moved and known is not None:
+            say(moved)
+
+    def _draw(
+        self,
+        robot: "ShownRobot",
+        layers: Layers,
+        namespace: str,
+        cameras: Sequence[str] = (),
+    ) -> None:
+        """Draw what is new, and say once what is left out, which costs the link much.
+
+        Args:
+            robot: The robot.
+            layers: Its layers.
+            namespace: The one that its own topics are in.
+            cameras: Topics of cameras that are left out.
+
+        """
+        self._has_drawn = True
+        drawn, others = on_page(layers, self._shown.grid)
+        self._shown.draw(robot, drawn, namespace)
+        new = robot.news_of_topics([*(layer.topic for layer in others), *cameras])
+        if new:
+            say(
+                f"{robot.robot.name}: not drawn, since there are enough of their kind: "
+                f"{', '.join(new)}"
+            )
+
+
+def on_page(layers: Layers, grid: bool) -> Layers:
+    """Return the layers without maps, where a floor plan is in their place."""
+    drawn = [layer for layer in layers.drawn if grid or role_of(layer) != "map"]
+    return Layers(tuple(drawn), layers.left_out)
+
+
+def _cameras_left_out(robot: "ShownRobot", found: FoundRobot) -> list[str]:
+    """Return the topics of cameras that are not shown, since there are enough."""
+    shown = {camera.topic for camera in robot.config.cameras}
+    if len(shown) < MOST_CAMERAS:
+        return []
+    cameras = found.guesses.get("camera", ())
+    return [guess.topic for guess in cameras if guess.topic not in shown]

@@ -1,0 +1,286 @@
+"""What a layer declares about itself: its topics, its switch and its class in CSS.
+
+Discovery, the limit of layers for each robot, the list of layers on the page,
+``webmap view --show`` and the reference are derived from it.
+"""
+
+import inspect
+import logging
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any, TypeVar
+
+import msgspec
+
+from webmap.core.registry import Namespace, map_modules, robot_modules
+from webmap.base.errors import ConfigError
+from webmap.ros.names import same_type, split_type
+
+log = logging.getLogger("webmap.modules")
+
+T = TypeVar("T", bound=type)
+
+View = type[msgspec.Struct]
+
+BY_TYPE = {"": "its type alone"}
+
+LAST = 1000.0
+"""The rank of a layer that names none: it comes after the built-in ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class TopicKind:
+    """Topics that a layer draws in the same way."""
+
+    name: str
+    """What discovery calls such a topic, such as ``"scan"``. Kinds of a layer that have
+    the same name share their limit, and only differ in their types and names."""
+
+    names: Mapping[str, str] = field(default_factory=lambda: BY_TYPE)
+    """Regular expressions that are searched in the topic's name, the best first, each
+    with the reason that people are shown."""
+
+    most: int = 3
+    """How many topics of this kind a robot gets."""
+
+    types: tuple[str, ...] = ()
+    """The types of such topics, without a dialect; all of the layer's if empty."""
+
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """The layer's options for such a topic."""
+
+    shared: bool = False
+    """Whether a topic outside of every robot's namespace belongs to all robots."""
+
+    role: str = ""
+    """The role of such a topic in ``--set ROBOT.ROLE=TOPIC``, if it has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundTopic:
+    """A topic that discovery found for a layer, and the robot that it belongs to."""
+
+    kind: TopicKind
+    topic: str
+    type: str
+    """As the bridge spells it."""
+
+    own: bool = True
+    """Whether the topic is in the robot's own namespace, and not shared by robots."""
+
+    namespace: str = ""
+    """The robot's: ``/robot_0``, or empty."""
+
+    frames: Mapping[str, Any] | None = None
+    """``map_frame`` and ``namespace`` of the robot's frames; None if it has none."""
+
+    number: int = 1
+    """Which of the robot's layers of this class it is, from 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """What :func:`layer` was told about a layer."""
+
+    layer: type
+    types: tuple[str, ...]
+    kinds: tuple[TopicKind, ...]
+    view: View | Mapping[str, View] | None
+    switches: Mapping[str, str]
+    """CSS selectors by the names of switches."""
+
+    css: str
+    rank: float
+
+    @property
+    def name(self) -> str:
+        """The name of the module."""
+        return self.layer.__name__
+
+    @property
+    def built_in(self) -> bool:
+        """Whether the layer comes with WebMap."""
+        return self.layer.__module__.startswith("webmap.")
+
+    @property
+    def of_maps(self) -> bool:
+        """Whether it is a layer of maps, and not of robots."""
+        return getattr(self.layer, "registry", robot_modules) is map_modules
+
+    def options_for(self, found: FoundTopic) -> dict[str, Any]:
+        """Return the options of the layer that draw a topic."""
+        chosen = getattr(self.layer, "options_for", None)
+        options: dict[str, Any] = (
+            usual_options(self.layer, found) if chosen is None else chosen(found)
+        )
+        return options
+
+    def view_of(self, type: str) -> View | None:
+        """Return what messages of a type are decoded as; None for plain messages.
+
+        Raises:
+            ConfigError: If the layer does not draw messages of that type.
+
+        """
+        plain = str(split_type(type))
+        if plain not in self.types:
+            raise ConfigError(f"type is one of {', '.join(self.types)}, got {type!r}")
+        return self.view[plain] if isinstance(self.view, Mapping) else self.view
+
+
+def usual_options(layer: type, found: FoundTopic) -> dict[str, Any]:
+    """Return the options of a topic's kind, and those that say what the topic is.
+
+    A layer that has an option ``type`` gets the type of the topic, if it is not the
+    usual one, and one that has an option ``map_frame`` the frames of the robot.
+
+    Args:
+        layer: The class of the layer.
+        found: The topic.
+
+    """
+    options = dict(found.kind.options)
+    takes = inspect.signature(layer).parameters
+    if "type" in takes and not same_type(found.type, takes["type"].default):
+        options["type"] = found.type
+    everybodys = found.kind.shared and not found.own
+    if "map_frame" in takes and found.frames is not None and not everybodys:
+        options |= {key: found.frames[key] for key in ("map_frame", "namespace")}
+    return options
+
+
+def layer(
+    *types: str,
+    kinds: Iterable[TopicKind] = (),
+    kind: str = "",
+    names: str = "",
+    most: int = 3,
+    view: View | Mapping[str, View] | None = None,
+    switch: str | Mapping[str, str] = "",
+    css: str = "",
+    rank: float = LAST,
+) -> Callable[[T], T]:
+    """Declare what a layer draws, so that discovery finds topics for it; a decorator.
+
+    A subclass of :class:`webmap.RobotLayer` or :class:`webmap.MapLayer` is registered
+    as a module under its own name; any other class has to be registered besides.
+
+    Args:
+        *types: Message types that the layer draws, without a dialect, such as
+            ``"sensor_msgs/Temperature"``; the first is its usual one.
+        kinds: The kinds of topics that discovery draws with it, the best first.
+        kind: The name of the only kind; without it and ``kinds`` the layer is added by
+            programs alone.
+        names: A regular expression that is searched in the names of topics of the only
+            kind; all topics of the types if empty.
+        most: How many topics of the only kind a robot gets.
+        view: A class that messages are decoded as, or one for each type. Without it
+            a message is decoded to an object that has all fields as attributes.
+        switch: The name of its switch in the list of layers, or CSS selectors by names.
+        css: The class of what it draws; the name of the layer in lower case if empty.
+        rank: Layers are found and drawn in this order; the built-in ones have 10 to
+            140.
+
+    Raises:
+        ConfigError: If there is no type or one is no name of a type, if both ``kind``
+            and ``kinds`` are given, or if a kind has a pattern that is no regular
+            expression, an option that the layer does not take, or the name of another
+            kind with another limit, role or options.
+
+    """
+    if not types or not all(isinstance(type, str) for type in types):
+        raise ConfigError(
+            f"a layer draws messages of one type or more, as in "
+            f'@layer("sensor_msgs/Temperature"); got {types}'
+        )
+    if kind and kinds:
+        raise ConfigError(f"a layer takes kind or kinds, got {kind!r} and {kinds}")
+    if kind:
+        why = {names: "its type and its name"} if names else BY_TYPE
+        kinds = (TopicKind(kind, why, most),)
+    plain = tuple(str(split_type(type)) for type in types)
+
+    def declare(made: T) -> T:
+        selector = f".{css or made.__name__.lower()}"
+        declaration = Declaration(
+            made,
+            plain,
+            tuple(replace(each, types=each.types or plain) for each in kinds),
+            view,
+            {switch: selector} if isinstance(switch, str) else switch,
+            selector[1:],
+            rank,
+        )
+        setattr(made, "declared", declaration)  # noqa: B010
+        _check_kinds(declaration)
+        registry = getattr(made, "registry", None)
+        if isinstance(registry, Namespace):
+            registry.register(made)
+        return made
+
+    return declare
+
+
+def _check_kinds(declared: Declaration) -> None:
+    """Let kinds pass that discovery can use."""
+    takes = list(inspect.signature(declared.layer).parameters)
+    first: dict[str, TopicKind] = {}
+    for kind in declared.kinds:
+        where = f"layer {declared.name}, kind {kind.name!r}"
+        same = first.setdefault(kind.name, kind)
+        if replace(kind, names=same.names, types=same.types) != same:
+            raise ConfigError(
+                f"{where}: kinds of one name must only differ in types and names"
+            )
+        for pattern in kind.names:
+            try:
+                re.compile(pattern)
+            except re.error as error:
+                raise ConfigError(
+                    f"{where}: {pattern!r} is no regular expression: {error}"
+                ) from error
+        for option in kind.options:
+            if option not in takes:
+                raise ConfigError(
+                    f"{where}: there is no option {option!r}; the layer takes "
+                    f"{', '.join(takes)}"
+                )
+
+
+def declarations() -> list[Declaration]:
+    """Return the declarations of all layers there are, in the order of their ranks.
+
+    A kind whose name another layer before has is left out, and logged once.
+    """
+    made = [*robot_modules, *map_modules]
+    found = (vars(each).get("declared") for each in made if isinstance(each, type))
+    declared = {id(each): each for each in found if isinstance(each, Declaration)}
+    ordered = sorted(declared.values(), key=lambda each: each.rank)
+    first: dict[str, Declaration] = {}
+    for each in ordered:
+        for kind in each.kinds:
+            first.setdefault(kind.name, each)
+    return [_without_taken_kinds(each, first) for each in ordered]
+
+
+def _without_taken_kinds(
+    declared: Declaration, first: Mapping[str, Declaration]
+) -> Declaration:
+    kinds = tuple(kind for kind in declared.kinds if first[kind.name] is declared)
+    if len(kinds) == len(declared.kinds):
+        return declared
+    for kind in declared.kinds:
+        if kind not in kinds:
+            _warn(
+                f"the layer {declared.name} has a kind {kind.name!r}, as "
+                f"{first[kind.name].name} has; give it another name. Discovery does "
+                f"not use it."
+            )
+    return replace(declared, kinds=kinds)
+
+
+@cache
+def _warn(text: str) -> None:
+    log.warning("%s", text)

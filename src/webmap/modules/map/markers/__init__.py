@@ -1,8 +1,0 @@
-"""Markers: what ROS programs draw to show what they think.
-
-The layer is in ``layer``, how a marker looks from above in ``shapes`` and ``drawing``.
-"""
-
-from webmap.modules.map.markers.layer import Markers
-
-__all__ = ["Markers"]

@@ -1,0 +1,24 @@
+"""Modules of robots, by name: ``webmap.modules.robot.LaserScanner``.
+
+A built-in module is the class that its file is named after. ``register`` is a
+decorator that adds one of your own, and a package adds its modules by an entry point
+in the group ``webmap.modules.robot``.
+"""
+
+from typing import Any
+
+from webmap.core.registry import robot_modules as namespace
+from webmap.base.errors import ModuleNotFound
+
+register = namespace.register
+
+
+def __getattr__(name: str) -> Any:
+    try:
+        return namespace[name]
+    except ModuleNotFound as error:
+        raise AttributeError(str(error)) from error
+
+
+def __dir__() -> list[str]:
+    return [*namespace.names(), "namespace", "register"]

@@ -1,0 +1,102 @@
+"""The base of what is drawn of a robot from the messages of one topic."""
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from webmap.modules.layer_options import Seconds
+from webmap.modules.placed import Placed
+from webmap.core.registry import robot_modules
+from webmap.modules.topic_layer import LEVEL, E, TopicLayer, label, origin
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+
+class RobotLayer(TopicLayer):
+    """Something drawn of a robot from the messages of one topic.
+
+    A subclass is declared with :func:`webmap.layer`. It makes its elements in
+    :meth:`build` and changes them in :meth:`draw`; everything else is done here. The
+    messages of the topic are decoded, and one that makes no sense is left out and
+    shown as a problem of the robot. What is drawn stays on the map where the frame of
+    the message was at its stamp, looks old when it is, has a name in the list of
+    layers, and goes with the module.
+
+    Annotated attributes of the class that have a value are options of the module. A
+    layer whose messages are in the robot's frame, unless they name another, sets
+    ``frame = "robot"``; ``x``, ``y`` and ``angle`` are then where its sensor is on the
+    robot, in metres and degrees. Annotated, these are options too.
+
+    What :meth:`draw` gets as ``at`` takes coordinates of the message to those of the
+    drawing, which is level: x and y are seen, and z is metres above the robot's base,
+    or above the map's plane with ``frame = "map"``. It is called for each message, and
+    again if the frame turns out to be tilted otherwise.
+    """
+
+    owner: ClassVar = "robot"
+    registry: ClassVar = robot_modules
+
+    in_plane: ClassVar[bool] = False
+    """Whether the drawing lies in the plane of its frame and tilts with it as a whole,
+    so that :meth:`draw` need not turn points in space."""
+
+    robot: "Robot"
+
+    throttle: int = 200
+    """The least time between two messages, in milliseconds."""
+
+    age_limit: Seconds = 60.0
+    """Seconds after which it is drawn as old."""
+
+    name: str = ""
+    """A further class, by which style sheets tell one of several."""
+
+    frame = "map"
+    x = y = angle = 0.0
+
+    def __init__(self, robot: "Robot", *args: Any, **options: Any) -> None:
+        self.robot = robot
+        self._take_arguments(robot, *args, **options)
+        self.placed = Placed(
+            robot,
+            class_=f"{self.declared.css} {self.name}".strip(),
+            frame=self.frame,
+            x=self.x,
+            y=self.y,
+            angle=self.angle,
+        )
+        """Where the drawing is."""
+        self.svg = self.placed.svg
+        label(self.svg, self.topic, robot)
+        self.build()
+        self._subscribe(robot)
+
+    def upright(self, element: E, x: float = 0.0, y: float = 0.0) -> E:
+        """Add an element that does not turn with the robot, such as a text.
+
+        Its y points down, as letters need, and its units are centimetres, since
+        browsers round the size of letters that are smaller than a unit.
+
+        Args:
+            element: The element.
+            x: Where it is from the origin of the frame, in metres along the map's x.
+            y: In metres along the map's y.
+
+        """
+        self.placed.keep_upright(self.add(element), x, y)
+        return element
+
+    def take(self, message: Any) -> None:
+        """Draw a message where its frame was at its stamp.
+
+        Raises:
+            ProtocolError: If it cannot be drawn.
+
+        """
+        found, at = self.read(message), origin(message)
+        if self.in_plane:
+            self.draw(found, LEVEL)  # before it is placed, since it may refuse it
+            self.placed.stand_in(*at)
+        else:
+            self.placed.stand_in(*at, partial(self.draw, found))
+        self.svg.set_age(self.bridge.lag, limit=self.age_limit)

@@ -1,0 +1,196 @@
+"""Where the frame of a message was when the message was measured."""
+
+from dataclasses import dataclass, replace
+
+from webmap.poses.placing import OTHER_CLOCK, Placing
+from webmap.core.pose_source import PoseSource
+from webmap.base.geometry import Pose
+from webmap.ros.tf import Buffer, NotKnownThen, Transform, TransformError
+
+AHEAD = 0.2
+"""Seconds for which a motion is extrapolated."""
+
+SOON = 0.5
+"""Seconds within which frames and poses catch up with a stamp, as a rule."""
+
+FLOWING = 1.0
+"""Seconds since the newest pose within which poses count as coming."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Where data is, as far as that is known now."""
+
+    offset: Transform
+    """What takes its coordinates to those of the robot's own map; or to the robot's."""
+
+    ground: float = 0.0
+    """Where heights begin: how high the robot's base is there, in metres."""
+
+    on_robot: bool = False
+    """Whether :attr:`offset` is on the robot, and goes with it."""
+
+    settled: bool = True
+    """Whether later poses and frames would not change it."""
+
+    trouble: str = ""
+    """The kind of trouble, if there is any; the sentences of one kind may differ."""
+
+    words: str = ""
+    """What is wrong, in a sentence."""
+
+
+class Sightings:
+    """Looks where a robot's sensors were.
+
+    Args:
+        poses: The poses of the robot, and the frames that it is placed by.
+        frame: ``"map"`` if data without a frame is in the map's, ``"robot"`` if it is
+            in the robot's.
+        mount: Where the sensor is on the robot, if that is configured; its frame is
+            then ignored.
+
+    """
+
+    def __init__(self, poses: PoseSource, frame: str, mount: Pose | None) -> None:
+        self._poses = poses
+        self._in_map = frame == "map"
+        self._is_mounted = mount is not None
+        self._mount = Transform.from_pose(mount or Pose())
+        self._known: dict[str, Transform] = {}
+
+    def look(self, frame_id: str, stamp: float) -> Sighting:
+        """Return where data of a frame was at a stamp.
+
+        Args:
+            frame_id: As the message names it; empty if it names none.
+            stamp: In seconds of the robot's clock; 0 if there is none.
+
+        """
+        placing = self._poses.pipeline.placing
+        if self._in_map and (placing is None or self._is_mounted or not frame_id):
+            return Sighting(self._mount)
+        if placing is None:
+            return self._by_poses(self._mount, stamp)
+        source = placing.name(frame_id) or placing.base_frame
+        if self._is_mounted:
+            source = placing.base_frame
+        if self._in_map:
+            return self._on_map(placing, source, stamp)
+        return self._carried(placing, source, stamp)
+
+    def _on_map(self, placing: Placing, source: str, stamp: float) -> Sighting:
+        """Return where data of the map is that came in another frame."""
+        try:
+            found, settled = newest_or_at(
+                placing.buffer, placing.map_frame, source, stamp
+            )
+        except TransformError as error:
+            found = self._known.get(source, Transform())
+            return _lost(placing, source, error, Sighting(found))
+        self._known[source] = found
+        return Sighting(found, settled=settled)
+
+    def _carried(self, placing: Placing, source: str, stamp: float) -> Sighting:
+        """Return where a sensor was that the robot carries."""
+        buffer, base, world = placing.buffer, placing.base_frame, placing.map_frame
+        mount = self._mount
+        if stamp:
+            try:
+                found = buffer.lookup(world, source, stamp)
+                ground = _height(buffer, world, base, stamp)
+                return Sighting(found @ mount, ground)
+            except TransformError:
+                pass  # The poses may know what the frames do not.
+        if source != base:
+            try:
+                self._known[source], _ = newest_or_at(buffer, base, source, stamp)
+            except TransformError as error:
+                found = self._known.get(source, Transform())
+                return _lost(placing, source, error, self._by_poses(found, stamp))
+            mount = self._known[source] @ mount
+        by_poses = self._by_poses(mount, stamp)
+        if by_poses.settled and not by_poses.trouble:
+            return by_poses
+        ahead = _ahead(buffer, world, base, stamp)
+        if ahead is None:
+            return by_poses
+        return Sighting(ahead @ mount, ahead.translation.z, settled=False)
+
+    def _by_poses(self, mount: Transform, stamp: float) -> Sighting:
+        """Return where the robot's poses have a sensor."""
+        on_robot = Sighting(mount, on_robot=True)
+        pipeline = self._poses.pipeline
+        newest = pipeline.newest_stamp
+        if not stamp or newest is None:
+            return on_robot
+        try:
+            base = pipeline.at(stamp)
+            return Sighting(base @ mount, base.translation.z)
+        except NotKnownThen as error:
+            reason = error
+        if newest < stamp <= newest + SOON:
+            reach = min(stamp, newest + AHEAD)
+            base = pipeline.at(reach, AHEAD)
+            return Sighting(base @ mount, base.translation.z, settled=False)
+        if not self._poses.come(within=FLOWING):
+            return on_robot
+        if pipeline.placing is None and abs(stamp - newest) <= OTHER_CLOCK:
+            return on_robot  # without frames nothing better is expected
+        return Sighting(
+            mount,
+            on_robot=True,
+            settled=stamp <= newest,
+            trouble="then",
+            words=f"it is not known where the robot was at the stamp of what is drawn, "
+            f"so it is drawn where the robot is now: {reason}; are the clocks of the "
+            f"sensor and of the odometry the same?",
+        )
+
+
+def _lost(
+    placing: Placing, source: str, error: TransformError, otherwise: Sighting
+) -> Sighting:
+    """Return what is known of data whose frame is not, with the trouble."""
+    if placing.quiet:
+        return otherwise
+    return replace(
+        otherwise,
+        settled=False,
+        trouble=f"{type(error).__name__} {source}",
+        words=f"it is not known where {source!r} is: {error}",
+    )
+
+
+def newest_or_at(
+    buffer: Buffer, target: str, source: str, stamp: float
+) -> tuple[Transform, bool]:
+    """Return a frame in another, and whether more news would not change it.
+
+    It is as it was at the stamp if that is known, and else as it is now.
+    """
+    if source == target:
+        return Transform(), True
+    found = buffer.find(target, source, stamp)
+    newest = found.newest
+    coming = bool(stamp) and newest is not None and newest < stamp <= newest + SOON
+    return found.transform, found.on_time or not coming
+
+
+def _height(buffer: Buffer, target: str, base: str, stamp: float) -> float:
+    """Return how high the base is, in metres; 0 if that is not known."""
+    try:
+        return newest_or_at(buffer, target, base, stamp)[0].translation.z
+    except TransformError:
+        return 0.0
+
+
+def _ahead(buffer: Buffer, target: str, source: str, stamp: float) -> Transform | None:
+    """Return where a frame is by extrapolation; None if its news is too old."""
+    try:
+        newest = buffer.newest(target, source)
+        if newest is None or not newest < stamp <= newest + SOON:
+            return None
+        return buffer.lookup(target, source, min(stamp, newest + AHEAD), ahead=AHEAD)
+    except TransformError:
+        return None

@@ -1,0 +1,255 @@
+"""The common base of layers of robots and of maps: draws the messages of a topic."""
+
+import math
+from array import array
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+import msgspec
+
+from webmap.modules.declaration import Declaration, FoundTopic, usual_options
+from webmap.modules.layer_options import LayerOptions
+from webmap.core.problems import Owner, Refusing
+from webmap.core.registry import Namespace
+from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.geometry import FARTHEST
+from webmap.ros.bridge import Bridge
+from webmap.ros.decoding import convert
+from webmap.ros.messages import Header
+from webmap.ros.subscriptions import Encoding
+from webmap.scene.element import Element
+from webmap.ros.tf import Transform
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+
+def label(drawn: "Element", topic: str, robot: "Robot") -> None:
+    """Name the topic of a drawing, so that viewers can switch it on and off.
+
+    Robots that are alike are switched together, so the robot's own namespace is left
+    out: ``/bob/front/scan`` of Bob is ``front/scan``.
+
+    Args:
+        drawn: The element that has the class of its layer.
+        topic: What it draws.
+        robot: Whose it is.
+
+    """
+    drawn.set("data-layer", short(topic, robot.name))
+
+
+def short(topic: str, name: str) -> str:
+    """Return a topic without the namespace of a robot of that name."""
+    first, _, rest = topic.strip("/").partition("/")
+    own = rest and first.casefold() == name.strip().casefold()
+    return rest if own else f"/{topic.strip('/')}"
+
+
+class MissingField(ProtocolError, AttributeError):
+    """A message has no field of a name."""
+
+
+class Message:
+    """A message whose fields are attributes; those that cannot be drawn are refused.
+
+    Args:
+        fields: The fields, as they were decoded.
+
+    """
+
+    __slots__ = ("_fields",)
+
+    def __init__(self, fields: Mapping[str, Any]) -> None:
+        self._fields = fields
+
+    @property
+    def frame_id(self) -> str:
+        """The frame that the numbers are in; empty if the message does not say."""
+        return self._header.frame_id
+
+    @property
+    def stamp(self) -> float:
+        """When it was measured, in seconds of the robot's clock; 0 if not said."""
+        return self._header.stamp.seconds
+
+    @property
+    def _header(self) -> Header:
+        """The header of the message; of a header, or without one, its own fields."""
+        found = self._fields.get("header")
+        if found is None:
+            kinds = {"frame_id": str, "stamp": dict}
+            own = ((name, self._fields.get(name), kinds[name]) for name in kinds)
+            found = {name: each for name, each, kind in own if isinstance(each, kind)}
+        header: Header = convert(found, Header)
+        return header
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self._fields:
+            known = ", ".join(self._fields) or "none"
+            raise MissingField(f"the message has no field {name!r}; there are: {known}")
+        return _usable(self._fields[name], name)
+
+
+def _usable(value: Any, name: str) -> Any:
+    """Return a field, whose own fields are attributes, if it can be drawn."""
+    if isinstance(value, dict):
+        return Message(value)
+    if isinstance(value, list):
+        return [_usable(item, name) for item in value]
+    check_numbers(value, name)
+    return value
+
+
+def origin(message: Any) -> tuple[str, float]:
+    """Return the frame and the stamp of a message, empty and 0 without a header."""
+    return getattr(message, "frame_id", ""), getattr(message, "stamp", 0.0)
+
+
+def check_numbers(value: Any, name: str = "a number") -> None:
+    """Let a message pass whose numbers can be drawn.
+
+    Args:
+        value: A view of a message, or a part of one.
+        name: What the part is called.
+
+    Raises:
+        ProtocolError: If a number is NaN, infinite or null, or a coordinate is farther
+            away than anything can be.
+
+    """
+    if isinstance(value, msgspec.Struct):
+        for field in value.__struct_fields__:
+            if field != "header":
+                check_numbers(getattr(value, field), field)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            check_numbers(item, name)
+    elif isinstance(value, array):  # how numbers come in a binary encoding
+        if not all(map(math.isfinite, value)):
+            raise ProtocolError(f"{name} must be finite numbers")
+    elif value is None or (isinstance(value, float) and not math.isfinite(value)):
+        got = "null" if value is None else value
+        raise ProtocolError(f"{name} must be a finite number, got {got}")
+    elif name in ("x", "y", "z") and _is_far(value):
+        raise ProtocolError(
+            f"{name} must be within {FARTHEST:g} m of the origin, got {value:g}"
+        )
+
+
+def _is_far(value: Any) -> bool:
+    return isinstance(value, int | float) and abs(value) > FARTHEST
+
+
+LEVEL = Transform()
+
+E = TypeVar("E", bound=Element)
+
+
+class TopicLayer(LayerOptions):
+    """Draws the messages of one topic, and refuses those that make no sense."""
+
+    registry: ClassVar[Namespace]
+    declared: ClassVar[Declaration]
+
+    encoding: ClassVar[Encoding | None] = None
+    """How messages come, as :meth:`webmap.Bridge.subscribe` takes it."""
+
+    queue_length: ClassVar[int] = 1
+    """How many messages the bridge may hold back."""
+
+    bridge: Bridge
+    topic: str
+    svg: Element
+    """The group of the drawing."""
+
+    # Layers that offer these as options annotate them.
+    type = ""
+    throttle = 0
+
+    def _take_arguments(self, *args: Any, **options: Any) -> None:
+        if not hasattr(self, "declared"):
+            name = self.__class__.__name__
+            raise ConfigError(
+                f"the layer {name} is not declared; write @webmap.layer("
+                f'"package/Type") before the class'
+            )
+        super()._take_arguments(*args, **options)
+
+    @classmethod
+    def options_for(cls, found: FoundTopic) -> dict[str, Any]:
+        """Return the options that draw a topic that discovery found."""
+        return usual_options(cls, found)
+
+    def build(self) -> None:
+        """Make the elements of the drawing; called once, when the options are set.
+
+        Raises:
+            ConfigError: If an option makes no sense.
+
+        """
+
+    def add(self, element: E) -> E:
+        """Put an element into the drawing, over those before, and return it."""
+        self.svg.append(element)
+        return element
+
+    def read(self, message: Any) -> Any:
+        """Return what is to be drawn of a message; called once for each.
+
+        Unless this is overridden, a message of a layer with a view is refused if a
+        number in it is NaN or infinite, or a place is farther away than anything can
+        be. A message of a layer without a view is refused when such a number is used.
+        A place is what fields named x, y and z say.
+
+        Args:
+            message: As the layer's view decodes it; nothing is changed by it as yet.
+
+        Raises:
+            ProtocolError: If the message cannot be drawn.
+
+        """
+        check_numbers(message)
+        return message
+
+    def draw(self, found: Any, at: Transform) -> None:
+        """Draw in place of what was drawn before.
+
+        Args:
+            found: What :meth:`read` returned.
+            at: What takes coordinates of the message to those of the drawing.
+
+        """
+
+    def take(self, message: Any) -> None:
+        """Draw a message where its frame was at its stamp.
+
+        Raises:
+            ProtocolError: If it cannot be drawn.
+
+        """
+        raise NotImplementedError
+
+    def complain(self, words: str) -> None:
+        """Show people what is wrong with the message, which is drawn all the same."""
+        self._refusing.complain(words)
+
+    def _subscribe(self, owner: Owner) -> None:
+        """Draw what comes on the topic; ``owner`` shows what is wrong with it."""
+        self._refusing = Refusing(owner, self.topic)
+        type = self.type or self.declared.types[0]
+        view = self.declared.view_of(type)
+        take = self.take if view is not None else self._take_plain
+        self.bridge.subscribe(
+            self.topic,
+            partial(self._refusing.take, take),
+            type,
+            throttle=self.throttle,
+            decode=view,
+            encoding=self.encoding,
+            queue_length=self.queue_length,
+        )
+
+    def _take_plain(self, message: Mapping[str, Any]) -> None:
+        self.take(Message(message))

@@ -1,0 +1,298 @@
+"""The frames of a ROS system, heard once for all robots that need them."""
+
+import asyncio
+import logging
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from webmap.poses.placing import Lasting
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import Quaternion, Vector3
+from webmap.ros.bridge import Bridge
+from webmap.ros.messages import TFMessage
+from webmap.base.scope import Removal, no_scope
+from webmap.ros.tf import Buffer, Transform, TransformError
+from webmap.ros.tf.buffer import LONGEST_NAME
+
+log = logging.getLogger("webmap.ros.tf")
+
+TYPE = "tf2_msgs/TFMessage"
+
+QUEUE = 100
+"""Messages that a bridge may hold back: many nodes share the topic, and each counts."""
+
+GRACE = 3.0
+"""Seconds since the link first opened in which no frame is called missing: publishers
+are still being discovered, and static frames come late."""
+
+PERIOD = 0.05
+"""Least seconds between two calls of the listeners: what comes meanwhile is one call,
+however many nodes share the topic."""
+
+STANDS = 10.0
+"""Seconds for which a fault is shown, after it was seen last."""
+
+MOST = 50
+"""Frames whose faults are kept."""
+
+_heard: dict[tuple[Bridge, str], "Frames"] = {}
+
+
+@dataclass(slots=True)
+class _Fault:
+    frames: tuple[str, str]
+    words: str
+    seen: float
+
+
+class FrameFaults:
+    """The faults of transforms, until they have not been seen for a while.
+
+    Args:
+        buffer: The frames; a fault concerns the robots whose frames descend from it.
+
+    """
+
+    def __init__(self, buffer: Buffer) -> None:
+        self._buffer = buffer
+        self._faults: dict[str, _Fault] = {}
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return bool(self._faults)
+
+    def note(self, parent: str, child: str, words: str, now: float) -> bool:
+        """Note that a transform had a fault.
+
+        Args:
+            parent: The frame that its numbers are in.
+            child: The frame that is placed.
+            words: What was wrong, in a sentence.
+            now: The time, in seconds of any clock that only goes forward.
+
+        Returns:
+            Whether it is new; a fault of every message is new once.
+
+        """
+        known = self._faults.get(child)
+        if known is not None:
+            known.seen = now
+            return False
+        if len(self._faults) >= MOST:
+            return False
+        self._faults[child] = _Fault((parent, child), words, now)
+        return True
+
+    def of(self, base: str, now: float) -> str | None:
+        """Return what is wrong with the frames that a robot is placed by, if anything.
+
+        Args:
+            base: The robot's own frame. Its ancestors concern it, and frames with the
+                same prefix.
+            now: As in :meth:`note`.
+
+        """
+        if not self._faults:
+            return None
+        for child in [c for c, f in self._faults.items() if now > f.seen + STANDS]:
+            del self._faults[child]
+        space = base.rpartition("/")[0]
+        chain = set(self._buffer.chain(base))
+        words = [
+            fault.words
+            for fault in self._faults.values()
+            if chain.intersection(fault.frames)
+            or (space and any(name.startswith(f"{space}/") for name in fault.frames))
+        ]
+        return words[0] if words else None
+
+
+class Frames:
+    """A buffer that ``/tf`` and ``/tf_static`` of one namespace fill, while needed.
+
+    Args:
+        bridge: The link to the ROS system.
+        namespace: Of both topics: ``/robot_0`` for ``/robot_0/tf``.
+
+    """
+
+    def __init__(self, bridge: Bridge, namespace: str) -> None:
+        self.bridge = bridge
+        self.namespace = namespace
+        self.buffer = Buffer()
+        self.faults = FrameFaults(self.buffer)
+        """What was wrong with transforms of late."""
+        self.heard_at = time.monotonic()
+        """When the first transform came for which the listeners are called now, in
+        seconds of :func:`time.monotonic`."""
+        self._untold_since: float | None = None
+        self._told_at = -math.inf
+        self._listeners: dict[int, Callable[[], object]] = {}
+        self._raised: set[tuple[int, type[Exception]]] = set()
+        self._since = time.monotonic()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._soon: asyncio.TimerHandle | None = None
+        with no_scope():
+            self._hears_open = bridge.on_open(self._opened)
+            self._subscriptions = [
+                bridge.subscribe(
+                    f"{namespace}/{topic}",
+                    partial(self._hear, topic == "tf_static"),
+                    TYPE,
+                    decode=TFMessage,
+                    queue_length=QUEUE,
+                )
+                for topic in ("tf", "tf_static")
+            ]
+
+    def join(self, listener: Callable[[], object]) -> Removal:
+        """Call ``listener`` when frames have moved, until the removal.
+
+        That is at once, or :data:`PERIOD` after the last call.
+        """
+        key = id(listener)
+        self._listeners[key] = listener
+
+        def leave() -> None:
+            del self._listeners[key]
+            self._raised = {raised for raised in self._raised if raised[0] != key}
+            if not self._listeners:
+                self._end()
+
+        return Removal(leave)
+
+    @property
+    def complete_from(self) -> float:
+        """From when on a frame that is not there is missing, on the monotonic clock."""
+        return self._since + GRACE
+
+    def wake(self, after: float) -> None:
+        """Call all listeners once more, also if nothing is heard until then.
+
+        Args:
+            after: Seconds from now; of several wishes the earliest counts.
+
+        """
+        if self._loop is None:
+            return
+        when = self._loop.time() + after
+        if self._timer is not None:
+            if self._timer.when() <= when:
+                return
+            self._timer.cancel()
+        self._timer = self._loop.call_at(when, self._wake)
+
+    def _opened(self) -> None:
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+            self._since = time.monotonic()
+            self.wake(GRACE)
+
+    def _wake(self) -> None:
+        self._timer = None
+        self._tell()
+
+    def _tell_in_time(self) -> None:
+        """Call all listeners; later if they have only just been called."""
+        loop = self._loop
+        # Before the link is up there is no time to go by, and nothing to spare.
+        if loop is None or loop.time() >= self._told_at + PERIOD:
+            self._tell()
+        elif self._soon is None:
+            self._soon = loop.call_at(self._told_at + PERIOD, self._tell)
+
+    def _tell(self) -> None:
+        if self._soon is not None:
+            self._soon.cancel()
+            self._soon = None
+        since, self._untold_since = self._untold_since, None
+        self.heard_at = time.monotonic() if since is None else since
+        for key, listener in list(self._listeners.items()):
+            try:
+                listener()
+            except Exception as error:  # The others are to hear of it all the same.
+                self._say_raised(key, error)
+        if self._loop is not None:  # What takes long leaves time for the rest.
+            self._told_at = self._loop.time()
+
+    def _say_raised(self, key: int, error: Exception) -> None:
+        """Log what a listener raised, once: it may do so whenever it is called."""
+        raised = (key, type(error))
+        if raised not in self._raised:
+            self._raised.add(raised)
+            log.error(
+                "%s: a listener to frames raised", self.bridge.name, exc_info=error
+            )
+
+    def _end(self) -> None:
+        _heard.pop((self.bridge, self.namespace), None)
+        self._hears_open.remove()
+        for subscription in self._subscriptions:
+            subscription.remove()
+        for timer in (self._timer, self._soon):
+            if timer is not None:
+                timer.cancel()
+
+    def _hear(self, static: bool, message: TFMessage) -> None:
+        now = time.monotonic()
+        for each in message.transforms:
+            parent = self.buffer.name(each.frame_id, self.namespace)
+            child = self.buffer.name(each.child_frame_id, self.namespace)
+            place, turn = each.transform.translation, each.transform.rotation
+            try:
+                note = self.buffer.add(
+                    parent,
+                    child,
+                    Transform(
+                        Vector3(place.x, place.y, place.z),
+                        Quaternion(turn.x, turn.y, turn.z, turn.w),
+                    ),
+                    each.stamp,
+                    static=static,
+                )
+            except TransformError as error:
+                note = f"a transform was left out: {error}"
+                parent, child = parent[:LONGEST_NAME], child[:LONGEST_NAME]
+            except ProtocolError as error:  # Of its stamp, which names no frames.
+                note = f"a transform was left out: {parent!r} -> {child!r}: {error}"
+            if note and self.faults.note(parent, child, note, now):
+                log.warning("%s: %s", self.bridge.name, note)
+        if not static or self.faults.any:
+            if self._untold_since is None:
+                self._untold_since = now
+            self._tell_in_time()
+
+
+def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
+    """Return the frames of a ROS system; they are shared by all callers."""
+    space = "/" + namespace.strip("/") if namespace.strip("/") else ""
+    key = (bridge, space)
+    if key not in _heard:
+        _heard[key] = Frames(bridge, space)
+    return _heard[key]
+
+
+def lasting(waits: Lasting, trouble: str, frames: Frames | None = None) -> str:
+    """Return trouble once it has lasted, and nothing before.
+
+    Args:
+        waits: What is known of it so far.
+        trouble: Which kind there is now; empty if there is none.
+        frames: Those it is about, if it is about frames. Nothing is returned while they
+            may still be coming, and their listeners are called when it is due.
+
+    """
+    now = time.monotonic()
+    due = waits.due(trouble, now, -math.inf if frames is None else frames.complete_from)
+    if due is None:
+        return ""
+    if now >= due:
+        return trouble
+    if frames is not None:
+        frames.wake(due - now)
+    return ""

@@ -1,0 +1,164 @@
+"""The topic with a robot's poses, whose type is found out if it is not given."""
+
+from collections.abc import Callable
+from typing import Any
+
+from webmap.poses.placing import PoseReading
+from webmap.poses.type_asking import TypeAsking
+from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.geometry import FARTHEST
+from webmap.ros.bridge import Bridge
+from webmap.ros.decoding import convert
+from webmap.ros.views import (
+    ODOMETRY_VIEWS,
+    OdometryView,
+    odometry_view,
+    odometry_view_by_shape,
+)
+from webmap.base.scope import Removable, Scope, no_scope
+
+ODOMETRY = "nav_msgs/Odometry"
+"""The type of poses that has a velocity too."""
+
+_NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
+
+
+class OdometryFeed:
+    """A subscription to a topic with poses.
+
+    Args:
+        bridge: The link to the ROS system that has the topic.
+        topic: The topic.
+        throttle: The least time between two messages, in milliseconds.
+        type: The message type; if not given, the bridge is asked, and the shape of the
+            first message is looked at.
+        listener: Called with each pose, in the model's thread.
+        typed: Called with the type when it is known, which may be at once; "" for one
+            that has no pose.
+        complain: Called with a sentence for people when the topic cannot be used,
+            and with None when it can be used again.
+        report: Called with a sentence about what failed and is over.
+
+    Raises:
+        ConfigError: If ``type`` is given and has no pose in it.
+
+    """
+
+    def __init__(
+        self,
+        bridge: Bridge,
+        topic: str,
+        throttle: int,
+        type: str | None,
+        *,
+        listener: Callable[[PoseReading], None],
+        typed: Callable[[str], None],
+        complain: Callable[[str | None], None],
+        report: Callable[[str], None],
+    ) -> None:
+        self.bridge = bridge
+        self.topic = topic
+        self.throttle = throttle
+        self.type: str | None = None
+        self._listener = listener
+        self._typed = typed
+        self._tell_complaint = complain
+        self._complaint: str | None = None
+        self._report = report
+        self._scope = Scope(
+            f"poses of {topic}", self._failed, lambda _: self._complain(None)
+        )
+        self._subscription: Removable | None = None
+        self._asking: Removable | None = None
+        if type is None:
+            self._asking = TypeAsking(bridge, topic, self._told, self._listen_untyped)
+        else:
+            self._subscribe(odometry_view(type))
+
+    def remove(self) -> None:
+        """Unsubscribe; the second call does nothing."""
+        for thing in (self._subscription, self._asking):
+            if thing is not None:
+                thing.remove()
+        self._subscription = self._asking = None
+
+    def _listen_untyped(self) -> None:
+        """Find the type by the shape of the first message: the bridge may not know it.
+
+        The bridge is asked all the same, since the first message may come only when the
+        robot moves.
+        """
+        if self._subscription is None:
+            with self._scope.active():
+                self._subscription = self.bridge.subscribe(
+                    self.topic, self._on_first, throttle=self.throttle
+                )
+
+    def _told(self, type: str) -> None:
+        """Take the type that the bridge returns."""
+        if self.type is not None:
+            return
+        try:
+            view = odometry_view(type)
+        except ConfigError as error:
+            self._complain(f"topic {self.topic!r}: {error}")
+            self._typed("")
+        else:
+            self._use(view)
+
+    def _use(self, view: type[OdometryView]) -> None:
+        """Listen with the type that is known now."""
+        untyped, asking = self._subscription, self._asking
+        self._subscribe(view)
+        for thing in (untyped, asking):
+            if thing is not None:
+                thing.remove()
+        self._asking = None
+
+    def _on_first(self, message: Any) -> None:
+        try:
+            view = odometry_view_by_shape(message)
+            first = convert(message, view)
+        except ProtocolError as error:
+            self._complain(f"topic {self.topic!r}: {error}; say type=... if one does")
+            self._typed("")
+            return
+        self._use(view)
+        self._hear(first)
+
+    def _subscribe(self, view: type[OdometryView]) -> None:
+        self.type = _NAMES[view]
+        self._typed(self.type)
+        with self._scope.active():
+            self._subscription = self.bridge.subscribe(
+                self.topic, self._hear, self.type, throttle=self.throttle, decode=view
+            )
+
+    def _hear(self, message: OdometryView) -> None:
+        try:
+            reading = PoseReading.of(message)
+        except ProtocolError as error:
+            self._complain(f"topic {self.topic!r}: {error}")
+            return
+        if not reading.is_usable:
+            self._complain(
+                f"topic {self.topic!r}: a pose with NaN, infinity, a number beyond "
+                f"{FARTHEST:g} or a quaternion of zeros was ignored"
+            )
+            return
+        if self._complaint is not None:
+            self._complain(None)
+        with no_scope():  # what others make of it is not this topic's
+            self._listener(reading)
+
+    def _failed(self, text: str, about: object) -> None:
+        """Pass on what the bridge reports; what is about nothing is over."""
+        if about is None:
+            self._report(text)
+        else:
+            self._complain(text)
+
+    def _complain(self, text: str | None) -> None:
+        if text != self._complaint:
+            self._complaint = text
+            self._tell_complaint(text)

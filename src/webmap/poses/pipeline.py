@@ -1,0 +1,272 @@
+"""The poses of one robot: from readings, frames and the time to what is drawn.
+
+This is the pure part: no I/O, no clock, no event loop. :mod:`webmap.core.pose_source`
+brings it what comes from the robot and shows what it returns.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+from webmap.poses.placing import CLOCKS, Lasting, Placing, PoseReading
+from webmap.base.geometry import Pose
+from webmap.ros.tf import Transform
+from webmap.ros.tf.track import Track
+
+if TYPE_CHECKING:
+    from webmap.poses.frames import Frames
+
+HISTORY = 10.0
+"""Seconds of poses that are kept."""
+
+GAP = 1.0
+"""Seconds between two poses beyond which nothing is known of the time in between."""
+
+FASTEST = 5.0
+"""Metres per second; no robot of WebMap's is faster."""
+
+SMALLEST = 0.5
+"""Metres; less is no jump but a correction, which all localisation makes."""
+
+LONGEST = 5.0
+"""Seconds between two poses after which the robot may be anywhere."""
+
+BACK = 1.0
+"""Seconds by which a stamp may be older than the one before; more is a jump of time."""
+
+AHEAD = 10.0
+"""Seconds by which stamps may go ahead of the time that passes here; links that
+stalled deliver late, and may leave out what is between."""
+
+JUMP_SHOWN = 10.0
+"""Seconds for which a jump is shown, after the last one."""
+
+EXPECTED = 5.0
+"""Seconds after somebody set the pose within which a jump is what they asked for."""
+
+OFTEN = 4
+"""Jumps within a short time after which they are no localisation."""
+
+
+class Problem(NamedTuple):
+    """What is wrong now."""
+
+    kind: str
+    """The sentences of one kind may differ, for example in their numbers."""
+
+    text: str
+    """A sentence for people."""
+
+
+class Step(NamedTuple):
+    """What follows from a reading, from frames that moved, or from time that passed."""
+
+    pose: PoseReading | None
+    """The new pose, on the common map; None if there is no news of it."""
+
+    problems: Mapping[str, Problem]
+    """All that is wrong now, by what it is about: ``"tf"``, ``"frames"``, ``"jumps"``.
+    The same object as before if nothing of it changed."""
+
+    look_again: float | None
+    """When to make a step without a reading, to show a problem that has lasted."""
+
+
+class PosePipeline:
+    """Where one robot is and was, and what is wrong with that.
+
+    Readings come in any frame. Frames take them to the robot's own map, and the
+    alignment takes that to the common map, which all robots are drawn on.
+
+    All times but stamps are in seconds of one clock that only goes forward.
+    """
+
+    def __init__(self) -> None:
+        self.alignment = Pose()
+        """Where the robot's own map lies on the common one."""
+        self.placing: Placing | None = None
+        """What takes poses to the robot's own map by frames; None to take them as they
+        come."""
+        self.jumps = Jumps()
+        self.newest: PoseReading | None = None
+        """The newest pose, in the robot's own map."""
+        self._by_topic = False
+        self._gap = GAP
+        self._track = Track("")
+        self._lasting = Lasting()
+        self._found: tuple[str, str | None, str | None] = ("", None, None)
+        self.problems: Mapping[str, Problem] = {}
+        """All that is wrong now; see :class:`Step`."""
+
+    def restart(self, period: float | None) -> None:
+        """Forget all poses and problems: those to come are from another source.
+
+        Args:
+            period: The least seconds between two readings of a topic; None if the
+                robot is placed by frames alone.
+
+        """
+        self._by_topic = period is not None
+        self._gap = max(GAP, 2.5 * (period or 0.0))
+        self.newest = None
+        self._track.clear()
+        self.jumps.forget()
+        self._lasting = Lasting()
+        self._found, self.problems = ("", None, None), {}
+
+    def step(
+        self, reading: PoseReading | None, frames: "Frames | None", now: float
+    ) -> Step:
+        """Take what there is to know now, and return what is to be shown.
+
+        Args:
+            reading: The pose of a message; None if frames moved or time passed.
+            frames: The frames, if the robot is placed by them.
+            now: The time.
+
+        """
+        placing = self.placing
+        if placing is not None:
+            if reading is not None:
+                reading = placing.of_reading(reading, now)
+            elif not self._by_topic:
+                reading = placing.of_base(now)
+        if reading is not None:
+            # Of poses by frames alone the frames show it themselves when time leaps.
+            self.jumps.look(reading, now, timed=self._by_topic)
+            self._keep(reading)
+        problems, look_again = self._look_for_problems(frames, now)
+        pose = None if reading is None else self.on_map(reading)
+        return Step(pose, problems, look_again)
+
+    def on_map(self, reading: PoseReading) -> PoseReading:
+        """Return a pose of the robot's own map on the common one."""
+        if self.alignment == Pose():
+            return reading
+        return reading.moved(Transform.from_pose(self.alignment), reading.frame_id)
+
+    def at(self, stamp: float, ahead: float = 0.0) -> Transform:
+        """Return where the robot was, in its own map.
+
+        Args:
+            stamp: When, in seconds of the robot's clock.
+            ahead: Seconds after the newest pose for which the motion is extrapolated.
+
+        Raises:
+            NotKnownThen: If the poses around that time are not known.
+
+        """
+        return self._track.at(stamp, self._gap, ahead)
+
+    @property
+    def newest_stamp(self) -> float | None:
+        """The newest stamp; None if poses have none."""
+        return self._track.newest
+
+    def _keep(self, reading: PoseReading) -> None:
+        if self.newest is not None and self.newest.frame_id != reading.frame_id:
+            self._track.clear()  # Its numbers are of another frame.
+        self.newest = reading
+        if reading.stamp:
+            newest = self._track.newest
+            if newest is not None and reading.stamp < newest - BACK:
+                self._track.clear()
+            self._track.add(reading.transform, reading.stamp, HISTORY)
+
+    def _look_for_problems(
+        self, frames: "Frames | None", now: float
+    ) -> tuple[Mapping[str, Problem], float | None]:
+        """Return all problems, and when to look again if one has not lasted yet."""
+        placing = self.placing
+        kind, fault = "", None
+        if placing is not None and frames is not None:
+            fault = frames.faults.of(placing.base_frame, now)
+            if placing.kind == CLOCKS or not placing.quiet:
+                kind = placing.kind
+        earliest = -math.inf if frames is None else frames.complete_from
+        due = self._lasting.due(kind, now, earliest)
+        waits = due is not None and now < due
+        found = ("" if waits else kind, fault, self.jumps.problem)
+        if found != self._found:
+            self.problems = self._problems_of(*found)
+            self._found = found
+        return self.problems, due if waits else None
+
+    def _problems_of(
+        self, kind: str, fault: str | None, jump: str | None
+    ) -> Mapping[str, Problem]:
+        problems = {}
+        if kind and kind == self._found[0]:
+            problems["tf"] = self.problems["tf"]  # as it was when it began
+        elif kind and self.placing is not None:
+            problems["tf"] = Problem(kind, self.placing.problem)
+        if fault is not None:
+            problems["frames"] = Problem("fault", fault)
+        if jump is not None:
+            problems["jumps"] = Problem("jump", jump)
+        return problems
+
+
+class Jumps:
+    """Notices when a robot is somewhere else than it can have driven to."""
+
+    def __init__(self) -> None:
+        self.problem: str | None = None
+        """What happened, in a sentence, as long as it is worth showing."""
+        self._last: PoseReading | None = None
+        self._came = -math.inf
+        self._jumped = self._asked_for = -math.inf
+        self._count = 0
+
+    def expect(self, now: float) -> None:
+        """Note that somebody set the pose: the next jumps are what they asked for."""
+        self._asked_for = now
+
+    def look(self, reading: PoseReading, now: float, *, timed: bool = True) -> None:
+        """Take the next pose, in the frame that all of them are in.
+
+        Args:
+            reading: The pose.
+            now: When it came, in seconds of any clock that only goes forward.
+            timed: Whether a leap of its clock is a problem; not if the source of the
+                pose shows that already.
+
+        """
+        if self.problem is not None and now - self._jumped > JUMP_SHOWN:
+            self.problem, self._count = None, 0
+        before, self._last = self._last, reading
+        passed, self._came = now - self._came, now
+        if before is None or before.frame_id != reading.frame_id:
+            return
+        # By the robot's own clock: after a stall of the link poses come all at once.
+        took = reading.stamp - before.stamp
+        known = timed and before.stamp and reading.stamp
+        if known and not -BACK <= took <= passed + AHEAD:
+            self._jumped = now
+            self.problem = (
+                f"the clock of its poses leapt by {took:+.1f} s: it was set, a "
+                f"recording began anew, or two nodes with other clocks tell where it is"
+            )
+            return
+        one, other = before.position, reading.position
+        went = math.hypot(one.x - other.x, one.y - other.y)
+        if not 0 < took < LONGEST or went <= SMALLEST + FASTEST * took:
+            return
+        if now - self._asked_for <= EXPECTED:
+            return
+        self._jumped = now
+        self._count += 1
+        if self._count == 1:
+            self.problem = (
+                f"it jumped by {went:.1f} m within {took:.2f} s: it was localised "
+                f"anew, or set somewhere else"
+            )
+        elif self._count == OFTEN:
+            self.problem = (
+                f"it jumps again and again, by {went:.1f} m: two nodes seem to tell "
+                f"where it is, each something else"
+            )
+
+    def forget(self) -> None:
+        """Forget where it was: poses to come are from somewhere else."""
+        self._last, self.problem, self._count = None, None, 0

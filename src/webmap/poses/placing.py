@@ -1,0 +1,218 @@
+"""Readings of a robot's pose, and how frames take them to the robot's map."""
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from webmap.base.geometry import FARTHEST, Quaternion, Twist, Vector3
+from webmap.ros.messages import OdometryMsg
+from webmap.ros.tf import Transform, TransformError
+
+if TYPE_CHECKING:
+    from webmap.poses.frames import Frames
+    from webmap.ros.views import OdometryView
+
+OTHER_CLOCK = 60.0
+"""Seconds between two stamps of one moment beyond which they are by different clocks;
+what is less may be a recording that was put together."""
+
+LATE = 2.0
+"""Seconds without news of a frame after which that is a problem."""
+
+CLOCKS = "clocks"
+"""The kind of problem that poses and frames have different clocks."""
+
+
+PATIENCE = 1.0
+"""Seconds for which something is wrong before that is shown: when a link opens, frames
+come one after another, and that is no trouble."""
+
+
+class PoseReading(NamedTuple):
+    """The pose of a robot in one message, and its velocity if the message has one."""
+
+    position: Vector3
+    orientation: Quaternion
+    twist: Twist | None = None
+    frame_id: str = ""
+    """The frame of the pose; empty if the message names none."""
+
+    stamp: float = 0.0
+    """When it was measured, in seconds of the robot's clock; 0 if not known."""
+
+    @classmethod
+    def of(cls, message: "OdometryView") -> "PoseReading":
+        """Take the pose out of a decoded message."""
+        place = message.place
+        p, q = place.position, place.orientation
+        return cls(
+            Vector3(p.x, p.y, p.z),
+            Quaternion(q.x, q.y, q.z, q.w),
+            message.velocity if isinstance(message, OdometryMsg) else None,
+            message.frame_id,
+            message.stamp,
+        )
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether it is somewhere that can be drawn, and the orientation is one."""
+        p, q = self.position, self.orientation
+        # Comparisons with NaN are false.
+        return (
+            abs(p.x) < FARTHEST
+            and abs(p.y) < FARTHEST
+            and abs(p.z) < FARTHEST
+            and q.norm > 1e-6
+            and max(abs(q.x), abs(q.y), abs(q.z), abs(q.w)) < FARTHEST
+        )
+
+    @property
+    def transform(self) -> Transform:
+        """The pose as what takes coordinates of the robot to those of its frame."""
+        return Transform(self.position, self.orientation)
+
+    def moved(self, by: Transform, frame_id: str) -> "PoseReading":
+        """Return the pose in another frame, where ``by`` has the frame of the pose."""
+        placed = by @ self.transform
+        return PoseReading(
+            placed.translation, placed.rotation, self.twist, frame_id, self.stamp
+        )
+
+
+class Placing:
+    """Takes poses of a robot to the frame of its map.
+
+    Args:
+        frames: What is known of the frames.
+        map_frame: The frame that the robot is drawn in.
+        base_frame: The robot's own frame.
+        quiet: Whether poses that cannot be taken there are no problem to be shown.
+
+    """
+
+    def __init__(
+        self, frames: "Frames", map_frame: str, base_frame: str, *, quiet: bool = False
+    ) -> None:
+        self.buffer = frames.buffer
+        self._namespace = frames.namespace
+        self.map_frame = self.name(map_frame)
+        self.base_frame = self.name(base_frame)
+        self.quiet = quiet
+        self.kind = ""
+        """The kind of problem that there is with the frames; empty if there is none."""
+        self.problem = ""
+        """The problem, in a sentence."""
+        self._known: dict[str, Transform] = {}
+        self._newest = -math.inf
+        self._news: dict[str, tuple[float, float]] = {}
+
+    def name(self, frame: str) -> str:
+        """Return the whole name of a frame as the robot names it."""
+        return self.buffer.name(frame, self._namespace)
+
+    def of_reading(self, reading: PoseReading, now: float) -> PoseReading:
+        """Return a pose in the frame of the map.
+
+        It is taken there as the frames were at its stamp, so that it does not lag
+        behind while the robot turns. A pose that is newer than the frames is taken
+        there by the newest; one whose frame was never seen stays as it came.
+
+        Args:
+            reading: The pose.
+            now: When it came, in seconds of any clock that only goes forward.
+
+        """
+        frame = self.name(reading.frame_id)
+        if not frame or frame == self.map_frame:
+            self.kind = ""
+            return reading._replace(frame_id=frame)
+        try:
+            found = self.buffer.find(self.map_frame, frame, reading.stamp)
+        except TransformError as error:
+            self._wrong(error, f"it is drawn where {frame!r} has it: {error}")
+            if frame not in self._known:
+                return reading._replace(frame_id=frame)
+        else:
+            self._known[frame] = found.transform
+            self._look_whether_it_stopped(frame, found.newest, now)
+            self._look_at_clocks(frame, found.newest, reading.stamp)
+        return reading.moved(self._known[frame], self.map_frame)
+
+    def of_base(self, now: float) -> PoseReading | None:
+        """Return where the frames have the base; None if there is no news of it.
+
+        Args:
+            now: The time, in seconds of any clock that only goes forward.
+
+        """
+        base = self.base_frame
+        try:
+            newest = self.buffer.newest(self.map_frame, base)
+            self._look_whether_it_stopped(base, newest, now)
+            newest = newest or 0.0
+            if newest == self._newest:
+                return None
+            placed = self.buffer.lookup(self.map_frame, base)
+        except TransformError as error:
+            self._wrong(error, f"its place is not known: {error}")
+            return None
+        self._newest = newest
+        return PoseReading(
+            placed.translation, placed.rotation, None, self.map_frame, newest
+        )
+
+    def _look_whether_it_stopped(
+        self, frame: str, newest: float | None, now: float
+    ) -> None:
+        """Note a problem if there is no news of a frame; what is static needs none."""
+        before, heard = self._news.get(frame, (None, now))
+        if newest is None or newest != before:
+            heard = now
+            self._news[frame] = (newest or 0.0, now)
+        self.kind = ""
+        if now > heard + LATE:
+            self.kind = "late"
+            self.problem = (
+                f"nothing new of {self.map_frame!r} -> {frame!r} was told for more "
+                f"than {LATE:g} s, so it may be somewhere else: does what publishes "
+                f"it still run?"
+            )
+
+    def _look_at_clocks(self, frame: str, newest: float | None, stamp: float) -> None:
+        """Note a problem if a pose and the frames cannot be by one clock."""
+        if self.kind or not stamp or newest is None:
+            return
+        apart = stamp - newest
+        if abs(apart) > OTHER_CLOCK:
+            self.kind = CLOCKS
+            self.problem = (
+                f"its odometry is stamped {abs(apart):.1f} s "
+                f"{'later' if apart > 0 else 'earlier'} than the newest of "
+                f"{self.map_frame!r} -> {frame!r}, so it is drawn by the newest: are "
+                f"the clocks of both the same?"
+            )
+
+    def _wrong(self, error: TransformError, words: str) -> None:
+        self.kind, self.problem = type(error).__name__, words
+
+
+class Lasting:
+    """Finds out when trouble has lasted for a while."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def due(self, trouble: str, now: float, earliest: float) -> float | None:
+        """Return when trouble is to be shown; None if there is none.
+
+        Args:
+            trouble: Which kind there is now; empty if there is none.
+            now: The time, in seconds of any clock that only goes forward.
+            earliest: When it is to be shown at the earliest.
+
+        """
+        if not trouble:
+            self._since = None
+            return None
+        if self._since is None:
+            self._since = now
+        return max(self._since + PATIENCE, earliest)

@@ -1,0 +1,380 @@
+"""The transforms between all frames, over the last seconds."""
+
+import difflib
+import heapq
+import math
+from collections import deque
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from webmap.ros.tf.track import Track
+from webmap.ros.tf.transform import (
+    FrameMissing,
+    NotConnected,
+    NotKnownThen,
+    Transform,
+    TransformError,
+)
+
+HISTORY = 10.0
+"""Seconds of transforms that are kept."""
+
+GAP = 1.0
+"""Seconds between two transforms beyond which nothing is interpolated."""
+
+JUMP = 1.0
+"""Seconds by which a stamp may be older than the newest; more is a jump of time."""
+
+SHARED = ("map", "world", "earth")
+"""Frames that are the same for all robots, in whatever namespace they are published."""
+
+MOST_FRAMES = 4096
+"""Frames that are kept; of more, those without news for the longest time go."""
+
+LONGEST_NAME = 256
+"""Characters of a frame's name."""
+
+MOST_COMPARED = 200
+"""Frames up to which a name like that of a missing frame is searched."""
+
+_LISTED = 12
+_SENTENCES = 100
+_WAYS = 1000
+
+
+class Found(NamedTuple):
+    """One frame in another, as well as that is known."""
+
+    transform: Transform
+    """Takes coordinates of the one to those of the other."""
+
+    newest: float | None
+    """The newest time at which all between is known; None for all times."""
+
+    on_time: bool
+    """Whether the transform is of the time that was asked for, and not the newest."""
+
+
+class _Way(NamedTuple):
+    """The tracks between two frames, up to their nearest common ancestor."""
+
+    down: list[Track]
+    """From the target up."""
+
+    up: list[Track]
+    """From the source up."""
+
+    @property
+    def newest(self) -> float | None:
+        """The newest time at which all of it is known; None for all times."""
+        found = None
+        for tracks in self:
+            for track in tracks:
+                newest = track.newest
+                if newest is not None and (found is None or newest < found):
+                    found = newest
+        return found
+
+
+class Buffer:
+    """The frames of one ROS system, each in its parent, over the last seconds.
+
+    Args:
+        history: How much is kept before the newest transform, in seconds.
+        gap: The longest time between two transforms that is bridged, in seconds.
+        shared: Frames that no namespace gets in front of.
+
+    """
+
+    def __init__(
+        self,
+        history: float = HISTORY,
+        *,
+        gap: float = GAP,
+        shared: Iterable[str] = SHARED,
+    ) -> None:
+        self.history = history
+        self.gap = gap
+        self.shared = frozenset(shared)
+        self.notes: deque[str] = deque(maxlen=20)
+        """Faults that were dealt with, in sentences, the newest last."""
+        self._tracks: dict[str, Track] = {}
+        """By the frame; the first one is without news for the longest time."""
+        self._roots: dict[str, int] = {}
+        """The number of child frames of each parent frame."""
+        self._missing: dict[str, str] = {}
+        """The sentences about missing frames, until frames come or go."""
+        self._ways: dict[tuple[str, str], _Way] = {}
+        """Those that were looked up since the tree of frames last changed."""
+
+    @property
+    def frames(self) -> list[str]:
+        """The names of all frames, sorted."""
+        return sorted({*self._tracks, *self._roots})
+
+    def name(self, frame: str, namespace: str = "") -> str:
+        """Return the whole name of a frame that was published in a namespace.
+
+        ``base_link`` on ``/robot_0/tf`` is ``robot_0/base_link``. A slash in front,
+        as ROS 1 had it once, is left out, and what has the namespace in front
+        already keeps its name.
+        """
+        frame, space = frame.strip().strip("/"), namespace.strip("/")
+        if not space or frame in self.shared or frame.startswith(f"{space}/"):
+            return frame
+        return f"{space}/{frame}" if frame else ""
+
+    def add(
+        self,
+        parent: str,
+        child: str,
+        transform: Transform,
+        stamp: float,
+        *,
+        static: bool = False,
+        namespace: str = "",
+    ) -> str | None:
+        """Take one transform.
+
+        Args:
+            parent: The frame that the numbers are in: the header's.
+            child: The frame whose place they are.
+            transform: Takes coordinates of the child to those of the parent.
+            stamp: When it held, in seconds of the robot's clock.
+            static: Whether it holds for all times: it came on ``/tf_static``.
+            namespace: Of the topic: ``/robot_0`` for ``/robot_0/tf``.
+
+        Returns:
+            A fault that was dealt with, in a sentence; None if there was none.
+
+        Raises:
+            TransformError: If the transform is invalid, would close a loop, or is of
+                one frame too many; nothing is changed. A frame is too many if no
+                other can go: those that are static or have children stay.
+
+        """
+        parent, child = self.name(parent, namespace), self.name(child, namespace)
+        longest = max(len(parent), len(child))
+        if longest > LONGEST_NAME:
+            raise TransformError(
+                f"a frame has a name of {longest} characters; {LONGEST_NAME} are the "
+                f"limit: {max(parent, child, key=len)[:40]!r}..."
+            )
+        names = f"{parent!r} -> {child!r}"
+        if not parent or not child:
+            raise TransformError(f"{names}: a frame has no name")
+        try:
+            transform = transform.checked()
+        except TransformError as error:
+            raise TransformError(f"{names}: {error}") from None
+        if not math.isfinite(stamp):
+            raise TransformError(f"{names}: the stamp is {stamp}")
+        track, note = self._track(parent, child, static)
+        newest = track.newest
+        if newest is not None and stamp < newest - JUMP:
+            note = (
+                f"{names}: time jumped back by {newest - stamp:.3f} s; what was known "
+                f"of it is forgotten"
+            )
+            track.clear()
+        track.add(transform, stamp, self.history)
+        if note is not None:
+            self.notes.append(note)
+        return note
+
+    def lookup(
+        self,
+        target: str,
+        source: str,
+        time: float | None = None,
+        *,
+        ahead: float = 0.0,
+    ) -> Transform:
+        """Return what takes coordinates of ``source`` to those of ``target``.
+
+        Args:
+            target: The frame that is wanted.
+            source: The frame that the numbers are in.
+            time: When, in seconds of the robot's clock; None for the newest time at
+                which the whole way is known.
+            ahead: Seconds after the newest transform of a frame for which its motion
+                is extrapolated.
+
+        Raises:
+            FrameMissing: If there is no such frame; the sentence names those there are.
+            NotConnected: If the frames are in two trees.
+            NotKnownThen: If a transform between them is not known at that time.
+
+        """
+        way = self._way(target, source)
+        return self._along(way, (way.newest or 0.0) if time is None else time, ahead)
+
+    def find(self, target: str, source: str, time: float = 0.0) -> Found:
+        """Return one frame in another at a time, or as it is now if that is not known.
+
+        Args:
+            target: The frame that is wanted.
+            source: The frame that the numbers are in.
+            time: When, in seconds of the robot's clock; 0 for now.
+
+        Raises:
+            FrameMissing: If there is no such frame; the sentence names those there are.
+            NotConnected: If the frames are in two trees.
+            NotKnownThen: If there is no time at which all of them are known.
+
+        """
+        way = self._way(target, source)
+        newest = way.newest
+        if time:
+            try:
+                return Found(self._along(way, time, 0.0), newest, True)
+            except NotKnownThen:
+                pass
+        return Found(self._along(way, newest or 0.0, 0.0), newest, False)
+
+    def newest(self, target: str, source: str) -> float | None:
+        """Return the newest time at which all between is known; None for all times.
+
+        Raises:
+            FrameMissing: If there is no such frame.
+            NotConnected: If the frames are in two trees.
+
+        """
+        return self._way(target, source).newest
+
+    def chain(self, frame: str) -> list[str]:
+        """Return a frame and its ancestors, up to the root."""
+        return self._ancestors(self.name(frame))
+
+    def _track(self, parent: str, child: str, static: bool) -> tuple[Track, str | None]:
+        """Return the track of a frame, a new one if its parent or kind has changed."""
+        track = self._tracks.get(child)
+        if track is not None and track.parent == parent and track.static == static:
+            self._tracks[child] = self._tracks.pop(child)
+            return track, None
+        self._ways.clear()
+        self._refuse_loop(parent, child)
+        if track is None and len(self._tracks) >= MOST_FRAMES:
+            self._make_room(parent, child)
+        note = None
+        if track is not None and track.parent != parent:
+            note = (
+                f"{child!r} was in {track.parent!r} and is in {parent!r} now; if that "
+                f"happens again and again, two nodes tell of it"
+            )
+            self._let_go(track.parent)
+        if track is None or parent not in self._roots:
+            self._missing.clear()
+        if track is None or track.parent != parent:
+            self._roots[parent] = self._roots.get(parent, 0) + 1
+        self._tracks.pop(child, None)
+        self._tracks[child] = found = Track(parent, child, static=static)
+        return found, note
+
+    def _make_room(self, parent: str, child: str) -> None:
+        """Forget the frame without news for the longest time, for one that is new.
+
+        A detector may name a new frame for each thing that it sees. Static frames stay,
+        as they are published once, and so do frames with children.
+        """
+        for frame, track in self._tracks.items():
+            if not track.static and frame not in self._roots and frame != parent:
+                self._let_go(track.parent)
+                del self._tracks[frame]
+                return
+        raise TransformError(
+            f"{parent!r} -> {child!r}: there are {MOST_FRAMES} frames already"
+        )
+
+    def _let_go(self, parent: str) -> None:
+        self._roots[parent] -= 1
+        if not self._roots[parent]:
+            del self._roots[parent]
+            self._missing.clear()
+
+    def _refuse_loop(self, parent: str, child: str) -> None:
+        way = [parent]
+        while way[-1] != child:
+            track = self._tracks.get(way[-1])
+            if track is None:
+                return
+            way.append(track.parent)
+        loop = " -> ".join(map(repr, [child, *reversed(way[:-1]), child]))
+        raise TransformError(f"{parent!r} -> {child!r} would close a loop: {loop}")
+
+    def _known(self, frame: str) -> str:
+        name = self.name(frame)
+        if name in self._tracks or name in self._roots:
+            return name
+        if len(name) > LONGEST_NAME:
+            raise FrameMissing(
+                f"there is no frame with a name of {len(name)} characters; "
+                f"{LONGEST_NAME} are the limit: {name[:40]!r}..."
+            )
+        sentence = self._missing.get(name)
+        if sentence is None:  # It is needed at each message.
+            if len(self._missing) >= _SENTENCES:
+                self._missing.clear()
+            self._missing[name] = sentence = self._sentence(name)
+        raise FrameMissing(sentence)
+
+    def _sentence(self, name: str) -> str:
+        """Return the sentence about a missing frame."""
+        frames = {*self._tracks, *self._roots}
+        hint = ""
+        if len(frames) <= MOST_COMPARED:
+            near = difflib.get_close_matches(name, sorted(frames), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+        listed = ", ".join(heapq.nsmallest(_LISTED, frames)) or "none"
+        more = f" and {len(frames) - _LISTED} more" if len(frames) > _LISTED else ""
+        return f"there is no frame {name!r}{hint}; there are: {listed}{more}"
+
+    def _way(self, target: str, source: str) -> _Way:
+        """Return the tracks between two frames, by their names as they were given."""
+        way = self._ways.get((target, source))
+        if way is None:
+            way = self._find_way(self._known(target), self._known(source))
+            if len(self._ways) >= _WAYS:
+                self._ways.clear()
+            self._ways[target, source] = way
+        return way
+
+    def _find_way(self, target: str, source: str) -> _Way:
+        down, up = self._ancestors(target), self._ancestors(source)
+        common = set(down) & set(up)
+        if not common:
+            raise NotConnected(
+                f"nothing leads from {source!r} to {target!r}: the one is in the tree "
+                f"of {up[-1]!r}, the other in that of {down[-1]!r}"
+            )
+        meet = next(frame for frame in up if frame in common)
+        return _Way(
+            [self._tracks[frame] for frame in down[: down.index(meet)]],
+            [self._tracks[frame] for frame in up[: up.index(meet)]],
+        )
+
+    def _ancestors(self, frame: str) -> list[str]:
+        way = [frame]
+        while (track := self._tracks.get(way[-1])) is not None:
+            way.append(track.parent)
+        return way
+
+    def _along(self, way: _Way, time: float, ahead: float) -> Transform:
+        """Return what takes coordinates of the way's source to those of its target."""
+        if not way.down:
+            return self._to_the_meeting(way.up, time, ahead)
+        down = self._to_the_meeting(way.down, time, ahead)
+        return down.inverse @ self._to_the_meeting(way.up, time, ahead)
+
+    def _to_the_meeting(
+        self, tracks: list[Track], time: float, ahead: float
+    ) -> Transform:
+        """Return what takes the first frame's coordinates to the last one's parent."""
+        total = None
+        for track in reversed(tracks):
+            try:
+                found = track.at(time, self.gap, ahead)
+            except NotKnownThen as error:
+                raise NotKnownThen(f"{track.name}: {error}") from None
+            total = found if total is None else total @ found
+        return total or Transform()

@@ -1,0 +1,142 @@
+"""What is known of one frame in its parent, over time."""
+
+import math
+from bisect import bisect_left, bisect_right
+
+from webmap.ros.tf.transform import NotKnownThen, Transform, between
+
+MOST = 4096
+"""Transforms that are kept of one frame, whatever their times."""
+
+SPAN = 0.1
+"""Seconds of a motion from which it is extrapolated."""
+
+EVEN = 0.5
+"""Seconds between two transforms beyond which a motion is not extrapolated."""
+
+FASTEST = 5.0
+"""Metres per second; what is faster is no motion but a correction."""
+
+FASTEST_TURN = 10.0
+"""Radians per second, likewise."""
+
+
+class Track:
+    """The transforms of one frame in its parent.
+
+    Args:
+        parent: The parent's name.
+        frame: The frame's own name.
+        static: Whether the one transform holds for all times.
+
+    """
+
+    def __init__(self, parent: str, frame: str = "", *, static: bool = False) -> None:
+        self.parent = parent
+        self.name = f"{parent!r} -> {frame!r}"
+        """What people call it."""
+        self.static = static
+        self._stamps: list[float] = []
+        self._transforms: list[Transform] = []
+
+    @property
+    def newest(self) -> float | None:
+        """The newest stamp; None if there is none, or all times are alike."""
+        return self._stamps[-1] if self._stamps and not self.static else None
+
+    def clear(self) -> None:
+        """Forget all transforms."""
+        self._stamps.clear()
+        self._transforms.clear()
+
+    def add(self, transform: Transform, stamp: float, history: float) -> None:
+        """Take a transform, in whatever order they come.
+
+        Args:
+            transform: The frame in its parent.
+            stamp: When it held, in seconds.
+            history: How much is kept before the newest, in seconds.
+
+        """
+        if self.static:
+            self._stamps[:], self._transforms[:] = [stamp], [transform]
+            return
+        place = bisect_left(self._stamps, stamp)
+        if place < len(self._stamps) and self._stamps[place] == stamp:
+            self._transforms[place] = transform
+        else:
+            self._stamps.insert(place, stamp)
+            self._transforms.insert(place, transform)
+        old = bisect_left(self._stamps, self._stamps[-1] - history)
+        old = max(old, len(self._stamps) - MOST)
+        if old:
+            del self._stamps[:old], self._transforms[:old]
+
+    def at(self, time: float, gap: float, ahead: float = 0.0) -> Transform:
+        """Return the transform at a time.
+
+        Args:
+            time: When, in seconds.
+            gap: The longest time between two transforms that is bridged, in seconds.
+            ahead: Seconds after the newest transform for which the motion is
+                extrapolated.
+
+        Raises:
+            NotKnownThen: If that time is not known; the sentence names no frames.
+
+        """
+        if not self._stamps:
+            raise NotKnownThen("nothing was told since time jumped")
+        if self.static:
+            return self._transforms[0]
+        place = bisect_left(self._stamps, time)
+        if place == len(self._stamps):
+            if time <= self._stamps[-1] + ahead:
+                return self._going_on(time)
+            raise NotKnownThen(
+                f"the newest is of {self._stamps[-1]:.3f} s, and {time:.3f} s is "
+                f"{time - self._stamps[-1]:.3f} s later"
+            )
+        if self._stamps[place] == time:
+            return self._transforms[place]
+        if place == 0:
+            raise NotKnownThen(
+                f"the oldest is of {self._stamps[0]:.3f} s, and {time:.3f} s is "
+                f"{self._stamps[0] - time:.3f} s earlier"
+            )
+        before, after = self._stamps[place - 1], self._stamps[place]
+        if after - before > gap:
+            raise NotKnownThen(
+                f"there is a gap of {after - before:.3f} s from {before:.3f} s on, and "
+                f"{time:.3f} s is in it"
+            )
+        share = (time - before) / (after - before)
+        return between(self._transforms[place - 1], self._transforms[place], share)
+
+    def _going_on(self, time: float) -> Transform:
+        """Return the extrapolated transform; the newest one after a leap."""
+        newest, last = self._transforms[-1], self._stamps[-1]
+        # Stamps that are close together give a bad speed.
+        place = bisect_right(self._stamps, last - SPAN) - 1
+        took = last - self._stamps[max(place, 0)]
+        before = self._transforms[max(place, 0)]
+        if not SPAN / 2 <= took <= EVEN or leapt(before, newest, took):
+            return newest
+        return between(before, newest, 1.0 + (time - last) / took)
+
+
+def leapt(one: Transform, other: Transform, took: float) -> bool:
+    """Return whether nothing moves that fast.
+
+    Args:
+        one: Where it was.
+        other: Where it is.
+        took: The time in between, in seconds.
+
+    """
+    p, q = one.rotation, other.rotation
+    cosine = abs(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w)
+    turned = 2.0 * math.acos(min(cosine, 1.0))
+    a, b = one.translation, other.translation
+    went = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
+    return went > FASTEST * took or turned > FASTEST_TURN * took

@@ -1,0 +1,227 @@
+"""One frame in another, in space, and what can be wrong with that."""
+
+import math
+from dataclasses import dataclass
+
+from webmap.base.errors import WebMapError
+from webmap.base.geometry import FARTHEST, Affine, Pose, Quaternion, Vector3
+
+NEARLY = 0.1
+"""How far the norm of a quaternion may be from 1; it is set right then."""
+
+_PARALLEL = 0.9995
+"""Cosine of half an angle above which a straight line between rotations will do."""
+
+_LEVEL = 1e-6
+"""Sine of half an angle below which a tilt cannot be seen."""
+
+_HERE = Vector3()
+_STRAIGHT = Quaternion()
+
+
+class TransformError(WebMapError):
+    """A transform that is invalid or not known; the sentence gives the reason."""
+
+
+class FrameMissing(TransformError, LookupError):
+    """There is no frame of that name."""
+
+
+class NotConnected(TransformError):
+    """Both frames exist, in two trees that nothing connects."""
+
+
+class NotKnownThen(TransformError):
+    """Both frames are connected, and a part between is not known at that time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Takes coordinates of one frame to those of another: turns, then moves.
+
+    It is named for what it gives: ``map_from_base`` takes coordinates of the base to
+    coordinates of the map, and ``map_from_odom @ odom_from_base`` is that too.
+    """
+
+    translation: Vector3 = _HERE
+    """Where the origin of the one frame is in the other, in metres."""
+
+    rotation: Quaternion = _STRAIGHT
+    """How the one frame is turned in the other, of norm 1."""
+
+    @classmethod
+    def from_pose(cls, pose: Pose) -> "Transform":
+        """Return the transform of a frame that has this pose in the plane."""
+        return cls(Vector3(pose.x, pose.y), Quaternion.from_yaw(pose.yaw))
+
+    @property
+    def planar(self) -> Pose:
+        """Place and heading seen from above."""
+        return Pose(self.translation.x, self.translation.y, self.rotation.yaw)
+
+    @property
+    def from_above(self) -> Affine:
+        """What it does to points of its own plane, seen from above.
+
+        It mirrors what hangs upside down, and flattens what stands upright.
+        """
+        q, by = self.rotation, self.translation
+        x, y = _turn(q, Vector3(1.0)), _turn(q, Vector3(0.0, 1.0))
+        return Affine(x.x, x.y, y.x, y.y, by.x, by.y)
+
+    @property
+    def upright(self) -> bool:
+        """Whether z points up: it turns about z alone."""
+        return abs(self.rotation.x) < _LEVEL and abs(self.rotation.y) < _LEVEL
+
+    @property
+    def heading_and_tilt(self) -> tuple[Pose, "Transform"]:
+        """Place and heading seen from above, and the rest.
+
+        The rest tilts and lifts, and comes first: ``Transform.from_pose(pose) @ tilt``
+        is the whole. Of a frame that stands upright it only lifts.
+        """
+        pose = self.planar
+        lift = Vector3(0.0, 0.0, self.translation.z)
+        if self.upright:
+            return pose, Transform(lift)
+        back = Quaternion.from_yaw(-pose.yaw)
+        return pose, Transform(lift, _times(back, self.rotation))
+
+    @property
+    def rows(self) -> tuple[tuple[float, float, float, float], ...]:
+        """The upper three rows of its matrix: turn, and in the last column move."""
+        q, by = self.rotation, self.translation
+        x, y, z = (
+            _turn(q, axis)
+            for axis in (Vector3(1.0), Vector3(0.0, 1.0), Vector3(0.0, 0.0, 1.0))
+        )
+        return (
+            (x.x, y.x, z.x, by.x),
+            (x.y, y.y, z.y, by.y),
+            (x.z, y.z, z.z, by.z),
+        )
+
+    def apply(self, point: Vector3) -> Vector3:
+        """Return where a point is in the other frame."""
+        turned, by = _turn(self.rotation, point), self.translation
+        return Vector3(turned.x + by.x, turned.y + by.y, turned.z + by.z)
+
+    def __matmul__(self, other: "Transform") -> "Transform":
+        """Return the transform that applies ``other`` first, then this one."""
+        return Transform(
+            self.apply(other.translation), _times(self.rotation, other.rotation)
+        )
+
+    @property
+    def inverse(self) -> "Transform":
+        """The transform that undoes this one."""
+        back = _conjugate(self.rotation)
+        moved = _turn(back, self.translation)
+        return Transform(Vector3(-moved.x, -moved.y, -moved.z), back)
+
+    def checked(self) -> "Transform":
+        """Return the same with a rotation of norm 1.
+
+        Raises:
+            TransformError: If a number is not finite, the rotation is none, or the
+                frame is farther away than anything can be.
+
+        """
+        t, q = self.translation, self.rotation
+        numbers = (t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+        if not all(map(math.isfinite, numbers)):
+            raise TransformError(f"a number is not finite: {t}, {q}")
+        if max(abs(t.x), abs(t.y), abs(t.z)) > FARTHEST:
+            raise TransformError(
+                f"a frame must be within {FARTHEST:g} m, got ({t.x:g}, {t.y:g}, "
+                f"{t.z:g})"
+            )
+        norm = q.norm
+        if abs(norm - 1.0) > NEARLY:
+            raise TransformError(f"the rotation has a norm of {norm:g}, expected 1")
+        return Transform(t, Quaternion(q.x / norm, q.y / norm, q.z / norm, q.w / norm))
+
+
+def between(one: Transform, other: Transform, share: float) -> Transform:
+    """Return a transform on the way from one to another.
+
+    Args:
+        one: Where the way begins; the result at 0.
+        other: Where it ends; the result at 1.
+        share: How much of it lies behind, from 0 to 1. Places lie on a straight line,
+            and rotations turn evenly the shorter way about.
+
+    """
+    a, b = one.translation, other.translation
+    rest = 1.0 - share
+    place = Vector3(
+        rest * a.x + share * b.x, rest * a.y + share * b.y, rest * a.z + share * b.z
+    )
+    return Transform(place, _slerp(one.rotation, other.rotation, share))
+
+
+def alike(one: Transform, other: Transform, apart: float, turned: float) -> bool:
+    """Return whether two transforms are the same within tolerances.
+
+    Args:
+        one: The one.
+        other: The other.
+        apart: Metres that do not matter.
+        turned: Radians that do not matter.
+
+    """
+    a, b, p, q = one.translation, other.translation, one.rotation, other.rotation
+    if math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) > apart:
+        return False
+    # Half an angle, of which the sine is exact where the cosine is not.
+    rest = _times(_conjugate(p), q)
+    return math.hypot(rest.x, rest.y, rest.z) <= math.sin(min(turned, math.pi) / 2)
+
+
+def _slerp(p: Quaternion, q: Quaternion, share: float) -> Quaternion:
+    cosine = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w
+    sign = 1.0 if cosine >= 0 else -1.0  # both mean one rotation; take the nearer
+    cosine = min(abs(cosine), 1.0)
+    if cosine > _PARALLEL:
+        first, second = 1.0 - share, share
+    else:
+        angle = math.acos(cosine)
+        first = math.sin((1.0 - share) * angle) / math.sin(angle)
+        second = math.sin(share * angle) / math.sin(angle)
+    second *= sign
+    mixed = Quaternion(
+        first * p.x + second * q.x,
+        first * p.y + second * q.y,
+        first * p.z + second * q.z,
+        first * p.w + second * q.w,
+    )
+    norm = mixed.norm
+    return Quaternion(mixed.x / norm, mixed.y / norm, mixed.z / norm, mixed.w / norm)
+
+
+def _times(p: Quaternion, q: Quaternion) -> Quaternion:
+    product = Quaternion(
+        p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+        p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x,
+        p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w,
+        p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z,
+    )
+    n = product.norm
+    return Quaternion(product.x / n, product.y / n, product.z / n, product.w / n)
+
+
+def _conjugate(q: Quaternion) -> Quaternion:
+    return Quaternion(-q.x, -q.y, -q.z, q.w)
+
+
+def _turn(q: Quaternion, v: Vector3) -> Vector3:
+    # v + 2 w (u x v) + 2 u x (u x v), where u is the vector part.
+    tx = 2.0 * (q.y * v.z - q.z * v.y)
+    ty = 2.0 * (q.z * v.x - q.x * v.z)
+    tz = 2.0 * (q.x * v.y - q.y * v.x)
+    return Vector3(
+        v.x + q.w * tx + q.y * tz - q.z * ty,
+        v.y + q.w * ty + q.z * tx - q.x * tz,
+        v.z + q.w * tz + q.x * ty - q.y * tx,
+    )

@@ -1,0 +1,289 @@
+"""Fragments as records, encoded once for all who watch them."""
+
+import math
+import struct
+from collections.abc import Callable
+from functools import lru_cache
+from typing import cast
+
+from webmap.base.geometry import Affine
+from webmap.scene.allowed import ATTRIBUTES, EVENTS
+from webmap.scene.bound import BoundElement, Document
+from webmap.scene.element import Element
+from webmap.scene.fragment import Added, Changed, Fragment, Removed
+from webmap.scene.node import Node, Text
+from webmap.scene.wire.opcodes import AFTER, FIRST, LAST, PREVENT, STOP, TAGS, Op
+
+_TAG = {tag: index for index, tag in reversed(list(enumerate(TAGS)))}
+_HTML_TAG = {tag: index for index, tag in enumerate(TAGS)}
+_ATTRIBUTE = {name: index for index, name in enumerate(ATTRIBUTES)}
+EVENT_NUMBER = {kind: index for index, kind in enumerate(EVENTS)}
+"""The events by their numbers on the wire."""
+
+_POSE = struct.Struct("<fff").pack
+_FAR_POSE = struct.Struct("<ddf").pack
+_MATRIX = struct.Struct("<6d").pack
+_FLOAT = struct.Struct("<f").pack
+_FAR = 4096.0
+"""Metres beyond which single precision is worse than half a millimetre."""
+
+
+@lru_cache(maxsize=1 << 12)  # for ids and lengths: ages never come twice
+def varint(number: int) -> bytes:
+    """Return ``number``, which is not negative, with seven bits in each byte."""
+    out = bytearray()
+    while number > 0x7F:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    out.append(number)
+    return bytes(out)
+
+
+def string(text: str) -> bytes:
+    """Return ``text`` in UTF-8 after its length; half characters become marks."""
+    data = text.encode("utf-8", "replace")
+    return varint(len(data)) + data
+
+
+class _Memo:
+    """What was encoded of a fragment at one revision."""
+
+    __slots__ = ("changes", "revision", "snapshot")
+
+    def __init__(self, revision: int) -> None:
+        self.revision = revision
+        self.changes: dict[int, bytes | None] = {}
+        self.snapshot: bytes | None = None
+
+
+def _memo(fragment: Fragment) -> _Memo:
+    memo = fragment.memo
+    if memo is None or memo.revision != fragment.revision:
+        memo = fragment.memo = _Memo(fragment.revision)
+    return cast("_Memo", memo)
+
+
+def encode_changes(fragment: Fragment, since: int) -> bytes | None:
+    """Return the records that bring a page from ``since`` to now.
+
+    Args:
+        fragment: What the page shows.
+        since: The revision that the page has.
+
+    Returns:
+        The section of the fragment, empty if nothing changed after all, or None if
+        only a snapshot will do.
+
+    """
+    memo = _memo(fragment)
+    try:
+        return memo.changes[since]
+    except KeyError:
+        data = memo.changes[since] = _encode_changes(fragment, since)
+        return data
+
+
+def encode_snapshot(fragment: Fragment) -> bytes:
+    """Return the records that build the whole fragment as it is now."""
+    memo = _memo(fragment)
+    if memo.snapshot is None:
+        fragment.mark_told()
+        out = bytearray()
+        _put_node(out, fragment.root, 0, LAST)
+        memo.snapshot = bytes(out)
+    return memo.snapshot
+
+
+def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
+    changes = fragment.changes_since(since)
+    if not changes:
+        return None if changes is None else b""
+    out = bytearray([Op.DELTA]) + varint(fragment.id)
+    for change in changes:
+        match change:
+            case Changed(node, slot):
+                _put_slot(out, node, slot)
+            case Removed(node_id):
+                out.append(Op.REMOVE)
+                out += varint(node_id)
+            case Added(node, after):
+                parent = cast("Element", node.parent).id
+                _put_node(out, node, parent, after.id + AFTER if after else FIRST)
+    return bytes(out)
+
+
+# Nodes --------------------------------------------------------------------------
+
+
+def _put_node(out: bytearray, node: Node, parent: int, place: int) -> None:
+    if isinstance(node, Text):
+        _head(out, Op.TEXT, node)
+        out += varint(parent) + varint(place) + string(node.data)
+        return
+    element = cast("Element", node)
+    if isinstance(element, Document):
+        _head(out, Op.DOCUMENT, element)
+    elif isinstance(element, BoundElement):
+        _head(out, Op.BIND, element)
+        out += string(element.html_id)
+    else:
+        _head(out, Op.CREATE, element)
+        tags = _TAG if element.namespace == "svg" else _HTML_TAG
+        out += varint(parent) + varint(place)
+        out.append(tags[element.tag])
+    for slot in _slots_of(element):
+        _put_slot(out, element, slot)
+    for child in element._children:
+        _put_node(out, child, element.id, LAST)
+
+
+def _slots_of(element: Element) -> list[str]:
+    """Return the slots whose values a new element needs to be told."""
+    slots = [*element._attributes, *element._styles]
+    if isinstance(element, BoundElement):
+        slots += element.dropped
+        if element.emptied:
+            slots.append("emptied")
+    if element._classes:
+        slots.append("class")
+    if element._transform is not None:
+        slots.append("transform")
+    if element._dots is not None:
+        slots.append("dots")
+    if element._age is not None:
+        slots += ("age-limit", "age")
+    if element._listeners:
+        slots.append("events")
+    if element._map is not None:
+        slots.append("map")
+    return slots
+
+
+def _head(out: bytearray, op: Op, node: Node) -> None:
+    out.append(op)
+    out += varint(node.id)
+
+
+# Values -------------------------------------------------------------------------
+
+
+def _put_slot(out: bytearray, node: Node, slot: str) -> None:
+    put = _SLOTS.get(slot)
+    if put is not None:
+        put(out, node)
+    elif slot.startswith("--"):
+        _put_style(out, cast("Element", node), slot)
+    else:
+        _put_attribute(out, cast("Element", node), slot)
+
+
+def _put_attribute(out: bytearray, element: Element, name: str) -> None:
+    value = element._attributes.get(name)
+    number = _ATTRIBUTE.get(name)
+    if number is not None:
+        _head(out, Op.UNSET if value is None else Op.ATTRIBUTE, element)
+        out.append(number)
+    else:
+        _head(out, Op.NAMED_UNSET if value is None else Op.NAMED_ATTRIBUTE, element)
+        out += string(name)
+    if value is not None:
+        out += string(value)
+
+
+def _put_style(out: bytearray, element: Element, name: str) -> None:
+    _head(out, Op.STYLE, element)
+    out += string(name) + string(element._styles.get(name, ""))
+
+
+def _put_transform(out: bytearray, element: Element) -> None:
+    transform = element._transform
+    if isinstance(transform, tuple):
+        _put_pose(out, element, *transform)
+    elif isinstance(transform, Affine):
+        _head(out, Op.MATRIX, element)
+        out += _MATRIX(*transform.values)
+    else:
+        _head(out, Op.UNSET if transform is None else Op.ATTRIBUTE, element)
+        out.append(_ATTRIBUTE["transform"])
+        if transform is not None:
+            out += string(transform)
+
+
+def _put_pose(out: bytearray, element: Element, x: float, y: float, yaw: float) -> None:
+    # An angle of any size means what it means within one turn.
+    yaw = math.remainder(yaw, math.tau)
+    if -_FAR < x < _FAR and -_FAR < y < _FAR:
+        _head(out, Op.POSE, element)
+        out += _POSE(x, y, yaw)
+    else:
+        _head(out, Op.FAR_POSE, element)
+        out += _FAR_POSE(x, y, yaw)
+
+
+def _put_dots(out: bytearray, element: Element) -> None:
+    if element._dots is not None:
+        points, unit = element._dots
+        _head(out, Op.DOTS, element)
+        out += _FLOAT(unit) + varint(len(points) // 4)
+        out += points
+
+
+def _put_age(out: bytearray, element: Element) -> None:
+    if element._age is not None:
+        measured = element._age.measured
+        _head(out, Op.AGE, element)
+        out += varint(max(1, round(measured * 1000)) if math.isfinite(measured) else 0)
+
+
+def _put_age_limit(out: bytearray, element: Element) -> None:
+    if element._age is not None:
+        _head(out, Op.AGE_LIMIT, element)
+        out += _FLOAT(element._age.limit)
+        out.append(element._age.shown)
+
+
+def _put_classes(out: bytearray, element: Element) -> None:
+    _head(out, Op.CLASSES, element)
+    out += string(" ".join(element._classes))
+
+
+def _put_events(out: bytearray, element: Element) -> None:
+    listening = element.listening
+    _head(out, Op.EVENTS, element)
+    out.append(len(listening))
+    for kind, (prevent, stop) in listening.items():
+        out.append(EVENT_NUMBER[kind])
+        out.append(PREVENT * prevent | STOP * stop)
+
+
+def _put_text(out: bytearray, text: Text) -> None:
+    _head(out, Op.DATA, text)
+    out += string(text.data)
+
+
+def _put_map(out: bytearray, element: Element) -> None:
+    if element._map is not None:
+        _head(out, Op.MAP, element)
+        out += varint(element._map.world_id)
+        out += _FLOAT(element._map.width) + _FLOAT(element._map.height)
+
+
+def _put_emptied(out: bytearray, element: Element) -> None:
+    _head(out, Op.EMPTY, element)
+
+
+_SLOTS = cast(
+    "dict[str, Callable[[bytearray, Node], None]]",
+    {
+        "transform": _put_transform,
+        "dots": _put_dots,
+        "age": _put_age,
+        "age-limit": _put_age_limit,
+        "class": _put_classes,
+        "events": _put_events,
+        "text": _put_text,
+        "map": _put_map,
+        "emptied": _put_emptied,
+    },
+)
+"""How each slot that is no plain attribute is written."""

@@ -1,0 +1,161 @@
+"""What a page says: typed, bounded, and refused when it is anything else."""
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from webmap.base.errors import WireError
+from webmap.base.nesting import MAX_DEPTH, is_too_deep
+from webmap.scene.allowed import EVENTS
+
+LONGEST = 16 * 1024
+"""Bytes that a message from a page may have."""
+
+LONGEST_TEXTS = {"name": 64, "value": 8192, "url": 2048, "trouble": 2000}
+"""Characters that texts in these messages may have; the browser cuts longer ones."""
+
+PAGE_ID = "^[A-Za-z0-9_-]{8,64}$"
+"""The pattern of the name that a page chooses for itself."""
+
+_Id = Annotated[int, Meta(ge=0, le=2**53)]
+_Name = Annotated[str, Meta(max_length=LONGEST_TEXTS["name"])]
+
+
+class Message(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    tag_field="op",
+    forbid_unknown_fields=True,
+):
+    """The base of what a page says."""
+
+
+class Hello(Message, frozen=True, tag="hello"):
+    """The first message on a socket: which page this is, and how large."""
+
+    page: Annotated[str, Meta(pattern=PAGE_ID)]
+    """Chosen by the page and kept through a reload, to find its maps again."""
+
+    url: Annotated[str, Meta(max_length=LONGEST_TEXTS["url"])]
+    """Path and query of the page."""
+
+    width: float
+    """Pixels of the window, from left to right."""
+
+    height: float
+    """Pixels of the window, from top to bottom."""
+
+    dpr: float = 1.0
+    """Pixels of the screen in one pixel of the page."""
+
+    theme: Literal["light", "dark"] = "light"
+    """What the viewer's system prefers."""
+
+    containers: dict[_Name, tuple[float, float]] = {}
+    """Pixels across and down of each element with an id in the page."""
+
+
+class ElementEvent(Message, frozen=True, tag="event"):
+    """Something happened at an element that is listened to."""
+
+    mount: _Id
+    element: _Id
+    event: _Name
+    x: float = 0.0
+    y: float = 0.0
+    world_x: float | None = None
+    world_y: float | None = None
+    key: _Name = ""
+    button: int = 0
+    delta: float = 0.0
+    shift: bool = False
+    ctrl: bool = False
+    alt: bool = False
+    meta: bool = False
+    value: Annotated[str, Meta(max_length=LONGEST_TEXTS["value"])] | None = None
+    checked: bool | None = None
+
+
+class ViewReport(Message, frozen=True, tag="view"):
+    """How a map is seen now: the matrix from the world to its pixels, and its place."""
+
+    map_element: _Id
+    a: float
+    b: float
+    c: float
+    d: float
+    e: float
+    f: float
+    width: float
+    height: float
+    left: float
+    """Pixels from the left of the window."""
+
+    top: float
+    """Pixels from the top of the window."""
+
+    follow: _Id = 0
+    """The element that the view follows, or 0."""
+
+    applied: _Id = 0
+    """The number of the newest operation that the view has in it."""
+
+
+class ModuleReady(Message, frozen=True, tag="ready"):
+    """The browser's half of a module was attached, maybe again after a reload."""
+
+    instance: _Id
+
+
+class ModuleMessage(Message, frozen=True, tag="module"):
+    """The browser's half of a module says something to the other."""
+
+    instance: _Id
+    data: dict[str, Any]
+
+
+class Trouble(Message, frozen=True, tag="trouble"):
+    """The page could not do something that somebody should know of."""
+
+    text: Annotated[str, Meta(max_length=LONGEST_TEXTS["trouble"])]
+
+
+class Seen(Message, frozen=True, tag="seen"):
+    """The page has applied this frame and all before it."""
+
+    frame: _Id
+
+
+class Resync(Message, frozen=True, tag="resync"):
+    """The page did not understand a frame and wants to be told everything."""
+
+
+PageEvent = Hello | ElementEvent | ViewReport | ModuleReady | ModuleMessage | Trouble
+"""What concerns more than the session itself."""
+
+_decoder: msgspec.json.Decoder[PageEvent | Seen | Resync] = msgspec.json.Decoder(
+    PageEvent | Seen | Resync
+)
+
+
+def read_message(text: str | bytes) -> PageEvent | Seen | Resync:
+    """Return what a page said.
+
+    Raises:
+        WireError: If it is too long or no message that a page may send.
+
+    """
+    size = len(text)
+    if size > LONGEST:
+        raise WireError(f"a page sent {size} characters; at most {LONGEST} are taken")
+    try:
+        message = _decoder.decode(text)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise WireError(f"a page sent no message that is known: {error}") from error
+    if isinstance(message, ModuleMessage) and is_too_deep(message.data):
+        raise WireError(f"a page sent a message nested deeper than {MAX_DEPTH} levels")
+    if isinstance(message, ElementEvent) and message.event not in EVENTS:
+        raise WireError(f"a page sent an unknown event {message.event!r}")
+    return message

@@ -1,0 +1,357 @@
+"""The display's side of one page's ``/scene``, without a socket."""
+
+import itertools
+import math
+import secrets
+import struct
+from typing import Any
+
+import msgspec
+
+from webmap.base.errors import WireError
+from webmap.scene.allowed import check_event
+from webmap.scene.element import Element, split_classes
+from webmap.scene.fragment import Fragment
+from webmap.scene.wire.encode import encode_changes, string, varint
+from webmap.scene.wire.messages import (
+    ElementEvent,
+    ModuleMessage,
+    ModuleReady,
+    PageEvent,
+    Resync,
+    Seen,
+    ViewReport,
+    read_message,
+)
+from webmap.scene.wire.opcodes import RESET, VERSION, Op
+from webmap.scene.wire.page_state import MapView, Mount, PendingRecords, flags
+
+_HEADER = struct.Struct("<HBId").pack
+
+
+class SceneSession:
+    """What one page shows, what it was told of it, and what comes next.
+
+    Ask :meth:`frame` for bytes at each tick and send every one of them, in order: a
+    frame builds on those before it. As long as the page has not acknowledged
+    :data:`WINDOW` frames there is no next one, and what changes meanwhile is told
+    by its newest value.
+    """
+
+    WINDOW = 2
+    HEARTBEAT = 1.0
+
+    def __init__(self) -> None:
+        self._key = secrets.randbits(31)
+        self._mounts: dict[int, Mount] = {}
+        self._map_views: dict[int, MapView] = {}
+        self._attached: dict[int, tuple[int, bytes]] = {}
+        # The revision of each fragment that the page has; None if not yet.
+        self._fragments: dict[Fragment, int | None] = {}
+        self._numbers = itertools.count(1)
+        self._frame = 0
+        self._seen = 0
+        self._spoke = math.inf
+        self._pending = PendingRecords()
+
+    # Fragments ------------------------------------------------------------------
+
+    def mount(
+        self,
+        fragment: Fragment,
+        *,
+        under: int,
+        order: float = 0,
+        within: int | None = None,
+    ) -> int:
+        """Show ``fragment`` on the page; it may be shown at several places.
+
+        Args:
+            fragment: What to show.
+            under: Id of the element that takes the fragment's root, or 0 for the
+                document.
+            order: Among the fragments under one element, the higher is further to
+                the front; those below 0 are behind the element's own children.
+            within: The mount that ``under`` belongs to, if any.
+
+        Returns:
+            The number of the mount.
+
+        Raises:
+            WireError: If ``within`` is not mounted.
+
+        """
+        if within is not None:
+            self._mount(within)
+        number = next(self._numbers)
+        self._mounts[number] = Mount(number, fragment, within or 0, under, order)
+        self._fragments.setdefault(fragment, None)
+        self._pending.new.append(number)
+        return number
+
+    def unmount(self, mount: int) -> None:
+        """Take a mount off the page, with what is mounted within it.
+
+        An unknown one is gone already, which is all right.
+        """
+        gone = self._mounts.pop(mount, None)
+        if gone is None:
+            return
+        for inner in [n for n, m in self._mounts.items() if m.within == mount]:
+            self.unmount(inner)
+        for map_view in [c for c in self._map_views.values() if c.mount == mount]:
+            self._forget(map_view)
+        if all(m.fragment is not gone.fragment for m in self._mounts.values()):
+            del self._fragments[gone.fragment]
+        if mount in self._pending.new:
+            self._pending.new.remove(mount)
+        else:
+            self._pending.gone += bytes((Op.UNMOUNT, *varint(mount)))
+
+    def _forget(self, map_view: MapView) -> None:
+        del self._map_views[map_view.svg]
+        for instance, (svg, _) in list(self._attached.items()):
+            if svg == map_view.svg:
+                self.detach(instance)
+
+    def _mount(self, number: int) -> Mount:
+        try:
+            return self._mounts[number]
+        except KeyError:
+            raise WireError(f"mount {number} is not on the page") from None
+
+    def set_class(self, mount: int, name: str, on: bool) -> None:
+        """Give or take a class of a mount's root, on this page only."""
+        place = self._mount(mount)
+        for word in split_classes(name):
+            if on != (word in place.classes):
+                if on:
+                    place.classes[word] = None
+                else:
+                    del place.classes[word]
+                self._pending.record(place.class_record(word, on))
+
+    def listen(
+        self,
+        mount: int,
+        element: int,
+        event: str,
+        *,
+        prevent: bool = False,
+        stop: bool = False,
+    ) -> None:
+        """Hear of an event at an element, on this page only.
+
+        Raises:
+            SceneError: If the event is not one that a scene knows.
+
+        """
+        check_event(event)
+        place = self._mount(mount)
+        place.listening[element, event] = flags(prevent=prevent, stop=stop)
+        self._pending.record(place.listen_record(element, event))
+
+    def unlisten(self, mount: int, element: int, event: str) -> None:
+        """Undo :meth:`listen`; it does nothing if there is nothing to undo."""
+        place = self._mounts.get(mount)
+        if place and place.listening.pop((element, event), None) is not None:
+            self._pending.record(place.listen_record(element, event))
+
+    def fragment(self, mount: int) -> Fragment | None:
+        """Return the fragment of a mount, or None if it is not on the page."""
+        place = self._mounts.get(mount)
+        return place.fragment if place else None
+
+    def element(self, mount: int, element: int) -> Element | None:
+        """Return the element with that id at that mount, or None if it went."""
+        fragment = self.fragment(mount)
+        node = fragment.find(element) if fragment else None
+        return node if isinstance(node, Element) else None
+
+    # Maps and modules -----------------------------------------------------------
+
+    def _map_view(self, map_element: int) -> MapView:
+        map_view = self._map_views.get(map_element)
+        if map_view is None:
+            map_view = self._find_map_view(map_element)
+            self._map_views[map_element] = map_view
+            self._pending.record(map_view.state(self._key))
+        return map_view
+
+    def _find_map_view(self, map_element: int) -> MapView:
+        for number in self._mounts:
+            element = self.element(number, map_element)
+            if element is not None and element._map is not None:
+                return MapView(number, map_element)
+        raise WireError(f"element {map_element} is no map on the page")
+
+    def view(self, map_element: int, operation: str, *args: float) -> None:
+        """Move the view of a map: one of translate, scale, rotate, set, fit, follow.
+
+        Args:
+            map_element: Id of the map's ``<svg>``.
+            operation: ``translate(x, y)`` in pixels; ``scale(factor[, x, y])`` and
+                ``rotate(degrees[, x, y])``, counter-clockwise as seen, about a
+                point in pixels or else the middle; ``set(a, b, c, d, e, f)``;
+                ``fit(x0, y0, x1, y1)`` in metres; ``follow(element id or 0)``.
+            args: Its numbers.
+
+        Raises:
+            ValueError: If the operation or its numbers are wrong.
+            WireError: If there is no such map on the page.
+
+        """
+        map_view = self._map_view(map_element)
+        self._pending.record(map_view.operate(operation, args))
+
+    def attach(
+        self,
+        map_element: int,
+        instance: int,
+        module_url: str,
+        options: dict[str, Any],
+        css_url: str | None = None,
+    ) -> None:
+        """Let the page load the browser's half of a module and attach it to a map.
+
+        Args:
+            map_element: Id of the map's ``<svg>``.
+            instance: A number of the caller's choice, for messages.
+            module_url: Address of the ES module, relative to the server's root.
+            options: Handed to the module; plain data.
+            css_url: Address of a style sheet, relative to the server's root.
+
+        """
+        self._map_view(map_element)
+        record = bytearray([Op.ATTACH]) + varint(map_element) + varint(instance)
+        record += string(module_url) + string(css_url or "")
+        record += string(msgspec.json.encode(options).decode())
+        self._attached[instance] = (map_element, bytes(record))
+        self._pending.record(record)
+
+    def detach(self, instance: int) -> None:
+        """Take the browser's half of a module away."""
+        if self._attached.pop(instance, None) is not None:
+            self._pending.record(bytes((Op.DETACH, *varint(instance))))
+
+    def send(self, instance: int, message: dict[str, Any]) -> None:
+        """Send a message to the browser's half of a module."""
+        if instance in self._attached:
+            text = msgspec.json.encode(message).decode()
+            self._pending.message(bytes((Op.MESSAGE, *varint(instance))) + string(text))
+
+    def error(self, text: str) -> None:
+        """Show a notice on the page, and again after it was loaded again."""
+        self._pending.notice(text)
+
+    def problem(self, number: int, text: str) -> None:
+        """Show what fails until :meth:`mended`; a new text takes its place.
+
+        Args:
+            number: Of the caller's choice; one thing's own, on every page.
+            text: A sentence for people, not empty.
+
+        """
+        self._pending.problem(number, text)
+
+    def mended(self, number: int) -> None:
+        """Take a problem back; an unknown one is gone already, which is all right."""
+        self._pending.problem(number, "")
+
+    # The socket -----------------------------------------------------------------
+
+    def restart(self) -> None:
+        """Tell everything again, because the page has a new socket or lost track."""
+        self._pending.send_all = True
+        self._seen = self._frame
+
+    def receive(self, text: str | bytes) -> list[PageEvent]:
+        """Take a message from the page.
+
+        Returns:
+            What others should hear of; not what concerns an element, a map or a
+            module that has gone meanwhile.
+
+        Raises:
+            WireError: If it is no message that a page may send.
+
+        """
+        message = read_message(text)
+        match message:
+            case Seen(frame=frame):
+                if self._seen < frame <= self._frame:
+                    self._seen = frame
+                return []
+            case Resync():
+                self.restart()
+                return []
+            case ElementEvent(mount=mount, element=element, event=event):
+                place = self._mounts.get(mount)
+                return [message] if place and place.hears(element, event) else []
+            case ViewReport(map_element=map_element):
+                return [message] if self._take_report(map_element, message) else []
+            case ModuleReady(instance=instance) | ModuleMessage(instance=instance):
+                return [message] if instance in self._attached else []
+        return [message]
+
+    def _take_report(self, map_element: int, report: ViewReport) -> bool:
+        try:
+            self._map_view(map_element).take(report)
+        except WireError:
+            return False
+        return True
+
+    def frame(self, now: float) -> bytes | None:
+        """Return the next frame, or None if there is nothing to say, or not yet.
+
+        A page that was spoken to is told the time every :data:`HEARTBEAT` seconds at
+        the latest, so that it notices when nobody speaks any more.
+
+        Args:
+            now: Seconds of :func:`time.monotonic`.
+
+        """
+        if self._frame - self._seen >= self.WINDOW:
+            return None
+        body = None if self._pending.send_all else self._changes()
+        if body == b"" and now - self._spoke < self.HEARTBEAT:
+            return None
+        if body is None:
+            body = self._everything()
+        head = _HEADER(VERSION, RESET * self._pending.send_all, self._frame + 1, now)
+        self._frame += 1
+        self._spoke = now
+        self._pending.sent()
+        return head + body
+
+    def _changes(self) -> bytes | None:
+        """Return what is new since the last frame; None if it was forgotten."""
+        parts: list[bytes | bytearray] = [self._pending.gone]
+        fragments = self._fragments
+        for fragment, known in fragments.items():
+            revision = fragment.revision
+            if known != revision and known is not None:
+                changes = encode_changes(fragment, known)
+                if changes is None:
+                    self._pending.send_all = True
+                    return None
+                parts.append(changes)
+                fragments[fragment] = revision
+        parts += [self._place(self._mounts[number]) for number in self._pending.new]
+        unsaid = self._pending
+        parts += (unsaid.records, *unsaid.messages, *unsaid.problems.values())
+        return b"".join(parts)
+
+    def _place(self, mount: Mount) -> bytes:
+        self._fragments[mount.fragment] = mount.fragment.revision
+        return mount.record()
+
+    def _everything(self) -> bytes:
+        parts = [self._place(mount) for mount in self._mounts.values()]
+        parts += [mount.choices() for mount in self._mounts.values()]
+        for map_view in self._map_views.values():
+            parts += (map_view.state(self._key), map_view.unreported)
+        parts += [record for _, record in self._attached.values()]
+        parts += self._pending.notices_again()
+        parts += self._pending.standing.values()
+        return b"".join((*parts, *self._pending.messages))

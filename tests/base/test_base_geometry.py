@@ -1,0 +1,110 @@
+"""Poses, orientations and maps of the plane keep their laws."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.base.geometry import Affine, Pose, Quaternion, Twist, normalize_angle
+
+NUMBERS = st.floats(-1e4, 1e4)
+ANGLES = st.floats(-100, 100)
+POSES = st.builds(Pose, NUMBERS, NUMBERS, ANGLES)
+
+
+def close(pose: Pose, other: Pose) -> bool:
+    return math.isclose(pose.x, other.x, abs_tol=1e-6) and (
+        math.isclose(pose.y, other.y, abs_tol=1e-6)
+        and abs(normalize_angle(pose.yaw - other.yaw)) < 1e-9
+    )
+
+
+@given(ANGLES)
+def test_a_normal_angle_is_the_same_direction_between_minus_pi_and_pi(angle):
+    normal = normalize_angle(angle)
+    assert -math.pi <= normal <= math.pi
+    assert math.cos(normal) == pytest.approx(math.cos(angle), abs=1e-9)
+    assert math.sin(normal) == pytest.approx(math.sin(angle), abs=1e-9)
+
+
+def test_the_float_just_below_minus_pi_stays_in_the_interval():
+    assert abs(normalize_angle(math.nextafter(-math.pi, -math.inf))) <= math.pi
+
+
+@given(POSES)
+def test_a_pose_and_its_inverse_undo_each_other(pose):
+    assert close(pose @ pose.inverse, Pose())
+    assert close(pose.inverse @ pose, Pose())
+
+
+@given(POSES, POSES, POSES)
+def test_poses_can_be_put_together_in_any_grouping(a, b, c):
+    left, right = (a @ b) @ c, a @ (b @ c)
+    assert math.isclose(left.x, right.x, abs_tol=1e-5)
+    assert math.isclose(left.y, right.y, abs_tol=1e-5)
+
+
+def test_a_metre_forward_of_a_robot_that_looks_north():
+    assert close(Pose(1, 2, math.pi / 2) @ Pose(1, 0, 0), Pose(1, 3, math.pi / 2))
+
+
+@given(st.floats(-math.pi, math.pi))
+def test_a_yaw_survives_its_quaternion(yaw):
+    again = Quaternion.from_yaw(yaw).yaw
+    assert normalize_angle(again - yaw) == pytest.approx(0, abs=1e-9)
+
+
+@given(st.floats(-3, 3), st.floats(0.1, 10))
+def test_a_quaternion_that_is_not_of_norm_one_has_the_same_yaw(yaw, factor):
+    q = Quaternion.from_yaw(yaw)
+    scaled = Quaternion(q.x * factor, q.y * factor, q.z * factor, q.w * factor)
+    assert scaled.yaw == pytest.approx(yaw)
+
+
+def test_a_quaternion_of_zeros_has_the_norm_zero():
+    assert Quaternion(0, 0, 0, 0).norm == 0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_twist_knows_whether_it_is_finite(bad):
+    assert Twist(1, 2, 3).is_finite
+    assert not Twist(bad, 0, 0).is_finite
+    assert not Twist(0, 0, bad).is_finite
+    assert Twist(0.0, -0.0, 0.0).is_zero
+
+
+MAPS = st.builds(
+    lambda angle, factor, x, y: (
+        Affine.translation(x, y)
+        @ Affine.rotation(angle)
+        @ Affine.scaling(factor)
+        @ Affine(d=-1)
+    ),
+    ANGLES,
+    st.floats(0.01, 100),
+    NUMBERS,
+    NUMBERS,
+)
+
+
+@given(MAPS, NUMBERS, NUMBERS)
+def test_a_map_of_the_plane_and_its_inverse_undo_each_other(tf, x, y):
+    assert tf.inverse.apply(*tf.apply(x, y)) == pytest.approx((x, y), abs=1e-3)
+
+
+@given(MAPS, MAPS, st.floats(-10, 10), st.floats(-10, 10))
+def test_two_maps_in_turn_are_one(first, second, x, y):
+    together = (second @ first).apply(x, y)
+    assert together == pytest.approx(second.apply(*first.apply(x, y)), rel=1e-6)
+
+
+def test_a_map_that_flattens_has_no_inverse():
+    with pytest.raises(ValueError, match="flattens"):
+        _ = Affine(0, 0, 0, 0).inverse
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, math.inf])
+def test_a_scale_must_be_a_number_above_zero(factor):
+    with pytest.raises(ValueError, match="above 0"):
+        Affine.scaling(factor)

@@ -1,0 +1,35 @@
+"""What a map takes is given back when it goes, whatever small thing came after it."""
+
+import platform
+import subprocess
+import sys
+
+import pytest
+
+LEFT_BEHIND = """
+import psutil
+from webmap.base.memory import return_large_pieces
+
+if {returning}:
+    return_large_pieces()
+before = psutil.Process().memory_info().rss
+del (first := [bytearray(20 << 20)])[:]  # from here on glibc keeps what is smaller
+map_, small = bytearray(b"1") * (16 << 20), bytearray(1000)
+del map_
+print(psutil.Process().memory_info().rss - before)
+"""
+
+
+def left_behind(*, returning: bool) -> int:
+    """Return the bytes that a process holds after a map of 16 MiB came and went."""
+    program = LEFT_BEHIND.format(returning=returning)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    return int(done.stdout)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's own habit")
+def test_a_map_that_went_leaves_nothing_behind():
+    assert left_behind(returning=False) > 15 << 20, "the habit is there to be ended"
+    assert left_behind(returning=True) < 2 << 20

@@ -1,0 +1,166 @@
+"""Files that people name, and what is no file though it has a name."""
+
+import errno
+import os
+import socket
+
+import pytest
+
+from webmap.base.errors import ConfigError
+from webmap.base.lined_yaml import LinedYaml
+from webmap.base.plain_files import read_file, refuse_special, resolved, write_file
+
+
+def test_a_file_is_read_and_so_is_one_behind_a_link(tmp_path):
+    (tmp_path / "a").write_bytes(b"abc")
+    (tmp_path / "b").symlink_to("a")
+    assert read_file(tmp_path / "b", 3) == b"abc"
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="pipe: expected a file, got a pipe"):
+        read_file(tmp_path / "pipe", 10)
+
+
+def test_folders_devices_and_sockets_are_refused(tmp_path, monkeypatch):
+    with pytest.raises(ConfigError, match="got a folder"):
+        read_file(tmp_path, 10)
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    with pytest.raises(ConfigError, match="got a device"):
+        read_file(tmp_path / "zero", 10)
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket")
+        with pytest.raises(OSError, match="No such device"):
+            read_file(tmp_path / "socket", 10)
+
+
+def test_a_file_that_is_too_large_is_refused(tmp_path):
+    (tmp_path / "a").write_bytes(b"x" * ((1 << 20) + 1))
+    with pytest.raises(ConfigError, match="larger than 1 MiB"):
+        read_file(tmp_path / "a", 1 << 20)
+
+
+def test_a_file_is_written_into_a_folder_that_is_made_for_it(tmp_path):
+    file = tmp_path / "new" / "a.json"
+    write_file(file, b"one")
+    write_file(file, b"two")
+    assert file.read_bytes() == b"two"
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_two_who_write_a_file_at_once_do_not_get_in_each_others_way(
+    tmp_path, monkeypatch
+):
+    file = tmp_path / "a.json"
+    written = []
+
+    def while_that_goes_to_the_disk(number):
+        if not written:
+            written.append(number)
+            write_file(file, b"second")
+            assert file.read_bytes() == b"second"
+
+    monkeypatch.setattr(os, "fsync", while_that_goes_to_the_disk)
+    write_file(file, b"the first")
+    assert file.read_bytes() == b"the first"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_disk_that_takes_nothing_leaves_the_file_as_it_was(tmp_path, monkeypatch):
+    file = tmp_path / "a.json"
+    write_file(file, b"before")
+
+    def full(number):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_file(file, b"after")
+    assert file.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_yaml_knows_on_which_line_something_stands(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("# places\nlabels:\n  - name: A\n    x: 1\n  - {x: 2}\n")
+    said = LinedYaml(file)
+    assert said.data == {"labels": [{"name": "A", "x": 1}, {"x": 2}]}
+    ways = [("labels",), ("labels", 0, "x"), ("labels", 1, "name"), ("none",)]
+    lines = [str(said.wrong(way, "?")).split(":")[1] for way in ways]
+    assert lines == ["2", "4", "5", "2"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a: 1\nb: &x [1]\nc: *x\n", ":3: this is no YAML: aliases (*name) have no"),
+        ("a: 1\na: 2\n", ':2: this is no YAML: the key "a" is there twice'),
+        ("a: 1\nb: [\n", ":3: this is no YAML: "),
+        ("a: !!python/object:os.system {}\n", ":1: this is no YAML: could not"),
+        ("a: 2001-99-99\n", ": this is no YAML: month must be in 1..12"),
+        ("\x00", ": this is no YAML: "),
+        ("[" * 5000, ":1: this is no YAML: values are nested more than 50 deep"),
+    ],
+)
+def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        LinedYaml(file)
+    assert str(error.value).startswith(f"{file}{said}")
+
+
+def test_what_a_file_holds_does_not_steer_a_terminal(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("a: 1\n")
+    assert str(LinedYaml(file).wrong(("a",), "\x1b[2J")) == f"{file}:1: \\x1b[2J"
+
+
+def test_links_in_a_circle_are_refused_with_a_sentence(tmp_path):
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises((ConfigError, OSError), match="symbolic links"):
+        read_file(resolved(tmp_path / "a"), 10)
+
+
+def test_a_path_with_a_nul_is_refused_with_a_sentence(tmp_path):
+    for look in (resolved, lambda path: read_file(path, 10)):
+        with pytest.raises(ConfigError, match="is no path: expected a text without"):
+            look(tmp_path / "a\0b")
+
+
+def test_what_has_no_end_is_refused_and_files_and_folders_are_not(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    for name, kind in (("pipe", "a pipe"), ("zero", "a device")):
+        with pytest.raises(ConfigError, match=f"a file or a folder, got {kind}"):
+            refuse_special(tmp_path / name)
+    refuse_special(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[" * 5000, "nested more than 50 deep"),
+        ("[" * 51 + "]" * 51, "nested more than 50 deep"),
+        ('{"a":' * 60 + "1" + "}" * 60, "nested more than 50 deep"),
+        ("- 1\n" * 50_000, "more than 40000 keys and values"),
+        ("a: " + "1:" * 5000 + "1", "a number has more than 100 characters"),
+        ("a: " + "1" * 200 + ".5", "a number has more than 100 characters"),
+        ("a: &a [1]\nb: *a", "aliases"),
+        ("#" * (1 << 18) + "#", "larger than 256 KiB"),
+    ],
+)
+def test_yaml_that_would_take_long_is_refused(tmp_path, text, words):
+    file = tmp_path / "a.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=words):
+        LinedYaml(file)
+
+
+def test_a_text_of_many_digits_is_no_number_where_texts_are_read(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("a: " + "1" * 200)
+    assert LinedYaml(file, texts=True).data == {"a": "1" * 200}

@@ -1,0 +1,71 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { StopTestButton } from "../../src/webmap/console/card_actions.js";
+
+/** A drive that has one robot, and what was asked of it. */
+function driveWith(report) {
+  const asked = [];
+  const robots = new Map([["r1", { robot: "r1", mine: true, ...report }]]);
+  return { asked, robots, stopTest: (robot) => asked.push(robot) };
+}
+
+test("two deliberate presses test the stop of a robot", () => {
+  const drive = driveWith({});
+  const button = new StopTestButton(drive);
+  assert.equal(button.state("r1", 0), "ready");
+  button.press("r1", 0);
+  assert.equal(button.state("r1", 100), "asking");
+  assert.deepEqual(drive.asked, []);
+  button.press("r1", 500);
+  assert.deepEqual(drive.asked, ["r1"]);
+  assert.equal(button.state("r1", 600), "ready");
+});
+
+test("a double click tests nothing, nor does a press long after the first", () => {
+  const drive = driveWith({});
+  const button = new StopTestButton(drive);
+  button.press("r1", 0);
+  button.press("r1", 100);
+  button.press("r1", 4500);
+  assert.deepEqual(drive.asked, []);
+});
+
+test("a first press on one robot is none on another", () => {
+  const drive = driveWith({});
+  drive.robots.set("r2", { robot: "r2", mine: true });
+  const button = new StopTestButton(drive);
+  button.press("r1", 0);
+  button.press("r2", 500);
+  assert.deepEqual(drive.asked, []);
+});
+
+test("a robot whose stop is stated, or was tested, is tested again", () => {
+  for (const known of [
+    { stop_time: 0.25, stop_source: "stated" },
+    { stop_time: 0.3, stop_source: "tested", test: { state: "done", text: "" } },
+  ]) {
+    const drive = driveWith(known);
+    const button = new StopTestButton(drive);
+    button.press("r1", 0);
+    button.press("r1", 500);
+    assert.deepEqual(drive.asked, ["r1"]);
+  }
+});
+
+test("what this page does not hold it does not test", () => {
+  const drive = driveWith({ mine: false });
+  const button = new StopTestButton(drive);
+  assert.equal(button.state("r1", 0), "take");
+  button.press("r1", 0);
+  button.press("r1", 500);
+  assert.deepEqual(drive.asked, []);
+});
+
+test("a test that goes on is said, and a robot that nobody drives has no test", () => {
+  const drive = driveWith({ test: { state: "waiting", text: "" } });
+  const button = new StopTestButton(drive);
+  assert.equal(button.state("r1", 0), "running");
+  assert.equal(button.state("r9", 0), "none");
+  assert.equal(button.state(null, 0), "none");
+});

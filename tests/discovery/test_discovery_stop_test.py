@@ -1,0 +1,246 @@
+"""``webmap doctor --stop-test`` against bases that stop by themselves, or do not."""
+
+import datetime
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
+from webmap.gate.events import Key, Press, StopRecord
+from webmap.gate.kept.records import Records
+from webmap.gate.rules.stoptest import MOVES_ON
+from webmap.testing import WitnessRobot
+from webmap_process import simulator
+
+# Beside others the simulator's clock lags, and a driver falls silent.
+pytestmark = pytest.mark.serial
+
+TODAY = datetime.datetime.now().astimezone().date().isoformat()
+
+
+def command(url, *arguments):
+    return [sys.executable, "-m", "webmap", "doctor", url, "--stop-test", *arguments]
+
+
+def run(url, *arguments, says=""):
+    return subprocess.run(
+        command(url, *arguments),
+        capture_output=True,
+        input=says,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_a_base_with_a_timeout_of_its_own_stops_by_itself_and_that_is_kept(folder):
+    with simulator("--port", "0", "--robot-timeout", "0.25") as url:
+        said = run(url, "robot_1", "--yes")
+    assert said.returncode == 0, said.stdout + said.stderr
+    found = re.search(r"Result of (\S+): it stops by itself in (\S+) s", said.stdout)
+    assert found, said.stdout
+    assert found[1] == TODAY
+    assert 0.25 <= float(found[2]) < 0.8
+    kept = Records(folder).stop_test_of(Key(url, "/robot_1/cmd_vel"))
+    assert kept.seconds == pytest.approx(float(found[2]), abs=0.006)
+
+
+def test_a_base_without_a_timeout_is_found_although_it_passed_before(folder):
+    with simulator("--port", "0", "--robot-timeout", "0") as url:
+        key = Key(url, "/robot_0/cmd_vel")
+        Records(folder).keep_stop_test(key, StopRecord(0.3, TODAY))
+        said = run(url, "robot_0", "--yes")
+    assert said.returncode == 1, said.stdout + said.stderr
+    assert "no more commands: does it stop?" in said.stdout
+    assert f"Result of {TODAY}: it does NOT stop by itself" in said.stdout
+    assert Records(folder).stop_test_of(key).seconds is None
+
+
+def test_nothing_moves_unless_the_person_agrees(folder):
+    with WitnessRobot() as robot:
+        said = run(robot.url, "robot", says="n\n")
+        moving = robot.log.moving_since(0.0)
+    assert said.returncode == 2
+    assert "will creep forward at 0.1 m/s" in said.stdout
+    assert "Nothing was moved." in said.stdout
+    assert moving == []
+
+
+def test_it_creeps_and_ends_with_zero_when_it_is_interrupted(folder):
+    with WitnessRobot(timeout=None) as robot:
+        with subprocess.Popen(
+            command(robot.url, "robot", "--yes"),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        ) as process:
+            for line in process.stdout:
+                if "no more commands" in line:
+                    break
+            process.send_signal(signal.SIGINT)
+            rest = process.stdout.read()
+            assert process.wait(10) == 2
+        moving = robot.log.moving_since(0.0)
+        ended = robot.log.told[-1]
+    assert "the robot is stopped" in rest
+    assert moving
+    assert max(told.speed for told in moving) <= 0.1 + 1e-9
+    assert ended.is_zero
+    assert time.monotonic() > ended.at > moving[-1].at
+
+
+def test_a_robot_whose_stop_stands_is_not_moved(folder):
+    with WitnessRobot() as robot:
+        Records(folder).keep_latch(
+            Key(robot.url, "/cmd_vel"), Press("Ann", "a1"), frozenset()
+        )
+        said = run(robot.url, "robot", "--yes")
+        assert robot.log.moving_since(0.0) == []
+    assert said.returncode == 2
+    assert "Nothing was found out: STOP" in said.stdout
+
+
+def test_a_robot_that_is_not_there_is_told_from_those_that_are(ros1, folder):
+    said = run(ros1, "robot_7", "--yes")
+    assert said.returncode == 2
+    assert "no robot 'robot_7'" in said.stderr
+    assert "robot_0, robot_1" in said.stderr
+
+
+def test_a_bridge_that_is_away_is_said():
+    said = run("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "0")
+    assert said.returncode == 2
+    assert "Nothing was found out" in said.stderr
+    assert "Traceback" not in said.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_that_is_interrupted_while_it_waits_has_found_nothing_out(number):
+    with subprocess.Popen(
+        command("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "30"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert "Waiting for the rosbridge" in process.stderr.readline()
+        process.send_signal(number)
+        assert "nothing was moved" in process.stdout.read()
+        assert process.wait(10) == UNKNOWN
+
+
+def test_two_addresses_are_one_too_many():
+    said = run("ws://127.0.0.1:1", "robot_0", "ws://127.0.0.1:2")
+    assert said.returncode == 2
+    assert "--stop-test takes one URL, got 2" in said.stderr
+
+
+# The hand, without a gate.
+
+FREE = {
+    "op": "robot",
+    "mine": False,
+    "armable": True,
+    "armed": False,
+    "latched": False,
+    "reason": None,
+    "epoch": None,
+    "test": None,
+    "stop_source": None,
+    "stop_time": None,
+    "stop_date": None,
+}
+MINE = {**FREE, "mine": True, "armed": True, "epoch": 3}
+
+
+def hand_that_tests():
+    """Return a hand whose robot creeps."""
+    hand = Hand(0.0)
+    hand.hear({"op": "tick", "tick": 7}, 0.0)
+    hand.hear(FREE, 0.0)
+    hand.begin(0.0)
+    hand.hear(MINE, 0.1)
+    hand.hear({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
+    return hand
+
+
+def test_the_hand_takes_the_robot_only_when_the_person_agreed():
+    hand = Hand(0.0)
+    hand.hear(FREE, 0.0)
+    assert hand.stage == "ready"
+    assert hand.step(60.0) == []
+    hand.begin(60.0)
+    assert hand.step(60.0) == [{"op": "take", "robot": "r1"}]
+    assert hand.step(60.05) == [], "it is not asked for at each step"
+
+
+def test_the_hand_says_that_every_input_is_released_and_nothing_else():
+    hand = hand_that_tests()
+    (state,) = hand.step(0.25)
+    assert json.dumps(state) == (
+        '{"op": "drive", "robot": "r1", "epoch": 3, "seq": 1, "tick": 7, '
+        '"x": 0.0, "y": 0.0, "turn": 0.0}'
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ({"op": "hello", "connection": "c2"}, "the gate was started anew meanwhile"),
+        ({"op": "refused", "what": "lease", "why": "STOP by Ann"}, "STOP by Ann"),
+        (
+            {**MINE, "test": {"state": "failed", "text": "a key was pressed"}},
+            "a key was pressed",
+        ),
+    ],
+)
+def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
+    hand = hand_that_tests()
+    hand.hear(words, 0.3)
+    assert hand.stage == "over"
+    assert hand.code == UNKNOWN
+    assert hand.news[-1] == f"Nothing was found out: {why}."
+
+
+def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
+    hand = Hand(0.0)
+    hand.hear({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
+    assert hand.step(9.0) == []
+    assert hand.stage == "coming"
+    hand.step(10.1)
+    assert hand.news == ["Nothing was found out: another WebMap has it."]
+
+
+@pytest.mark.parametrize(
+    ("test", "before", "after", "code"),
+    [
+        ({"state": "failed", "text": MOVES_ON}, 0.3, None, GOES_ON),
+        (
+            {"state": "done", "text": "stopped by itself after 0.26 s"},
+            None,
+            0.264,
+            STOPS,
+        ),
+    ],
+)
+def test_the_result_of_the_test_before_is_not_taken_for_this_ones(
+    test, before, after, code
+):
+    hand = hand_that_tests()
+    kept = {**MINE, "test": test, "stop_source": "tested", "stop_date": TODAY}
+    hand.hear({**kept, "stop_time": before}, 0.3)
+    assert hand.stage == "testing"
+    hand.hear({**kept, "stop_time": after}, 0.4)
+    assert hand.stage == "over"
+    assert hand.code == code
+    assert TODAY in hand.news[-1]

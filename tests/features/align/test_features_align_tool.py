@@ -1,0 +1,244 @@
+"""Who may align what, and what is kept of it."""
+
+import asyncio
+import json
+import math
+import os
+from types import SimpleNamespace
+
+import pytest
+from module_fakes import Channel, Link, Someone, pose
+
+from webmap import Map, Robot
+from webmap.core import alignment_store
+from webmap.poses.alignment import align_bridge, alignments
+from webmap.core.alignment_store import AlignmentStore, name_of
+from webmap.core.page import Page, PageEntry
+from webmap.base.geometry import Pose
+
+NAME = "ws://test:9090 Bob"
+
+
+class Saying(Channel):
+    """Notes what browser halves are told."""
+
+    def send(self, instance, message):
+        self.__dict__.setdefault("told", []).append(message)
+
+
+@pytest.fixture
+def channel():
+    return Saying()
+
+
+@pytest.fixture
+def store(tmp_path, monkeypatch):
+    fresh = AlignmentStore(tmp_path / "state")
+    monkeypatch.setattr("webmap.features.align.align_tool.store", fresh)
+    return fresh
+
+
+@pytest.fixture
+def robot(robot, link):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    return robot
+
+
+@pytest.fixture
+def tool(map, robot, store):
+    map.add_robot(robot)
+    return map.add_module("AlignTool")
+
+
+def answer(channel, key):
+    (said,) = [message[key] for message in channel.told if key in message]
+    channel.told.clear()
+    return said
+
+
+def save(tool, robot, x=1.0, y=2.0, angle=90.0, *, whole=False) -> None:
+    async def say():
+        wanted = {"robot": robot.id, "whole": whole, "x": x, "y": y, "angle": angle}
+        tool.on_message({"save": wanted})
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        if tasks:
+            await asyncio.wait(tasks)
+
+    asyncio.run(say())
+
+
+def test_the_page_is_told_what_there_is_to_align(tool, robot, channel, link):
+    ann = Robot("Ann")
+    ann.set_odometry_topic(link, "/ann/odom", type="geometry_msgs/PoseStamped")
+    tool.map.add_robot(ann)
+    align_bridge(link, 3.0, 0.0, 90.0)
+    tool.on_message({"begin": robot.id})
+    told = answer(channel, "align")
+    assert (told["robot"], told["name"], told["whole"]) == (robot.id, "Bob", True)
+    assert told["together"] == [robot.id, ann.id]
+    assert told["own"] == told["common"] == (3.0, 0.0, 90.0)
+    assert told["mark"] == alignments.mark(link)
+    ann.set_alignment(0.0, 0.0, 0.0)
+    tool.on_message({"begin": ann.id})
+    told = answer(channel, "align")
+    assert (told["whole"], told["own"]) == (False, (0.0, 0.0, 0.0))
+    ann.destroy()
+
+
+def test_what_is_saved_holds_and_is_kept(tool, robot, channel, store, link):
+    save(tool, robot)
+    line = "alignment = [1.0, 2.0, 90.0] # metres, metres, degrees"
+    assert answer(channel, "saved") == {"line": line, "lost": ""}
+    assert robot.whereabouts.own_alignment == Pose(1.0, 2.0, math.pi / 2)
+    again = AlignmentStore(store._folder)
+    bob = Robot("Bob")
+    bob.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    again.restore(bob)
+    assert bob.whereabouts.own_alignment == Pose(1.0, 2.0, math.pi / 2)
+    kept = json.loads(store.path(NAME).read_text())
+    assert (kept["by"], kept["of"], kept["instead_of"]) == ("Ann", NAME, None)
+    bob.destroy()
+
+
+def test_what_is_stated_anew_counts_more_than_what_was_saved(
+    tool, robot, store, link, caplog
+):
+    robot.set_alignment(5.0, 0.0, 0.0)
+    save(tool, robot)
+    same, other = Robot("Bob"), Robot("Bob")
+    for bob, stated in ((same, 5.0), (other, 6.0)):
+        bob.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+        bob.set_alignment(stated, 0.0, 0.0)
+        AlignmentStore(store._folder).restore(bob)
+    assert same.whereabouts.own_alignment == Pose(1.0, 2.0, math.pi / 2)
+    assert other.whereabouts.own_alignment == Pose(6.0, 0.0, 0.0)
+    assert "another one was stated since" in caplog.text
+    assert not store.path(NAME).exists()
+    for bob in (same, other):
+        bob.destroy()
+
+
+def test_all_behind_a_bridge_go_along_and_the_robots_own_ends(tool, robot, store, link):
+    save(tool, robot)
+    save(tool, robot, 7.0, 0.0, 0.0, whole=True)
+    assert alignments.of(link) == Pose(7.0, 0.0, 0.0)
+    assert robot.whereabouts.own_alignment is None
+    assert not store.path(NAME).exists()
+    fresh = Link()
+    AlignmentStore(store._folder).restore_bridge(fresh)
+    assert alignments.of(fresh) == Pose(7.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("state", ["driving", "stopping"])
+def test_a_robot_that_is_driven_stays_where_it_is(tool, robot, channel, state):
+    robot.report = SimpleNamespace(state=state)
+    tool.on_message({"begin": robot.id})
+    assert "Bob is being driven" in answer(channel, "refused")
+    save(tool, robot)
+    assert "Bob is being driven" in answer(channel, "refused")
+    assert robot.whereabouts.own_alignment is None
+
+
+def test_one_that_is_driven_keeps_its_whole_bridge_in_place(tool, robot, channel, link):
+    ann = Robot("Ann")
+    ann.set_odometry_topic(link, "/ann/odom", type="geometry_msgs/PoseStamped")
+    tool.map.add_robot(ann)
+    ann.report = SimpleNamespace(state="driving")
+    save(tool, robot, whole=True)
+    assert "Ann is being driven" in answer(channel, "refused")
+    save(tool, robot)
+    assert robot.whereabouts.own_alignment is not None
+    ann.destroy()
+
+
+@pytest.mark.parametrize("wrong", ["far", None, math.inf, 1e9])
+def test_numbers_that_make_no_sense_are_refused(tool, robot, channel, wrong):
+    save(tool, robot, wrong)
+    assert "metres and an angle in degrees" in answer(channel, "refused")
+    assert robot.whereabouts.own_alignment is None
+
+
+def test_a_viewer_aligns_nothing(tmp_path, robot, channel, store):
+    entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
+    page = Page(entry, channel, Someone(role="viewer"), None, {})
+    map = Map(page.element("map"), 700, 500)
+    map.add_robot(robot)
+    tool = map.add_module("AlignTool")
+    tool.on_message({"begin": robot.id})
+    assert answer(channel, "refused") == "Only an operator may align maps."
+    save(tool, robot)
+    assert answer(channel, "refused") == "Only an operator may align maps."
+    assert robot.whereabouts.own_alignment is None
+    page.close()
+
+
+def test_a_robot_that_nobody_places_cannot_be_aligned(tool, channel):
+    lost = Robot("Lost")
+    tool.map.add_robot(lost)
+    tool.on_message({"begin": lost.id})
+    assert "Nothing tells where Lost is" in answer(channel, "refused")
+    tool.on_message({"begin": "r0"})
+    assert answer(channel, "refused") == "Select a robot first."
+    lost.destroy()
+
+
+def test_what_cannot_be_kept_holds_and_that_is_said(tool, robot, channel, store):
+    store._folder.parent.mkdir(exist_ok=True)
+    store._folder.write_text("a file where the folder should be")
+    save(tool, robot)
+    said = answer(channel, "saved")
+    assert said["lost"].startswith("It holds until WebMap ends, and cannot be kept")
+    assert robot.whereabouts.own_alignment is not None
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", '{"alignment": [1, 2], "instead_of": 0}']
+)
+def test_a_file_that_cannot_be_read_aligns_nothing_and_is_said(
+    robot, store, caplog, text
+):
+    store.path(NAME).parent.mkdir(exist_ok=True)
+    store.path(NAME).write_text(text)
+    store.restore(robot)
+    assert robot.whereabouts.own_alignment is None
+    assert "cannot be read" in caplog.text
+
+
+def test_no_secret_of_an_address_is_kept():
+    link = SimpleNamespace(url="wss://ann:secret@south.example:9443/ros?token=secret")
+    assert name_of(link, "Bob") == "wss://south.example:9443/ros Bob"
+
+
+def test_files_are_in_the_state_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
+    assert alignment_store.store.path("x").parent == tmp_path
+
+
+def test_what_a_page_says_besides_is_ignored(tool, caplog):
+    tool.on_message({"align": 1})
+    assert "unknown message" in caplog.text
+
+
+def test_a_robot_that_comes_later_is_aligned_as_it_was_saved(tool, robot, store, link):
+    store.save("ws://test:9090 Eve", None, Pose(4.0, 0.0, 0.0), "Ann")
+    store._stated.clear()
+    eve = Robot("Eve")
+    eve.set_odometry_topic(link, "/eve/odom", type="geometry_msgs/PoseStamped")
+    tool.map.add_robot(eve)
+    link.say("/eve/odom", {"header": {}, "pose": pose(1.0, 0.0)})
+    assert eve.position.x == pytest.approx(5.0)
+    eve.destroy()
+
+
+@pytest.mark.parametrize("kind", ["deep", "pipe"])
+def test_an_alignment_that_cannot_be_read_is_as_if_nothing_was_saved(
+    store, robot, caplog, kind
+):
+    file = store.path(NAME)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if kind == "pipe":
+        os.mkfifo(file)
+    else:
+        file.write_bytes(b"[" * 100_000)
+    AlignmentStore(store._folder).restore(robot)
+    assert "as if nothing was saved" in caplog.text

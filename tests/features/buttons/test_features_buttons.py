@@ -1,0 +1,453 @@
+"""Buttons of robots: what they do over a real rosbridge, and what they never do."""
+
+import asyncio
+import contextlib
+import json
+import threading
+import time
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import pytest
+from button_robot import robot_node
+
+from webmap import Bridge, Robot
+from webmap.config.buttons import ButtonMistake, read_button
+from webmap.core.page import Page, PageEntry
+from webmap.base.errors import ConfigError
+from webmap.scene.events import Event
+from webmap_process import simulator
+
+DOCK = {"label": "Dock", "service": "/dock", "type": "std_srvs/Trigger"}
+HORN = {
+    "label": "Horn",
+    "topic": "/horn",
+    "type": "std_msgs/Bool",
+    "message": {"data": True},
+}
+
+
+# What a configuration may say.
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ({"service": None}, "", "one of service, topic and parameter; got none"),
+        ({"topic": "/x"}, "", "got service and topic"),
+        ({"lable": "x"}, "lable", 'no such key; did you mean "label"?'),
+        ({"label": ""}, "label", "expected a text of 1 to 60"),
+        ({"label": None}, "label", "expected a text of 1 to 60"),
+        ({"service": "a b"}, "service", "the name of a service"),
+        ({"type": "Trigger"}, "type", "got 'Trigger', expected a type, such as \"std"),
+        ({"timeout": 0}, "timeout", "expected seconds above 0, up to 3600"),
+        ({"timeout": True}, "timeout", "expected seconds above 0"),
+        ({"confirm": 1}, "confirm", "expected true, false or a question"),
+        ({"form": "yes"}, "form", "expected true or false"),
+        ({"args": [1]}, "args", "expected a table of fields"),
+        ({"args": {"data": 1}}, "args.data", "no such field; there are none"),
+        (
+            {"type": "std_srvs/SetBool", "args": {"data": 1}},
+            "args.data",
+            "got 1, expected true or false",
+        ),
+        ({"type": "my/Srv", "args": {"x": {1, 2}}}, "args", "no JSON can hold it"),
+        ({"type": None, "form": True}, "type", "a form needs the type"),
+    ],
+)
+def test_a_button_that_makes_no_sense_is_refused_by_its_key(change, key, words):
+    data = {**DOCK, **change}
+    data = {name: value for name, value in data.items() if value is not None}
+    with pytest.raises(ButtonMistake) as error:
+        read_button(data)
+    assert error.value.key == key
+    assert words in error.value.words
+
+
+@pytest.mark.parametrize(
+    ("button", "words"),
+    [
+        ({"topic": "/x", "type": "geometry_msgs/Twist"}, "carries a velocity"),
+        ({"topic": "/x", "type": "geometry_msgs/msg/TwistStamped"}, "a velocity"),
+        ({"topic": "/bob/cmd_vel", "type": "std_msgs/String"}, "carries a velocity"),
+        ({"topic": "bob/cmd_vel/", "type": "std_msgs/String"}, "carries a velocity"),
+        (
+            {"topic": "/wheels/commands", "type": "std_msgs/Float64MultiArray"},
+            "/wheels/commands of type std_msgs/Float64MultiArray carries a velocity",
+        ),
+        ({"topic": "/x", "type": "gazebo_msgs/ModelState"}, "the place or the speed"),
+        ({"topic": "/x", "type": "geometry_msgs/PoseStamped"}, "carries a goal"),
+        ({"topic": "/goal_pose", "type": "std_msgs/Empty"}, "carries a goal"),
+        ({"topic": "/mb/cancel", "type": "std_msgs/Empty"}, "the end of a goal"),
+        ({"topic": "/x", "type": "actionlib_msgs/GoalID"}, "the end of a goal"),
+        ({"service": "/n/_action/send_goal"}, "carries a goal"),
+        ({"service": "/n/_action/cancel_goal"}, "the end of a goal"),
+        ({"service": "/x", "type": "action_msgs/srv/CancelGoal"}, "the end of a goal"),
+    ],
+)
+def test_what_moves_robots_is_refused_by_name_and_by_type(link, robot, button, words):
+    with pytest.raises(ConfigError, match="the gate") as error:
+        robot.add_module("Buttons", link, [{"label": "Go", **button}])
+    assert "button 'Go'" in str(error.value)
+    assert words in str(error.value)
+    assert robot.modules == []
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (None, "a value is needed"),
+        (float("nan"), "expected a finite number"),
+        (2**63, "64 bits"),
+        ([1, "a"], "a list of one kind"),
+        ({"a": 1}, "expected true, false, a number, a text or a list"),
+    ],
+)
+def test_a_parameter_has_a_value_that_ros_knows(value, words):
+    with pytest.raises(ButtonMistake, match=words):
+        read_button({"label": "P", "parameter": "/p", "value": value})
+
+
+def test_no_two_buttons_of_a_robot_have_one_label(link, robot):
+    with pytest.raises(ConfigError, match="two buttons have the label 'Dock'"):
+        robot.add_module("Buttons", link, [DOCK, DOCK])
+
+
+def test_a_topic_that_a_robot_is_moved_by_is_refused_whatever_it_is_called(robot):
+    bridge = Bridge("ws://test-buttons:9090")
+    other = Robot("Ann")
+    try:
+        other.set_twist_topic(
+            bridge,
+            "/wheels",
+            stop_hooks=[{"topic": "/lock", "type": "std_msgs/Bool"}],
+        )
+        other.set_move_topic(bridge, "/there", cancel_topic="/not_there")
+        same = Bridge("ws://TEST-buttons:9090/")
+        for topic in ("/wheels", "/there", "/not_there", "lock"):
+            button = {"label": "Go", "topic": topic, "type": "std_msgs/Bool"}
+            with pytest.raises(ConfigError, match="the gate does"):
+                robot.add_module("Buttons", same, [button])
+    finally:
+        other.destroy()
+
+
+# What it does over a rosbridge.
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """Let a busy machine take its time to tell a type."""
+    monkeypatch.setattr("webmap.ros.rosbridge.graph.BRIEF", 20.0)
+
+
+@pytest.fixture(scope="module")
+def sim() -> Iterator[dict[str, str]]:
+    """The addresses of two simulated rosbridges, by dialect."""
+    with (
+        simulator("--robots", "1") as ros1,
+        simulator("--robots", "1", "--dialect", "ros2") as ros2,
+    ):
+        yield {"ros1": ros1, "ros2": ros2}
+
+
+@contextlib.asynccontextmanager
+async def linked(url, services=None, topics=None):
+    node = robot_node(url, services or {}, topics or {})
+    playing = await asyncio.to_thread(node.__enter__)
+    bridge = Bridge(url)
+    bridge.start(asyncio.get_running_loop())
+    await until(lambda: bridge.state == "open")
+    try:
+        yield bridge, playing
+    finally:
+        await bridge.stop()
+        await asyncio.to_thread(node.__exit__, None, None, None)
+
+
+async def until(condition) -> None:
+    deadline = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)
+
+
+def trigger(success=True, message="docked"):
+    return ("std_srvs/Trigger", lambda args: {"success": success, "message": message})
+
+
+def pressed(robot, button, url, values=None, *, before=None, **world):
+    """Press one button over a simulator; return it and what the robot's node took."""
+
+    async def scenario():
+        async with linked(url, **world) as (bridge, node):
+            module = robot.add_module("Buttons", bridge, [button])
+            (only,) = module.buttons
+            if before is not None:
+                before(bridge)
+            await only.press(values, by="Ann")
+            await until(lambda: only.state != "done" or node.heard or node.calls)
+            return only, node
+
+    return asyncio.run(scenario())
+
+
+def test_a_press_calls_the_service_and_says_what_it_answered(sim, robot):
+    heard = []
+    robot.add_module(
+        lambda _: SimpleNamespace(on_button=lambda b: heard.append((b.state, b.by)))
+    )
+    button, node = pressed(robot, DOCK, sim["ros1"], services={"/dock": trigger()})
+    assert (button.state, button.words) == ("done", "Done: docked")
+    assert [name for name, _ in node.calls] == ["/dock"]
+    assert heard == [("running", "Ann"), ("done", "Ann")]
+
+
+def test_success_false_is_a_failure_in_the_robots_words(sim, robot):
+    services = {"/dock": trigger(False, "no dock in sight")}
+    button, _ = pressed(robot, DOCK, sim["ros1"], services=services)
+    assert (button.state, button.words) == ("failed", "Failed: no dock in sight")
+
+
+def test_a_service_that_is_not_there_is_a_failure(sim, robot):
+    button, _ = pressed(robot, DOCK, sim["ros1"])
+    assert button.state == "failed"
+    assert "/dock" in button.words
+    assert "does not exist" in button.words
+
+
+def test_a_service_that_does_not_answer_is_given_up_after_the_timeout(sim, robot):
+    services = {"/dock": ("std_srvs/Trigger", lambda args: None)}
+    button, _ = pressed(robot, {**DOCK, "timeout": 0.2}, sim["ros1"], services=services)
+    assert button.words == "Failed: /dock did not answer within 0.2 s"
+
+
+def test_a_press_publishes_the_message(sim, robot):
+    button, node = pressed(robot, HORN, sim["ros1"], topics={"/horn": "std_msgs/Bool"})
+    assert button.words == "Published"
+    assert node.heard == [("/horn", {"data": True})]
+
+
+def test_while_it_runs_it_cannot_be_pressed_again(sim, robot):
+    go_on = threading.Event()
+
+    def wait(args: dict) -> dict:
+        go_on.wait(30)
+        return {"success": False, "message": "no dock in sight"}
+
+    async def scenario():
+        services = {"/dock": ("std_srvs/Trigger", wait)}
+        async with linked(sim["ros1"], services=services) as (bridge, node):
+            module = robot.add_module("Buttons", bridge, [{**DOCK, "timeout": 60}])
+            dock = module["Dock"]
+            first = asyncio.create_task(dock.press(by="Ann"))
+            try:
+                await until(lambda: node.calls)
+                assert dock.barred == "it runs already, for Ann"
+                assert await dock.press(by="Bea") is False
+            finally:
+                go_on.set()
+            assert await first is False
+            assert len(node.calls) == 1
+            assert dock.by == "Ann"
+
+    asyncio.run(scenario())
+
+
+def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
+    async def scenario():
+        async with linked(sim["ros1"], services={"/dock": trigger()}) as (bridge, node):
+            light = {**DOCK, "label": "Light", "during_stop": True}
+            module = robot.add_module("Buttons", bridge, [DOCK, light])
+            said = {"doing": "stopped", "holder": None, "goal": None}
+            report = SimpleNamespace(latched=True, other_writer=None, **said)
+            robot.on_gate_report(report)
+            assert await module["Dock"].press() is False
+            assert module["Dock"].words == "Not done: STOP stands: reset it first"
+            assert node.calls == []
+            assert await module["Light"].press() is True
+
+    asyncio.run(scenario())
+
+
+def test_a_topic_that_turns_out_to_be_a_velocity_is_refused_at_the_press(sim, robot):
+    button = {"label": "Go", "topic": "/wheels", "type": "std_msgs/Bool"}
+    pressed_, node = pressed(
+        robot, button, sim["ros1"], topics={"/wheels": "geometry_msgs/Twist"}
+    )
+    assert pressed_.state == "failed"
+    assert "refused: /wheels of type geometry_msgs/Twist carries" in pressed_.words
+    assert node.heard == []
+
+
+def test_a_service_that_turns_out_to_cancel_goals_is_refused_at_the_press(sim, robot):
+    services = {"/dock": ("action_msgs/CancelGoal", lambda args: {})}
+    button, node = pressed(
+        robot, {"label": "Dock", "service": "/dock"}, sim["ros1"], services=services
+    )
+    assert "refused: /dock of type action_msgs/CancelGoal" in button.words
+    assert node.calls == []
+
+
+def test_a_topic_that_is_declared_later_is_refused_at_the_press(sim, robot):
+    def declare(bridge):
+        robot.set_move_topic(Bridge(bridge.url), "/horn")
+
+    button, node = pressed(
+        robot, HORN, sim["ros1"], before=declare, topics={"/horn": "std_msgs/Bool"}
+    )
+    assert "refused: /horn carries a goal" in button.words
+    assert node.heard == []
+
+
+def test_a_topic_of_another_type_is_not_published_on(sim, robot):
+    button, node = pressed(
+        robot, HORN, sim["ros1"], topics={"/horn": "std_msgs/String"}
+    )
+    assert (
+        button.words == "Failed: /horn is of type std_msgs/String, not of std_msgs/Bool"
+    )
+    assert node.heard == []
+
+
+def params(store):
+    """rosapi's parameters of ROS 1; what begins with /fixed cannot be set."""
+
+    def set_param(args):
+        if not args["name"].startswith("/fixed"):
+            store[args["name"]] = args["value"]
+        return {}
+
+    def get_param(args):
+        return {"value": store.get(args["name"], args.get("default", ""))}
+
+    return {
+        "/rosapi/set_param": ("rosapi/SetParam", set_param),
+        "/rosapi/get_param": ("rosapi/GetParam", get_param),
+    }
+
+
+@pytest.mark.parametrize("value", [0.4, 7, True, "fast", [1, 2]])
+def test_a_parameter_of_ros_1_is_set_and_read_back(sim, robot, value):
+    store: dict[str, str] = {}
+    button = {"label": "P", "parameter": "/planner/x", "value": value}
+    done, _ = pressed(robot, button, sim["ros1"], services=params(store))
+    assert done.state == "done"
+    assert json.loads(store["/planner/x"]) == value
+
+
+def test_a_parameter_that_stays_as_it_was_is_a_failure(sim, robot):
+    store = {"/fixed/x": "1"}
+    button = {"label": "P", "parameter": "/fixed/x", "value": 2}
+    failed, _ = pressed(robot, button, sim["ros1"], services=params(store))
+    assert failed.words == "Failed: /fixed/x was to be 2, and the robot says 1"
+
+
+@pytest.mark.parametrize(
+    ("result", "state", "words"),
+    [
+        ({"successful": True, "reason": ""}, "done", "max_vel is 0.4"),
+        (
+            {"successful": False, "reason": "too fast"},
+            "failed",
+            "Failed: /controller refused: too fast",
+        ),
+    ],
+)
+def test_a_parameter_of_ros_2_is_set_by_its_node(sim, robot, result, state, words):
+    button = {
+        "label": "P",
+        "parameter": "max_vel",
+        "node": "/controller",
+        "value": 0.4,
+    }
+    services = {
+        "/controller/set_parameters": (
+            "rcl_interfaces/SetParameters",
+            lambda args: {"results": [result]},
+        )
+    }
+    done, node = pressed(robot, button, sim["ros2"], services=services)
+    assert (done.state, done.words) == (state, words)
+    ((_, args),) = node.calls
+    (parameter,) = args["parameters"]
+    assert parameter["name"] == "max_vel"
+    value = parameter["value"]
+    assert len(value) == 10, "the graph knows the type, and fills the other fields in"
+    said = {name: each for name, each in value.items() if each}
+    assert said == {"type": 3, "double_value": 0.4}
+
+
+def test_without_a_link_it_says_so(robot):
+    async def scenario():
+        module = robot.add_module("Buttons", Bridge("ws://127.0.0.1:1"), [HORN])
+        assert await module["Horn"].press() is False
+        return module["Horn"].words
+
+    assert "was never opened" in asyncio.run(scenario())
+
+
+def test_fields_that_nobody_ships_are_asked_of_ros_1_on_request_only(sim, robot):
+    button = {"label": "F", "topic": "/f", "type": "nav_msgs/Path2", "form": True}
+
+    async def scenario(dialect):
+        asked = []
+        details = {"typedefs": [typedef("nav_msgs/Path2", n="int8", p="my/Part"),
+                                typedef("my/Part", ok="bool")]}  # fmt: skip
+        services = {
+            "/rosapi/message_details": (
+                "rosapi/MessageDetails",
+                lambda args: asked.append(args) or details,
+            )
+        }
+        async with linked(sim[dialect], services) as (bridge, _):
+            (only,) = robot.add_module("Buttons", bridge, [button]).buttons
+            with pytest.raises(ConfigError, match="Path2 are not known here"):
+                only.fields()
+            assert asked == []
+            try:
+                await only.ask_fields()
+            except Exception as error:
+                return str(error), asked
+            return [field.name for field in only.fields()], asked
+
+    assert asyncio.run(scenario("ros1")) == (["n", "p"], [{"type": "nav_msgs/Path2"}])
+    words, asked = asyncio.run(scenario("ros2"))
+    assert "a ROS 2 bridge is not asked for the fields of nav_msgs/Path2" in words
+    assert asked == []
+
+
+def typedef(type, **fields):
+    return {
+        "type": type,
+        "fieldnames": list(fields),
+        "fieldtypes": list(fields.values()),
+        "fieldarraylen": [-1] * len(fields),
+        "examples": [""] * len(fields),
+        "constnames": [],
+        "constvalues": [],
+    }
+
+
+# How it looks on a page.
+
+
+def test_a_viewer_who_may_not_sees_the_button_disabled_and_cannot_press_it(
+    link, robot, channel, tmp_path
+):
+    entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
+    viewer = SimpleNamespace(id="v2", name="Vic", role="viewer")
+    page = Page(entry, channel, viewer, None, {})
+    module = robot.add_module("Buttons", link, [DOCK])
+    with page.scope.active():
+        module.show_buttons_in(page.element("here"))
+    (holder,) = page.element("here").children
+    go = next(e for e in holder.walk() if getattr(e, "tag", "") == "button")
+    assert go.get("disabled") is not None
+    assert go.get("title") == "Not now: only an operator may"
+    (handler,) = go.handlers("click")
+    asyncio.run(handler(Event(kind="click")))
+    assert module["Dock"].state == "idle"
+    page.close()
+    assert module["Dock"]._listeners != []  # the module's own
+    assert len(module["Dock"]._listeners) == 1

@@ -1,0 +1,79 @@
+import assert from "node:assert/strict";
+import { beforeEach, describe, test } from "node:test";
+
+import { NewestPicture } from "../../../src/webmap/features/cameras/camera_panel.js";
+
+const settled = () => new Promise((resolve) => setImmediate(resolve));
+
+describe("the newest picture", () => {
+  let now, loads, shown, picture;
+  beforeEach(() => {
+    [now, loads, shown] = [0, [], []];
+    const load = (url) =>
+      new Promise((resolve, reject) => loads.push({ url, end: () => resolve(url), fail: reject }));
+    picture = new NewestPicture(load, (one) => shown.push(one), () => now);
+  });
+
+  test("loads one at a time, and of what came meanwhile the last", async () => {
+    for (const url of ["a", "b", "c"]) picture.offer(url, 0);
+    assert.deepEqual(loads.map(({ url }) => url), ["a"]);
+    loads[0].end();
+    await settled();
+    assert.deepEqual(loads.map(({ url }) => url), ["a", "c"]);
+    loads[1].end();
+    await settled();
+    assert.deepEqual(shown, ["a", "c"]);
+  });
+
+  test("is as old as it was when it came, and ages on", async () => {
+    picture.offer("a", 300);
+    now = 200;
+    loads[0].end();
+    await settled();
+    assert.equal(picture.age, 500);
+    now = 1200;
+    assert.equal(picture.age, 1500);
+  });
+
+  test("is, before there is one, as old as the wait for it", () => {
+    now = 1234;
+    assert.equal(picture.age, 1234);
+    assert.ok(!picture.shown);
+  });
+
+  test("that cannot be loaded makes room for the next and does not count", async () => {
+    picture.offer("a", 0);
+    picture.offer("b", 0);
+    now = 500;
+    loads[0].fail(new Error("404"));
+    await settled();
+    assert.equal(picture.age, 500);
+    loads[1].end();
+    await settled();
+    assert.deepEqual(shown, ["b"]);
+  });
+
+  test("is not held up for good by one that never comes", async () => {
+    picture.offer("a", 0);
+    now = 2000;
+    picture.offer("b", 0);
+    loads[1].end();
+    loads[0].end();
+    await settled();
+    assert.deepEqual(shown, ["b"]);
+  });
+
+  test("of the camera before is not shown for the next one", async () => {
+    picture.offer("a", 0);
+    now = 700;
+    picture.restart();
+    loads[0].end();
+    await settled();
+    assert.deepEqual(shown, []);
+    assert.equal(picture.age, 0);
+    picture.offer("b", 0);
+    loads[1].end();
+    await settled();
+    assert.deepEqual(shown, ["b"]);
+  });
+});

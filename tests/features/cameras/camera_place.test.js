@@ -1,0 +1,61 @@
+import assert from "node:assert/strict";
+import { afterEach, describe, test } from "node:test";
+
+import { keep, nextCorner, readKept } from "../../../src/webmap/features/cameras/camera_view.js";
+
+const MEANT = { open: false, dock: "side", camera: "", x: 0, y: 0 };
+
+/** @param {string | null} text */
+function storage(text) {
+  globalThis.localStorage = {
+    getItem: () => text,
+    setItem: (_key, value) => {
+      text = value;
+    },
+  };
+}
+
+describe("what is kept of the camera's panel", () => {
+  afterEach(() => {
+    delete globalThis.localStorage;
+  });
+
+  test("comes back as it was", () => {
+    storage(null);
+    const kept = { open: true, dock: "float", camera: "Front", x: 0.25, y: 1 };
+    keep(kept);
+    assert.deepEqual(readKept(), kept);
+  });
+
+  test("is what is meant without it where there is no storage", () => {
+    assert.deepEqual(readKept(), MEANT);
+    keep({ ...MEANT, open: true });
+  });
+
+  for (const text of [
+    "",
+    "{",
+    "null",
+    "7",
+    "[]",
+    '"open"',
+    '{"open": 1, "dock": "moon", "camera": 7, "x": "0", "y": null}',
+    '{"x": -1, "y": 1.5}',
+    '{"x": 1e999}',
+  ]) {
+    test(`is not taken from ${text || "nothing"}`, () => {
+      storage(text);
+      assert.deepEqual(readKept(), MEANT);
+    });
+  }
+});
+
+test("corners follow each other clockwise, from wherever it was dragged", () => {
+  const round = [];
+  let place = { x: 0.2, y: 0.4 };
+  for (let turn = 0; turn < 5; turn++) {
+    place = nextCorner(place.x, place.y);
+    round.push(`${place.x}${place.y}`);
+  }
+  assert.deepEqual(round, ["10", "11", "01", "00", "10"]);
+});

@@ -1,0 +1,323 @@
+"""Cameras on the web: pulled once for all who watch, over real connections."""
+
+import asyncio
+import io
+import ssl
+import threading
+import time
+
+import pytest
+from PIL import Image
+
+from camera_server import BOUNDARY, CameraServer, part
+from webmap import Robot
+from webmap.core.pictures import pictures
+from webmap.base.errors import ConfigError
+from webmap.base.lifecycle import Lifecycle
+from webmap.features.cameras import http_camera
+from webmap.features.cameras.http_camera import HttpCamera
+from webmap.ros import image_pull
+from webmap.ros.backoff import Backoff
+from webmap.ros.image_address import parse_address
+from webmap.base.scope import Scope, current_scope
+
+STREAM = "/stream?topic=/camera/image_raw&type=mjpeg"
+
+
+async def until(condition, seconds=10.0) -> None:
+    patience = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < patience, "it never came true"
+        await asyncio.sleep(0.005)
+
+
+def run(scenario) -> None:
+    """Run a scenario with a server and a robot."""
+
+    async def whole():
+        robot = Robot("Bob")
+        http_camera.lifecycle.begin(asyncio.get_running_loop())
+        try:
+            async with CameraServer() as server:
+                await scenario(server, robot)
+                robot.destroy()
+                await until(lambda: server.open == 0)
+        finally:
+            robot.destroy()
+            await http_camera.lifecycle.end()
+
+    asyncio.run(whole())
+
+
+@pytest.fixture(autouse=True)
+def own_process(monkeypatch):
+    """Start nothing but what a test made."""
+    monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
+
+
+@pytest.fixture(autouse=True)
+def quickly_again(monkeypatch):
+    """Wait a moment only until it is tried again."""
+    monkeypatch.setattr(Backoff, "next", lambda self, lasted=0.0: 0.02)
+
+
+def shown(camera) -> Image.Image:
+    published = pictures.get(camera.url.rpartition("/")[2])
+    assert published.media_type == "image/jpeg"
+    return Image.open(io.BytesIO(published.data))
+
+
+def test_a_stream_is_pulled_once_for_all_and_only_while_somebody_watches():
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
+        assert not server.asked
+        seen = []
+        first = camera.watch(lambda: seen.append(camera.url))
+        others = [camera.watch(lambda: None) for _ in range(20)]
+        await until(lambda: len(set(seen)) > 3)
+        assert shown(camera).size == (16, 12)
+        assert (server.open, len(server.asked)) == (1, 1)
+        assert server.asked[0].startswith(f"GET {STREAM} HTTP/1.0\r\n")
+        first.remove()
+        assert camera.watched
+        for watching in others:
+            watching.remove()
+        await until(lambda: server.open == 0)
+        assert camera.url is None
+
+    run(scenario)
+
+
+def test_pictures_go_on_when_the_scope_of_the_first_who_watched_has_ended():
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
+        first, scopes = Scope("first"), []
+        with first.active():
+            camera.watch(lambda: None)
+            camera.watch(lambda: None).remove()
+        assert len(first) == 1
+        camera.watch(lambda: scopes.append(current_scope()))
+        first.close()
+        await until(lambda: len(scopes) > 2)
+        assert set(scopes) == {None}
+
+    run(scenario)
+
+
+def test_who_watches_before_the_process_runs_sees_pictures_when_it_does(robot):
+    async def scenario():
+        async with CameraServer() as server:
+            camera = HttpCamera(robot, server.at(STREAM), throttle=0)
+            camera.watch(lambda: None)
+            for _ in range(2):  # a process may stop and start again
+                http_camera.lifecycle.begin(asyncio.get_running_loop())
+                await until(lambda last=camera.stamp: camera.stamp != last)
+                await http_camera.lifecycle.end()
+                await until(lambda: server.open == 0)
+            camera.destroy()
+
+    asyncio.run(scenario())
+
+
+def test_a_single_picture_is_asked_for_again_at_a_polite_rate():
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at("/snapshot"), throttle=50)
+        seen = []
+        began = time.monotonic()
+        camera.watch(lambda: seen.append(shown(camera).size))
+        await until(lambda: len(seen) >= 5)
+        assert time.monotonic() - began >= 4 * 0.05 - 0.01
+        assert len(server.asked) <= 6
+
+    run(scenario)
+
+
+def test_a_stream_is_thinned_out_to_its_newest_pictures():
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=200)
+        seen = []
+        camera.watch(lambda: seen.append(shown(camera).getpixel((8, 6))[0]))
+        await until(lambda: len(seen) >= 3 and server.pictures > 2 * len(seen))
+        newest = server.pictures * 5
+        assert newest - seen[-1] < 15 * 5
+
+    run(scenario)
+
+
+def test_the_last_picture_of_a_burst_is_shown_though_nothing_follows_it():
+    async def scenario(server, robot):
+        server.frozen = True
+        head = (
+            f"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;"
+            f"boundary={BOUNDARY}\r\n\r\n--{BOUNDARY}\r\n"
+        )
+        server.pictures = 1
+        first = part(server.picture())
+        server.pictures = 40
+        server.scripts["/burst"] = (
+            head.encode() + first + part(server.picture()),
+            False,
+        )
+        camera = robot.add_module("HttpCamera", server.at("/burst"), throttle=100)
+        camera.watch(lambda: None)
+        await until(lambda: camera.url and shown(camera).getpixel((8, 6))[0] > 190)
+
+    run(scenario)
+
+
+@pytest.mark.parametrize(
+    ("path", "answer", "said"),
+    [
+        ("/a", b"HTTP/1.1 404 No\r\n\r\n", "answers 404"),
+        ("/b", b"HTTP/1.1 302 No\r\nLocation: /stream\r\n\r\n", "not followed"),
+        ("/c", b"HTTP/1.1 200 OK\r\nContent-Type: text/html\r\n\r\nhi", "text/html"),
+        ("/d", b"", "without an answer"),
+        (
+            "/e",
+            b"HTTP/1.1 200 OK\r\nContent-Type: image/jpeg\r\n\r\n<svg onload=x>",
+            "no JPEG, PNG or WebP",
+        ),
+    ],
+)
+def test_what_is_no_camera_is_a_problem_that_ends_when_it_is_one(path, answer, said):
+    async def scenario(server, robot):
+        server.scripts[path] = (answer, True)
+        camera = robot.add_module("HttpCamera", server.at(path), "Front", throttle=20)
+        camera.watch(lambda: None)
+        await until(lambda: robot.problems)
+        (text,) = robot.problems.values()
+        assert text.startswith(f"Front at {server.at(path)}: ")
+        assert said in text
+        # Where it would have led, nobody went.
+        assert {line.split()[1] for line in server.asked} == {path}
+        del server.scripts[path]
+        await until(lambda: camera.url is not None)
+        assert not robot.problems
+
+    run(scenario)
+
+
+def test_a_stream_that_ends_is_opened_again():
+    async def scenario(server, robot):
+        head = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=b"
+        server.scripts[STREAM] = (head + b"\r\n\r\n", True)
+        camera = robot.add_module("HttpCamera", server.at(STREAM))
+        camera.watch(lambda: None)
+        await until(lambda: len(server.asked) >= 3)
+        assert "it hung up" in next(iter(robot.problems.values()))
+        del server.scripts[STREAM]
+        await until(lambda: camera.url is not None)
+
+    run(scenario)
+
+
+def test_a_camera_that_drips_without_a_picture_is_given_up_and_tried_again():
+    async def scenario(server, robot):
+        server.scripts["/drip"] = (b"HTTP/1.1 200 OK\r\nContent-Type: ima", False)
+        said = []
+        pull = image_pull.Pull(
+            image_pull.Address("127.0.0.1", server.port, False, "/drip", "x"),
+            0.0,
+            lambda picture: None,
+            said.append,
+            patience=0.1,
+            backoff=Backoff(),
+        )
+        pull.start(asyncio.get_running_loop())
+        await until(lambda: len(server.asked) >= 2)
+        await pull.stop()
+        assert said[0] == "no picture came for 0.1 s"
+
+    run(scenario)
+
+
+def test_where_nobody_listens_it_is_said():
+    async def scenario(server, robot):
+        server._server.close()
+        camera = robot.add_module("HttpCamera", server.at("/stream"))
+        camera.watch(lambda: None)
+        await until(lambda: robot.problems)
+        assert "nothing listens there" in next(iter(robot.problems.values()))
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("name", ["cam..local", ".local", f"{'c' * 64}.local"])
+def test_a_name_that_no_host_can_have_is_said_and_tried_again(robot, name):
+    async def scenario():
+        said = []
+        pull = image_pull.Pull(
+            parse_address(f"http://{name}/stream"),
+            0.0,
+            lambda picture: None,
+            said.append,
+        )
+        pull.start(asyncio.get_running_loop())
+        await until(lambda: len(said) >= 2)
+        await pull.stop()
+        assert set(said) == {"there is no such host"}
+
+    asyncio.run(scenario())
+
+
+def test_who_may_vouch_for_a_camera_is_read_once_and_in_a_thread(monkeypatch):
+    read_in = []
+    create = ssl.create_default_context
+
+    def reading():
+        read_in.append(threading.current_thread())
+        return create()
+
+    monkeypatch.setattr(ssl, "create_default_context", reading)
+
+    async def scenario(server, robot):
+        said = []
+        address = parse_address(server.at("/snapshot").replace("http:", "https:"))
+        pull = image_pull.Pull(address, 0.0, lambda picture: None, said.append)
+        pull.start(asyncio.get_running_loop())
+        await until(lambda: len(said) >= 3)
+        await pull.stop()
+
+    run(scenario)
+    (thread,) = read_in
+    assert thread is not threading.main_thread()
+
+
+def test_who_watches_after_a_camera_failed_to_begin_has_it_begin_again(monkeypatch):
+    async def scenario(server, robot):
+        camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
+
+        def failing(*args):
+            raise RuntimeError("not now")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(http_camera, "Pull", failing)
+            with pytest.raises(RuntimeError, match="not now"):
+                camera.watch(lambda: None)
+        assert not camera.watched
+        camera.watch(lambda: None)
+        await until(lambda: camera.url is not None)
+
+    run(scenario)
+
+
+def test_what_does_not_speak_tls_is_said():
+    async def scenario(server, robot):
+        address = server.at("/").replace("http:", "https:")
+        camera = robot.add_module("HttpCamera", address)
+        camera.watch(lambda: None)
+        await until(lambda: robot.problems)
+        assert "does not speak TLS" in next(iter(robot.problems.values()))
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("throttle", [-1, 0.5, "100", None])
+def test_a_time_between_pictures_that_is_none_is_refused(robot, throttle):
+    with pytest.raises(ConfigError, match="milliseconds"):
+        HttpCamera(robot, "http://cam/", throttle=throttle)
+
+
+def test_an_address_that_is_none_is_refused(robot):
+    with pytest.raises(ConfigError, match="begins with http"):
+        robot.add_module("HttpCamera", "rtsp://cam/")

@@ -1,0 +1,103 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { assign, formation } from "../../../src/webmap/features/goals/goal_tool.js";
+import { look, ShownGoals } from "../../../src/webmap/web/tools/goal_words.js";
+
+function goal(state, more = {}) {
+  const silent = { left: null, time: null, eta: null, recoveries: null };
+  return { id: "g1", x: 0, y: 0, yaw: 0, state, why: "", ...silent, ...more };
+}
+
+function near(one, other) {
+  assert.ok(Math.hypot(one.x - other.x, one.y - other.y) < 1e-9, JSON.stringify(one));
+}
+
+test("a goal is said in words, with what the robot tells", () => {
+  const told = { left: 3.24, eta: 75, recoveries: 2 };
+  assert.equal(
+    look(goal("under way", told)).text,
+    "Goal under way, 3.2 m to go, about 75 s, 2 × stuck",
+  );
+  assert.equal(look(goal("under way", { left: 12.3, eta: 150 })).text, "Goal under way, 12 m to go, about 3 min");
+  assert.equal(look(goal("failed", { why: "no path" })).text, "Goal failed, no path");
+  assert.equal(look(goal("failed")).over, true);
+  assert.equal(look(goal("unknown")).over, false);
+  assert.equal(look(goal("sent")).shape, "sent");
+});
+
+test("a goal that ended leaves the map after a while, a failure stays", () => {
+  for (const [state, stays] of [["reached", false], ["cancelled", false], ["failed", true]]) {
+    const shown = new ShownGoals();
+    shown.report("r1", goal("under way"), 0);
+    shown.report("r1", goal(state), 1000);
+    assert.equal(shown.shown(4000).size, 1);
+    shown.report("r1", goal(state), 5000);
+    assert.equal(shown.shown(6000).size, stays ? 1 : 0, state);
+    shown.dismiss("r1");
+    assert.equal(shown.shown(6000).size, 0);
+    shown.report("r1", goal("sent", { id: "g2" }), 7000);
+    assert.equal(shown.shown(7000).size, 1, "the next one is shown");
+  }
+});
+
+test("a goal that was over when the page came is not shown", () => {
+  const shown = new ShownGoals();
+  shown.report("r1", goal("failed"), 0);
+  assert.equal(shown.shown(0).size, 0);
+  shown.report("r1", null, 1);
+  shown.gone("r1");
+  shown.dismiss("r1");
+  shown.report("r1", goal("failed"), 2);
+  assert.equal(shown.shown(2).size, 0, "nor after the robot was gone");
+});
+
+test("a goal that ended before the page had a report of it is shown", () => {
+  const shown = new ShownGoals();
+  shown.report("r1", null, 0);
+  shown.report("r1", goal("failed"), 1);
+  assert.equal(shown.shown(6000).size, 1, "the robot had no goal before");
+  shown.report("r1", goal("reached", { id: "g2" }), 7000);
+  assert.equal(shown.shown(7000).size, 1, "the robot had another goal before");
+  shown.report("r1", goal("reached", { id: "g2" }), 12_000);
+  assert.equal(shown.shown(12_000).size, 0);
+});
+
+test("one robot goes where it is sent, and two stand beside that", () => {
+  const pose = { x: 1, y: 2, yaw: Math.PI / 2 };
+  assert.deepEqual(formation(pose, 1, 1), [{ x: 1, y: 2, yaw: Math.PI / 2 }]);
+  const [left, right] = formation(pose, 2, 1);
+  near(left, { x: 0.5, y: 2 });
+  near(right, { x: 1.5, y: 2 });
+});
+
+test("many robots stand in a grid behind the pose, none nearer than the spacing", () => {
+  for (const count of [3, 5, 7, 12, 20]) {
+    const places = formation({ x: 0, y: 0, yaw: 0.3 }, count, 1.5);
+    assert.equal(places.length, count);
+    for (const [i, a] of places.entries()) {
+      for (const b of places.slice(i + 1)) {
+        assert.ok(Math.hypot(a.x - b.x, a.y - b.y) > 1.5 - 1e-9, `${count} robots`);
+      }
+    }
+  }
+});
+
+test("robots are matched to places so that no ways cross", () => {
+  let seed = 1;
+  const random = () => ((seed = (seed * 48271) % 2147483647), seed / 2147483647);
+  const turn = (a, b, c) => (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  for (let round = 0; round < 50; round++) {
+    const robots = Array.from({ length: 8 }, () => ({ x: 10 * random(), y: 10 * random() }));
+    const goals = assign(robots, formation({ x: 5, y: 5, yaw: 6 * random() }, 8, 1));
+    assert.equal(new Set(goals).size, 8);
+    for (let i = 0; i < 8; i++) {
+      for (let j = i + 1; j < 8; j++) {
+        const [a, b, c, d] = [robots[i], goals[i], robots[j], goals[j]];
+        const crosses =
+          turn(a, b, c) * turn(a, b, d) < -1e-9 && turn(c, d, a) * turn(c, d, b) < -1e-9;
+        assert.equal(crosses, false);
+      }
+    }
+  }
+});

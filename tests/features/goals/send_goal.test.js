@@ -1,0 +1,57 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/tools/goal_words.js";
+import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
+
+const LINKLESS = "no link to where its goals go";
+
+const pass = holdTimeouts();
+
+/** A gate that answers with these refusals, the last one again and again. */
+function gate(...answers) {
+  const asked = { times: 0 };
+  asked.offer = async () => {
+    const why = answers[Math.min(asked.times++, answers.length - 1)];
+    if (why !== null) throw new Error(why);
+  };
+  return asked;
+}
+
+test("a goal for which there is no link is offered again until the gate takes it", async () => {
+  const asked = gate(LINKLESS, LINKLESS, null);
+  const sent = sendGoal(asked.offer, () => true);
+  await settle();
+  assert.equal(asked.times, 1, "not before the wait is over");
+  await pass(2);
+  assert.equal(await sent, true);
+  assert.equal(asked.times, 3);
+});
+
+test("after about three seconds without a link it is given up for that reason", async () => {
+  const asked = gate(LINKLESS);
+  const sent = assert.rejects(sendGoal(asked.offer, () => true), { message: LINKLESS });
+  await pass(20);
+  await sent;
+  assert.equal(asked.times, TRIES);
+  assert.equal((TRIES - 1) * RETRY, 3000);
+});
+
+test("a goal that is refused for another reason is not offered again", async () => {
+  const asked = gate("Ann drives it");
+  const sent = assert.rejects(sendGoal(asked.offer, () => true), /Ann drives it/);
+  await pass(2);
+  await sent;
+  assert.equal(asked.times, 1);
+});
+
+test("a goal that is called off while it waits is not offered again", async () => {
+  const asked = gate(LINKLESS);
+  let wanted = true;
+  const sent = sendGoal(asked.offer, () => wanted);
+  await pass(1);
+  wanted = false;
+  await pass(2);
+  assert.equal(await sent, false);
+  assert.equal(asked.times, 2);
+});

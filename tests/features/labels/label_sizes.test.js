@@ -1,0 +1,20 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { crowded } from "../../../src/webmap/features/labels/labels.js";
+
+test("of names that lie on each other the first is shown", () => {
+  const one = { x: 100, y: 100, across: 60 };
+  assert.deepEqual(crowded([one, { ...one, x: 150 }, { ...one, x: 170 }]), [
+    false,
+    true,
+    false,
+  ]);
+  assert.deepEqual(crowded([one, { ...one, y: 150 }]), [false, false]);
+  assert.deepEqual(crowded([]), []);
+});
+
+test("a name that is not shown takes no room from others", () => {
+  const names = [0, 30, 60, 90].map((x) => ({ x, y: 0, across: 40 }));
+  assert.deepEqual(crowded(names), [false, true, false, true]);
+});

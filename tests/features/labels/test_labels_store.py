@@ -1,0 +1,142 @@
+"""Places with a name: what is taken, and how they are kept."""
+
+import json
+import os
+
+import pytest
+
+from webmap.features.labels.label_store import (
+    ICONS,
+    Label,
+    LabelStore,
+    label_file,
+    new_label,
+    read_labels,
+)
+from webmap.base.errors import ConfigError
+
+DOCK = {"name": "Dock", "x": 1, "y": -2.5, "icon": "charger", "kind": "a-b", "yaw": 3}
+
+
+def test_a_list_of_tables_is_a_list_of_labels():
+    one, two = read_labels([DOCK, {"name": " Tür <b> ", "x": 0, "y": 0}], "it")
+    assert one == Label("Dock", 1.0, -2.5, "charger", "a-b", 3.0, "c0")
+    assert (two.name, two.icon, two.kind, two.yaw) == ("Tür <b>", "pin", "", None)
+    assert read_labels({"labels": [DOCK]}, "it") == (one,)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"name": ""}, "it[0].name: expected 1 to 60 characters, got ''"),
+        ({"name": "x" * 61}, "it[0].name: expected 1 to 60"),
+        ({"name": 5}, "it[0].name: expected"),
+        ({"x": "1"}, "it[0].x: expected a number of metres, got '1'"),
+        ({"x": None}, "it[0].x: expected a number of metres"),
+        ({"x": True}, "it[0].x: expected a number"),
+        ({"y": float("nan")}, "it[0].y: expected a number of metres, got nan"),
+        ({"y": 1e7}, "it[0].y: expected a number"),
+        ({"yaw": "north"}, "it[0].yaw: expected a number of radians"),
+        ({"icon": "rocket"}, "it[0].icon: expected one of pin, charger"),
+        ({"icon": ["pin"]}, "it[0].icon: expected one of"),
+        ({"kind": "a b"}, "it[0].kind: expected the name of a class, got 'a b'"),
+        ({"nmae": "x"}, "it[0].'nmae': no such key; did you mean \"name\"?"),
+    ],
+)
+def test_a_label_that_makes_no_sense_is_named(change, words):
+    with pytest.raises(ConfigError) as error:
+        read_labels([{**DOCK, **change}], "it")
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize("data", [None, 3, "text", {"label": []}, [1], [[]]])
+def test_what_is_no_list_of_tables_is_refused(data):
+    with pytest.raises(ConfigError, match=r"expected|no such key"):
+        read_labels(data, "it")
+
+
+def test_there_is_a_most():
+    with pytest.raises(ConfigError, match="2000 labels are the most"):
+        read_labels([DOCK] * 2001, "it")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.yaml", "- name: Dock\n  x: 1\n  y: -2.5\n"),
+        ("a.yaml", "labels:\n- {name: Dock, x: 1, y: -2.5}\n"),
+        ("a.json", json.dumps([{"name": "Dock", "x": 1, "y": -2.5}])),
+    ],
+)
+def test_a_file_is_yaml_or_json(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    (label,) = label_file(tmp_path / name)
+    assert (label.name, label.x, label.y) == ("Dock", 1.0, -2.5)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "expected a list of labels, got None"),
+        (b"- name: [", r"a\.yaml:1: this is no YAML"),
+        (b"\xff\xfe\x00", "this is no YAML"),
+        (b"!!python/object/apply:os.system ['true']", "no YAML"),
+        (b"[" * 50_000, "nested more than 50 deep"),
+        (b"a: &a [1]\nb: *a", r"a\.yaml:2: this is no YAML: aliases"),
+        (b"- {name: A, x: 1, y: 2}\n- {}\n", r"a\.yaml:2: labels\[1\]\.name: expected"),
+        (b"labels:\n- name: A\n  x: 1\n  y: '2'\n", r":4: labels\[0\]\.y: expected a"),
+        (
+            b"- name: A\n  x: 1\n  y: 2\n  iocn: pin\n",
+            r":4: labels\[0\]\.'iocn': no",
+        ),
+        (b"- name: A\n  x: 1\n  y: 2\n  it's: 3\n", r":4: labels\[0\]\.\"it's\": no"),
+        (b"x" * (1 << 20) + b"xx", "larger than 256 KiB"),
+    ],
+)
+def test_a_file_that_is_none_is_refused(tmp_path, data, words):
+    (tmp_path / "a.yaml").write_bytes(data)
+    with pytest.raises(ConfigError, match=words):
+        label_file(tmp_path / "a.yaml")
+    with pytest.raises(ConfigError, match="No such file"):
+        label_file(tmp_path / "b.yaml")
+
+
+def test_labels_that_are_kept_are_read_again(tmp_path):
+    store = LabelStore(tmp_path, "hall")
+    assert store.load() == ()
+    store.save([new_label(DOCK), new_label({"name": "Ü", "x": 0, "y": 0})])
+    one, two = LabelStore(tmp_path, "hall").load()
+    assert (one.name, one.icon, one.kind, one.yaw) == ("Dock", "charger", "a-b", 3.0)
+    assert (two.name, two.kept) == ("Ü", True)
+    assert one.id != two.id
+    assert [file.name for file in (tmp_path / "labels").iterdir()] == ["hall.json"]
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b'{"labels": [{"name": 1}]}', b"\xff", b"[" * 100_000]
+)
+def test_a_file_of_kept_labels_that_is_broken_is_said(tmp_path, data):
+    store = LabelStore(tmp_path, "hall")
+    store.file.parent.mkdir()
+    store.file.write_bytes(data)
+    with pytest.raises(ConfigError):
+        store.load()
+
+
+def test_a_pipe_in_place_of_kept_labels_is_not_waited_for(tmp_path):
+    store = LabelStore(tmp_path, "hall")
+    store.file.parent.mkdir()
+    os.mkfifo(store.file)
+    with pytest.raises(ConfigError, match="got a pipe"):
+        store.load()
+
+
+@pytest.mark.parametrize("name", ["", "../x", "a/b", "a.b", "x" * 41])
+def test_a_name_that_is_no_files_is_refused(tmp_path, name):
+    with pytest.raises(ConfigError, match="letters, digits"):
+        LabelStore(tmp_path, name)
+
+
+def test_every_icon_is_drawn_with_what_a_path_knows():
+    for path in ICONS.values():
+        assert set(path) <= set("MmLlHhVvCcSsAazZ0123456789.- ")

@@ -1,0 +1,169 @@
+"""What modules draw, taken to its place by the frames that a robot knows."""
+
+import math
+
+import pytest
+from module_fakes import dots, header, image_of, numbers, pose, to_root
+from test_modules_cloud import cloud
+from test_modules_grid import BLACK, CORNERS, grid
+from test_modules_poses import sonar
+from test_modules_ways import in_world, near, path
+
+from webmap.poses.frames import _heard
+from webmap.base.geometry import Affine
+
+
+def transform(parent, child, x, y, yaw, secs=3) -> dict:
+    at = pose(x, y, yaw)
+    return {
+        "header": {"stamp": {"secs": secs, "nsecs": 5}, "frame_id": parent},
+        "child_frame_id": child,
+        "transform": {"translation": at["position"], "rotation": at["orientation"]},
+    }
+
+
+def tell(link, *transforms, static=False) -> None:
+    topic = "/tf_static" if static else "/tf"
+    link.say(topic, {"transforms": list(transforms)})
+
+
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
+
+
+@pytest.fixture
+def robot(robot, link):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    robot.set_tf(link)
+    return robot
+
+
+ODOM = (10.0, -5.0, math.pi / 2)
+IN_ODOM = Affine.translation(10, -5) @ Affine.rotation(math.pi / 2)
+
+
+def odometry(link, x, y, yaw):
+    link.say("/odom", {"header": header("odom"), "pose": pose(x, y, yaw)})
+
+
+def test_a_path_in_the_frame_of_the_odometry_is_drawn_where_that_is(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    tell(link, transform("map", "odom", *ODOM))
+    message = path([(1.0, 2.0), (3.0, 4.0)])
+    message["header"] = header("odom")
+    link.say("/plan", message)
+    wanted = [IN_ODOM.apply(1, 2), IN_ODOM.apply(3, 4)]
+    assert in_world(module.line) == near(wanted)
+    odometry(link, 7, 7, 1.0)
+    assert in_world(module.line) == near(wanted)
+    link.say("/plan", path([(1.0, 2.0), (3.0, 4.0)]))
+    assert in_world(module.line) == near([(1, 2), (3, 4)])
+
+
+def test_a_frame_is_looked_up_as_it_was_at_the_stamp(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    tell(link, transform("map", "odom", 1, 0, 0, secs=3))
+    tell(link, transform("map", "odom", 2, 0, 0, secs=4))
+    message = path([(0.0, 0.0), (0.0, 4.0)])
+    message["header"] = header("odom")
+    link.say("/plan", message)
+    assert in_world(module.line) == near([(1, 0), (1, 4)])
+
+
+def test_a_sensor_is_where_the_frames_have_it_on_the_robot(link, robot):
+    cone = robot.add_module("Range", link, "/sonar")
+    points = robot.add_module("PointCloud", link, "/points")
+    tell(
+        link,
+        transform("base_link", "sonar", 0.3, 0.1, math.pi),
+        transform("base_link", "laser", 0.0, 0.5, -math.pi / 2),
+        static=True,
+    )
+    link.say("/sonar", sonar(1.0))
+    link.say("/points", cloud([[2.0, 0.0, 0.0]]))
+    on_robot = to_root(robot.svg).inverse @ to_root(cone.cone)
+    assert on_robot.apply(1, 0) == pytest.approx((-0.7, 0.1))
+    (dot,) = dots(points.dots[0])
+    on_robot = to_root(robot.svg).inverse @ to_root(points.dots[0])
+    assert on_robot.apply(*dot) == pytest.approx((0.0, -1.5), abs=2e-3)
+
+
+def test_a_place_that_a_module_was_told_comes_before_the_frames(link, robot):
+    cone = robot.add_module("Range", link, "/sonar", 0.2, 0.0, 0.0)
+    tell(link, transform("base_link", "sonar", 5, 5, 1), static=True)
+    link.say("/sonar", sonar(1.0))
+    on_robot = to_root(robot.svg).inverse @ to_root(cone.cone)
+    assert on_robot.apply(0, 0) == pytest.approx((0.2, 0))
+
+
+def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    message = path([(1.0, 2.0), (3.0, 4.0)])
+    message["header"] = header("odom")
+    link.say("/plan", message)
+    assert in_world(module.line) == near([(1, 2), (3, 4)])
+    (problem,) = robot.problems.values()
+    assert "it is not known where 'odom' is" in problem
+    tell(link, transform("map", "odom", *ODOM))
+    link.say("/plan", message)
+    assert robot.problems == {}
+    assert len(numbers(module.line.get("points"))) == 4
+    link.say("/plan", {**message, "header": header("nowhere")})
+    assert len(robot.problems) == 1
+    robot.remove_module(module)
+    assert robot.problems == {}
+
+
+def colour(image, x: float, y: float) -> tuple[int, ...]:
+    """The colour of a place of the world, in a picture whose group may be placed."""
+    u, v = to_root(image).inverse.apply(x, y)
+    picture = image_of(image)
+    width, height = float(image.get("width")), float(image.get("height"))
+    return picture.getpixel(
+        (int(u / width * picture.width), int(v / height * picture.height))
+    )
+
+
+def local(**info) -> dict:
+    return {**grid(CORNERS, 1.0, pose(2, 3), **info), "header": header("odom")}
+
+
+def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel):
+    before = dict(_heard)
+    module = map.add_module("OccupancyGrid", link, "/local", map_frame="map")
+    link.say("/local", {**local(), "header": header("map")})
+    assert "/tf" not in link.listeners, "nobody needs frames yet"
+    link.say("/local", local())
+    (error,) = channel.errors
+    assert "it is not known where 'odom' is on the map" in error
+    image = module.layer.picture.element
+    for at in [ODOM, (0.0, 0.0, -1.0)]:
+        tell(link, transform("map", "odom", *at, secs=4 + int(at != ODOM)))
+        there = Affine.translation(*at[:2]) @ Affine.rotation(at[2])
+        # The occupied cell is the lower left one of the grid, at (2, 3) of odom.
+        assert colour(image, *there.apply(2.5, 3.5)) == BLACK
+        assert colour(image, *there.apply(3.5, 3.5)) != BLACK
+    assert module.layer.problems == {}
+    map.remove_module(module)
+    assert link.listeners == {}
+    assert _heard == before
+
+
+def test_a_costmap_of_one_of_many_robots_is_placed_by_that_ones_frames(map, link):
+    module = map.add_module(
+        "OccupancyGrid", link, "/r1/local", map_frame="map", namespace="/r1"
+    )
+    link.say("/r1/local", local())
+    link.say("/r1/tf", {"transforms": [transform("map", "odom", *ODOM)]})
+    image = module.layer.picture.element
+    assert colour(image, *IN_ODOM.apply(2.5, 3.5)) == BLACK
+    assert "/tf" not in link.listeners
+
+
+def test_without_a_frame_of_the_map_a_grid_is_drawn_as_it_comes(map, link):
+    module = map.add_module("OccupancyGrid", link, "/local")
+    link.say("/local", local())
+    assert colour(module.layer.picture.element, 2.5, 3.5) == BLACK
+    assert set(link.listeners) == {"/local", "/local_updates"}

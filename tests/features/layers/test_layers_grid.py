@@ -1,0 +1,277 @@
+"""Grids: which colour is where in the world."""
+
+import asyncio
+import math
+import time
+
+import numpy as np
+import pytest
+from module_fakes import header, image_of, pixel, pose, typed
+
+from webmap import Map
+from webmap.core.layer import Layer
+from webmap.core.pictures import pictures
+from webmap.base.geometry import Affine
+from webmap.features.layers import occupancy_grid as room
+from webmap.server.files import Published
+
+WHITE, BLACK, CLEAR = (255, 255, 255, 255), (0, 0, 0, 255), (0, 0, 0, 0)
+
+
+def grid(cells, resolution=0.5, origin=None, *, ros2=False, **info) -> dict:
+    """A message; ``cells`` has its lowest row first."""
+    cells = np.asarray(cells, np.int8)
+    height, width = cells.shape
+    told = {
+        "map_load_time": header(ros2=ros2)["stamp"],
+        "resolution": resolution,
+        "width": width,
+        "height": height,
+        "origin": origin or pose(0, 0),
+        **info,
+    }
+    return {"header": header(ros2=ros2), "info": told, "data": cells.ravel().tolist()}
+
+
+def update(x, y, cells) -> dict:
+    cells = np.asarray(cells, np.int8)
+    height, width = cells.shape
+    return {
+        "header": header(),
+        "x": x,
+        "y": y,
+        "width": width,
+        "height": height,
+        "data": cells.ravel().tolist(),
+    }
+
+
+def shown(module):
+    return module.layer.picture.element
+
+
+@pytest.fixture
+def module(map, link):
+    return map.add_module("OccupancyGrid", link, "/map")
+
+
+CORNERS = [[100, 0, 0], [0, -1, 50]]
+"""Occupied at the lower left, unknown above the middle, 50 at the upper right."""
+
+
+@pytest.mark.parametrize("ros2", [False, True])
+@pytest.mark.parametrize(
+    ("x", "y", "yaw"),
+    [(0, 0, 0), (-12.34, 7.89, 0), (3.3, -4.4, math.pi / 2), (-1, -2, -2.5)],
+)
+def test_every_cell_is_where_its_origin_puts_it(link, module, x, y, yaw, ros2):
+    link.say("/map", grid(CORNERS, 0.35, pose(x, y, yaw), ros2=ros2))
+    placed = Affine.translation(x, y) @ Affine.rotation(yaw)
+    colours = {100: BLACK, 0: WHITE, -1: CLEAR, 50: (128, 128, 128, 255)}
+    for row, values in enumerate(CORNERS):
+        for column, value in enumerate(values):
+            at = placed.apply(0.35 * (column + 0.5), 0.35 * (row + 0.5))
+            assert pixel(shown(module), *at) == colours[value], (row, column)
+    outside = placed.apply(-0.1, 0.1)
+    assert pixel(shown(module), *outside) is None
+
+
+def test_the_image_itself_has_the_highest_row_at_the_top(link, module):
+    link.say("/map", grid(CORNERS))
+    assert image_of(shown(module)).getpixel((0, 1)) == BLACK
+
+
+def test_cells_in_cbor_are_the_same_cells(link, module):
+    message = grid(CORNERS)
+    message["data"] = typed(72, np.array(CORNERS, np.int8))
+    link.say("/map", message, cbor=True)
+    assert pixel(shown(module), 0.2, 0.2) == BLACK
+    assert pixel(shown(module), 0.7, 0.7) == CLEAR
+
+
+def test_a_costmap_shows_what_is_lethal_inscribed_and_free(map, link):
+    module = map.add_module("OccupancyGrid", link, "/costmap", palette="costmap")
+    link.say("/costmap", grid([[0, 1, 98, 99, 100, -1]], 1.0))
+    colours = [pixel(shown(module), x + 0.5, 0.5) for x in range(6)]
+    assert colours[0] == colours[5] == CLEAR
+    assert colours[1][2] > 250
+    assert colours[1][3] == 255
+    assert colours[2][:3] == (255, 0, 0)
+    assert colours[3][:3] == (0, 255, 255)
+    assert colours[4][:3] == (255, 0, 255)
+    assert module.layer.svg.classes
+
+
+def test_a_costmap_lies_over_a_map_and_both_under_robots(map, link, channel, robot):
+    map.add_robot(robot)
+    layers = [
+        map.add_module("OccupancyGrid", link, "/costmap", palette="costmap").layer,
+        map.add_module("OccupancyGrid", link, "/map").layer,
+    ]
+    number = {fragment: mount for mount, fragment in channel.mounted.items()}
+    group = next(each for each in number if "robots" in each.root.classes)
+    fragments = [group, *(layer.fragment for layer in layers)]
+    robots, costs, plan = (channel.orders[number[f]] for f in fragments)
+    assert plan < costs < robots
+
+
+def test_an_update_changes_its_rectangle_alone(link, module):
+    link.say("/map", grid(np.zeros((4, 5)), 1.0, pose(10, 20)))
+    link.say("/map_updates", update(1, 2, [[100, 100], [-1, 100]]))
+    black = {
+        (x, y)
+        for x in range(5)
+        for y in range(4)
+        if pixel(shown(module), 10.5 + x, 20.5 + y) == BLACK
+    }
+    assert black == {(1, 2), (2, 2), (2, 3)}
+    assert pixel(shown(module), 11.5, 23.5) == CLEAR
+
+
+def test_an_update_before_the_grid_changes_nothing(link, module, channel):
+    link.say("/map_updates", update(0, 0, [[100]]))
+    assert shown(module).get("href") is None
+    assert channel.errors == []
+
+
+@pytest.mark.parametrize(("x", "y"), [(-1, 0), (0, -1), (2, 0), (0, 2), (2**31, 0)])
+def test_an_update_that_reaches_out_is_refused(link, module, channel, x, y):
+    link.say("/map", grid(np.zeros((3, 3))))
+    before = shown(module).get("href")
+    link.say("/map_updates", update(x, y, [[100, 100], [100, 100]]))
+    assert shown(module).get("href") == before
+    (error,) = channel.errors
+    assert "reaches out of a grid of 3 x 3" in error
+
+
+BAD = {
+    "a cell must be a number of metres above 0, got 0": grid(CORNERS, 0),
+    "above 0, got -0.05": grid(CORNERS, -0.05),
+    "above 0, got nan": grid(CORNERS, None),
+    "came with 6 of them": grid(CORNERS, width=4),
+    "of -3 x -2 cells has none": grid(CORNERS, width=-3, height=-2),
+    "0 x 0 cells has none": grid(np.zeros((0, 0))),
+    "is too large": grid(CORNERS, width=2**31, height=2**31),
+    "8193 x 8193 cells is too large": grid(CORNERS, width=8193, height=8193),
+    "one is 101": grid([[0, 101]]),
+    "one is -2": grid([[0, -2]]),
+    "finite": grid(CORNERS, origin=pose(math.nan, 0)),
+    "quaternion of zeros": grid(
+        CORNERS,
+        origin={
+            "position": {"x": 0, "y": 0, "z": 0},
+            "orientation": {"x": 0, "y": 0, "z": 0, "w": 0},
+        },
+    ),
+    "expected an array of numbers": {**grid(CORNERS), "data": ["a"] * 6},
+    "missing required field `info`": {"data": []},
+}
+
+
+@pytest.mark.parametrize("why", BAD)
+def test_a_grid_that_makes_no_sense_is_refused_and_the_old_one_stays(
+    link, module, channel, why
+):
+    link.say("/map", grid(CORNERS))
+    before = shown(module).attributes, shown(module)._transform
+    link.say("/map", BAD[why])
+    link.say("/map", BAD[why])
+    assert (shown(module).attributes, shown(module)._transform) == before
+    (error,) = channel.errors
+    assert why in error
+    link.say("/map", grid([[0]]))
+    assert pixel(shown(module), 0.1, 0.1) == WHITE
+
+
+def test_who_opens_a_page_later_reads_what_is_wrong_too(map, page, link, channel):
+    first = map.add_module("OccupancyGrid", link, "/map")
+    link.say("/map", grid(CORNERS, 0))
+    other = Map(page.element("other"), 10, 10)
+    second = other.add_module("OccupancyGrid", link, "/map")
+    assert first.layer is second.layer
+    assert len(channel.errors) == 2
+    link.say("/map", grid(CORNERS))
+    assert first.layer.problems == {}
+
+
+def test_raw_cells_may_have_any_value(map, link, channel):
+    module = map.add_module("OccupancyGrid", link, "/raw", palette="raw")
+    link.say("/raw", grid([[0, 101, -2]], 1.0))
+    greys = [pixel(shown(module), x + 0.5, 0.5)[0] for x in range(3)]
+    assert greys == [255, 154, 1]
+    assert channel.errors == []
+
+
+def test_a_palette_that_does_not_exist_is_named(map, link):
+    with pytest.raises(ValueError, match='"map" or "costmap" or "raw", got'):
+        map.add_module("OccupancyGrid", link, "/map", palette="heat")
+    assert Layer._shared == {}
+
+
+def test_fifty_maps_cost_one_picture_and_leave_none_behind(page, link, monkeypatch):
+    drawn, before = [], len(pictures)
+    monkeypatch.setattr(
+        room, "grid_png", lambda *args: drawn.append(args) or b"picture"
+    )
+    maps = [Map(page.element(f"m{i}"), 10, 10) for i in range(50)]
+    for map in maps:
+        map.add_module("OccupancyGrid", link, "/map")
+    link.say("/map", grid(CORNERS))
+    assert len(drawn) == 1
+    page.close()
+    assert link.listeners == {}
+    assert Layer._shared == {}
+    assert len(pictures) == before
+
+
+def test_the_server_serves_the_newest_picture_and_drops_the_old_ones(
+    link, module, monkeypatch
+):
+    monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 0.0)
+    published, before = Published(), len(pictures)
+    for value in range(4):
+        link.say("/map", grid([[value * 10]]))
+    tag = shown(module).get("href").rpartition("/")[2]
+    assert published.image(tag).media_type == "image/png"
+    assert published.image(tag).data.startswith(b"\x89PNG")
+    assert len(pictures) == before + 2, "what a page that is a frame behind asks for"
+
+
+def test_a_large_grid_is_drawn_beside_the_model_and_the_newest_wins(map, link):
+    async def scenario():
+        module = map.add_module("OccupancyGrid", link, "/map")
+        cells = np.zeros((600, 600), np.int8)
+        for value in (10, 20, 100):
+            cells[:] = value
+            message = grid(cells)
+            message["data"] = typed(72, cells)
+            link.say("/map", message, cbor=True)
+        assert shown(module).get("href") is None, "it is not drawn in the callback"
+        deadline = time.monotonic() + 20
+        while module.layer._drawing is not None:
+            assert time.monotonic() < deadline
+            await asyncio.sleep(0.005)
+        assert pixel(shown(module), 1, 1) == BLACK
+
+    asyncio.run(scenario())
+
+
+def test_the_age_of_a_map_is_known_but_it_is_old_only_where_that_is_said(map, link):
+    once = map.add_module("OccupancyGrid", link, "/map")
+    often = map.add_module("OccupancyGrid", link, "/costmap", age_limit=2.0)
+    for topic in ("/map", "/costmap"):
+        link.say(topic, grid(CORNERS))
+    assert once.layer.svg._age.limit > 1e6
+    assert often.layer.svg._age.limit == 2.0
+
+
+def test_a_page_that_is_behind_still_gets_the_pictures_of_a_moment_ago(
+    link, module, monkeypatch
+):
+    monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 60.0)
+    urls, before = [], len(pictures)
+    for value in range(100):
+        link.say("/map", grid([[value]]))
+        urls.append(shown(module).get("href"))
+    assert Published().image(urls[-50].rpartition("/")[2]).data
+    assert len(pictures) == before + 64

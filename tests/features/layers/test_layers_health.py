@@ -1,0 +1,254 @@
+"""What the parts of a robot say of themselves."""
+
+import base64
+
+import pytest
+from module_fakes import header
+
+from webmap import Robot
+from webmap.base.errors import ConfigError
+from webmap.features.layers import diagnostics as room
+from webmap.scene import html
+from webmap.base.scope import Scope
+
+
+def status(name, level, message="", **values) -> dict:
+    return {
+        "name": name,
+        "level": level,
+        "message": message,
+        "hardware_id": "rosbot",
+        "values": [{"key": key, "value": value} for key, value in values.items()],
+    }
+
+
+def array(*parts, ros2=False) -> dict:
+    return {"header": header("", ros2=ros2), "status": list(parts)}
+
+
+@pytest.fixture
+def module(robot, link):
+    return robot.add_module("Diagnostics", link)
+
+
+def levels(module) -> dict[str, str]:
+    return {part.name: part.level for part in module.parts}
+
+
+@pytest.mark.parametrize("ros2", [False, True])
+def test_each_part_is_known_by_its_name_and_the_worst_is_first(link, module, ros2):
+    assert module.level is None
+    link.say("/diagnostics", array(status("motors", 0), status("lidar", 1), ros2=ros2))
+    link.say("/diagnostics", array(status("battery", 2, "low", volts="21.5")))
+    assert [part.name for part in module.parts] == ["battery", "lidar", "motors"]
+    assert module.level == "error"
+    assert module.parts[0].values == {"volts": "21.5"}
+    assert set(module.svg.classes) == {"diagnostics", "error"}
+    assert module.svg.text == "battery: low"
+    link.say("/diagnostics", array(status("battery", 0)))
+    assert module.level == "warn"
+
+
+@pytest.mark.parametrize(
+    "write", [chr, lambda n: base64.b64encode(bytes([n])).decode()]
+)
+def test_a_level_may_come_as_a_byte_in_text(link, module, write):
+    parts = [status(name, write(level)) for level, name in enumerate("abcd")]
+    link.say("/diagnostics", array(*parts))
+    assert levels(module) == {"a": "ok", "b": "warn", "c": "error", "d": "stale"}
+
+
+@pytest.mark.parametrize("level", [4, -1, 48, "0", "error", "AAA=", ""])
+def test_a_level_that_there_is_not_is_said_and_the_other_parts_count(
+    link, module, robot, level
+):
+    link.say("/diagnostics", array(status("one", 1)))
+    link.say("/diagnostics", array(status("one", level), status("two", 0)))
+    assert levels(module) == {"one": "warn", "two": "ok"}
+    (problem,) = robot.problems.values()
+    assert problem == f"/diagnostics: 'one': a level is 0 to 3, got {level!r}"
+    link.say("/diagnostics", array(status("one", 0)))
+    assert robot.problems == {}
+
+
+def test_a_part_that_falls_silent_is_stale(link, module, monkeypatch):
+    now = room.time.monotonic()
+    monkeypatch.setattr(room.time, "monotonic", lambda: now)
+    link.say("/diagnostics", array(status("one", 0), status("two", 0)))
+    monkeypatch.setattr(room.time, "monotonic", lambda: now + 12)
+    link.say("/diagnostics", array(status("two", 0)))
+    assert levels(module) == {"one": "stale", "two": "ok"}
+    assert module.parts[0].message == "silent for 12 s"
+
+
+def test_robots_that_share_a_topic_have_each_its_own_parts(link, robot):
+    module = robot.add_module("Diagnostics", link, prefix="bob: ")
+    link.say("/diagnostics", array(status("bob: arm", 0), status("eve: arm", 2)))
+    assert levels(module) == {"bob: arm": "ok"}
+
+
+@pytest.mark.parametrize("said", ["robot_0/", "/robot_0/"])
+@pytest.mark.parametrize("name", ["robot_0/base: Motors", "/robot_0/base: Motors"])
+def test_a_slash_in_front_makes_no_other_prefix_or_name(link, robot, said, name):
+    module = robot.add_module("Diagnostics", link, prefix=said)
+    link.say("/diagnostics", array(status(name, 2), status("/robot_01/arm: a", 1)))
+    assert levels(module) == {name: "error"}
+
+
+@pytest.mark.parametrize("name", ["base: Motors", "/Power/base", "a/base: Motors"])
+def test_the_only_robot_of_a_topic_has_all_parts_whatever_they_are_called(
+    link, robot, name
+):
+    module = robot.add_module("Diagnostics", link, namespace="/robot_0")
+    link.say("/diagnostics", array(status(name, 0)))
+    assert (levels(module), module.level) == ({name: "ok"}, "ok")
+    assert set(module.svg.classes) == {"diagnostics", "ok"}
+
+
+@pytest.fixture
+def two(link):
+    """The diagnostics of two robots that share a topic."""
+    robots = [Robot("A"), Robot("B")]
+    yield [
+        robot.add_module("Diagnostics", link, namespace=space)
+        for robot, space in zip(robots, ["/a", "/b"], strict=True)
+    ]
+    for robot in robots:
+        robot.destroy()
+
+
+def test_of_robots_that_share_a_topic_each_has_what_begins_with_its_namespace(
+    link, two
+):
+    names = ["a/base: Motors", "/b/laser: Frequency", "/a/Power/battery"]
+    link.say("/diagnostics", array(*(status(name, 0) for name in names)))
+    assert [set(levels(module)) for module in two] == [
+        {"a/base: Motors", "/a/Power/battery"},
+        {"/b/laser: Frequency"},
+    ]
+    assert [module.level for module in two] == ["ok", "ok"]
+
+
+def test_an_error_of_a_part_that_no_namespace_is_in_front_of_is_on_every_robot(
+    link, two
+):
+    link.say("/diagnostics", array(status("a/base: Motors", 0)))
+    link.say("/diagnostics", array(status("base: Motors", 2, "hot")))
+    assert [module.level for module in two] == ["error", "error"]
+    assert [module.svg.text for module in two] == ["base: Motors: hot"] * 2
+    assert [part.shared for part in two[0].parts] == [True, False]
+
+
+def test_that_parts_of_nobody_are_well_says_nothing_of_any_robot(link, two):
+    link.say("/diagnostics", array(status("b/x: y", 0), status("base: Motors", 0)))
+    a, b = two
+    assert (a.level, b.level) == (None, "ok")
+    assert set(a.svg.classes) == {"diagnostics", "unheard"}
+    assert a.svg.text == "no part of this robot was heard"
+
+
+def test_a_robot_whose_filter_lets_nothing_through_is_not_well(link, robot):
+    module = robot.add_module("Diagnostics", link, prefix="robot_0/")
+    assert set(module.svg.classes) == {"diagnostics", "unheard"}
+    link.say("/diagnostics", array(status("base: Motors", 0)))
+    assert module.level is None
+    assert set(module.svg.classes) == {"diagnostics", "unheard"}
+
+
+def test_a_robot_that_comes_later_takes_its_parts_from_the_one_that_was_alone(
+    link, robot
+):
+    first = robot.add_module("Diagnostics", link, namespace="/a")
+    link.say("/diagnostics", array(status("b/base: Motors", 2), status("base: x", 0)))
+    assert first.level == "error"
+    later = Robot("B")
+    later.add_module("Diagnostics", link, namespace="/b")
+    assert (levels(first), first.level) == ({"base: x": "ok"}, None)
+    later.destroy()
+    assert first.level == "error", "it is the only one again"
+
+
+def test_an_error_is_not_hidden_by_another_robots_part_of_the_same_name(
+    link, two, monkeypatch
+):
+    now = room.time.monotonic()
+    link.say("/diagnostics", array(status("base: Motors", 2, "hot")))
+    link.say("/diagnostics", array(status("base: Motors", 0)))
+    assert two[0].level == "error"
+    monkeypatch.setattr(room.time, "monotonic", lambda: now + 12)
+    link.say("/diagnostics", array(status("base: Motors", 0)))
+    assert two[0].level is None, "nobody says it any more"
+
+
+def test_of_two_parts_of_one_name_on_other_hardware_the_worse_counts(link, module):
+    bad, good = status("motor: Driver", 2), status("motor: Driver", 0)
+    link.say("/diagnostics", array({**bad, "hardware_id": "left"}))
+    link.say("/diagnostics", array({**good, "hardware_id": "right"}))
+    assert module.level == "error"
+    link.say("/diagnostics", array({**good, "hardware_id": "left"}))
+    assert module.level == "ok"
+
+
+def test_a_namespace_and_a_prefix_are_not_given_both(link, robot):
+    with pytest.raises(ConfigError, match="or a prefix, not both, got '/a' and 'b/'"):
+        robot.add_module("Diagnostics", link, namespace="/a", prefix="b/")
+
+
+def test_a_list_on_a_page_has_a_row_for_each_part_until_the_page_ends(link, module):
+    rows, page = html.ul(), Scope("page")
+    with page.active():
+        module.show_in(rows)
+    link.say("/diagnostics", array(status("a", 0, "<b>fine</b>"), status("b", 2)))
+    first, second = rows.children
+    assert (str(first.classes), str(second.classes)) == ("error", "ok")
+    assert second.text == "a<b>fine</b>"
+    link.say("/diagnostics", array(status("b", 2)))
+    assert rows.children == (first, second), "what is the same is not made anew"
+    page.close()
+    link.say("/diagnostics", array(status("c", 2)))
+    assert len(rows.children) == 2
+
+
+def test_there_is_an_end_to_the_number_of_parts(link, module, robot, monkeypatch):
+    monkeypatch.setattr(room, "MAX_PARTS", 3)
+    link.say("/diagnostics", array(*(status(f"p{i}", 0) for i in range(5))))
+    assert len(module.parts) == 3
+    assert "3 parts are the limit" in next(iter(robot.problems.values()))
+
+
+def test_others_are_told_and_the_badge_goes_with_the_module(link, robot, module):
+    heard = []
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_diagnostics_update(self, diagnostics):
+            heard.append(diagnostics.level)
+
+    robot.add_module(Listener)
+    link.say("/diagnostics", array(status("a", 1)))
+    assert heard == ["warn"]
+    robot.remove_module(module)
+    assert module.svg.parent is None
+    assert link.listeners == {}
+
+
+def test_a_time_of_nothing_is_refused(link, robot):
+    with pytest.raises(ValueError, match="hold must be seconds above 0, got 0"):
+        robot.add_module("Diagnostics", link, hold=0)
+
+
+def test_of_endless_texts_the_beginning_is_kept(link, module):
+    long = "x" * 100_000
+    part = {**status(long, 2, long), "hardware_id": long}
+    part["values"] = [{"key": f"{i}{long}", "value": long} for i in range(200)]
+    link.say("/diagnostics", array(part))
+    (kept,) = module.parts
+    assert (len(kept.name), len(kept.message), len(kept.hardware_id)) == (
+        256,
+        1000,
+        256,
+    )
+    assert len(kept.values) == 100
+    assert all(len(k) == 256 and len(v) == 1000 for k, v in kept.values.items())

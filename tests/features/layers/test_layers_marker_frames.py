@@ -1,0 +1,182 @@
+"""Markers lie where the frames that they name themselves are."""
+
+import math
+
+import pytest
+from module_fakes import pose, to_root
+from test_modules_at_stamp import stamp, transform
+from test_modules_frames import tell
+from test_modules_markers import CUBE, TEXT, marker
+
+from webmap.poses.alignment import align_bridge
+from webmap.poses.frames import _heard
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import Affine
+from webmap.features.layers.markers import layer as markers
+
+
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
+
+
+@pytest.fixture
+def layer(map, link):
+    return map.add_module("Markers", link, "/markers").layer
+
+
+def cube(number, frame, seconds=0.0, *, locked=False, at=(1.0, 0.0, 0.0)) -> dict:
+    return marker(
+        CUBE,
+        at=at,
+        id=number,
+        frame_locked=locked,
+        header={"stamp": stamp(seconds), "frame_id": frame},
+    )
+
+
+def say(link, *markers) -> None:
+    link.say("/markers", {"markers": list(markers)})
+
+
+def drive(link, x, seconds) -> None:
+    """A robot that drives along the y of the map, as its odometry is turned."""
+    tell(link, transform("map", "odom", 10.0, 0.0, math.pi / 2, seconds))
+    tell(link, transform("odom", "base_link", x, 0.0, 0.0, seconds))
+
+
+def middle(layer, number) -> tuple[float, float]:
+    return to_root(layer.shapes["test", number]).apply(0.0, 0.0)
+
+
+def test_each_marker_of_an_array_is_in_its_own_frame(link, layer):
+    say(link, cube(9, "odom"))
+    drive(link, 5.0, 100.0)
+    say(link, cube(1, "map"), cube(2, "odom"), cube(3, "base_link"), cube(4, "/map"))
+    assert middle(layer, 1) == pytest.approx((1.0, 0.0))
+    assert middle(layer, 2) == pytest.approx((10.0, 1.0))
+    assert middle(layer, 3) == pytest.approx((10.0, 6.0))
+    assert middle(layer, 4) == pytest.approx((1.0, 0.0))
+    (box,) = layer.shapes["test", 2].children
+    assert to_root(box).apply(1, 0) == pytest.approx((10.0, 2.0)), "turned as well"
+
+
+def test_a_locked_marker_goes_along_and_others_stay(link, layer):
+    say(link, cube(9, "odom"))
+    drive(link, 5.0, 100.0)
+    say(link, cube(1, "base_link", locked=True), cube(2, "base_link"))
+    drive(link, 7.0, 101.0)
+    assert middle(layer, 1) == pytest.approx((10.0, 8.0))
+    assert middle(layer, 2) == pytest.approx((10.0, 6.0))
+    say(link, cube(1, "base_link"))
+    drive(link, 9.0, 102.0)
+    assert middle(layer, 1) == pytest.approx((10.0, 8.0)), "it is locked no more"
+
+
+def test_a_marker_is_where_its_frame_was_at_the_stamp(link, layer):
+    say(link, cube(9, "odom"))
+    drive(link, 5.0, 100.0)
+    drive(link, 6.0, 100.5)
+    say(link, cube(1, "base_link", 100.25), cube(2, "base_link", 100.75))
+    assert middle(layer, 1) == pytest.approx((10.0, 6.5))
+    drive(link, 7.0, 101.0)
+    assert middle(layer, 2) == pytest.approx((10.0, 7.5)), "set right when it is known"
+    drive(link, 9.0, 102.0)
+    assert middle(layer, 2) == pytest.approx((10.0, 7.5))
+
+
+def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, layer, channel):
+    say(link, cube(1, "odom"), cube(2, "map"))
+    assert middle(layer, 1) == pytest.approx((1.0, 0.0)), "as it comes"
+    (problem,) = layer.problems.values()
+    assert "it is not known where 'odom' is on the map: there is no frame" in problem
+    assert channel.errors == [problem]
+    drive(link, 0.0, 100.0)
+    assert middle(layer, 1) == pytest.approx((10.0, 1.0))
+    assert layer.problems == {}
+    drive(link, 0.0, 101.0)
+    say(link, cube(3, "nowhere"))
+    assert "'nowhere'" in next(iter(layer.problems.values()))
+    say(link, {**cube(3, "nowhere"), "action": 2})
+    assert layer.problems == {}, "what is gone needs no frame"
+
+
+def test_texts_are_upright_in_whatever_frame(link, layer):
+    say(link, cube(9, "odom"))
+    drive(link, 5.0, 100.0)
+    header = {"stamp": stamp(0), "frame_id": "base_link"}
+    say(link, marker(TEXT, at=(2.0, 0.0, 1.0), text="here", header=header))
+    placed = to_root(layer.shapes["test", 1])
+    assert placed.apply(0, 0) == pytest.approx((10.0, 7.0))
+    assert placed.b == placed.c == 0
+
+
+def test_frames_are_heard_only_when_a_marker_needs_them(map, link):
+    before = dict(_heard)
+    module = map.add_module("Markers", link, "/markers")
+    say(link, cube(1, "map"), cube(2, ""))
+    assert set(link.listeners) == {"/markers"}
+    say(link, cube(1, "odom"))
+    assert set(link.listeners) == {"/markers", "/tf", "/tf_static"}
+    map.remove_module(module)
+    assert link.listeners == {}
+    assert _heard == before
+
+
+def test_who_wants_no_frames_gets_markers_as_they_come(map, link):
+    layer = map.add_module("Markers", link, "/markers", map_frame=None).layer
+    say(link, cube(1, "odom"))
+    assert set(link.listeners) == {"/markers"}
+    assert middle(layer, 1) == pytest.approx((1.0, 0.0))
+
+
+def test_markers_of_one_of_many_robots_go_by_that_ones_frames(map, link):
+    layer = map.add_module("Markers", link, "/markers", namespace="/r1").layer
+    say(link, cube(1, "odom", locked=True))
+    told = transform("map", "odom", 4.0, 0.0, 0.0, 100.0)
+    link.say("/r1/tf", {"transforms": [told]})
+    say(link, cube(1, "odom", locked=True))
+    assert middle(layer, 1) == pytest.approx((5.0, 0.0))
+
+
+def test_markers_lie_as_their_bridge_is_aligned(link, layer):
+    say(link, cube(1, "map"))
+    align_bridge(link, 2.0, 3.0, 90.0)
+    assert middle(layer, 1) == pytest.approx((2.0, 4.0))
+
+
+def test_a_marker_without_sense_does_not_move_with_a_frame(link, layer):
+    wrong = cube(1, "base_link", locked=True, at=(math.nan, 0.0, 0.0))
+    say(link, {**wrong, "pose": {**pose(0, 0), "position": {"x": None, "y": 0}}})
+    drive(link, 5.0, 100.0)
+    drive(link, 6.0, 101.0)
+    assert layer.shapes == {}
+    assert to_root(layer.svg) == Affine()
+
+
+def test_a_marker_that_cannot_be_drawn_where_its_frame_gets_is_left_out_and_said(
+    link, layer, robot, monkeypatch
+):
+    def place(shape, marker, frame):
+        if marker.id == 1 and frame.translation.y > 7.5:
+            raise ProtocolError("it is beyond the end of the world")
+        shape_place(shape, marker, frame)
+
+    shape_place = markers.place
+    monkeypatch.setattr(markers, "place", place)
+    say(link, cube(1, "base_link", locked=True), cube(2, "base_link", locked=True))
+    robot.set_tf(link)
+    drive(link, 7.0, 101.0)
+    assert layer.problems == {}
+    drive(link, 8.0, 102.0)
+    assert list(layer.shapes) == [("test", 2)]
+    assert middle(layer, 2) == pytest.approx((10.0, 9.0))
+    assert (robot.position.x, robot.position.y) == pytest.approx((10.0, 8.0))
+    said = ["/markers: marker 1 of 'test': it is beyond the end of the world"]
+    assert list(layer.problems.values()) == said
+    drive(link, 9.0, 103.0)
+    assert middle(layer, 2) == pytest.approx((10.0, 10.0))
+    assert list(layer.problems.values()) == said, "until the next message"
+    say(link, cube(2, "base_link", locked=True))
+    assert layer.problems == {}

@@ -1,0 +1,81 @@
+"""The views of the modules' messages, also by way of the worker for large frames."""
+
+import json
+
+import pytest
+from module_fakes import header, pose
+from test_modules_cloud import POINTS, cloud
+from test_modules_fix import fix
+from test_modules_grid import CORNERS, grid, update
+from test_modules_health import array, status
+from test_modules_markers import CUBE, marker
+from test_modules_points import cells, point
+from test_modules_poses import FOOT, covariance, doubtful, polygon, sonar
+from test_modules_ways import path
+
+from webmap import Bridge
+from webmap.core.layer import Layer
+from webmap.base.errors import ConfigError, ProtocolError
+from webmap.features.layers.markers.messages import MarkerArrayMsg
+from webmap.features.layers.occupancy_grid import OccupancyGridUpdateMsg
+from webmap.features.layers.diagnostics import DiagnosticArrayMsg
+from webmap.features.layers.grid_cells import GridCellsMsg
+from webmap.features.layers.nav_sat_fix import NavSatFixMsg
+from webmap.features.layers.point_cloud import PointCloud2Msg
+from webmap.features.layers.point_stamped import PointStampedMsg
+from webmap.features.layers.polygon import PolygonStampedMsg
+from webmap.features.layers.pose_array import ParticleCloudMsg, PoseArrayMsg
+from webmap.features.layers.pose_with_covariance import DoubtfulPoseStampedMsg
+from webmap.features.layers.range import RangeMsg
+from webmap.ros.messages import OccupancyGridMsg, PathMsg
+from webmap.ros.offload import values
+from webmap.ros.rosbridge.events import Publish
+from webmap.ros.worker import Request, answer, view_name
+
+MESSAGES = {
+    OccupancyGridMsg: grid(CORNERS),
+    OccupancyGridUpdateMsg: update(0, 0, CORNERS),
+    PathMsg: path([(1, 2), (3, 4)]),
+    PoseArrayMsg: {"header": header(), "poses": [pose(1, 2)]},
+    ParticleCloudMsg: {
+        "header": header(ros2=True),
+        "particles": [{"pose": pose(1, 2), "weight": 1.0}],
+    },
+    DoubtfulPoseStampedMsg: doubtful(pose(1, 2), covariance(1, 1)),
+    PolygonStampedMsg: polygon(FOOT),
+    RangeMsg: sonar(1.0),
+    PointStampedMsg: point(1, 2),
+    GridCellsMsg: cells([(1, 2), (3, 4)]),
+    PointCloud2Msg: cloud(POINTS),
+    MarkerArrayMsg: {"markers": [marker(CUBE)]},
+    DiagnosticArrayMsg: array(status("one", 1)),
+    NavSatFixMsg: fix(50, 14),
+}
+
+
+@pytest.mark.parametrize("view", MESSAGES, ids=lambda view: view.__name__)
+def test_a_large_message_is_the_same_by_way_of_the_worker(view):
+    text = json.dumps({"op": "publish", "topic": "/t", "msg": MESSAGES[view]}).encode()
+    here = Publish("/t", text).decode(view)
+    name = view_name(view)
+    assert name is not None
+    *_, there = values(
+        *answer(Request(len(text), "/t", view_name(Publish), name), text), view
+    )
+    assert there == here
+
+
+@pytest.mark.parametrize("view", MESSAGES, ids=lambda view: view.__name__)
+@pytest.mark.parametrize("message", [{}, {"poses": 1}, {"x": "y"}, [], 5, "a", None])
+def test_a_message_of_another_type_is_an_error_and_nothing_is_drawn(view, message):
+    text = json.dumps({"op": "publish", "topic": "/t", "msg": message}).encode()
+    with pytest.raises(ProtocolError, match=r"Expected|missing"):
+        Publish("/t", text).decode(view)
+
+
+def test_a_layer_that_cannot_start_leaves_nothing_behind(map):
+    bridge = Bridge("ws://nowhere:9090")
+    with pytest.raises(ConfigError):
+        map.add_module("OccupancyGrid", bridge, "two words")
+    assert Layer._shared == {}
+    assert bridge._topics == {}

@@ -1,0 +1,99 @@
+"""Map modules that a robot brings along."""
+
+import pytest
+from module_fakes import header, pose
+
+from webmap import Map, Robot
+from webmap.core.layer import Layer
+from webmap.modules.map_layer import ShownLayer
+from webmap.base.errors import ConfigError, ModuleNotFound
+
+
+def grids(map: Map) -> list:
+    return [m for m in map.modules if isinstance(m, ShownLayer)]
+
+
+def test_every_map_that_shows_the_robot_has_the_module_and_no_other(
+    map, page, robot, link
+):
+    other = Map(page.element("other"), 10, 10)
+    map.add_robot(robot)
+    module = robot.add_module("OnMaps", "OccupancyGrid", link, "/c", palette="costmap")
+    assert (len(grids(map)), len(grids(other))) == (1, 0)
+    other.add_robot(robot)
+    assert grids(other)[0].layer is grids(map)[0].layer, "it is drawn once for both"
+    map.remove_robot(robot)
+    assert (len(grids(map)), len(grids(other))) == (0, 1)
+    robot.remove_module(module)
+    assert grids(other) == []
+    assert Layer._shared == {}
+    assert link.listeners == {}
+
+
+def test_a_page_that_ends_takes_its_own_away(map, page, robot, link):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "Markers", link, "/m")
+    page.close()
+    assert Layer._shared == {}
+    assert robot.maps == []
+
+
+def test_a_module_taken_from_the_map_by_hand_is_not_missed(map, robot, link):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
+    map.remove_module(grids(map)[0])
+    map.remove_robot(robot)
+    assert grids(map) == []
+
+
+def test_what_it_draws_is_drawn(map, robot, link, channel):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
+    info = {"map_load_time": header()["stamp"], "resolution": 1, "width": 1}
+    info |= {"height": 1, "origin": pose(0, 0)}
+    link.say("/c", {"header": header(), "info": info, "data": [100]})
+    assert grids(map)[0].layer.picture.element.get("href")
+
+
+def test_a_module_that_there_is_not_is_named(robot):
+    with pytest.raises(ModuleNotFound, match="OccupancyGird"):
+        robot.add_module("OnMaps", "OccupancyGird")
+
+
+@pytest.mark.parametrize(
+    ("module", "options", "said"),
+    [
+        ("OccupancyGrid", {"palette": "grey"}, 'palette: expected "map" or "costmap"'),
+        ("OccupancyGrid", {"pallet": "map"}, 'did you mean "palette"'),
+        ("Markers", {"type": "std_msgs/String"}, "type: expected"),
+    ],
+)
+def test_arguments_of_the_wrong_kind_are_refused_before_any_map(
+    robot, link, module, options, said
+):
+    with pytest.raises(ConfigError, match=said):
+        robot.add_module("OnMaps", module, link, "/c", **options)
+
+
+def test_what_it_brings_belongs_to_this_robot_unless_another_is_told(map, robot, link):
+    map.add_robot(robot)
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
+    other = Robot("Other")
+    robot.add_module("OnMaps", "OccupancyGrid", link, "/d", robot=other)
+    owners = [grid.layer.svg.get("data-layer-of") for grid in grids(map)]
+    assert owners == [robot.id, other.id]
+    other.destroy()
+
+
+def test_another_robot_is_refused_by_what_belongs_to_none(robot):
+    with pytest.raises(ConfigError, match=r'Follow: there is no argument "robot"'):
+        robot.add_module("OnMaps", "Follow", robot=robot)
+    with pytest.raises(ConfigError, match="robot: expected a Robot, got 'Bob'"):
+        robot.add_module("OnMaps", "Markers", robot="Bob")
+
+
+def test_arguments_that_make_no_sense_are_said_on_the_map(map, robot, channel):
+    robot.add_module("OnMaps", "TileLayer", "/none", (50.0, 14.0), most=0)
+    map.add_robot(robot)
+    (error,) = channel.errors
+    assert "Bob: TileLayer: most is a number of tiles" in error

@@ -1,0 +1,104 @@
+"""Layers over real sockets, from the simulator, in both dialects."""
+
+import asyncio
+import time
+
+import numpy as np
+import pytest
+from module_fakes import pixel
+
+from webmap import Bridge, Map
+from webmap.core.page import Page
+from webmap.sim.maps import FLOOR, load_map
+from webmap.sim.process import run_simulator
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_the_simulators_floor_is_drawn_cell_by_cell(
+    dialect, map: Map, page: Page, robot
+):
+    async def scenario():
+        urls, stop = [], asyncio.Event()
+        simulator = asyncio.create_task(
+            run_simulator(robots=1, dialect=dialect, on_ready=urls.append, stop=stop)
+        )
+        await until(lambda: urls)
+        bridge = Bridge(urls[0])
+        module = map.add_module("OccupancyGrid", bridge, "/map")
+        way = robot.add_module("Path", bridge, "/robot_0/plan")
+        bridge.start(asyncio.get_running_loop())
+        image = module.layer.picture.element
+        try:
+            await until(lambda: image.get("href"))
+            assert module.layer.problems == {}
+            check(image)
+            assert way.points == []
+            assert robot.problems == {}
+        finally:
+            page.close()
+            await bridge.stop()
+            stop.set()
+            await simulator
+
+    asyncio.run(scenario())
+
+
+def test_frames_that_are_missing_are_said_a_while_after_the_link_is_up(
+    monkeypatch, map: Map, page: Page, robot
+):
+    """Nothing ever comes of them, so nothing but the time makes anybody look."""
+    monkeypatch.setattr("webmap.poses.frames.GRACE", 0.6)
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.1)
+
+    async def scenario():
+        urls, stop = [], asyncio.Event()
+        simulator = asyncio.create_task(
+            run_simulator(robots=1, on_ready=urls.append, stop=stop)
+        )
+        await until(lambda: urls)
+        bridge = Bridge(urls[0])
+        opened = []
+        # Before the frames, whose time begins when they hear of it.
+        bridge.on_open(lambda: opened.append(time.monotonic()))
+        robot.set_tf(bridge, namespace="/ghost")
+        grid = map.add_module(
+            "OccupancyGrid", bridge, "/map", map_frame="other", namespace="/ghost"
+        ).layer
+        bridge.start(asyncio.get_running_loop())
+        try:
+            await until(lambda: grid.problems or robot.problems)
+            assert time.monotonic() - opened[0] > 0.55
+            await until(lambda: grid.problems and robot.problems)
+            (of_grid,), (of_robot,) = grid.problems.values(), robot.problems.values()
+            assert "there is no frame 'ghost/other'" in of_grid
+            assert "there is no frame 'map'; there are: none" in of_robot
+        finally:
+            page.close()
+            robot.unset_tf()
+            await bridge.stop()
+            stop.set()
+            await simulator
+
+    asyncio.run(scenario())
+
+
+def check(image) -> None:
+    """Compare 200 places of the picture with the floor plan of the simulator."""
+    plan = load_map(FLOOR)
+    rows, columns = plan.occupancy.shape
+    random = np.random.default_rng(3)
+    seen = set()
+    for row, column in random.integers((rows, columns), size=(200, 2)):
+        value = int(plan.occupancy[row, column])
+        r, _, _, alpha = pixel(image, *plan.center(row, column))
+        drawn = -1 if alpha == 0 else round(100 * (255 - r) / 255)
+        assert drawn == value, (row, column)
+        seen.add(value)
+    assert len(seen) > 1
+
+
+async def until(condition) -> None:
+    deadline = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.01)

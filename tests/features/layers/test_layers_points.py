@@ -1,0 +1,254 @@
+"""Points that somebody publishes, and the cells of grids, in their places."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+from module_fakes import header, matrix_of, numbers, pose, to_root
+from test_modules_frames import tell
+from test_modules_tilted import MAP, SLOPE, mount, sensed
+from tilted_frames import frame, taken
+
+from webmap.features.layers.grid_cells import rows_of
+
+FAR = 1e300
+ENDLESS = {"stamp": {"secs": 10**400, "nsecs": 0}, "frame_id": "map"}
+
+
+@pytest.fixture
+def robot(robot, link):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    link.say("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
+    return robot
+
+
+def at(x, y, z=0.0) -> dict:
+    return {"x": x, "y": y, "z": z}
+
+
+def point(x, y, z=0.0, *, frame="map", ros2=False) -> dict:
+    return {"header": header(frame, ros2=ros2), "point": at(x, y, z)}
+
+
+def spot(module) -> tuple[float, float]:
+    """Where a point is drawn on the map."""
+    return to_root(module.spot).apply(0, 0)
+
+
+@pytest.mark.parametrize("ros2", [False, True])
+def test_a_point_is_a_spot_that_stays_on_the_map(link, robot, ros2):
+    module = robot.add_module("PointStamped", link, "/clicked_point", name="far")
+    assert list(module.svg.classes) == ["pointstamped", "far"]
+    assert module.svg.get("visibility") == "hidden", "there is none yet"
+    link.say("/clicked_point", point(-3, 40, ros2=ros2))
+    assert module.svg.get("visibility") is None
+    assert spot(module) == pytest.approx((-3, 40), abs=2e-3)
+    link.say("/odom", {"header": header(), "pose": pose(-3, 40, 3.0)})
+    assert spot(module) == pytest.approx((-3, 40), abs=2e-3)
+    link.say("/clicked_point", point(1, 1, ros2=ros2))
+    assert spot(module) == pytest.approx((1, 1), abs=2e-3)
+
+
+def test_a_point_of_the_base_is_where_the_base_was_at_its_stamp(link, robot):
+    robot.set_tf(link)
+    module = robot.add_module("PointStamped", link, "/lookahead_point", frame="robot")
+    turned = (0.0, 0.0, math.pi / 2)
+    for seconds, x in ((2.9, 4.9), (3.1, 5.1)):
+        tell(link, frame("map", "base_link", (x, 0.0, 0.0), turned, seconds))
+    link.say("/lookahead_point", point(1.0, 0.5, frame="base_link"))
+    assert spot(module) == pytest.approx((4.5, 1.0), abs=2e-3)
+    assert robot.problems == {}
+
+
+def test_without_frames_a_point_of_the_base_is_on_the_robot(link, robot):
+    module = robot.add_module("PointStamped", link, "/lookahead_point", frame="robot")
+    link.say("/lookahead_point", point(1, 0, frame="base_link"))
+    wanted = (4 + math.cos(0.7), -2 + math.sin(0.7))
+    assert spot(module) == pytest.approx(wanted, abs=2e-3)
+
+
+def test_a_tilted_point_is_turned_in_space_before_it_is_flattened(link, robot):
+    robot.set_tf(link)
+    tell(link, MAP, SLOPE)
+    mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
+    module = robot.add_module("PointStamped", link, "/seen")
+    link.say("/seen", sensed({"point": at(1.0, 0.2, 2.0)}))
+    ((x, y, _),) = taken([[1.0, 0.2, 2.0]], MAP, SLOPE, mounted)
+    assert spot(module) == pytest.approx((x, y), abs=3e-3)
+
+
+def test_a_point_without_a_height_lies_in_the_plane(link, robot):
+    module = robot.add_module("PointStamped", link, "/seen")
+    link.say("/seen", point(1, 2, math.nan))
+    assert spot(module) == pytest.approx((1, 2), abs=2e-3)
+    assert robot.problems == {}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (point(math.nan, 2), "a point must be of finite numbers, got (nan, 2.0)"),
+        (point(1, math.inf), "a point must be of finite numbers, got (1.0, "),
+        (point(0, -FAR), "within 1e+07 m of the origin, got (0, -1e+300)"),
+        (point(0, 0, 2e7), "within 1e+07 m of the plane, got a height of 2e+07"),
+        (point(5, 5) | {"header": ENDLESS}, "seconds of hundreds of digits"),
+    ],
+)
+def test_a_point_that_is_none_is_refused_and_the_last_one_stays(
+    link, robot, wrong, said
+):
+    module = robot.add_module("PointStamped", link, "/seen")
+    link.say("/seen", point(1, 2))
+    before = matrix_of(module.spot)
+    link.say("/seen", wrong)
+    assert matrix_of(module.spot) == before
+    (problem,) = robot.problems.values()
+    assert said in problem
+    link.say("/seen", point(3, 4))
+    assert robot.problems == {}
+
+
+@pytest.mark.parametrize("radius", [0, -1, math.inf, math.nan])
+def test_a_spot_of_a_size_that_makes_no_sense_is_refused(link, robot, radius):
+    with pytest.raises(ValueError, match="radius must be metres above 0"):
+        robot.add_module("PointStamped", link, "/seen", radius=radius)
+
+
+def cells(middles, width=0.5, height=0.25, *, ros2=False) -> dict:
+    return {
+        "header": header(ros2=ros2),
+        "cell_width": width,
+        "cell_height": height,
+        "cells": [at(*middle) for middle in middles],
+    }
+
+
+def boxes(module) -> list[list[tuple[float, float]]]:
+    """The corners on the map of each rectangle that is drawn."""
+    place = to_root(module.drawn)
+    found = []
+    for text in (module.drawn.get("d") or "").split("z")[:-1]:
+        x, y, *steps = numbers(text)
+        corners = [(x, y)]
+        for along, aside in zip(steps[::2], steps[1::2], strict=True):
+            x, y = x + along, y + aside
+            corners.append((x, y))
+        found.append([place.apply(*corner) for corner in corners])
+    return found
+
+
+def box(x, y, width, height) -> list:
+    """The corners about a middle, as :func:`boxes` has them."""
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return [
+        pytest.approx((x + i * width / 2, y + j * height / 2), abs=2e-3)
+        for i, j in corners
+    ]
+
+
+@pytest.mark.parametrize("ros2", [False, True])
+def test_a_cell_is_a_box_about_its_middle_that_stays_on_the_map(link, robot, ros2):
+    module = robot.add_module("GridCells", link, "/cells", name="frontiers")
+    assert list(module.svg.classes) == ["gridcells", "frontiers"]
+    link.say("/cells", cells([(1, 2), (4, -1)], ros2=ros2))
+    wanted = [box(4, -1, 0.5, 0.25), box(1, 2, 0.5, 0.25)]
+    assert boxes(module) == wanted
+    link.say("/odom", {"header": header(), "pose": pose(-40, 2, 3.0)})
+    assert boxes(module) == wanted
+    link.say("/cells", cells([], 0, 0))
+    assert boxes(module) == []
+
+
+def test_cells_that_touch_along_x_are_one_box_in_whatever_order(link, robot):
+    module = robot.add_module("GridCells", link, "/cells")
+    side = float(np.float32(0.05))
+    middles = [(7 + 0.05 * i, 3 + 0.05 * j) for i in range(40) for j in range(3)]
+    middles.remove((7 + 0.05 * 20, 3 + 0.05 * 1))
+    random.Random(1).shuffle(middles)
+    link.say("/cells", cells(middles, side, side))
+    assert boxes(module) == [
+        box(7.975, 3.0, 2.0, 0.05),
+        box(7.475, 3.05, 1.0, 0.05),
+        box(8.5, 3.05, 0.95, 0.05),
+        box(7.975, 3.1, 2.0, 0.05),
+    ]
+
+
+def test_cells_that_are_a_little_off_are_boxes_that_stay_where_the_cells_are():
+    step = 0.1 * 1.0005  # far within the tolerance, which many of them are not
+    middles = np.array([(number * step, 0.0, 0.0) for number in range(200)])
+    rows = rows_of(middles, 0.1, 0.1)
+    assert sum(rows.lengths) == 200
+    assert len(rows.lengths) < 20
+    drawn = [
+        first[0] + number * 0.1
+        for first, length in zip(rows.first, rows.lengths, strict=True)
+        for number in range(length)
+    ]
+    assert np.abs(np.array(drawn) - middles[:, 0]).max() < 0.002
+
+
+def test_tilted_cells_are_turned_in_space_before_they_are_flattened(link, robot):
+    robot.set_tf(link)
+    tell(link, MAP, SLOPE)
+    mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
+    module = robot.add_module("GridCells", link, "/cells")
+    link.say("/cells", sensed(cells([(1.0, 0.2, 2.0), (1.5, 0.2, 2.0)])))
+    low, high = 0.075, 0.325
+    corners = [[0.75, low], [1.75, low], [1.75, high], [0.75, high]]
+    there = taken([[*corner, 2.0] for corner in corners], MAP, SLOPE, mounted)
+    (drawn,) = boxes(module)
+    assert np.array(drawn) == pytest.approx(there[:, :2], abs=3e-3)
+
+
+def test_of_many_cells_some_are_drawn_and_that_is_said(link, robot):
+    module = robot.add_module("GridCells", link, "/cells", max_cells=10)
+    link.say("/cells", cells([(i, 0) for i in range(25)]))
+    drawn = sorted(corners[0][0] for corners in boxes(module))
+    assert len(drawn) == 10
+    assert drawn[0] == pytest.approx(-0.25, abs=2e-3)
+    assert drawn[-1] == pytest.approx(23.75, abs=2e-3)
+    assert max(np.diff(drawn)) < 5, "evenly chosen"
+    (problem,) = robot.problems.values()
+    assert "more than 10 cells, of which so many are drawn" in problem
+    link.say("/cells", cells([(i, 0) for i in range(10)]))
+    assert len(boxes(module)) == 10
+    assert robot.problems == {}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (cells([(1, 1), (math.nan, 1)]), "finite numbers, got (nan, 1.0) as point 1"),
+        (cells([(1, math.inf)]), "cells must be of finite numbers"),
+        (cells([(FAR, 0)]), "within 1e+07 m of the origin, got (1e+300, 0)"),
+        (cells([(0, 0, FAR)]), "got a height of 1e+300"),
+        (cells([(1, 1)], width=0), "cell_width must be from 0.0001 to 1e+07 m, got 0"),
+        (cells([(1, 1)], height=-1), "cell_height must be from 0.0001 to 1e+07 m"),
+        (cells([(1, 1)], height=None), "got nan"),
+        (cells([(1, 1)], width=FAR), "got 1e+300"),
+        (
+            cells([]) | {"cells": [at(0, 0)] * 100_001},
+            "100001 cells; 100000 are the limit",
+        ),
+        (cells([(5, 5)]) | {"header": ENDLESS}, "seconds of hundreds of digits"),
+    ],
+)
+def test_cells_that_are_none_are_refused_and_those_before_stay(
+    link, robot, wrong, said
+):
+    module = robot.add_module("GridCells", link, "/cells")
+    link.say("/cells", cells([(1, 2)]))
+    before = module.drawn.get("d")
+    link.say("/cells", wrong)
+    assert module.drawn.get("d") == before
+    (problem,) = robot.problems.values()
+    assert said in problem
+    link.say("/cells", cells([]))
+    assert robot.problems == {}
+
+
+def test_a_number_of_cells_that_makes_no_sense_is_refused(link, robot):
+    with pytest.raises(ValueError, match="max_cells must be at least 1, got 0"):
+        robot.add_module("GridCells", link, "/cells", max_cells=0)

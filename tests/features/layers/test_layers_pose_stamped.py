@@ -1,0 +1,105 @@
+"""A pose that is published, such as a goal, is an arrow in its place."""
+
+import math
+
+import pytest
+from module_fakes import header, matrix_of, pose, to_root
+
+from webmap.base.errors import ConfigError
+
+
+@pytest.fixture
+def robot(robot, link):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    link.say("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
+    return robot
+
+
+def at(module) -> tuple[float, float, float]:
+    """Where the arrow stands on the map, and where it points."""
+    place = to_root(module.arrow)
+    (x, y), (to_x, to_y) = place.apply(0, 0), place.apply(1, 0)
+    return x, y, math.atan2(to_y - y, to_x - x)
+
+
+def test_a_pose_is_an_arrow_with_its_heading_that_stays_on_the_map(link, robot):
+    module = robot.add_module("PoseStamped", link, "/target", name="far")
+    assert module.svg.get("visibility") == "hidden", "there is none yet"
+    assert {"posestamped", "far"} <= set(module.svg.classes)
+    link.say("/target", {"header": header(), "pose": pose(-3, 40, 2.0)})
+    assert module.svg.get("visibility") is None
+    assert at(module) == pytest.approx((-3, 40, 2.0), abs=1e-3)
+    link.say("/odom", {"header": header(), "pose": pose(-3, 40, 3.0)})
+    assert at(module) == pytest.approx((-3, 40, 2.0), abs=1e-3)
+    assert module.svg.get("visibility") is None, "no goal, so it stays"
+    link.say("/target", {"header": header(), "pose": pose(1, 1, 0.0)})
+    assert at(module) == pytest.approx((1, 1, 0.0), abs=1e-3)
+
+
+def test_a_pose_lies_as_the_robots_own_map_is_aligned(link, robot):
+    module = robot.add_module("PoseStamped", link, "/target")
+    link.say("/target", {"header": header(), "pose": pose(1, 0, 0.0)})
+    robot.set_alignment(10.0, 0.0, 90.0)
+    assert at(module) == pytest.approx((10, 1, math.pi / 2), abs=1e-3)
+
+
+def test_a_goal_goes_when_the_robot_gets_there(link, robot):
+    module = robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
+    robot.set_alignment(10.0, 0.0, 90.0)
+    link.say("/goal_pose", {"header": header(), "pose": pose(8, 8, 0.0)})
+    first = module.svg.get("data-pose")
+    link.say("/odom", {"header": header(), "pose": pose(7, 8, 0.0)})
+    assert module.svg.get("visibility") is None, "a metre is not there"
+    link.say("/odom", {"header": header(), "pose": pose(7.8, 8, 0.0)})
+    assert module.svg.get("visibility") == "hidden"
+    link.say("/odom", {"header": header(), "pose": pose(7, 8, 0.0)})
+    assert module.svg.get("visibility") == "hidden", "it was there"
+    link.say("/goal_pose", {"header": header(), "pose": pose(2, 2, 0.0)})
+    assert module.svg.get("visibility") is None
+    assert module.svg.get("data-pose") != first, "the page can tell it from the last"
+
+
+@pytest.mark.parametrize(("frame", "seen"), [("odom", "hidden"), ("map", None)])
+def test_a_goal_is_reached_in_the_frame_that_the_robot_is_drawn_in(
+    link, robot, frame, seen
+):
+    robot.set_tf(link, map_frame="odom", namespace="/bob", quiet=True)
+    module = robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
+    link.say("/goal_pose", {"header": header(frame), "pose": pose(8, 8, 0.0)})
+    assert module.svg.get("visibility") is None
+    link.say("/odom", {"header": header("odom"), "pose": pose(8, 8, 0.0)})
+    assert module.svg.get("visibility") == seen
+
+
+def test_a_pose_that_is_none_is_refused_and_the_last_one_stays(link, robot):
+    module = robot.add_module("PoseStamped", link, "/target")
+    link.say("/target", {"header": header(), "pose": pose(1, 2)})
+    before = matrix_of(module.arrow)
+    link.say("/target", {"header": header(), "pose": pose(math.nan, 2)})
+    assert matrix_of(module.arrow) == before
+    assert any("finite" in said for said in robot.problems.values())
+
+
+@pytest.mark.parametrize("wrong", [{"length": 0}, {"reached": math.inf}])
+def test_a_length_that_makes_no_sense_is_refused(link, robot, wrong):
+    with pytest.raises(ConfigError, match="must be metres above 0"):
+        robot.add_module("PoseStamped", link, "/target", **wrong)
+
+
+def test_scans_are_told_apart_by_name(link, robot):
+    front = robot.add_module("LaserScanner", link, "/front", name="front")
+    plain = robot.add_module("LaserScanner", link, "/scan")
+    assert list(front.svg.classes) == ["laserscan", "front"]
+    assert list(plain.svg.classes) == ["laserscan"]
+
+
+def test_what_is_drawn_says_of_what_without_the_robots_own_namespace(link, robot):
+    names = {
+        "/bob/front/scan": "front/scan",  # the robot is called Bob
+        "/scan": "/scan",
+        "/bob": "/bob",
+        "/ann/scan": "/ann/scan",
+    }
+    for topic, name in names.items():
+        module = robot.add_module("LaserScanner", link, topic)
+        assert module.svg.get("data-layer") == name

@@ -1,0 +1,191 @@
+"""The robot modules that come with WebMap."""
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from webmap import Robot
+from webmap.base.errors import ProtocolError
+from webmap.features.layers.laser_scanner import check_rays, scan_points
+from webmap.ros.decoding import convert
+from webmap.ros.messages import BatteryStateMsg, LaserScanMsg
+from webmap.base.scope import Removal, keep
+
+
+class Link:
+    """A bridge that remembers who subscribed."""
+
+    url = "ws://test:9090"
+    state = "open"
+    lag = 0.0
+
+    def __init__(self) -> None:
+        self.listeners: dict[str, tuple] = {}
+
+    def subscribe(self, topic, callback, type=None, **options):
+        self.listeners[topic] = (callback, type, options)
+        return keep(Removal(lambda: self.listeners.pop(topic)))
+
+
+def scan(ranges, *, start=0.0, step=math.pi / 2, low=0.1, high=10.0) -> LaserScanMsg:
+    plain = {
+        "header": {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "laser"},
+        "angle_min": start,
+        "angle_increment": step,
+        "range_min": low,
+        "range_max": high,
+        "ranges": ranges,
+    }
+    return convert(plain, LaserScanMsg)
+
+
+def test_a_dot_is_where_a_ray_hits():
+    points, rays = scan_points(scan([1.0, 2.0, 3.0]))
+    assert list(rays) == [0, 1, 2]
+    assert points == pytest.approx(np.array([[1, 0], [0, 2], [-3, 0]]), abs=1e-6)
+
+
+@pytest.mark.parametrize("miss", [None, math.inf, -math.inf, math.nan, 0.05, 11.0])
+def test_a_ray_that_hits_nothing_has_no_dot(miss):
+    points, rays = scan_points(scan([1.0, miss, 3.0]))
+    assert list(rays) == [0, 2]
+    assert points == pytest.approx(np.array([[1, 0], [-3, 0]]), abs=1e-6)
+
+
+def test_a_scan_that_sweeps_clockwise():
+    points, _ = scan_points(scan([1.0, 1.0], step=-math.pi / 2))
+    assert points == pytest.approx(np.array([[1, 0], [0, -1]]), abs=1e-6)
+
+
+def test_dots_are_thinned_evenly_and_keep_their_bearings():
+    step = math.tau / 360
+    points, _ = scan_points(scan([1.0] * 360, step=step), max_dots=50)
+    assert len(points) == 50
+    bearings = np.arctan2(points[:, 1], points[:, 0])
+    rays = np.round(np.unwrap(bearings) / step).astype(int)
+    assert set(np.diff(rays)) <= {7, 8}
+
+
+def test_fewer_rays_than_dots_are_all_drawn():
+    assert len(scan_points(scan([1.0] * 20), max_dots=50)[0]) == 20
+
+
+@pytest.mark.parametrize(
+    "bad", [scan([]), scan([None] * 5), scan([1.0], high=math.nan)]
+)
+def test_a_scan_with_nothing_in_it_draws_nothing_or_all_that_is_finite(bad):
+    assert len(scan_points(bad)[0]) <= 1
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf])
+def test_a_scan_without_an_angle_is_refused(angle):
+    for wrong in (scan([1.0], start=angle), scan([1.0], step=angle)):
+        with pytest.raises(ProtocolError, match=r"angle_\w+ must be finite radians"):
+            check_rays(wrong)
+
+
+def test_the_scanner_draws_one_path_of_class_dot_in_its_place_on_the_robot():
+    link, robot = Link(), Robot("Bob")
+    scanner = robot.add_module("LaserScanner", link, "/base_scan", 0.1, 0.0, 90.0)
+    callback, type_name, options = link.listeners["/base_scan"]
+    assert type_name == "sensor_msgs/LaserScan"
+    assert options["throttle"] == 300
+    callback(scan([1.0, 2.0]))
+    (dot,) = scanner.svg.children
+    assert "dot" in dot.classes
+    assert "laserscan" in scanner.svg.classes
+    assert scanner.svg.parent is robot.svg
+    assert list(np.frombuffer(dot._dots.points, "<i2")) == [1000, 0, 0, 2000]
+    assert dot._dots.unit == 0.001
+    robot.remove_module(scanner)
+    assert link.listeners == {}
+    assert scanner.svg.parent is None
+
+
+def test_a_scan_that_reaches_far_uses_a_coarser_unit():
+    link, robot = Link(), Robot("Bob")
+    scanner = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
+    scanner.take(scan([80.0], high=100.0))
+    (dot,) = scanner.svg.children
+    x, _ = np.frombuffer(dot._dots.points, "<i2")
+    assert x * dot._dots.unit == pytest.approx(80.0, abs=0.01)
+
+
+def test_a_number_of_dots_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="max_dots must be at least 1"):
+        Robot("Bob").add_module("LaserScanner", Link(), "/scan", max_dots=0)
+
+
+def say_percentages(link, *percentages):
+    """Let battery states come in."""
+    callback, _, _ = link.listeners["/battery"]
+    for percentage in percentages:
+        callback(convert({"percentage": percentage, "voltage": 24.0}, BatteryStateMsg))
+
+
+def test_a_battery_that_counts_to_a_hundred_is_understood_also_when_it_is_low():
+    link, robot = Link(), Robot("Bob")
+    battery = robot.add_module("Battery", link, "/battery")
+    say_percentages(link, 1.04)  # a gauge that is not calibrated
+    assert battery.charge == 1.0
+    say_percentages(link, 80.0)
+    assert battery.charge == 0.8
+    say_percentages(link, 1.0)
+    assert battery.charge == 0.01
+    assert not robot.problems
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 101.0, 1e300])
+def test_a_percentage_that_none_can_be_is_said_until_one_comes_that_can(wrong):
+    link, robot = Link(), Robot("Bob")
+    battery = robot.add_module("Battery", link, "/battery")
+    say_percentages(link, 0.5, wrong)
+    assert battery.charge is None
+    (said,) = robot.problems.values()
+    assert said.startswith("/battery: a battery has a percentage of 0 to 1, or of 0 to")
+    assert f"got {wrong:g}" in said
+    say_percentages(link, 0.5)
+    assert battery.charge == 0.5
+    assert not robot.problems
+
+
+@pytest.mark.parametrize(
+    ("percentage", "charge"), [(0.5, 0.5), (None, None), (80.0, 0.8), (-1.0, None)]
+)
+def test_a_battery_that_does_not_know_its_charge_says_so(percentage, charge):
+    heard = []
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_battery_update(self, battery):
+            heard.append(battery.charge)
+
+    link, robot = Link(), Robot("Bob")
+    robot.add_module(Listener)
+    robot.add_module("Battery", link, "/battery")
+    say_percentages(link, percentage)
+    assert heard == [charge]
+
+
+def test_plain_data_with_modules_makes_them():
+    link = Link()
+    robot = Robot.from_dict(
+        {
+            "name": "Bob",
+            "modules": [
+                {
+                    "name": "LaserScanner",
+                    "args": [{"bridge": "lab"}, "/scan"],
+                    "options": {"max_dots": 20},
+                }
+            ],
+        },
+        {"lab": link},
+    )
+    assert robot.modules[0].max_dots == 20
+    assert "/scan" in link.listeners
+    assert msgspec.json.encode(robot.motion.spec()) == b"null"

@@ -1,0 +1,153 @@
+"""Stamps an hour off, over a real socket: drawn all the same, and said once.
+
+What is said names the difference. Stamps that are none at all are refused, which
+``test_modules_bad_from_robot`` has for most types.
+"""
+
+import asyncio
+
+import pytest
+from module_fakes import header, pose
+from test_modules_bad_from_robot import (
+    DEADLINE,
+    NANOSECONDS,
+    Scene,
+    dots_of,
+    odometry,
+    publish,
+    scan,
+    until,
+    with_scene,
+)
+
+NOW = 1_000_000.0
+"""By the robot's clock, in seconds; that of this machine does not matter."""
+
+HOUR = 3600.0
+WAYS = {"ahead": HOUR, "behind": -HOUR}
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """Let nothing be said because this process was held up for a second."""
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 60.0)
+
+
+def at(frame: str, seconds: float) -> dict:
+    nanoseconds = round(seconds % 1 * 1e9)
+    return header(frame) | {"stamp": {"secs": int(seconds), "nsecs": nanoseconds}}
+
+
+def transform(parent: str, child: str, x: float, about: dict) -> dict:
+    place = pose(x, 0.0)
+    move = {"translation": place["position"], "rotation": place["orientation"]}
+    about = about | {"frame_id": parent}
+    return {"header": about, "child_frame_id": child, "transform": move}
+
+
+async def say(scene: Scene, topic: str, message: dict) -> None:
+    await scene.servers[0].send(publish(topic, message))
+
+
+async def stand(scene: Scene, x: float, seconds: float) -> None:
+    """Say where the robot is, and wait until it is drawn there."""
+    await say(scene, "/odom", odometry(x, header=at("odom", seconds)))
+    await until(lambda: drawn_at(scene, x))
+
+
+def drawn_at(scene: Scene, x: float) -> bool:
+    return scene.robots[0].position.x == pytest.approx(x)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_scan_an_hour_off_is_drawn_and_the_hour_is_said_once(
+    map, channel, monkeypatch, way
+):
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    off = scan(1.5, header=at("laser", NOW + WAYS[way]))
+
+    async def scenario(scene: Scene) -> None:
+        await stand(scene, 1.0, NOW)
+        async with asyncio.timeout(DEADLINE):
+            while not scene.errors:  # A robot that fell silent is asked for nothing.
+                await say(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
+                await say(scene, "/scan", off)
+                await asyncio.sleep(0.02)
+        assert len(dots_of(scene)) == 5
+        for _ in range(3):
+            await say(scene, "/scan", off)
+        await stand(scene, 1.1, NOW + 0.1)
+        await say(scene, "/scan", scan(1.0, header=at("laser", NOW + 0.1)))
+        await until(lambda: channel.problems == {})
+        (line,) = scene.errors
+        assert line.startswith("Bob: laserscan: ")
+        than = "later" if way == "ahead" else "earlier"
+        assert f"3600.000 s {than}; are the clocks of the sensor and of the" in line
+
+    with_scene(map, channel, scenario)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_odometry_an_hour_off_is_drawn_and_the_hour_is_said_once(map, channel, way):
+    async def scenario(scene: Scene) -> None:
+        await stand(scene, 1.0, NOW)
+        await stand(scene, 1.1, NOW + WAYS[way])
+        await until(lambda: scene.errors)
+        await stand(scene, 1.2, NOW + 0.2)
+        await stand(scene, 1.3, NOW + 0.3)
+        (line,) = scene.errors
+        assert line.startswith("Bob: the clock of its poses leapt by ")
+        assert f"{WAYS[way]:+.1f} s" in line
+
+    with_scene(map, channel, scenario)
+
+
+async def placed(scene: Scene) -> None:
+    """Give the robot frames, and wait until it is drawn by them."""
+    scene.robots[0].set_tf(scene.bridges[0])
+    await until(lambda: "/tf" in scene.servers[0].asked)
+    await tell(scene, at("", NOW))
+    await say(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
+    await until(lambda: drawn_at(scene, 11.0))
+
+
+async def tell(scene: Scene, about: dict) -> None:
+    chain = [("map", "odom", 10.0), ("odom", "base_link", 1.0)]
+    transforms = [transform(*link, about) for link in chain]
+    await say(scene, "/tf", {"transforms": transforms})
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_frame_an_hour_off_is_said_once_and_the_robot_stays_in_place(
+    map, channel, way
+):
+    async def scenario(scene: Scene) -> None:
+        await placed(scene)
+        await tell(scene, at("", NOW + WAYS[way]))
+        await tell(scene, at("", NOW))
+        await until(lambda: scene.errors)
+        await say(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
+        await until(lambda: drawn_at(scene, 11.1))
+        (line,) = scene.errors
+        assert line.startswith("Bob: 'map' -> 'odom': time jumped back by 3600.000 s")
+
+    with_scene(map, channel, scenario)
+
+
+def test_a_frame_of_two_thousand_million_nanoseconds_is_left_out_and_said_once(
+    map, channel
+):
+    async def scenario(scene: Scene) -> None:
+        await placed(scene)
+        for _ in range(3):
+            await tell(scene, header() | NANOSECONDS)
+        await until(lambda: scene.errors)
+        await say(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
+        await until(lambda: drawn_at(scene, 11.1))
+        (line,) = scene.errors
+        assert line == (
+            "Bob: a transform was left out: 'map' -> 'odom': a time has 2000000005 "
+            "nanoseconds; expected 0 to 999999999"
+        )
+
+    with_scene(map, channel, scenario)

@@ -1,0 +1,267 @@
+"""Data of sensors that are tilted, hang upside down or look along z, from above."""
+
+import math
+
+import numpy as np
+import pytest
+from module_fakes import dots, numbers, to_root
+from test_modules_at_stamp import odometry, scan, stamp
+from test_modules_cloud import cloud
+from test_modules_frames import tell
+from test_modules_poses import sonar
+from test_modules_ways import in_world
+from tilted_frames import OPTICAL, OVER, frame, matrix, posed, quaternion, taken
+
+from webmap.base.geometry import Quaternion
+
+MAP = frame("map", "odom", (1.0, -2.0, 0.0), (0.0, 0.0, 0.3), 100.0)
+BASE = frame("odom", "base_link", (3.0, 1.0, 0.0), (0.0, 0.0, 2.0), 100.0)
+SLOPE = frame("odom", "base_link", (3.0, 1.0, 4.0), (0.1, -0.2, 2.0), 100.0)
+"""The same where the floor is not level, and four metres higher."""
+
+POINTS = [[1.0, 0.2, 2.0], [-0.5, 0.1, 1.0], [0.3, -1.5, 3.0], [0.0, 0.3, 5.0]]
+
+
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
+
+
+@pytest.fixture(params=[BASE, SLOPE], ids=["level", "slope"])
+def base(request, robot, link):
+    """The way to the base of a robot that stands, level or on a slope."""
+    robot.set_tf(link)
+    tell(link, MAP, request.param)
+    return MAP, request.param
+
+
+def mount(link, place, turns) -> dict:
+    found = frame("base_link", "sensor", place, turns)
+    tell(link, found, static=True)
+    return found
+
+
+def sensed(message: dict, seconds: float = 100.0) -> dict:
+    return {**message, "header": {"stamp": stamp(seconds), "frame_id": "sensor"}}
+
+
+def on_map(*paths) -> np.ndarray:
+    found = [to_root(path).apply(*dot) for path in paths for dot in dots(path)]
+    return np.array(sorted(found))
+
+
+def flat(points) -> np.ndarray:
+    return np.array(sorted(map(tuple, points[:, :2])))
+
+
+def near(points, within=0.003):
+    return pytest.approx(points, abs=within)
+
+
+TURNS = {
+    "an optical frame": OPTICAL,
+    "an optical frame that looks down": (-math.pi / 2 - 0.6, 0.0, -math.pi / 2),
+    "upside down": OVER,
+    "pitched": (0.0, 0.5, 0.0),
+    "on its side": (math.pi / 2, 0.0, 0.4),
+    "straight down": (0.0, math.pi / 2, 0.0),
+    "all at once": (0.7, -0.9, 2.5),
+}
+
+
+@pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
+def test_a_cloud_is_turned_in_space_before_it_is_flattened(link, robot, base, turns):
+    mounted = mount(link, (0.3, 0.1, 0.8), turns)
+    module = robot.add_module("PointCloud", link, "/points", cell=0)
+    link.say("/points", sensed(cloud(POINTS)))
+    assert on_map(*module.dots) == near(flat(taken(POINTS, *base, mounted)))
+    assert robot.problems == {}
+
+
+@pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
+def test_heights_are_above_the_base_straight_up(link, robot, base, turns):
+    mounted = mount(link, (0.3, 0.1, 0.8), turns)
+    there = taken(POINTS, *base, mounted)
+    heights = there[:, 2] - base[1]["transform"]["translation"]["z"]
+    lowest, low, high, highest = sorted(heights)
+    window = {"z_min": (lowest + low) / 2, "z_max": (high + highest) / 2}
+    module = robot.add_module("PointCloud", link, "/points", cell=0, **window)
+    link.say("/points", sensed(cloud(POINTS)))
+    within = (heights > lowest) & (heights < highest)
+    assert on_map(*module.dots) == near(flat(there[within]))
+
+
+def test_colours_by_height_are_by_that_above_the_base_too(link, robot, base):
+    mounted = mount(link, (0.3, 0.1, 0.8), OPTICAL)
+    module = robot.add_module(
+        "PointCloud", link, "/points", cell=0, colour_by="z", low=0.0, high=8.0
+    )
+    link.say("/points", sensed(cloud([[0.0, -y, 2.0] for y in (0.7, 3.7, 6.7)])))
+    there = taken([[0.0, -y, 2.0] for y in (0.7, 3.7, 6.7)], *base, mounted)
+    heights = there[:, 2] - base[1]["transform"]["translation"]["z"]
+    for height, point in zip(heights, there, strict=True):
+        band = module.dots[int(height)]
+        assert on_map(band) == near(point[np.newaxis, :2]), height
+
+
+def test_a_cloud_on_the_map_has_heights_above_the_map(link, robot):
+    robot.set_tf(link)
+    tell(link, MAP, SLOPE)
+    mounted = mount(link, (0.0, 0.0, 0.5), OPTICAL)
+    module = robot.add_module(
+        "PointCloud", link, "/points", cell=0, frame="map", z_min=4.0, z_max=5.0
+    )
+    link.say("/points", sensed(cloud(POINTS)))
+    there = taken(POINTS, MAP, SLOPE, mounted)
+    within = (there[:, 2] > 4.0) & (there[:, 2] < 5.0)
+    assert 0 < within.sum() < len(POINTS)
+    assert on_map(*module.dots) == near(flat(there[within]))
+
+
+def test_a_cloud_that_overtakes_the_frames_is_drawn_anew_as_the_robot_leans(
+    link, robot
+):
+    robot.set_tf(link)
+    still = (3.0, 1.0, 0.0)
+    for seconds in (100.0, 100.1):
+        level = frame("map", "base_link", still, (0.0, 0.0, 0.5), seconds)
+        tell(link, level)
+    mounted = mount(link, (0.3, 0.0, 0.8), OPTICAL)
+    module = robot.add_module("PointCloud", link, "/points", cell=0)
+    link.say("/points", sensed(cloud(POINTS), 100.2))
+    assert on_map(*module.dots) == near(flat(taken(POINTS, level, mounted)))
+    leaning = frame("map", "base_link", still, (0.2, 0.1, 0.5), 100.2)
+    tell(link, leaning)
+    assert on_map(*module.dots) == near(flat(taken(POINTS, leaning, mounted)))
+
+
+def test_a_robot_without_a_map_has_its_camera_where_its_frames_have_it(link, robot):
+    robot.set_odometry_topic(link, "/odom", 0, type="geometry_msgs/PoseStamped")
+    robot.set_tf(link, quiet=True)
+    mounted = mount(link, (0.3, 0.1, 0.8), OPTICAL)
+    module = robot.add_module(
+        "PointCloud", link, "/points", cell=0, z_min=0.0, z_max=1.0
+    )
+    for seconds in (100.0, 100.1):
+        odometry(link, seconds, "map")
+    link.say("/points", sensed(cloud(POINTS), 100.0))
+    there = taken(POINTS, frame("map", "base_link", (4.0, 3.0, 0.0)), mounted)
+    within = (there[:, 2] >= 0.0) & (there[:, 2] <= 1.0)
+    assert 0 < within.sum() < len(POINTS)
+    assert on_map(*module.dots) == near(flat(there[within]))
+
+
+RAYS = [(2.0, 0.5), (1.0, -1.0), (-3.0, 0.25)]
+
+
+@pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
+def test_the_plane_of_a_scan_is_seen_from_above(link, robot, base, turns):
+    mounted = mount(link, (0.2, 0.0, 0.3), turns)
+    module = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
+    link.say("/scan", sensed(scan(RAYS, 100.0)))
+    (path,) = module.svg.children
+    # The rays of the scan are a degree apart.
+    rays = [
+        (r * math.cos(a), r * math.sin(a), 0.0)
+        for x, y in RAYS
+        for r, a in [(math.hypot(x, y), math.radians(round(_degrees(x, y))))]
+    ]
+    assert on_map(path) == near(flat(taken(rays, *base, mounted)))
+    whole = to_root(path)
+    assert whole.determinant == pytest.approx(1.0), "dots stay squares"
+
+
+def _degrees(x, y):
+    return math.degrees(math.atan2(y, x))
+
+
+@pytest.mark.parametrize("turns", [OVER, (math.pi / 2, 0, 0), (0, math.pi / 2, 0)])
+def test_a_sweep_in_any_plane_is_straightened_in_that_plane(link, robot, turns):
+    robot.set_tf(link)
+    for step in range(3):
+        seconds = 100.0 + step / 10
+        place = (2.0 + 0.5 * step, 1.0, 0.0)
+        tell(link, frame("map", "base_link", place, seconds=seconds))
+    mounted = mount(link, (0.0, 0.0, 0.3), turns)
+    module = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
+    message = scan([(2.0, 0.0), (-2.0, 0.0)], 100.0, increment=0.1 / 360)
+    link.say("/scan", sensed(message))
+    ahead, back = np.array([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]])
+    there = taken([ahead, back], frame("map", "x", (2.0, 1.0, 0.0)), mounted)
+    # Half a sweep later, at 5 m/s; out of the plane nobody looks for that.
+    there[1, 0] += 0.25 * abs(matrix(*turns)[0, 0])
+    (path,) = module.svg.children
+    assert on_map(path) == near(flat(there))
+
+
+def outline(cone) -> np.ndarray:
+    text = cone.get("d")
+    assert "A" not in text
+    pairs = [part.split() for part in text.strip("Mz").split("L")]
+    place = to_root(cone)
+    return np.array([place.apply(float(x), float(y)) for x, y in pairs])
+
+
+@pytest.mark.parametrize("roll", [0.0, math.pi / 2, math.pi, 2.0])
+def test_a_cone_is_the_same_however_it_is_turned_about_its_axis(link, robot, roll):
+    robot.set_tf(link)
+    tell(link, MAP, BASE)
+    mount(link, (0.2, 0.1, 0.4), (roll, 0.0, 0.7))
+    module = robot.add_module("Range", link, "/sonar")
+    link.say("/sonar", sensed(sonar(2.0, view=0.5)))
+    x0, y0, x, y, *_ = numbers(module.cone.get("d"))
+    place = to_root(module.cone)
+    side = [2 * math.cos(0.25), -2 * math.sin(0.25), 0.0]
+    level = frame("base_link", "sensor", (0.2, 0.1, 0.4), (0.0, 0.0, 0.7))
+    tip, corner = taken([[0, 0, 0], side], MAP, BASE, level)[:, :2]
+    assert place.apply(x0, y0) == near(tip)
+    assert place.apply(x, y) == near(corner)
+
+
+def test_a_cone_that_looks_down_has_the_outline_that_it_has_from_above(
+    link, robot, base
+):
+    pitch, half, reach = 1.0, 0.25, 2.0
+    mounted = mount(link, (0.2, 0.1, 0.4), (0.3, pitch, 0.7))
+    module = robot.add_module("Range", link, "/sonar")
+    link.say("/sonar", sensed(sonar(reach, view=2 * half)))
+    drawn = outline(module.cone)
+    turns = np.linspace(0, math.tau, 200)
+    rim = np.column_stack(
+        (
+            np.full(200, reach * math.cos(half)),
+            reach * math.sin(half) * np.cos(turns),
+            reach * math.sin(half) * np.sin(turns),
+        )
+    )
+    true = taken(np.vstack([[0, 0, 0], rim, [[reach, 0, 0]]]), *base, mounted)[:, :2]
+    for angle in np.linspace(0, math.tau, 36):
+        way = np.array([math.cos(angle), math.sin(angle)])
+        assert (drawn @ way).max() == pytest.approx((true @ way).max(), abs=0.01)
+
+
+@pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
+def test_plans_and_polygons_of_any_frame_are_seen_from_above(link, robot, base, turns):
+    mounted = mount(link, (0.2, 0.1, 0.4), turns)
+    outline = robot.add_module("Polygon", link, "/footprint")
+    plan = robot.add_module("Path", link, "/plan")
+    wanted = taken(POINTS, *base, mounted)[:, :2]
+    corners = [dict(zip("xyz", point, strict=True)) for point in POINTS]
+    link.say("/footprint", sensed({"polygon": {"points": corners}}))
+    poses = [{"header": {}, "pose": posed(point)} for point in POINTS]
+    link.say("/plan", sensed({"poses": poses}))
+    assert np.array(in_world(outline.outline)) == near(wanted)
+    assert np.array(in_world(plan.line)) == near(wanted)
+
+
+def test_the_frames_of_these_tests_are_turned_as_ros_has_it():
+    """RViz turns about fixed axes: roll, then pitch, then yaw."""
+    right, down, ahead = matrix(*OPTICAL).T
+    assert ahead == pytest.approx([1, 0, 0])
+    assert down == pytest.approx([0, 0, -1])
+    assert right == pytest.approx([0, -1, 0])
+    for turns in TURNS.values():
+        there = frame("a", "b", (0, 0, 0), turns)
+        assert taken(POINTS, there) == pytest.approx(POINTS @ matrix(*turns).T)
+        assert Quaternion(**quaternion(*turns)).norm == pytest.approx(1.0)

@@ -1,0 +1,121 @@
+"""The panel with what nodes log: shared, counted, and heard while it is open."""
+
+import asyncio
+
+import msgspec
+import pytest
+from module_fakes import header
+
+from webmap.base.errors import ConfigError
+from webmap.features.log.rosout_panel import LONGEST, MOST, BridgeLog, log_of
+
+ROS1, ROS2 = {"info": 2, "error": 8}, {"info": 20, "error": 40}
+
+
+class LogLink:
+    """A bridge that somebody may listen to, and that can say something."""
+
+    def __init__(self, name):
+        self.name, self.url, self.state = name, f"ws://{name}:9090", "open"
+        self.listeners = []
+
+    def subscribe(self, topic, callback, type=None, *, decode, queue_length):
+        assert (topic, type) == ("/rosout", None)
+        heard = (callback, decode)
+        self.listeners.append(heard)
+        link = self
+
+        class Subscription:
+            def remove(self):
+                link.listeners.remove(heard)
+
+        return Subscription()
+
+    def say(self, level, text, name="/planner", *, ros2=False):
+        where = {"stamp": {"sec": 3, "nanosec": 0}} if ros2 else {"header": header("")}
+        number = (ROS2 if ros2 else ROS1)[level]
+        plain = {**where, "level": number, "name": name, "msg": text}
+        for callback, decode in self.listeners:
+            callback(msgspec.convert(plain, decode))
+
+
+@pytest.fixture
+def said(monkeypatch):
+    sent = []
+    monkeypatch.setattr(
+        "webmap.core.world_view.BrowserHalf.send",
+        lambda self, message: sent.append(message),
+    )
+    return sent
+
+
+def test_lines_of_both_dialects_come_while_the_panel_is_open(map, page, said):
+    old, new = LogLink("old"), LogLink("new")
+
+    async def scenario():
+        panel = map.add_module("RosoutPanel", [old, new])
+        assert old.listeners == [], "nothing is asked of a robot while it is folded"
+        panel.on_message({"open": True})
+        old.say("error", "stuck")
+        new.say("info", "on my way", "nav", ros2=True)
+        panel.tell()
+        first, second = said
+        assert (first["bridge"], first["total"], first["state"]) == (0, 1, "open")
+        assert first["said"][0][1:5] == ["error", "/planner", "stuck", 1]
+        assert second["said"][0][1:5] == ["info", "nav", "on my way", 1]
+        said.clear()
+        panel.tell()
+        assert said == [], "what was told is not told again"
+        old.say("error", "stuck")
+        old.state = "closed"
+        panel.tell()
+        assert said[0]["said"][0][4] == 2, "what is said again is counted"
+        assert said[0]["state"] == "closed"
+        panel.on_message({"open": False})
+        assert old.listeners == new.listeners == []
+        panel.on_message({"open": "please"})
+        panel.on_message({})
+        assert old.listeners == []
+        panel.on_message({"open": True})
+        page.close()
+        assert old.listeners == [], "a page that is gone listens to nothing"
+
+    asyncio.run(scenario())
+
+
+def test_a_bridge_is_asked_once_for_all_pages_and_keeps_the_newest():
+    link = LogLink("shared")
+    log = log_of(link)
+    assert log_of(link) is log
+    one, other = log.watch(), log.watch()
+    assert len(link.listeners) == 1
+    for number in range(MOST + 5):
+        link.say("info", f"{number}" + "x" * 2 * LONGEST)
+    assert (len(log.lines), log.total) == (MOST, MOST + 5)
+    assert len(log.lines[-1].text) == LONGEST
+    assert [line.number for line in log.since(log.version - 2)] == [MOST + 4, MOST + 5]
+    one.remove()
+    one.remove()
+    assert len(link.listeners) == 1, "the other still looks"
+    other.remove()
+    assert link.listeners == []
+    log.watch()
+    assert len(link.listeners) == 1
+
+
+def test_a_bridge_that_is_gone_is_not_listened_to():
+    log = BridgeLog(LogLink("gone"))
+    log.watch().remove()
+    assert list(log.lines) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"level": "loud"}, "level is one of debug, info, warn, error, fatal"),
+        ({"lines": 0}, "lines must be 1 to 200, got 0"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(map, options, words):
+    with pytest.raises(ConfigError, match=words):
+        map.add_module("RosoutPanel", [], **options)

@@ -1,0 +1,150 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import {
+  cleaned,
+  contains,
+  holds,
+  LEAST_AREA,
+  longestSide,
+  MOST_CORNERS,
+  problemOf,
+} from "../../../src/webmap/features/routes/polygon.js";
+import { placed } from "./areas.js";
+
+const ONE_BAY = placed([
+  [0, 0],
+  [6, 0],
+  [6, 4],
+  [4, 4],
+  [4, 2],
+  [2, 2],
+  [2, 4],
+  [0, 4],
+]);
+
+test("an area with a bay is one, whichever way round it is pressed", () => {
+  assert.equal(problemOf(ONE_BAY), "");
+  assert.equal(problemOf([...ONE_BAY].reverse()), "");
+});
+
+for (const [what, corners, problem] of [
+  ["one corner", [[0, 0]], "Got 1 corner: 3 are needed."],
+  [
+    "two corners",
+    [
+      [0, 0],
+      [1, 0],
+    ],
+    "Got 2 corners: 3 are needed.",
+  ],
+  [
+    "sides that cross",
+    [
+      [0, 0],
+      [4, 0],
+      [0, 4],
+      [4, 4],
+    ],
+    "Sides 2 and 4 cross or touch: sides that meet only at their corners are needed.",
+  ],
+  [
+    "a corner on another side",
+    [
+      [0, 0],
+      [4, 0],
+      [4, 4],
+      [2, 0],
+      [0, 4],
+    ],
+    "Sides 1 and 3 cross or touch: sides that meet only at their corners are needed.",
+  ],
+  [
+    "a side that goes back along the one before",
+    [
+      [0, 0],
+      [4, 0],
+      [4, 3],
+      [4, 1],
+      [0, 1],
+    ],
+    "Sides 2 and 4 cross or touch: sides that meet only at their corners are needed.",
+  ],
+  [
+    "three corners on a line",
+    [
+      [0, 0],
+      [2, 0],
+      [5, 0],
+    ],
+    `Got 0.00 m²: an area has ${LEAST_AREA} m² at least.`,
+  ],
+  [
+    "next to nothing",
+    [
+      [0, 0],
+      [0.2, 0],
+      [0.2, 0.2],
+      [0, 0.2],
+    ],
+    `Got 0.04 m²: an area has ${LEAST_AREA} m² at least.`,
+  ],
+]) {
+  test(`${what}: what was got and what is needed`, () => {
+    assert.equal(problemOf(placed(corners)), problem);
+  });
+}
+
+test("more corners than a preview keeps up with are refused with both numbers", () => {
+  const around = (count) =>
+    placed(
+      Array.from({ length: count }, (_, i) => [
+        9 * Math.cos((2 * Math.PI * i) / count),
+        9 * Math.sin((2 * Math.PI * i) / count),
+      ]),
+    );
+  assert.equal(problemOf(around(MOST_CORNERS)), "");
+  assert.equal(
+    problemOf(around(MOST_CORNERS + 1)),
+    `Got ${MOST_CORNERS + 1} corners: an area has ${MOST_CORNERS} at most.`,
+  );
+});
+
+test("a corner that was pressed twice is one corner, the first and last too", () => {
+  const pressed = placed([
+    [0, 0],
+    [4, 0],
+    [4, 0.001],
+    [4, 3],
+    [0.002, 0],
+  ]);
+  assert.deepEqual(cleaned(pressed), [pressed[0], pressed[1], pressed[3]]);
+});
+
+test("the longest side says the direction, and of two as long the first", () => {
+  assert.equal(longestSide(ONE_BAY), 0);
+  const tall = placed([
+    [0, 0],
+    [2, 0],
+    [2, 5],
+    [0, 5],
+  ]);
+  assert.equal(longestSide(tall), Math.PI / 2);
+});
+
+test("what is on an edge is in the area, and what is in a bay is not", () => {
+  assert.ok(contains(ONE_BAY, { x: 1, y: 3 }));
+  assert.ok(contains(ONE_BAY, { x: 6, y: 1 }));
+  assert.ok(contains(ONE_BAY, { x: 2, y: 2 }));
+  assert.ok(!contains(ONE_BAY, { x: 3, y: 3 }));
+  assert.ok(!contains(ONE_BAY, { x: -1, y: 2 }));
+});
+
+test("a straight way stays in the area along a side and past a corner, not over a bay", () => {
+  assert.ok(holds(ONE_BAY, { x: 2, y: 2 }, { x: 4, y: 2 }));
+  assert.ok(holds(ONE_BAY, { x: 1, y: 1 }, { x: 3, y: 2 }));
+  assert.ok(holds(ONE_BAY, { x: 0, y: 2 }, { x: 6, y: 2 }));
+  assert.ok(!holds(ONE_BAY, { x: 1, y: 3 }, { x: 5, y: 3 }));
+  assert.ok(!holds(ONE_BAY, { x: 2, y: 4 }, { x: 4, y: 4 }));
+  assert.ok(!holds(ONE_BAY, { x: 1, y: 1 }, { x: 7, y: 1 }));
+});

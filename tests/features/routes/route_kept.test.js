@@ -1,0 +1,22 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import {
+  KEPT_FOR,
+  keepRoute,
+  keptRoute,
+} from "../../../src/webmap/features/routes/route_run.js";
+
+const ROUTE = { points: [{ x: 1, y: 2, yaw: 0 }], loop: true, open: true, runs: new Map() };
+
+test("a route is kept for the tool that comes next on its map, once", () => {
+  keepRoute(7, ROUTE, 1000);
+  assert.equal(keptRoute(8, 1100), null);
+  assert.equal(keptRoute(7, 1100), ROUTE);
+  assert.equal(keptRoute(7, 1100), null);
+});
+
+test("a map that comes much later is another one", () => {
+  keepRoute(7, ROUTE, 1000);
+  assert.equal(keptRoute(7, 1000 + KEPT_FOR), null);
+});

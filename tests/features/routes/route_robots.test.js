@@ -1,0 +1,242 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { RouteRobots } from "../../../src/webmap/features/routes/route_run.js";
+import { TRIES } from "../../../src/webmap/web/tools/goal_words.js";
+import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
+
+const LINKLESS = "no link to where its goals go";
+const POINTS = [1, 2, 3].map((x) => ({ x, y: 0, yaw: 0 }));
+
+const pass = holdTimeouts();
+
+/** The page's line to a gate that refuses goals while `refusal` says why. */
+class FakeDrive {
+  constructor() {
+    this.refusal = null;
+    /** Where goals were offered, by x; and "cancel". */
+    this.said = [];
+    this.kept = 0;
+    this.robots = new Map();
+    this._listeners = {};
+  }
+
+  on(kind, fn) {
+    this._listeners[kind] = fn;
+    return () => delete this._listeners[kind];
+  }
+
+  tell(kind, what) {
+    this._listeners[kind]?.(what);
+  }
+
+  holds() {
+    return true;
+  }
+
+  keep() {
+    this.kept += 1;
+  }
+
+  cancel() {
+    this.said.push("cancel");
+  }
+
+  async goal(robot, { x }) {
+    await this.taking;
+    this.said.push(x);
+    this.tell("goal", robot);
+    if (this.refusal !== null) throw new Error(this.refusal);
+  }
+
+  report(word, more = {}) {
+    this.robots.set("r1", { robot: "r1", latched: false, goal: word, ...more });
+    this.tell("robot", { robot: "r1" });
+  }
+}
+
+function goal(id, state = "under way") {
+  return { id, state, why: "", way: "navigate_to_pose", left: null, eta: null };
+}
+
+/** A robot whose first goal waits for the link that another robot's goal used up. */
+async function waiting() {
+  const drive = new FakeDrive();
+  drive.report(null);
+  drive.refusal = LINKLESS;
+  const robots = new RouteRobots(drive, () => null, () => {});
+  robots.begin("r1", POINTS, { loop: false });
+  await settle();
+  assert.deepEqual(drive.said, [1]);
+  return { drive, robots, run: robots.of("r1").run };
+}
+
+test("a route goes on where another robot's goal has used up the link for a moment", async () => {
+  const { drive, run } = await waiting();
+  assert.equal(run.state, "going");
+  drive.refusal = null;
+  await pass();
+  drive.report(goal("g1"));
+  drive.refusal = LINKLESS;
+  drive.report(goal("g1", "reached"));
+  await settle();
+  drive.refusal = null;
+  await pass();
+  drive.report(goal("g2"));
+  assert.deepEqual(drive.said, [1, 1, 2, 2]);
+  assert.equal(run.state, "going");
+});
+
+test("a route halts at last where there is no link, and says so", async () => {
+  const { drive, run } = await waiting();
+  await pass(20);
+  assert.equal(run.state, "halted");
+  assert.equal(run.why, LINKLESS);
+  assert.equal(drive.said.length, TRIES);
+});
+
+test("a route that waits is not busy, so a person may pause or skip it", async () => {
+  const { robots } = await waiting();
+  assert.equal(robots.of("r1").busy, false);
+});
+
+for (const [what, act, state] of [
+  ["paused", ({ robots }) => robots.act("r1", "pause"), "paused"],
+  ["ended", ({ robots }) => robots.act("r1", "end"), "ended"],
+  ["stopped", ({ drive }) => drive.tell("stop", "r1"), "halted"],
+  ["stopped with all robots", ({ drive }) => drive.tell("stop", "*"), "halted"],
+  ["stopped by another page", ({ drive }) => drive.report(null, { latched: true }), "halted"],
+  ["sent elsewhere by this page", ({ drive }) => drive.tell("goal", "r1"), "halted"],
+  ["sent elsewhere by another", ({ drive }) => drive.report(goal("g9")), "halted"],
+]) {
+  test(`nothing more is sent of a route that is ${what} while it waits`, async () => {
+    const bench = await waiting();
+    act(bench);
+    bench.drive.refusal = null;
+    await pass(20);
+    assert.equal(bench.run.state, state);
+    assert.deepEqual(
+      bench.drive.said.filter((each) => each !== "cancel"),
+      [1],
+    );
+  });
+}
+
+test("a STOP of another robot does not halt a route", async () => {
+  const { drive, run } = await waiting();
+  drive.tell("stop", "r2");
+  assert.equal(run.state, "going");
+});
+
+test("a point that is skipped while it waits is not sent, and the next one is once", async () => {
+  const { drive, robots, run } = await waiting();
+  drive.refusal = null;
+  robots.act("r1", "skip");
+  await pass(20);
+  assert.deepEqual(drive.said, [1, 2]);
+  assert.equal(run.state, "going");
+});
+
+test("a route that is paused and goes on while it waits sends its point once", async () => {
+  const { drive, robots, run } = await waiting();
+  robots.act("r1", "pause");
+  drive.refusal = null;
+  robots.act("r1", "go");
+  await pass(20);
+  assert.deepEqual(drive.said, [1, "cancel", 1]);
+  assert.equal(run.state, "going");
+});
+
+test("nothing more is sent after the tool is gone", async () => {
+  const { drive, robots } = await waiting();
+  robots.destroy();
+  await pass(20);
+  assert.deepEqual(drive.said, [1]);
+});
+
+test("a route that is ended while the lease is taken cancels the goal that follows", async () => {
+  const drive = new FakeDrive();
+  drive.report(null);
+  let take;
+  drive.taking = new Promise((resolve) => (take = resolve));
+  const robots = new RouteRobots(drive, () => null, () => {});
+  robots.begin("r1", POINTS, { loop: false });
+  robots.act("r1", "end");
+  take();
+  await settle();
+  assert.deepEqual(drive.said, ["cancel", 1, "cancel"]);
+  assert.equal(robots.of("r1").run.state, "ended");
+});
+
+test("a robot that is gone halts its route", async () => {
+  const { drive, robots, run } = await waiting();
+  drive.robots.clear();
+  robots.look();
+  assert.equal(run.why, "the robot is gone");
+});
+
+test("the robots that go, and no others, are kept for this page", async () => {
+  const { drive, robots } = await waiting();
+  drive.tell("step", null);
+  assert.equal(drive.kept, 1);
+  robots.act("r1", "end");
+  drive.tell("step", null);
+  assert.equal(drive.kept, 1);
+});
+
+test("a run goes on by the robots that come after, when the map was drawn anew", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  drive.report(goal("g1"), { name: "Bob" });
+  const runs = before.destroy();
+  const after = new RouteRobots(drive, () => null, () => {}, runs);
+  drive.report(goal("g1", "reached"), { name: "Bob" });
+  await settle();
+  assert.deepEqual(drive.said, [1, 2]);
+  assert.equal(after.of("r1").run.index, 1);
+  assert.equal(before.of("r1"), undefined);
+});
+
+test("what was being sent when the map was drawn anew waits for a person", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  drive.refusal = LINKLESS;
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  const after = new RouteRobots(drive, () => null, () => {}, before.destroy());
+  drive.refusal = null;
+  await pass(20);
+  assert.deepEqual(drive.said, [1]);
+  assert.equal(after.of("r1").run.why, "the map was drawn anew");
+});
+
+test("a robot that is called so by a display that was started anew gets no run", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  const runs = before.destroy();
+  drive.report(null, { name: "Alice" });
+  const after = new RouteRobots(drive, () => null, () => {}, runs);
+  assert.equal(after.of("r1"), undefined);
+});
+
+test("a goal that leaves after the map was drawn anew is called off", async () => {
+  const drive = new FakeDrive();
+  drive.report(null, { name: "Bob" });
+  let take = () => {};
+  drive.taking = new Promise((done) => (take = done));
+  const before = new RouteRobots(drive, () => null, () => {});
+  before.begin("r1", POINTS, { loop: false });
+  await settle();
+  const after = new RouteRobots(drive, () => null, () => {}, before.destroy());
+  take();
+  await pass();
+  assert.deepEqual(drive.said, [1, "cancel"]);
+  assert.equal(after.of("r1").run.state, "halted");
+});

@@ -1,0 +1,173 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { RouteRun } from "../../../src/webmap/features/routes/route_run.js";
+
+const POINTS = [1, 2, 3].map((x) => ({ x, y: 0, yaw: 0 }));
+
+function goal(id, state = "under way", more = {}) {
+  return { id, state, why: "", way: "move_base", left: null, eta: null, ...more };
+}
+
+/** A run whose first goal, `g1`, is under way. */
+function underWay(options) {
+  const run = new RouteRun(POINTS, options);
+  run.go(null);
+  run.accepted(0);
+  say(run, goal("g1"));
+  return run;
+}
+
+function say(run, word, { mine = true, latched = false, away = null, now = 0 } = {}) {
+  return run.report({ mine, latched, goal: word }, away, now);
+}
+
+test("one goal follows the other, and after the last it ends", () => {
+  const run = underWay();
+  for (const n of [1, 2]) {
+    assert.deepEqual(say(run, goal(`g${n}`, "reached")), { send: POINTS[n] });
+    assert.equal(say(run, goal(`g${n}`, "reached")), null, "it is sent once");
+    run.accepted(0);
+    assert.equal(say(run, goal(`g${n}`, "reached")), null, "that is the one before");
+    assert.equal(say(run, goal(`g${n + 1}`)), null);
+  }
+  assert.equal(say(run, goal("g3", "reached")), null);
+  assert.equal(run.state, "ended");
+  assert.equal(run.go("g3"), null);
+});
+
+test("a loop begins anew", () => {
+  const run = underWay({ loop: true });
+  run.skip("g1");
+  run.skip("g1");
+  run.accepted(0);
+  say(run, goal("g3"));
+  const later = { now: 1000 };
+  assert.deepEqual(say(run, goal("g3", "reached"), later), { send: POINTS[0] });
+  assert.equal(run.rounds, 1);
+});
+
+test("a loop of points that are all reached already sends one goal a second", () => {
+  const run = new RouteRun(POINTS, { loop: true });
+  run.go(null);
+  run.accepted(0);
+  const sent = [];
+  for (let now = 0; now < 10_000; now += 50) {
+    const there = goal(`g${sent.length}`, "sent", { way: "topic" });
+    if (say(run, there, { away: 0.1, now }) === null) continue;
+    sent.push(now);
+    run.accepted(now);
+  }
+  assert.deepEqual(sent, [1, 2, 3, 4, 5, 6, 7, 8, 9].map((second) => 1000 * second));
+});
+
+test("a route that does not loop does not wait at points that are reached at once", () => {
+  assert.deepEqual(say(underWay(), goal("g1", "reached")), { send: POINTS[1] });
+});
+
+test("a STOP while a loop waits at a point that it has reached halts it", () => {
+  const run = underWay({ loop: true });
+  assert.equal(say(run, goal("g1", "reached"), { now: 500 }), null);
+  say(run, goal("g1", "reached"), { now: 1500, latched: true });
+  assert.equal(run.state, "halted");
+});
+
+test("a loop of one point ends there, as there is nowhere to go on to", () => {
+  const run = new RouteRun(POINTS.slice(0, 1), { loop: true });
+  run.go(null);
+  run.accepted(0);
+  say(run, goal("g1"));
+  assert.equal(say(run, goal("g1", "reached"), { now: 60_000 }), null);
+  assert.equal(run.state, "ended");
+});
+
+test("a failure halts it, and a person goes on or skips", () => {
+  const run = underWay();
+  assert.equal(say(run, goal("g1", "failed", { why: "no path" })), null);
+  assert.equal(run.state, "halted");
+  assert.equal(run.why, "failed: no path");
+  assert.equal(say(run, goal("g1", "failed")), null);
+  assert.deepEqual(run.go("g1"), { send: POINTS[0] });
+  run.accepted(0);
+  say(run, goal("g2", "failed"));
+  assert.deepEqual(run.skip("g2"), { send: POINTS[1] });
+});
+
+test("STOP, a lost lease, another's goal and a cancel halt it", () => {
+  const cases = [
+    [goal("g1"), { latched: true }, /STOP/],
+    [goal("g1"), { mine: false }, /does not have the robot/],
+    [goal("g9"), {}, /another goal/],
+    [goal("g1", "cancelled", { why: "STOP" }), {}, /cancelled: STOP/],
+    [goal("g1", "cancelling"), {}, /cancelled/],
+  ];
+  for (const [word, more, why] of cases) {
+    const run = underWay();
+    assert.equal(say(run, word, more), null);
+    assert.equal(run.state, "halted");
+    assert.match(run.why, why);
+    assert.equal(say(run, goal("g1", "reached")), null, "nothing goes on by itself");
+  }
+});
+
+test("before the gate has accepted a goal a missing lease is no news", () => {
+  const run = new RouteRun(POINTS);
+  run.go(null);
+  assert.equal(say(run, null, { mine: false }), null);
+  assert.equal(run.state, "going");
+  run.halt("Ann drives it");
+  assert.equal(run.why, "Ann drives it");
+});
+
+test("a goal that the gate never tells of halts it", () => {
+  const run = new RouteRun(POINTS);
+  run.go("g0");
+  run.accepted(0);
+  say(run, goal("g0", "reached"), { now: 4000 });
+  assert.equal(run.state, "going");
+  say(run, goal("g0", "reached"), { now: 6000 });
+  assert.equal(run.state, "halted");
+});
+
+test("a pause cancels, and going on sends the same point again", () => {
+  const run = underWay();
+  assert.deepEqual(run.pause(), { cancel: true });
+  assert.equal(run.pause(), null);
+  assert.equal(say(run, goal("g1", "cancelled")), null);
+  assert.equal(run.state, "paused");
+  assert.equal(run.skip("g1"), null, "while it is paused nothing is sent");
+  assert.equal(run.index, 1);
+  assert.deepEqual(run.go("g1"), { send: POINTS[1] });
+});
+
+test("skipping goes to the next point at once, and the last one ends it", () => {
+  const run = underWay();
+  assert.deepEqual(run.skip("g1"), { send: POINTS[1] });
+  assert.deepEqual(run.skip("g2"), { send: POINTS[2] });
+  assert.deepEqual(run.skip("g3"), { cancel: true });
+  assert.equal(run.state, "ended");
+  assert.equal(run.skip("g3"), null);
+});
+
+test("ending cancels what is under way", () => {
+  const run = underWay();
+  assert.deepEqual(run.end(), { cancel: true });
+  assert.equal(run.end(), null);
+  assert.equal(run.live, false);
+});
+
+test("a robot that does not say how it goes is there when it is near", () => {
+  const run = new RouteRun(POINTS);
+  run.go(null);
+  run.accepted(0);
+  const sent = goal("g1", "sent", { way: "topic" });
+  assert.equal(say(run, sent, { away: 0.5 }), null);
+  assert.deepEqual(say(run, sent, { away: 0.2 }), { send: POINTS[1] });
+});
+
+test("a robot that says how it goes is not believed to be there before it says so", () => {
+  const run = underWay();
+  assert.equal(say(run, goal("g1"), { away: 0.1 }), null);
+  assert.equal(say(run, goal("g1", "unknown"), { away: 0.1 }), null);
+  assert.equal(run.state, "going");
+});

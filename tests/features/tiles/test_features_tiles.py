@@ -1,0 +1,123 @@
+"""A layer of tiles on a map: what it loads, says and lets go."""
+
+import asyncio
+import threading
+from pathlib import Path
+
+import pytest
+from scene_of_tiles import DATUM, EAST, made_tiles, number
+
+from webmap.core.pictures import pictures
+from webmap.base.errors import ConfigError
+from webmap.features.tiles import tile_layer
+
+
+@pytest.fixture(scope="module")
+def tiles(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("tiles")
+    made_tiles(folder)
+    return folder
+
+
+def test_tiles_end_with_their_map(map, tiles, channel):
+    async def scenario():
+        before = len(pictures)
+        map.fit(-200, -150, 400, 300)
+        layer = map.add_module("TileLayer", tiles, DATUM, east=EAST, most=12)
+        for _ in range(500):
+            await asyncio.sleep(0.01)
+            if layer._looking is None:
+                break
+        assert 4 <= len(layer.shown) <= 12
+        assert len(pictures) > before
+        map.remove_module(layer)
+        await asyncio.sleep(0)
+        assert len(pictures) == before
+        assert layer._fragment not in channel.mounted.values()
+
+    asyncio.run(scenario())
+
+
+def test_a_tile_that_is_none_is_said_once_and_the_others_are_drawn(
+    map, channel, tmp_path
+):
+    made_tiles(tmp_path)
+    x, y = (int(n) for n in number(17, *DATUM))
+    for row in (y, y + 1):
+        (tmp_path / "17" / str(x) / f"{row}.png").write_text("<svg/>")
+
+    async def scenario():
+        map.fit(-200, -150, 400, 300)
+        layer = map.add_module("TileLayer", tmp_path, DATUM)
+        for _ in range(500):
+            await asyncio.sleep(0.01)
+            if layer._looking is None:
+                break
+        drawn = [tile for tile, shown in layer.shown.items() if shown]
+        map.remove_module(layer)
+        return drawn
+
+    drawn = asyncio.run(scenario())
+    assert len(drawn) > 3
+    (said,) = channel.errors
+    assert "a tile is not shown" in said
+    assert "is no PNG, JPEG or WebP" in said
+
+
+class Slow:
+    """Tiles from a disk that takes its time."""
+
+    zooms = range(20)
+    attribution = ""
+
+    def __init__(self):
+        self.reading = threading.Event()
+        self.goes_on = threading.Event()
+        self.closed_in: threading.Thread | None = None
+
+    def read(self, tile):
+        self.reading.set()
+        assert self.goes_on.wait(10)
+        raise ConfigError("the file is closed")
+
+    def close(self):
+        assert self.goes_on.wait(10)
+        self.closed_in = threading.current_thread()
+
+
+def test_a_page_that_closes_does_not_wait_for_a_tile_that_is_read(
+    map, page, channel, monkeypatch
+):
+    slow = Slow()
+    monkeypatch.setattr(tile_layer, "open_tiles", lambda source: slow)
+
+    async def scenario():
+        map.fit(-200, -150, 400, 300)
+        map.add_module("TileLayer", "a.mbtiles", DATUM)
+        await asyncio.to_thread(slow.reading.wait, 10)
+        page.close()
+        assert slow.closed_in is None
+        slow.goes_on.set()
+
+    asyncio.run(scenario())
+    assert slow.closed_in not in (None, threading.main_thread())
+    assert not channel.errors
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"datum": (91, 0)}, "datum is a latitude and a longitude"),
+        ({"datum": (50,)}, "datum: expected 2 in a list: a number, a number"),
+        ({"tile_size": 100}, "tile_size is 256 or 512"),
+        ({"most": 0}, "most is a number of tiles up to 256"),
+        ({"opacity": 2}, "opacity is from 0 to 1"),
+        ({"east": float("inf")}, "east must be finite"),
+        ({"source": "https://tiles.example"}, "this machine's disk alone"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(map, tiles, change, words):
+    options = {"source": tiles, "datum": DATUM, **change}
+    with pytest.raises(ConfigError, match=words):
+        map.add_module("TileLayer", **options)
+    assert map.modules == []

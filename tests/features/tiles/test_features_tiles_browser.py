@@ -1,0 +1,168 @@
+"""Tiles in a real browser: where they are, beside the fixes of satellites."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page, expect
+from scene_of_tiles import DATUM, EAST, FIXES, colour, made_tiles, missing, number
+
+from real_browser import watched_tab
+from webmap.base.local_plane import LocalPlane
+from webmap.base.geometry import Affine
+from webmap_process import page_of
+
+pytestmark = pytest.mark.browser
+
+HERE = Path(__file__).parent
+PLANE = LocalPlane(*DATUM, EAST)
+CTM = """selector => {
+  const m = document.querySelector(selector).getScreenCTM();
+  return [m.a, m.b, m.c, m.d, m.e, m.f];
+}"""
+
+
+@pytest.fixture(scope="module")
+def tiles(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("tiles")
+    made_tiles(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def url(tiles: Path) -> Iterator[str]:
+    told = {"PYTHONPATH": str(HERE), "TILES": str(tiles)}
+    with page_of(HERE / "scene_of_tiles.py", **told) as found:
+        yield found
+
+
+@pytest.fixture
+def tab(chromium: Browser, url: str) -> Iterator[Page]:
+    with watched_tab(chromium, 900, 700) as page:
+        page.goto(url)
+        page.locator("svg.webmap-view-control").wait_for()  # hands move it from now on
+        settled(page, 17)
+        yield page
+
+
+def settled(tab: Page, level: int) -> None:
+    """Wait until all tiles are of one level, drawn, and wherever there is one."""
+    tab.wait_for_function(
+        """([level, missing]) => {
+          const tiles = [...document.querySelectorAll('.tile')];
+          if (tiles.length <= 5 || !tiles.every((tile) =>
+            tile.dataset.tile.startsWith(level + '/') && tile.hasAttribute('href')))
+            return false;
+          const there = new Set([missing, ...tiles.map((tile) => tile.dataset.tile)]);
+          const [, x, y] = tiles[0].dataset.tile.split('/').map(Number);
+          const m = tiles[0].getScreenCTM().inverse();
+          for (let u = 20; u < innerWidth; u += 40)
+            for (let v = 20; v < innerHeight; v += 40) {
+              const at = new DOMPoint(u, v).matrixTransform(m);
+              const [column, row] = [x + Math.floor(at.x), y + Math.floor(at.y)];
+              if (!there.has(`${level}/${column}/${row}`)) return false;
+            }
+          return true;
+        }""",
+        arg=[level, "/".join(map(str, missing()))],
+    )
+    tab.evaluate(
+        """async () => {
+          const tiles = [...document.querySelectorAll('.tile')];
+          await Promise.all(tiles.map(async (tile) => {
+            const image = new Image();
+            image.src = tile.href.baseVal;
+            await image.decode();
+          }));
+          await new Promise((done) => requestAnimationFrame(() =>
+            requestAnimationFrame(done)));
+        }"""
+    )
+
+
+def seen(tab: Page) -> np.ndarray:
+    """What is on the screen but the robots, of shape (h, w, 3)."""
+    tab.evaluate(
+        "for (const e of document.querySelectorAll('.robot'))"
+        " e.style.visibility = 'hidden'"
+    )
+    return np.asarray(Image.open(io.BytesIO(tab.screenshot())).convert("RGB"))
+
+
+def world(tab: Page) -> Affine:
+    return Affine(*tab.evaluate(CTM, "svg.webmap .world"))
+
+
+@pytest.mark.parametrize("level", [17, 18])
+def test_tiles_lie_where_the_globe_has_them_and_fixes_where_the_tiles_say(tab, level):
+    if level == 18:
+        for _ in range(2):
+            before = tab.evaluate(CTM, "svg.webmap .world")[0]
+            tab.mouse.move(450, 350)
+            tab.mouse.wheel(0, -300)
+            tab.wait_for_function(
+                "before => document.querySelector('svg.webmap .world')"
+                ".getScreenCTM().a !== before",
+                arg=before,
+            )
+        settled(tab, 18)
+    picture, view = seen(tab), world(tab)
+    checked = 0
+    for u in range(20, 880, 43):
+        for v in range(20, 680, 37):
+            lat, lon = PLANE.to_globe(*view.inverse.apply(u, v))
+            x, y = number(level, lat, lon)
+            near_an_edge = min(x % 1, y % 1, 1 - x % 1, 1 - y % 1) < 0.015
+            tile = (level, int(x), int(y))
+            if near_an_edge or tile == missing() or (picture[v, u] < 30).all():
+                continue
+            if v < 120 or (u > 700 and v > 600):  # what lies over the map
+                continue
+            assert np.abs(picture[v, u].astype(int) - colour(*tile)).max() <= 3, tile
+            checked += 1
+    assert checked > 150
+    black = (picture < 40).all(axis=2)
+    for number_, fix in enumerate(FIXES):
+        selector = f'g.robot[data-name="{"AB"[number_]}"] .cross'
+        matrix = tab.evaluate(CTM, selector)
+        x, y = matrix[4], matrix[5]
+        rows, columns = np.nonzero(
+            black[int(y) - 12 : int(y) + 13, int(x) - 12 : int(x) + 13]
+        )
+        assert len(rows) > 20, fix
+        off = (
+            columns.mean() - 12 + int(x) + 0.5 - x,
+            rows.mean() - 12 + int(y) + 0.5 - y,
+        )
+        assert np.hypot(*off) < 1.5, fix
+
+
+def test_a_tile_that_is_not_there_is_left_empty_and_is_not_said(tab):
+    z, x, y = missing()
+    middle = (x + 0.5) / 2**z * 360 - 180
+    lat = np.degrees(np.arctan(np.sinh(np.pi * (1 - 2 * (y + 0.5) / 2**z))))
+    u, v = world(tab).apply(*PLANE.from_globe(float(lat), middle))
+    assert tuple(seen(tab)[round(v), round(u)]) == (255, 255, 255)
+    assert tab.locator(f'.tile[data-tile="{z}/{x}/{y}"]').count() == 0
+    assert tab.locator(".webmap-notice").count() == 0
+
+
+def test_whose_tiles_they_are_is_said_as_text(tab):
+    expect(tab.locator(".webmap-attribution")).to_have_text("<b>Nobody's</b> tiles")
+
+
+def test_another_view_has_other_tiles_and_never_more_than_the_most(tab):
+    before = tab.locator(".tile").evaluate_all("all => all.map((t) => t.dataset.tile)")
+    tab.mouse.move(450, 350)
+    tab.mouse.down()
+    tab.mouse.move(100, 100, steps=5)
+    tab.mouse.up()
+    tab.wait_for_function(
+        "before => [...document.querySelectorAll('.tile')].some((tile) =>"
+        " !before.includes(tile.dataset.tile))",
+        arg=before,
+    )
+    assert tab.locator(".tile").count() <= 30

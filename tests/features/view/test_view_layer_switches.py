@@ -1,0 +1,61 @@
+"""What may be switched."""
+
+import pytest
+from playwright.sync_api import expect
+
+from real_browser import watched_tab
+from webmap.base.errors import ConfigError
+from webmap_process import page_of
+
+MANY = """
+import webmap
+from webmap import svg
+
+
+@webmap.page("/")
+def main(page):
+    map = webmap.Map(page.element("webmap_container"))
+    for number in range(20, 0, -1):
+        scan = svg.g(class_="laserscan")
+        map.world.append(scan.set("data-layer", f"/robot_{number}/scan"))
+    map.add_module("LayerSwitches")
+"""
+
+
+def test_a_layer_that_does_not_exist_is_named_with_those_that_do(map):
+    there_are = "no layer 'Scan'; there are Tiles, Maps, Pictures, Costmaps"
+    with pytest.raises(ConfigError, match=there_are):
+        map.add_module("LayerSwitches", off=["Scan"])
+
+
+def test_the_browser_is_told_names_selectors_and_what_is_off(map):
+    switches = map.add_module("LayerSwitches", {"Dust": ".dust"}, off=["Dust"])
+    assert switches in map.modules
+
+
+def test_each_of_several_drawings_has_the_name_that_it_is_switched_by(map, link, robot):
+    made = [
+        robot.add_module("Range", link, "/bob/sonar/left"),
+        robot.add_module("PoseWithCovariance", link, "/bob/amcl_pose"),
+        map.add_module("Markers", link, "/bob/goals", robot=robot).layer,
+        map.add_module("Markers", link, "/bob/zones").layer,
+    ]
+    names = [each.svg.get("data-layer") for each in made]
+    assert names == ["sonar/left", "amcl_pose", "goals", "/bob/zones"]
+
+
+@pytest.mark.browser
+def test_many_robots_are_in_natural_order_and_those_without_a_switch_explained(
+    chromium, tmp_path
+):
+    file = tmp_path / "many.py"
+    file.write_text(MANY)
+    with page_of(file) as url, watched_tab(chromium, 1280, 800) as page:
+        page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
+        page.goto(url)
+        page.locator(".webmap-layers summary").click()
+        rows = page.locator(".webmap-layers-row")
+        robots = [f"/robot_{number}/scan" for number in range(1, 17)]
+        note = "4 more: the switch \N{LEFT DOUBLE QUOTATION MARK}Scans"
+        note += "\N{RIGHT DOUBLE QUOTATION MARK} is for all of them"
+        expect(rows).to_have_text(["Scans", *robots, note])

@@ -1,0 +1,217 @@
+"""Where a robot is to go and where it has been, in the frame of the map."""
+
+import itertools
+import math
+
+import pytest
+from module_fakes import header, numbers, pose, to_root
+
+from webmap.base.geometry import Quaternion
+
+
+def path(points, *, ros2=False) -> dict:
+    return {
+        "header": header(ros2=ros2),
+        "poses": [{"header": header(ros2=ros2), "pose": pose(x, y)} for x, y in points],
+    }
+
+
+def go(link, x, y, yaw=0.0, frame="odom"):
+    link.say("/odom", {"header": header(frame), "pose": pose(x, y, yaw)})
+
+
+@pytest.fixture
+def robot(robot, link):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    return robot
+
+
+def in_world(line) -> list[tuple[float, float]]:
+    """The points of a line, where they lie on the map."""
+    values = numbers(line.get("points") or "")
+    place = to_root(line)
+    pairs = zip(values[::2], values[1::2], strict=True)
+    return [place.apply(x, y) for x, y in pairs]
+
+
+def near(points):
+    return [pytest.approx(point, abs=2e-3) for point in points]
+
+
+@pytest.mark.parametrize("ros2", [False, True])
+def test_a_path_stays_where_it_is_on_the_map_while_the_robot_goes(link, robot, ros2):
+    module = robot.add_module("Path", link, "/plan")
+    points = [(1.0, 2.0), (3.5, -4.25), (-7.125, 0.0)]
+    link.say("/plan", path(points, ros2=ros2))
+    for at in [(0, 0, 0), (5, -3, 1), (-200.5, 77, math.pi), (1, 1, -2)]:
+        go(link, *at)
+        assert in_world(module.line) == near(points)
+
+
+def test_a_path_that_is_added_to_a_robot_on_its_way_is_in_place(link, robot):
+    go(link, 10, 20, 2.0)
+    module = robot.add_module("Path", link, "/plan")
+    link.say("/plan", path([(1, 2), (3, 4)]))
+    assert in_world(module.line) == near([(1, 2), (3, 4)])
+
+
+def test_a_path_lies_under_the_robot_and_takes_no_clicks(link, robot):
+    module = robot.add_module("Path", link, "/plan", name="local")
+    children = list(robot.svg.children)
+    assert children.index(module.svg) < children.index(robot.model)
+    assert module.svg.get("pointer-events") == "none"
+    assert set(module.svg.classes) == {"path", "local"}
+    robot.remove_module(module)
+    assert module.svg.parent is None
+    assert "/plan" not in link.listeners
+
+
+def test_a_path_without_poses_takes_the_line_away(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    link.say("/plan", path([(1, 2), (4, 6)]))
+    assert module.length == pytest.approx(5.0)
+    link.say("/plan", path([]))
+    assert in_world(module.line) == []
+    assert module.length == 0
+
+
+def test_a_long_path_is_thinned_evenly_and_keeps_both_ends(link, robot):
+    module = robot.add_module("Path", link, "/plan", max_points=100)
+    link.say("/plan", path([(i * 0.01, 0) for i in range(5000)]))
+    drawn = in_world(module.line)
+    assert len(drawn) == 100
+    assert drawn[0] == pytest.approx((0, 0))
+    assert drawn[-1] == pytest.approx((49.99, 0))
+    gaps = [b[0] - a[0] for a, b in itertools.pairwise(drawn)]
+    assert max(gaps) < 1.1
+    assert len(module.points) == 5000
+
+
+@pytest.mark.parametrize("wrong", [None, math.nan, math.inf])
+def test_a_path_with_a_point_that_is_nowhere_is_refused(link, robot, wrong):
+    module = robot.add_module("Path", link, "/plan")
+    link.say("/plan", path([(1, 2), (3, 4)]))
+    link.say("/plan", path([(1, 2), (3, wrong)]))
+    assert in_world(module.line) == near([(1, 2), (3, 4)])
+    (problem,) = robot.problems.values()
+    assert "as point 1 of 2" in problem
+    assert "/plan" in problem
+    link.say("/plan", path([(5, 6), (7, 8)]))
+    assert robot.problems == {}
+    assert in_world(module.line) == near([(5, 6), (7, 8)])
+
+
+def test_a_path_of_poses_that_turn_nowhere_is_a_path(link, robot):
+    message = path([(1, 2), (3, 4)])
+    for each in message["poses"]:
+        each["pose"]["orientation"] = {"x": 0, "y": 0, "z": 0, "w": 0}
+    module = robot.add_module("Path", link, "/plan")
+    link.say("/plan", message)
+    assert in_world(module.line) == near([(1, 2), (3, 4)])
+
+
+def test_what_a_removed_path_complained_of_is_forgotten(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    link.say("/plan", path([(math.nan, 0)]))
+    robot.remove_module(module)
+    assert robot.problems == {}
+
+
+def test_a_path_tells_the_other_modules_of_its_robot(link, robot):
+    heard = []
+
+    class Listener:
+        def __init__(self, robot) -> None:
+            pass
+
+        def on_path_update(self, path):
+            heard.append(path.length)
+
+    robot.add_module(Listener)
+    robot.add_module("Path", link, "/plan")
+    link.say("/plan", path([(0, 0), (0, 3)]))
+    assert heard == [3.0]
+
+
+def test_a_trail_is_where_the_robot_was(link, robot):
+    trail = robot.add_module("Trail")
+    way = [(0.1 * i, 0.05 * i, 0.3 * i) for i in range(30)]
+    for at in way:
+        go(link, *at)
+    (line,) = trail.svg.children
+    assert in_world(line) == near([(x, y) for x, y, _ in way])
+
+
+def test_small_steps_add_no_points(link, robot):
+    trail = robot.add_module("Trail", step=0.5)
+    for i in range(101):
+        go(link, 0.01 * i, 0)
+    assert trail.points == [[(0, 0), (0.5, 0), (1.0, 0)]]
+
+
+def test_a_jump_breaks_the_trail(link, robot):
+    trail = robot.add_module("Trail", jump=1.0)
+    for x in (0, 0.5, 1.0, 9.0, 9.5):
+        go(link, x, 0)
+    assert trail.points == [[(0, 0), (0.5, 0), (1.0, 0)], [(9, 0), (9.5, 0)]]
+    assert len(trail.svg.children) == 2
+
+
+def test_a_robot_that_only_jumps_leaves_no_heap_of_lines(link, robot):
+    trail = robot.add_module("Trail")
+    for x in range(0, 1000, 10):
+        go(link, x, 0)
+    assert len(trail.svg.children) == 1
+
+
+def test_a_trail_is_no_longer_than_it_may_be_and_its_old_pieces_stay_as_they_are(
+    link, robot
+):
+    trail = robot.add_module("Trail", length=10.0, step=0.09)
+    for i in range(1000):
+        go(link, 0.1 * i, 0)
+    points = [point for piece in trail.points for point in piece]
+    assert 9.8 <= points[-1][0] - points[0][0] <= 10.2
+    middle = trail.svg.children[1]
+    before = middle.get("points")
+    go(link, 100.0, 0)
+    assert middle.get("points") == before
+    assert len(trail.svg.children) <= 4
+
+
+def test_a_trail_goes_on_from_one_piece_to_the_next_without_a_gap(link, robot):
+    trail = robot.add_module("Trail", step=0.09)
+    for i in range(120):
+        go(link, 0.1 * i, 0)
+    pieces = trail.points
+    assert len(pieces) == 3
+    for one, next in itertools.pairwise(pieces):
+        assert one[-1] == next[0]
+
+
+def test_a_trail_can_be_cleared(link, robot):
+    trail = robot.add_module("Trail")
+    go(link, 0, 0)
+    go(link, 0.5, 0)
+    trail.clear()
+    assert trail.svg.children == ()
+    go(link, 0.6, 0)
+    go(link, 0.8, 0)
+    assert trail.points == [[(0.6, 0), (0.8, 0)]]
+
+
+@pytest.mark.parametrize("name", ["length", "step", "jump"])
+@pytest.mark.parametrize("value", [0, -1, math.nan, math.inf])
+def test_a_trail_of_no_length_is_refused(robot, name, value):
+    with pytest.raises(ValueError, match=f"{name} must be metres above 0"):
+        robot.add_module("Trail", **{name: value})
+
+
+def test_a_robot_that_lies_on_its_side_has_its_path_in_place(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    link.say("/plan", path([(1, 2), (3, 4)]))
+    q = Quaternion(0.5, 0.5, 0.5, 0.5)
+    message = {"header": header(), "pose": pose(3, 4)}
+    message["pose"]["orientation"] = {"x": q.x, "y": q.y, "z": q.z, "w": q.w}
+    link.say("/odom", message)
+    assert in_world(module.line) == near([(1, 2), (3, 4)])

@@ -1,0 +1,103 @@
+"""Alignments of a fleet file: read strictly, and laid under what people saved."""
+
+import math
+
+import pytest
+
+from webmap import Robot
+from webmap.fleet.made import prepare, restore
+from webmap.poses.alignment import alignments
+from webmap.core.alignment_store import AlignmentStore
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Pose
+
+FILE = """\
+[bridges]
+north = "ws://north:9090"
+south = { url = "ws://south:9090", alignment = [12.5, -3, 90.0] }
+
+[[robots]]
+name = "Bob"
+bridge = "south"
+odometry = "/odom"
+
+[[robots]]
+name = "Ann"
+bridge = "south"
+odometry = "/ann/odom"
+alignment = [1.0, 2.0, -45]
+"""
+
+
+@pytest.fixture
+def ready(tmp_path):
+    def ready_(text):
+        file = tmp_path / "fleet.toml"
+        file.write_text(text)
+        return prepare(file)
+
+    return ready_
+
+
+def refused(ready, text):
+    with pytest.raises(ConfigError) as error:
+        ready(text)
+    return str(error.value)
+
+
+def test_bridges_and_robots_lie_where_the_file_says(ready):
+    bob, ann = ready(FILE).robots
+    assert bob.whereabouts.alignment == Pose(12.5, -3.0, math.pi / 2)
+    assert bob.whereabouts.own_alignment is None
+    assert ann.whereabouts.alignment == Pose(1.0, 2.0, -math.pi / 4)
+    assert alignments.of(bob.whereabouts.bridge) == Pose(12.5, -3.0, math.pi / 2)
+
+
+@pytest.mark.parametrize("value", ['"north"', "[1, 2]", "[1, 2, nan]", "[1, 2, true]"])
+@pytest.mark.parametrize(
+    ("old", "line", "place"),
+    [
+        ("[1.0, 2.0, -45]", 14, "robots[1].alignment"),
+        ("[12.5, -3, 90.0]", 3, "bridges.south.alignment"),
+    ],
+)
+def test_one_that_makes_no_sense_is_named(ready, value, old, line, place):
+    said = refused(ready, FILE.replace(old, value))
+    assert f"fleet.toml:{line}: {place}: got " in said
+    assert "expected x and y in metres and an angle in degrees" in said
+
+
+def test_a_bridge_s_table_is_read_strictly(ready):
+    said = refused(ready, FILE.replace("alignment = [12.5", "aligment = [12.5"))
+    assert 'did you mean "alignment"?' in said
+    said = refused(ready, FILE.replace('url = "ws://south:9090", ', ""))
+    assert 'bridges.south: the key "url" is missing' in said
+
+
+def test_what_people_saved_holds_until_the_file_says_otherwise(
+    ready, tmp_path, monkeypatch
+):
+    store = AlignmentStore(tmp_path / "state")
+    store.save(
+        "ws://south:9090", Pose(12.5, -3.0, math.pi / 2), Pose(7.0, 0.0, 0.0), "Eve"
+    )
+    for text, wanted in ((FILE, 7.0), (FILE.replace("12.5", "13.5"), 13.5)):
+        fresh = AlignmentStore(tmp_path / "state")
+        monkeypatch.setattr("webmap.fleet.made.store", fresh)
+        robots = ready(text).robots
+        restore(robots)
+        assert alignments.of(robots[0].whereabouts.bridge).x == wanted
+
+
+def test_a_robots_alignment_is_plain_data_and_back():
+    bob = Robot("Bob")
+    assert "alignment" not in bob.to_dict()
+    bob.set_alignment(1.5, -2.0, 30.0)
+    data = bob.to_dict()
+    assert list(data["alignment"]) == [1.5, -2.0, 30.0]
+    again = Robot.from_dict(data)
+    assert again.to_dict() == data
+    with pytest.raises(ConfigError, match="alignment"):
+        Robot.from_dict({"name": "Bob", "alignment": [1, 2]})
+    for robot in (bob, again):
+        robot.destroy()

@@ -1,0 +1,96 @@
+"""Buttons in a fleet file: read strictly, each mistake with its line."""
+
+import pytest
+
+from webmap.fleet.made import prepare
+from webmap.base.errors import ConfigError
+
+HEAD = """\
+[bridges]
+hall = "ws://hall:9090"
+
+[[robots]]
+name = "Bob"
+twist = "/bob/wheels"
+
+[[robots.buttons]]
+label = "Dock"
+service = "/bob/dock"
+type = "std_srvs/Trigger"
+confirm = "Is the dock free?"
+timeout = 60
+"""
+
+
+def prepared(tmp_path, text):
+    file = tmp_path / "fleet.toml"
+    file.write_text(HEAD + text)
+    return prepare(file)
+
+
+def test_the_buttons_of_a_file_are_those_of_the_robot(tmp_path):
+    more = """
+[[robots.buttons]]
+label = "Slow"
+node = "/bob/controller"
+parameter = "max_vel"
+value = 0.2
+"""
+    (robot,) = prepared(tmp_path, more).robots
+    try:
+        (module,) = [each for each in robot.modules if hasattr(each, "buttons")]
+        dock, slow = (button.spec for button in module.buttons)
+        assert (dock.name, dock.confirm, dock.timeout) == (
+            "/bob/dock",
+            "Is the dock free?",
+            60.0,
+        )
+        assert (slow.kind, slow.node, slow.value) == (
+            "parameter",
+            "/bob/controller",
+            0.2,
+        )
+    finally:
+        robot.destroy()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            'label = "Go"\ntopic = "/go"\ntype = "geometry_msgs/Twist"',
+            "fleet.toml:17: robots[0].buttons[1].topic: /go of type geometry_msgs/Twist"
+            " carries a velocity, and a button may not write that: it goes through the "
+            "gate",
+        ),
+        (
+            'label = "Go"\nservice = "/go"\nconfrim = true',
+            'fleet.toml:18: robots[0].buttons[1].confrim: no such key; did you mean',
+        ),
+        (
+            'label = "H"\ntopic = "/h"\ntype = "std_msgs/UInt8"\nmessage.data = 256',
+            "fleet.toml:19: robots[0].buttons[1].message.data: got 256, expected a"
+            " whole number from 0 to 255",
+        ),
+        (
+            'label = "Dock"\nservice = "/again"',
+            "fleet.toml:16: robots[0].buttons[1].label: got \"Dock\", expected a label",
+        ),
+        (
+            'label = "Go"\ntopic = "bob//wheels"\ntype = "std_msgs/Bool"',
+            "fleet.toml:8: robots[0].buttons: button 'Go': /bob/wheels carries a",
+        ),
+    ],
+)  # fmt: skip
+def test_a_button_that_makes_no_sense_is_named_with_its_line(tmp_path, line, said):
+    with pytest.raises(ConfigError) as error:
+        prepared(tmp_path, f"\n[[robots.buttons]]\n{line}\n")
+    assert said in str(error.value)
+
+
+def test_buttons_that_are_no_tables_are_refused(tmp_path):
+    file = tmp_path / "fleet.toml"
+    text = HEAD.partition("[[robots.buttons]]")[0]
+    file.write_text(f"{text}buttons = 3\n")
+    with pytest.raises(ConfigError, match=r"expected a table \[\[robots.buttons\]\]"):
+        prepare(file)

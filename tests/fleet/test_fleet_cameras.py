@@ -1,0 +1,94 @@
+"""The cameras of a robot in a fleet file."""
+
+import pytest
+
+from webmap.fleet.made import prepare
+from webmap.discovery import discover
+from webmap.discovery.fleet_toml import fleet_toml
+from webmap.base.errors import ConfigError
+
+HEAD = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Read a file with these cameras, in its line 6, and return the robot's."""
+    robots = []
+
+    def read_(cameras: str) -> list:
+        file = tmp_path / "fleet.toml"
+        file.write_text(f"{HEAD}cameras = {cameras}\n")
+        robots.extend(prepare(file).robots)
+        modules = robots[-1].modules
+        return [module for module in modules if hasattr(module, "watch")]
+
+    yield read_
+    for robot in robots:
+        robot.destroy()
+
+
+def test_a_topic_or_an_address_is_enough(read):
+    (camera,) = read('"/front/image_raw/compressed"')
+    assert (camera.name, camera.topic) == ("Camera", "/front/image_raw/compressed")
+    (camera,) = read('"http://bob:8080/stream?topic=/front"')
+    assert (camera.name, camera.address) == ("Camera", "http://bob:8080/stream")
+
+
+def test_several_have_names_of_their_own(read):
+    cameras = read(
+        '["/front", {url = "https://bob/rear", name = "Rear", throttle = 500}, '
+        '{topic = "/arm"}]'
+    )
+    kinds = [(type(camera).__name__, camera.name) for camera in cameras]
+    assert kinds == [
+        ("Camera", "Camera 1"),
+        ("HttpCamera", "Rear"),
+        ("Camera", "Camera 3"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("cameras", "said"),
+    [
+        ('"rtsp://bob/stream"', 'cameras: got the text "rtsp://bob/stream", expected'),
+        ('"front camera"', 'cameras: got the text "front camera", expected a topic'),
+        ("7", "cameras: got the whole number 7, expected a topic"),
+        ("[7]", "cameras[0]: got the whole number 7"),
+        ("{}", 'cameras: a camera has either a "topic" or a "url"'),
+        (
+            '{topic = "/a", url = "http://bob/"}',
+            'cameras: a camera has either a "topic" or a "url"',
+        ),
+        ('{url = "bob"}', 'cameras.url: got the text "bob", expected the address'),
+        (
+            '{topic = "/a", throtle = 5}',
+            'cameras.throtle: there is no key "throtle" here; did you mean "throttle"?',
+        ),
+        ('{topic = "/a", throttle = -5}', "expected a whole number of milliseconds"),
+        (
+            '[{topic = "/a", name = "Arm"}, {topic = "/b", name = "arm"}]',
+            'cameras[1]: a second camera is called "arm"',
+        ),
+    ],
+)
+def test_a_mistake_is_named_with_its_line(read, cameras, said):
+    with pytest.raises(ConfigError) as refused:
+        read(cameras)
+    (line,) = str(refused.value).splitlines()
+    assert "fleet.toml:6: robots[0]." in line
+    assert said in line
+
+
+def test_what_is_found_is_written_so_that_each_camera_has_a_name(tmp_path):
+    image = "sensor_msgs/msg/CompressedImage"
+    topics = {f"/cam{n}/image_raw/compressed": image for n in (1, 2)}
+    findings = discover({"/odom": "nav_msgs/msg/Odometry"} | topics, "bob")
+    file = tmp_path / "fleet.toml"
+    file.write_text(fleet_toml([("hall", "ws://hall:9090", findings)]))
+    (robot,) = prepare(file).robots
+    cameras = [module for module in robot.modules if hasattr(module, "watch")]
+    assert {camera.name: camera.topic for camera in cameras} == {
+        "Camera 1": "/cam1/image_raw/compressed",
+        "Camera 2": "/cam2/image_raw/compressed",
+    }
+    robot.destroy()

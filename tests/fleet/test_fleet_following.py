@@ -1,0 +1,239 @@
+"""Robots of which frames, places and topics come while the console runs."""
+
+import asyncio
+from itertools import pairwise
+
+import pytest
+
+from webmap import Bridge
+from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.shown import ShownRobot, ShownRobots
+from webmap.fleet.stated import Candidate
+from webmap.console import Console, make_robot
+from webmap.discovery import FoundRobot, Guess, discover
+from webmap.discovery.hearing import late_frames
+from webmap.discovery.newcomers import Newcomers
+from webmap.discovery.tf_robots import Trees
+
+TF = {"/tf": "tf2_msgs/TFMessage"}
+ODOM = {"/bob/odom": "nav_msgs/Odometry"}
+DRIVEN = {"/bob/cmd_vel": "geometry_msgs/Twist"}
+GOALS = {
+    "/bob/goal_pose": "geometry_msgs/PoseStamped",
+    "/bob/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
+}
+AT_FIRST = "bob/odom bob/base_link"
+LATER = f"bob/map {AT_FIRST}"
+
+
+def candidate(bridge, **topics):
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in topics.items()}
+    return Candidate(bridge, FoundRobot("Al", "", guesses))
+
+
+def trees(chain):
+    found = Trees()
+    for parent, child in pairwise(chain.split()):
+        found.take("", parent, child)
+    return found
+
+
+class Watched:
+    """A console that looks again and again, at topics and frames as a test has them."""
+
+    def __init__(self, bridge, *settings, told=()):
+        self.bridge = bridge
+        said = Overruling([parse_setting(text) for text in settings])
+        self.late = ShownRobots(Console(), said, told=told)
+        self.newcomers = Newcomers()
+
+    def look(self, topics, chain=""):
+        """Look as often as news takes to settle, and once more."""
+        for _ in range(3):
+            findings = discover(topics, "host", trees(chain))
+            for news in self.newcomers.look(findings):
+                self.late.came(news, self.bridge)
+
+    @property
+    def robot(self):
+        (robot,) = self.late.robots
+        return robot
+
+
+@pytest.fixture
+def bridge():
+    return Bridge("ws://bob:9090")
+
+
+@pytest.fixture
+def watched(bridge):
+    made = Watched(bridge)
+    yield made
+    for robot in made.late.robots:
+        robot.destroy()
+
+
+def test_a_robot_of_frames_alone_is_drawn_in_the_map_once_that_is_there(
+    watched, capsys
+):
+    watched.look(TF, "odom base_link")
+    assert watched.robot.tf["map_frame"] == "odom"
+    capsys.readouterr()
+    watched.look(TF, "map odom base_link")
+    assert watched.robot.tf["map_frame"] == "map"
+    said = capsys.readouterr().err.splitlines()
+    assert said == ["host is drawn where map has base_link from now on"]
+
+
+def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
+    watched.look(TF | ODOM | GOALS, AT_FIRST)
+    assert watched.robot.motion.spec().goal_frame == "map"
+    capsys.readouterr()
+    watched.look(TF | ODOM | GOALS, LATER)
+    assert watched.robot.tf["map_frame"] == "bob/map"
+    assert watched.robot.motion.spec().goal_frame == "bob/map"
+    assert capsys.readouterr().err.splitlines() == [
+        "bob is drawn where bob/map has bob/base_link and told goals and its place in "
+        "bob/map from now on"
+    ]
+
+
+def test_a_robot_without_goals_is_told_its_place_in_a_map_that_comes_later(watched):
+    place = {name: type for name, type in GOALS.items() if "initial" in name}
+    watched.look(TF | ODOM | place, AT_FIRST)
+    watched.look(TF | ODOM | place, LATER)
+    assert watched.robot.motion.spec().goal_frame == "bob/map"
+
+
+def test_goals_that_come_while_frames_are_quiet_go_in_the_frame_that_is_known(watched):
+    watched.look(TF | ODOM, LATER)
+    watched.look(TF | ODOM | GOALS)
+    assert watched.robot.motion.spec().goal_frame == "bob/map"
+
+
+@pytest.mark.parametrize("later", ["", AT_FIRST, "bob/map bob/base_link"])
+def test_a_robot_stays_in_its_map_when_that_is_quiet(watched, later, capsys):
+    watched.look(TF | ODOM, LATER)
+    capsys.readouterr()
+    watched.look(TF | ODOM, later)
+    assert watched.robot.tf["map_frame"] == "bob/map"
+    assert capsys.readouterr().err == ""
+
+
+def test_frames_that_a_person_said_stay_as_they_are(bridge, capsys):
+    watched = Watched(bridge, "bob.tf=/tf")
+    watched.look(TF | ODOM | GOALS, AT_FIRST)
+    capsys.readouterr()
+    watched.look(TF | ODOM | GOALS, LATER)
+    assert watched.robot.tf["map_frame"] == "map"
+    assert watched.robot.motion.spec().goal_frame == "map"
+    assert capsys.readouterr().err == ""
+    watched.robot.destroy()
+
+
+def test_what_lies_in_the_frame_of_before_is_laid_into_the_new_one(watched, bridge):
+    watched.look(TF | ODOM, AT_FIRST)
+    robot = watched.robot
+    old = {"map_frame": "map", "palette": "costmap"}
+    robot.add_module("OnMaps", "OccupancyGrid", bridge, "/bob/costmap", **old)
+    robot.add_module("OnMaps", "OccupancyGrid", bridge, "/bob/as_it_comes")
+    watched.look(TF | ODOM, LATER)
+    made = {args[2]: said for name, args, said in robot.module_arguments() if args[2:]}
+    assert made == {
+        "/bob/costmap": {"map_frame": "bob/map", "palette": "costmap"},
+        "/bob/as_it_comes": {},
+    }
+
+
+def test_a_robot_that_is_drawn_by_odometry_in_the_map_has_no_news_of_it(
+    watched, capsys
+):
+    watched.look(TF | ODOM, AT_FIRST)
+    before = watched.robot.tf
+    capsys.readouterr()
+    watched.look(TF | ODOM, f"map {AT_FIRST}")
+    assert watched.robot.tf == before
+    assert capsys.readouterr().err == ""
+
+
+POSE = {"/bob/robot_pose": "geometry_msgs/PoseStamped"}
+
+
+def test_a_robot_without_a_place_is_placed_by_a_pose_that_comes(watched, capsys):
+    watched.look(DRIVEN)
+    assert watched.robot.feed is None
+    watched.look(DRIVEN | POSE)
+    assert watched.robot.feed.topic == "/bob/robot_pose"
+    said = capsys.readouterr().err.splitlines()[1:]
+    assert said == ["bob has more now: pose /bob/robot_pose"]
+
+
+def test_a_pose_that_comes_does_not_take_the_place_of_odometry(watched, capsys):
+    watched.look(DRIVEN | ODOM)
+    capsys.readouterr()
+    watched.look(DRIVEN | ODOM | POSE)
+    assert watched.robot.feed.topic == "/bob/odom"
+    assert capsys.readouterr().err == ""
+
+
+def test_a_pose_that_comes_does_not_take_the_place_of_frames(watched):
+    watched.look(TF | DRIVEN, LATER)
+    watched.look(TF | DRIVEN | POSE, LATER)
+    assert watched.robot.feed is None
+
+
+def test_a_robot_that_a_person_wants_nowhere_is_not_placed_by_a_pose(bridge):
+    watched = Watched(bridge, "bob.odometry=")
+    watched.look(DRIVEN)
+    watched.look(DRIVEN | POSE)
+    assert watched.robot.feed is None
+    watched.robot.destroy()
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        ({"odometry": "/bob/odom"}, []),
+        ({"velocity": "/bob/cmd_vel"}, []),
+        ({"odometry": "/al/odom"}, ["bob"]),
+    ],
+)
+def test_a_told_robot_takes_the_place_of_one_that_comes_later(
+    bridge, said, shown, capsys
+):
+    told = candidate(bridge, **said)
+    watched = Watched(bridge, told=[told])
+    watched.look(DRIVEN | ODOM)
+    watched.look(DRIVEN | ODOM | POSE | TF, LATER)
+    assert [robot.name for robot in watched.late.robots] == shown
+    assert ("A robot appeared" in capsys.readouterr().err) == bool(shown)
+    for robot in watched.late.robots:
+        robot.destroy()
+
+
+def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, capsys):
+    about = candidate(bridge, odometry="/bob/odom", goal="/bob/goal_pose")
+    config = about.found.config(bridge.url)
+    robot = make_robot(config, [bridge])
+    told = [ShownRobot(*about, robot, config)]
+    drawing = LookingForLayers(bridge, ShownRobots(Console()), told=told)
+    frames = late_frames(bridge)
+    heard = []
+
+    async def listen(topics):
+        heard.append(topics)
+        return frames.trees
+
+    monkeypatch.setattr(frames, "listen", listen)
+    frames.trees = trees(AT_FIRST)
+    asyncio.run(drawing.take(TF | ODOM))
+    assert robot.tf["map_frame"] == "map"
+    for chain in (LATER, AT_FIRST):
+        frames.trees = trees(chain)
+        asyncio.run(drawing.take(TF | ODOM))
+        assert robot.tf["map_frame"] == "bob/map"
+        assert robot.motion.spec().goal_frame == "bob/map"
+    assert len(heard) == 3, "also once it is drawn by frames"
+    assert capsys.readouterr().err.count("Al is drawn where bob/map has") == 1
+    robot.destroy()

@@ -1,0 +1,156 @@
+"""What commands print of a bridge whose names and texts would steer a terminal."""
+
+import functools
+import json
+import subprocess
+import sys
+import threading
+import tomllib
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from websockets.sync.server import serve
+
+import webmap.cli as webmap_cli
+from webmap.base.echo import LONGEST, echo
+from webmap.discovery.fleet_toml import fleet_toml
+from webmap.discovery.found import Findings, FoundRobot
+from webmap.discovery.layers import Layers
+from webmap.discovery.words import report
+
+EVIL = "\n[[robots]]\r\x1b[2J\x1b]0;mine\x07\x9b31m\u202eevil"
+TOPICS = {
+    "/bob/odom": "nav_msgs/Odometry",
+    "/bob/cmd_vel": "geometry_msgs/Twist",
+    "/bob/base_scan": "sensor_msgs/LaserScan",
+    "/tf": "tf2_msgs/TFMessage",
+}
+TURN = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+STAMP = {"secs": 1, "nsecs": 0}
+FRAME = {
+    "header": {"frame_id": "map", "stamp": STAMP},
+    "child_frame_id": f"evil{EVIL}/base_link",
+    "transform": {"translation": TURN, "rotation": TURN},
+}
+SAID = {
+    "/tf": {"transforms": [FRAME]},
+    "/bob/odom": {"header": {"frame_id": EVIL}, "child_frame_id": EVIL},
+    "/bob/base_scan": {
+        "header": {"seq": 0, "stamp": STAMP, "frame_id": EVIL},
+        EVIL: EVIL,
+    },
+}
+
+
+def answered(socket, *, knows_topics):
+    for frame in socket:
+        asked = json.loads(frame)
+        if asked["op"] == "subscribe":
+            message = SAID.get(asked["topic"], {})
+            said = {"op": "publish", "topic": asked["topic"], "msg": message}
+        elif asked["op"] == "call_service":
+            known = knows_topics and asked["service"] == "/rosapi/topics"
+            values = {"topics": [*TOPICS], "types": [*TOPICS.values()]}
+            said = {
+                "op": "service_response",
+                "service": asked["service"],
+                "id": asked.get("id"),
+                "result": known,
+                "values": values if known else f"there is no such service{EVIL}",
+            }
+        else:
+            said = {"op": "status", "level": "error", "msg": f"no{EVIL}"}
+        socket.send(json.dumps(said))
+
+
+@contextmanager
+def bridge(*, knows_topics):
+    """Give the address of a bridge with such frames, or with such errors."""
+    answer = functools.partial(answered, knows_topics=knows_topics)
+    with serve(answer, "127.0.0.1", 0) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}"
+        server.shutdown()
+        thread.join()
+
+
+def webmap(*arguments):
+    done = subprocess.run(
+        [sys.executable, "-m", "webmap", *arguments],
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    return done.stdout.decode() + done.stderr.decode()
+
+
+def assert_harmless(said):
+    assert "evil" in said, said
+    lines = said.split("\n")
+    assert [line for line in lines if not line.isprintable()] == []
+    assert [line for line in lines if line.startswith("[[robots]]\\r")] == []
+
+
+def test_names_of_frames_steer_no_terminal_and_forge_no_line():
+    with bridge(knows_topics=True) as url:
+        assert_harmless(webmap("doctor", "--seconds", "0.5", url))
+
+
+def test_names_of_robots_that_are_found_steer_no_terminal():
+    robot = FoundRobot(name=f"Bob{EVIL}", namespace="", notes=(EVIL,))
+    assert_harmless(report("ws://127.0.0.1:1", Findings(robots=(robot,))))
+
+
+def test_names_of_fields_that_are_recorded_steer_no_terminal(tmp_path):
+    with bridge(knows_topics=True) as url:
+        out = str(tmp_path / "bag")
+        assert_harmless(webmap("record", url, "--duration", "1", "--out", out))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("discover",),
+        ("doctor", "--seconds", "0.5"),
+        ("doctor", "--stop-test", "nobody"),
+        ("view", "--show"),
+        ("record", "--duration", "1"),
+    ],
+)
+def test_errors_of_a_bridge_steer_no_terminal_and_forge_no_line(command):
+    with bridge(knows_topics=False) as url:
+        assert_harmless(webmap(*command, url))
+
+
+def test_names_of_topics_write_nothing_into_a_fleet_file():
+    robot = FoundRobot(name=f"Bob{EVIL}\x7f", namespace="", guesses={}, notes=(EVIL,))
+    findings = Findings(robots=(robot,), layers={"": Layers()})
+    data = tomllib.loads(fleet_toml([("b", "ws://127.0.0.1:1", findings)]))
+    assert [one["name"] for one in data["robots"]] == [f"Bob{EVIL}\x7f"]
+
+
+def test_commands_print_in_one_place():
+    folder = Path(webmap_cli.__file__).parent
+    raw = ("click.echo(", "click.secho(", "print(")
+    found = {
+        (file.name, line.strip())
+        for file in folder.rglob("*.py")
+        for line in file.read_text("utf-8").splitlines()
+        if any(word in line.replace("_footprint(", "") for word in raw)
+    }
+    allowed = {
+        "discover.py": "click.echo(text, nl=False)",  # escaped as TOML has it
+        "echo.py": "click.echo((lines_of if lines",
+        "recording_to.py": 'click.echo(f"\\r{text.ljust(',  # numbers alone
+    }
+    assert {name for name, _ in found} == set(allowed)
+    assert all(line.startswith(allowed[name]) for name, line in found)
+
+
+def test_a_text_that_is_printed_is_one_line_and_is_cut(capsys):
+    echo(EVIL + "x" * 100_000)
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    assert len(out) == LONGEST + 1

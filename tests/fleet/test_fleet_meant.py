@@ -1,0 +1,114 @@
+"""Which robots ``webmap doctor`` is told to look at."""
+
+import click
+import pytest
+
+from webmap.fleet.diagnose import bridges_of
+from webmap.discovery import discover
+from webmap.discovery.doctor.meant import lay_over
+from webmap.base.errors import ConfigError
+
+URL = "ws://127.0.0.1:9090"
+TOPICS = {
+    "/a/odom": "nav_msgs/Odometry",
+    "/a/cmd_vel": "geometry_msgs/Twist",
+    "/a/scan": "sensor_msgs/LaserScan",
+    "/a/rear/scan": "sensor_msgs/LaserScan",
+    "/a/battery": "sensor_msgs/BatteryState",
+    "/a/plan": "nav_msgs/Path",
+    "/b/odom": "nav_msgs/Odometry",
+    "/b/cmd_vel": "geometry_msgs/Twist",
+}
+FLEET = """
+[bridges]
+hall = "ws://hall:9090"
+yard = "ws://yard:9090"
+
+[[map]]
+bridge = "hall"
+topic = "/floor"
+
+[[robots]]
+name = "Bob"
+bridge = "hall"
+odometry = "/bob/odom"
+twist = { topic = "/bob/cmd_vel", type = "geometry_msgs/TwistStamped" }
+scan = ["/bob/front", "/bob/rear"]
+"""
+
+
+def looked_at(robots=(), settings=()):
+    """The robots that are looked at of those behind a bridge."""
+    ((_, meant),) = bridges_of([URL], robots, settings)
+    found = discover(TOPICS)
+    findings, _ = lay_over(found, meant(found), TOPICS)
+    return {robot.name: robot for robot in findings.robots}
+
+
+def test_where_nothing_is_said_each_bridge_is_looked_at_as_it_is_found():
+    found = bridges_of([URL, "ws://Bob"], (), ())
+    assert [url for url, _ in found] == ["ws://127.0.0.1:9090", "ws://bob"]
+    assert [list(meant(discover(TOPICS))) for _, meant in found] == [[], []]
+
+
+def test_one_topic_is_overruled_and_the_others_stay_with_the_type_that_is_said():
+    robots = looked_at(
+        settings=[
+            "a.scan=/a/rear/scan",
+            "a.battery=",
+            "a.name=Ann",
+            "a.velocity_type=geometry_msgs/TwistStamped",
+        ]
+    )
+    assert list(robots) == ["Ann", "b"]
+    ann = robots["Ann"]
+    assert [guess.topic for guess in ann.guesses["scan"]] == ["/a/rear/scan"]
+    assert "battery" not in ann.guesses
+    assert ann.topic("odometry") == "/a/odom"
+    assert ann.type_of("velocity") == "geometry_msgs/TwistStamped"
+    assert robots["b"].type_of("velocity") == "geometry_msgs/Twist"
+
+
+def test_a_robot_that_is_told_has_what_was_told_and_what_is_drawn_of_it_besides():
+    robots = looked_at(["Bob:/a/odom:/a/cmd_vel:/a/rear/scan"], ["Bob.camera=/c"])
+    assert list(robots) == ["Bob"]
+    bob = robots["Bob"]
+    assert [guess.topic for guess in bob.guesses["scan"]] == ["/a/rear/scan"]
+    assert bob.topic("camera") == "/c"
+    assert bob.topic("plan") == "/a/plan"
+    assert "battery" not in bob.guesses
+
+
+def test_a_fleet_file_says_which_robots_are_behind_which_bridge(tmp_path):
+    file = tmp_path / "fleet.toml"
+    file.write_text(FLEET)
+    (hall, at_hall), (yard, at_yard) = bridges_of([str(file)], (), ())
+    assert (hall, yard) == ("ws://hall:9090", "ws://yard:9090")
+    (bob,) = at_hall(discover({}))
+    assert bob.name == "Bob"
+    assert bob.topics["velocity"] == (("/bob/cmd_vel", "geometry_msgs/TwistStamped"),)
+    assert bob.topics["scan"] == (("/bob/front", ""), ("/bob/rear", ""))
+    assert bob.topics["map"] == (("/floor", ""),)
+    assert list(at_yard(discover({}))) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "robots", "settings", "words"),
+    [
+        (["ws://a", "ws://b"], [], ["a.scan="], "about what is behind one bridge"),
+        (["ws://a", "ws://b"], ["Bob:/odom"], [], "and 2 were given"),
+        (["fleet.toml"], ["Bob:/odom"], [], "fleet.toml says which bridges"),
+        (["ws://a", "fleet.toml"], [], [], "leave out --robot, --set and other"),
+    ],
+)
+def test_what_cannot_go_together_is_refused(given, robots, settings, words):
+    with pytest.raises(click.UsageError, match=words):
+        bridges_of(given, robots, settings)
+
+
+def test_a_setting_about_nobody_is_refused_when_the_robots_are_known():
+    ((_, meant),) = bridges_of([URL], (), ["c.scan=/scan"])
+    with pytest.raises(ConfigError, match="there is no robot 'c'"):
+        meant(discover(TOPICS))
+    with pytest.raises(ConfigError, match="there is no robot 'a'"):
+        bridges_of([URL], ["Bob:/odom"], ["a.scan=/scan"])

@@ -1,0 +1,122 @@
+"""Labels and tiles in a fleet file: read strictly, each mistake with its line."""
+
+import io
+import os
+
+import pytest
+from PIL import Image
+
+from webmap.fleet.made import prepare
+from webmap.base.errors import ConfigError
+
+HEAD = """\
+[bridges]
+hall = "ws://hall:9090"
+
+[[robots]]
+name = "Bob"
+
+"""
+TILES = '[tiles]\nsource = "tiles"\nlatitude = 50\nlongitude = 14.5\neast = 90\n'
+
+
+@pytest.fixture
+def prepared(tmp_path):
+    (tmp_path / "tiles" / "3" / "4").mkdir(parents=True)
+    data = io.BytesIO()
+    Image.new("RGB", (256, 256)).save(data, "PNG")
+    (tmp_path / "tiles" / "3" / "4" / "2.png").write_bytes(data.getvalue())
+    made = []
+
+    def prepared_(text, head=HEAD):
+        file = tmp_path / "fleet.toml"
+        file.write_text(text if head is None else f"{text}{head}")
+        made.append(prepare(file))
+        return made[-1]
+
+    yield prepared_
+    for fleet in made:
+        for robot in fleet.robots:
+            robot.destroy()
+
+
+def test_tiles_lie_where_the_file_says(prepared, tmp_path):
+    assert prepared(TILES).modules == {
+        "TileLayer": {
+            "source": str(tmp_path / "tiles"),
+            "datum": (50.0, 14.5),
+            "east": 90.0,
+        }
+    }
+
+
+def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
+    label = {"name": "Dock", "x": 1.5, "y": -2}
+    table = '[[labels]]\nname = "Dock"\nx = 1.5\ny = -2\n'
+    assert prepared(table).modules == {"Labels": {"labels": [label]}}
+    (tmp_path / "places.yaml").write_text("- {name: Dock, x: 1, y: 2}")
+    assert prepared('labels = "places.yaml"\n').modules == {
+        "Labels": {"file": str(tmp_path / "places.yaml")}
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "labels = 3\n",
+            "fleet.toml:1: labels: got the whole number 3, expected a file",
+        ),
+        ('labels = "no.yaml"\n', "no.yaml: No such file or directory"),
+        (
+            '[[labels]]\nname = "A"\nx = 1\ny = "2"\n',
+            "fleet.toml:4: labels[0].y: expected a number of metres, got '2'",
+        ),
+        (
+            '[[labels]]\nname = "A"\nx = 1\ny = 2\niocn = "pin"\n',
+            'fleet.toml:5: labels[0].iocn: no such key; did you mean "icon"?',
+        ),
+        (
+            '[[labels]]\nname = "A"\nx = 1\n',
+            'fleet.toml:1: labels[0]: the key "y" is missing',
+        ),
+        (
+            TILES.replace("50", "91"),
+            "fleet.toml:3: tiles.latitude: got the whole number 91, expected a number "
+            "of degrees from -89.999 to 89.999",
+        ),
+        (
+            TILES.replace("latitude", "lattitude"),
+            'there is no key "lattitude" here; did you mean "latitude"?',
+        ),
+        (
+            TILES.replace('"tiles"', '"https://tiles.example/{z}/{x}/{y}.png"'),
+            "fleet.toml:2: tiles.source: tiles 'https://tiles.example/{z}/{x}/{y}.png':"
+            " tiles are read from this machine's disk alone",
+        ),
+        (TILES.replace('"tiles"', '"no"'), "no such folder and no such file"),
+    ],
+)
+def test_what_makes_no_sense_is_named_with_its_line(prepared, text, said):
+    with pytest.raises(ConfigError) as error:
+        prepared(text)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["floor", "labels"])
+def test_a_file_beside_it_is_named_with_its_own_line_too(prepared, tmp_path, key):
+    (tmp_path / "own.yaml").write_text(
+        "image: none.png\nresolution: 0.1\norigin: [0, 0, north]\n"
+        if key == "floor"
+        else "- {name: Dock, x: 1, y: 2}\n- name: Desk\n  x: far\n  y: 2\n"
+    )
+    with pytest.raises(ConfigError) as error:
+        prepared(f'{key} = "own.yaml"\n')
+    assert f"fleet.toml:1: {key}: {tmp_path / 'own.yaml'}:3: " in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["floor", "labels"])
+def test_a_pipe_beside_it_is_refused_and_not_waited_for(prepared, tmp_path, key):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="pipe: expected a file, got a pipe"):
+        prepared(f'{key} = "pipe"\n')

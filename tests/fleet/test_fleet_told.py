@@ -1,0 +1,265 @@
+"""Robots that are told by hand have what else is in their namespaces."""
+
+import asyncio
+
+import pytest
+from click.testing import CliRunner
+
+import webmap
+import webmap.console
+from webmap import Bridge
+from webmap.fleet import found as found_fleet
+from webmap.fleet.find import Found
+from webmap.fleet.found import FoundFleet
+from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.shown import ShownRobot, ShownRobots
+from webmap.fleet.stated import (
+    Candidate,
+    namespace_of,
+    offer,
+    parse_robot,
+    same_robot,
+    told_robots,
+)
+from webmap.cli.view import view
+from webmap.console import Console, make_robot
+from webmap.discovery import FoundRobot, Guess, discover
+from webmap.base.errors import ConfigError
+from webmap.features.layers.on_maps import OnMaps
+
+URL = "ws://bob:9090"
+GRID = "nav_msgs/OccupancyGrid"
+ONE = {
+    "odom": "nav_msgs/Odometry",
+    "ekf/odometry/filtered": "nav_msgs/Odometry",
+    "cmd_vel": "geometry_msgs/Twist",
+    "front/scan": "sensor_msgs/LaserScan",
+    "rear/scan": "sensor_msgs/LaserScan",
+    "local_costmap/costmap": GRID,
+    "points": "sensor_msgs/PointCloud2",
+    "plan": "nav_msgs/Path",
+    "markers": "visualization_msgs/MarkerArray",
+}
+TOPICS = {f"/{name}/{topic}": type for name in "ab" for topic, type in ONE.items()}
+TOPICS |= {"/map": GRID}
+FRAMES = {"/tf": "tf2_msgs/TFMessage"}
+
+
+@pytest.fixture
+def bridge():
+    return Bridge(URL)
+
+
+def described(bridge, name="Bob", **topics):
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in topics.items()}
+    return Candidate(bridge, FoundRobot(name, "", guesses))
+
+
+def made(robot):
+    return make_robot(robot.found.config(robot.bridge.url), [robot.bridge])
+
+
+def drawn(bridge, topics, *told):
+    """Draw what is behind a bridge of robots that were told; return all of it."""
+    console = Console([made(about) for about in told])
+    known = [
+        ShownRobot(*about, robot, about.found.config(about.bridge.url))
+        for about, robot in zip(told, console.told, strict=True)
+    ]
+    layers = LookingForLayers(bridge, ShownRobots(console), told=known)
+    asyncio.run(layers.take(topics))
+    return console
+
+
+def what_of(robot):
+    made = []
+    for module in robot.modules:
+        if isinstance(module, OnMaps):
+            made.append((module.module, module._arguments[0][1]))
+        elif getattr(module, "topic", None):
+            made.append((type(module).__name__, module.topic))
+    return sorted(made)
+
+
+def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
+    told = described(
+        bridge, odometry="/a/odom", velocity="/a/cmd_vel", scan="/a/rear/scan"
+    )
+    console = drawn(bridge, TOPICS, told)
+    (robot,) = console.told
+    assert what_of(robot) == [
+        ("LaserScanner", "/a/rear/scan"),
+        ("Markers", "/a/markers"),
+        ("OccupancyGrid", "/a/local_costmap/costmap"),
+        ("Path", "/a/plan"),
+        ("PointCloud", "/a/points"),
+    ]
+    assert [type(module).__name__ for module in robot.modules].count("Trail") == 1
+    assert list(console.grids) == [(bridge, "/map")]
+    assert robot.feed.topic == "/a/odom", "its odometry is as it was told"
+    robot.destroy()
+
+
+@pytest.mark.parametrize(("said", "drawn_of"), [([], ["Bob"]), (["--as-told"], [])])
+def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
+    asked = []
+
+    def looking(bridge, shown, *, told, **options):
+        asked.extend(each.robot.name for each in told)
+
+    def open_console(bridges, told, floor):
+        return Console([make_robot(config, bridges) for config in told])
+
+    monkeypatch.setattr(webmap.console, "open_console", open_console)
+    monkeypatch.setattr(webmap, "run", lambda **options: None)
+    monkeypatch.setattr(found_fleet, "LookingForLayers", looking)
+    done = CliRunner().invoke(view, [URL, "--robot", "Bob:/a/odom", *said])
+    assert (done.exit_code, asked) == (0, drawn_of)
+
+
+def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(bridge):
+    placed = described(bridge, odometry="/a/odom")
+    nowhere = described(bridge, name="b", velocity="/b/cmd_vel")
+    console = drawn(bridge, TOPICS | FRAMES, placed, nowhere)
+    one, other = console.told
+    assert (one.tf["map_frame"], one.tf["quiet"]) == ("map", True)
+    assert other.tf is None, "without odometry it was to be nowhere"
+    one.destroy()
+    other.destroy()
+
+
+def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge):
+    topics = TOPICS | {"/c/where": "geometry_msgs/Pose", "/c/plan": "nav_msgs/Path"}
+    told = described(bridge, odometry="/c/where")
+    assert offer(told.found, topics, discover(topics)).found is None
+    console = drawn(bridge, topics, told)
+    assert what_of(console.told[0]) == [("Path", "/c/plan")]
+    console.told[0].destroy()
+
+
+def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge):
+    first = described(bridge, name="Al", odometry="/a/odom")
+    second = described(bridge, name="Bo", odometry="/a/ekf/odometry/filtered")
+    console = drawn(bridge, TOPICS, first, second)
+    assert [len(what_of(robot)) for robot in console.told] == [4, 0]
+    made = [[type(module).__name__ for module in r.modules] for r in console.told]
+    assert [names.count("Trail") for names in made] == [1, 1], "each goes its own way"
+    behind = {bridge: Found(URL, "bob", discover(TOPICS), topics=TOPICS)}
+    fleet = FoundFleet([first, second], behind=behind)
+    assert fleet.table(grid=True, as_told=False).count("/a/points") == 1
+    for robot in console.told:
+        robot.destroy()
+
+
+def test_robots_behind_another_bridge_are_left_alone(bridge):
+    elsewhere = described(Bridge("ws://al:9090"), odometry="/a/odom")
+    console = drawn(bridge, TOPICS, elsewhere)
+    assert what_of(console.told[0]) == []
+    assert console.grids == {}
+    console.told[0].destroy()
+
+
+@pytest.mark.parametrize(
+    ("told", "namespace"),
+    [
+        ({"odometry": "/a/ekf/odometry/filtered"}, "/a"),  # not the best of its role
+        ({"odometry": "a/odom/"}, "/a"),
+        ({"velocity": "/b/cmd_vel"}, "/b"),
+        ({"name": "b", "scan": "/scan"}, "/b"),
+        ({"scan": "/a/front/scan"}, None),
+        ({"odometry": "/none of a topic"}, None),
+    ],
+)
+def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
+    bridge, told, namespace
+):
+    found = same_robot(described(bridge, **told).found, discover(TOPICS).robots)
+    assert (None if found is None else found.namespace) == namespace
+
+
+@pytest.mark.parametrize(
+    ("told", "namespace"),
+    [
+        ({"odometry": "/c/odom", "velocity": "/c/cmd_vel", "scan": "/c/scan"}, "/c"),
+        ({"odometry": "/c/base/odom", "velocity": "/c/cmd_vel"}, "/c"),
+        ({"odometry": "/c/platform/odom"}, "/c"),
+        ({"odometry": "/c/odom", "velocity": "/d/cmd_vel"}, ""),
+        ({"odometry": "/odom", "velocity": "/c/cmd_vel"}, ""),
+    ],
+)
+def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
+    bridge, told, namespace
+):
+    assert namespace_of(described(bridge, **told).found) == namespace
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (["Bob:/odom", "bob:/odom2"], "robot 'bob:/odom2': there is a robot 'Bob' alr"),
+        (["Bob:/a b"], "robot 'Bob:/a b': '/a b' is not the name of a topic: expected"),
+        (["B\nob:/a"], "a name is one line of 100 characters at the most"),
+        (["b" * 101 + ":/a"], "a name is one line of 100 characters at the most"),
+        (["Bob:/a:/c", "Al:/b:c/"], "c/ drives 'Bob' already; each robot has its own"),
+    ],
+)
+def test_robots_that_are_told_amiss_are_refused_with_what_was_said(bridge, texts, said):
+    with pytest.raises(ConfigError) as refused:
+        told_robots(texts, [bridge])
+    assert said in str(refused.value)
+
+
+def test_robots_of_one_topic_behind_two_bridges_are_two(bridge):
+    bridges = [bridge, Bridge("ws://al:9090")]
+    told = told_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
+    assert [robot.found.name for robot in told] == ["Bob", "Al"]
+    assert told_robots(["Bob:/a", "Al:/b"], [bridge])[1].found.topic("velocity") == ""
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-1", "x"])
+@pytest.mark.parametrize("option", ["--wait", "--stops-within"])
+def test_seconds_are_a_finite_number(option, number):
+    done = CliRunner().invoke(view, [URL, option, number])
+    assert done.exit_code == 2
+    assert f"Invalid value for '{option}'" in done.output
+
+
+@pytest.fixture
+def bridges():
+    return [Bridge("ws://localhost:9090"), Bridge("ws://localhost:9091")]
+
+
+def test_a_robot_is_a_name_and_three_topics(bridges):
+    told = parse_robot("Bob:/odom:/cmd_vel:/scan", bridges)
+    assert told == described(
+        bridges[0], odometry="/odom", velocity="/cmd_vel", scan="/scan"
+    )
+
+
+def test_topics_may_be_empty_or_left_out(bridges):
+    told = parse_robot("Bob:/odom::/scan", bridges)
+    assert told == described(bridges[0], odometry="/odom", scan="/scan")
+    told = parse_robot("Bob:/odom", bridges)
+    assert told == described(bridges[0], odometry="/odom")
+
+
+def test_a_number_says_behind_which_bridge_it_is(bridges):
+    assert parse_robot("2@Bob:/odom", bridges).bridge is bridges[1]
+
+
+def test_an_at_sign_in_a_topic_is_no_number_of_a_bridge(bridges):
+    assert parse_robot("Bob:/a@b", bridges).found.topic("odometry") == "/a@b"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "Bob", ":/odom", "Bob:::", "Bob:/a:/b:/c:/d", "  :/odom"]
+)
+def test_another_form_is_refused_with_the_right_one(bridges, text):
+    with pytest.raises(ConfigError, match="NAME:ODOM:CMD_VEL:SCAN"):
+        parse_robot(text, bridges)
+
+
+@pytest.mark.parametrize("number", ["0", "3", "-1", "x", "", "²"])
+def test_a_bridge_that_is_not_there_is_refused(bridges, number):
+    with pytest.raises(ConfigError, match="there are 2"):
+        parse_robot(f"{number}@Bob:/odom", bridges)

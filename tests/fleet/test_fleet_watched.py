@@ -1,0 +1,55 @@
+"""Robots of a recording are seen, and nothing of them is told anything."""
+
+from webmap import Bridge
+from webmap.fleet.overrides import MOTION, Watched
+from webmap.fleet.shown import ShownRobots
+from webmap.config.motion import MotionConfig
+from webmap.console import Console
+from webmap.discovery import discover
+from webmap.discovery.newcomers import News
+
+URL = "ws://127.0.0.1:9090"
+SEEN = {
+    "/odom": "nav_msgs/msg/Odometry",
+    "/scan": "sensor_msgs/msg/LaserScan",
+}
+TOPICS = SEEN | {
+    "/cmd_vel": "geometry_msgs/msg/Twist",
+    "/goal_pose": "geometry_msgs/msg/PoseStamped",
+    "/initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "/navigate_to_pose/_action/feedback": (
+        "nav2_msgs/action/NavigateToPose_FeedbackMessage"
+    ),
+}
+
+
+def test_a_robot_that_could_be_driven_is_described_as_one_that_is_seen():
+    (found,) = discover(TOPICS, "robot").robots
+    assert {"velocity", "goal", "action", "initialpose"} <= set(found.guesses)
+    watched = Watched("office")
+    config = watched.config(URL, watched.apply(URL, found))
+    assert (config.odometry.topic, config.scan) == ("/odom", ["/scan"])
+    assert config.motion == MotionConfig()
+
+
+def test_topics_that_come_later_do_not_let_it_be_driven_either():
+    bridge, late = Bridge(URL), ShownRobots(Console(), Watched("office"))
+    came = late.came
+    (bare,) = discover(SEEN, "robot").robots
+    came(News(bare), bridge)
+    (whole,) = discover(TOPICS, "robot").robots
+    came(News(whole, MOTION), bridge)
+    (robot,) = late.robots
+    try:
+        assert robot.motion.config == MotionConfig()
+    finally:
+        robot.destroy()
+
+
+def test_a_robot_without_a_name_of_its_own_is_called_as_the_recording():
+    names = {}
+    for prefix in ("", "/bob"):
+        topics = {f"{prefix}{topic}": type for topic, type in SEEN.items()}
+        (found,) = discover(topics, "robot").robots
+        names[prefix] = Watched("office").apply(URL, found).name
+    assert names == {"": "office", "/bob": "bob"}

@@ -1,0 +1,113 @@
+"""A reading, frames and the time become a pose and what is wrong with it."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from webmap import Robot
+from webmap.poses.frames import FrameFaults
+from webmap.poses.placing import Placing, PoseReading
+from webmap.poses.pipeline import PosePipeline
+from webmap.base.geometry import Pose, Quaternion, Vector3
+from webmap.ros.tf import Buffer, NotKnownThen, Transform
+
+
+@pytest.fixture
+def frames():
+    buffer = Buffer()
+    return SimpleNamespace(
+        buffer=buffer, namespace="", faults=FrameFaults(buffer), complete_from=0.0
+    )
+
+
+@pytest.fixture
+def pipeline(frames):
+    """A robot with a topic, whose poses are placed by frames."""
+    pipeline = PosePipeline()
+    pipeline.placing = Placing(frames, "map", "base_link")
+    pipeline.restart(0.1)
+    return pipeline
+
+
+def reading(x, stamp, frame="odom"):
+    return PoseReading(Vector3(x), Quaternion(), None, frame, stamp)
+
+
+def at(x):
+    return Transform(Vector3(x))
+
+
+def test_a_pose_is_taken_to_the_map_and_nothing_is_wrong(pipeline, frames):
+    frames.buffer.add("map", "odom", at(10.0), 5.0)
+    step = pipeline.step(reading(1.0, 5.0), frames, 100.0)
+    assert step.pose == reading(11.0, 5.0, "map")
+    assert (dict(step.problems), step.look_again) == ({}, None)
+
+
+def test_an_alignment_takes_it_on_to_the_common_map(pipeline, frames):
+    frames.buffer.add("map", "odom", at(10.0), 5.0)
+    pipeline.alignment = Pose(0.0, 3.0, math.pi / 2)
+    place = pipeline.step(reading(1.0, 5.0), frames, 100.0).pose.position
+    assert (place.x, place.y) == pytest.approx((0.0, 14.0))
+    assert pipeline.newest == reading(11.0, 5.0, "map")
+
+
+def test_problems_are_the_same_object_until_one_of_them_changes(pipeline, frames):
+    steps = [
+        pipeline.step(reading(0.0, 5.0 + n / 10), frames, 100.0 + n / 10)
+        for n in range(12)
+    ]
+    first, later = steps[0].problems, steps[-1].problems
+    assert first == {}
+    assert all(step.problems is first for step in steps[:10])
+    assert "there is no frame 'map'" in later["tf"].text
+    assert pipeline.step(reading(0.0, 6.2), frames, 101.2).problems is later
+
+
+def test_trouble_that_has_not_lasted_asks_for_another_look(pipeline, frames):
+    frames.complete_from = 103.0
+    assert pipeline.step(reading(0.0, 5.0), frames, 100.0).look_again == 103.0
+    step = pipeline.step(None, frames, 103.0)
+    assert step.pose is None
+    assert step.look_again is None
+    assert step.problems.keys() == {"tf"}
+
+
+def test_without_a_topic_the_frames_have_the_base(pipeline, frames):
+    pipeline.restart(None)
+    frames.buffer.add("map", "base_link", at(3.0), 5.0)
+    assert pipeline.step(None, frames, 100.0).pose == reading(3.0, 5.0, "map")
+    assert pipeline.step(None, frames, 100.1).pose is None, "that is no news"
+
+
+def test_where_the_robot_was_is_forgotten_when_poses_come_from_elsewhere(pipeline):
+    pipeline.placing = None
+    for n in range(3):
+        pipeline.step(reading(n, 5.0 + n / 10), None, 100.0 + n / 10)
+    assert pipeline.at(5.15).translation.x == pytest.approx(1.5)
+    pipeline.restart(0.1)
+    assert pipeline.newest is None
+    with pytest.raises(NotKnownThen):
+        pipeline.at(5.15)
+
+
+def test_a_robot_is_told_of_problems_when_they_change_and_only_then(monkeypatch):
+    class Link:
+        url = name = "test"
+        state, lag = "open", 0.0
+
+        def subscribe(self, topic, callback, type=None, **options):
+            return SimpleNamespace(remove=lambda: None)
+
+    robot, calls = Robot("Bob"), []
+    robot.set_odometry_topic(Link(), "/odom", type="geometry_msgs/PoseStamped")
+    monkeypatch.setattr(robot, "set_problem", lambda about, _: calls.append(about))
+    monkeypatch.setattr(robot, "clear_problem", lambda about: calls.append(about))
+    for n in range(5):
+        robot.whereabouts.feed._listener(reading(0.0, 5.0 + n / 10))
+    assert calls == []
+    for n in range(5, 10):
+        robot.whereabouts.feed._listener(reading(90.0, 5.0 + n / 10))
+    assert calls == ["jumps"]
+    robot.destroy()

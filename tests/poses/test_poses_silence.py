@@ -1,0 +1,221 @@
+"""A robot that falls silent while its link is up is said in the log, both ways."""
+
+import asyncio
+import logging
+import re
+import time
+
+import msgspec
+import pytest
+
+from webmap import Robot
+from webmap.poses import silence
+from webmap.poses.silence import AGAIN, LIMIT, Silence
+from webmap.ros.bridge import BridgeStats
+from webmap.base.scope import Removal
+
+
+@pytest.fixture
+def heard():
+    """A robot that was heard at 100 s."""
+    heard = Silence()
+    heard.hear(100.0)
+    return heard
+
+
+def test_a_silence_is_said_once_when_it_has_lasted(heard):
+    assert heard.look(100.0 + LIMIT - 0.1, linked=True) is None
+    assert heard.look(100.0 + LIMIT, linked=True) == LIMIT
+
+
+def test_the_pose_after_a_silence_that_was_said_tells_how_long_it_was(heard):
+    assert heard.hear(102.0) is None
+    heard.look(106.0, linked=True)
+    assert heard.hear(114.0) == 12.0
+    assert heard.hear(115.0) is None
+
+
+def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come(heard):
+    assert heard.look(110.0, linked=False) is None
+    assert heard.look(112.0, linked=True) is None
+    assert heard.look(113.0, linked=True) == 13.0
+
+
+def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
+    flickering, said, again = Silence(), [], []
+    for start in range(0, 600, 5):
+        if flickering.hear(float(start)) is not None:
+            again.append(start)
+        if flickering.look(start + LIMIT + 1.0, linked=True) is not None:
+            said.append(start)
+    assert said == [AGAIN * n for n in range(10)]
+    assert again == [start + 5 for start in said]
+
+
+def test_a_silence_that_lasts_is_said_also_soon_after_another(heard):
+    heard.look(103.0, linked=True)
+    heard.hear(104.0)
+    assert heard.look(110.0, linked=True) is None
+    assert heard.due == 103.0 + AGAIN
+    assert heard.look(103.0 + AGAIN, linked=True) == AGAIN - 1.0
+
+
+def test_a_topic_that_is_slow_on_purpose_has_longer(heard):
+    heard.limit = 25.0
+    assert heard.look(124.0, linked=True) is None
+    assert heard.look(125.0, linked=True) == 25.0
+
+
+class Link:
+    """A bridge that is open, and hands over what a test says."""
+
+    url = "ws://test:9090"
+    name = "hall"
+    state = "open"
+    lag = 0.0
+
+    def __init__(self) -> None:
+        self.stats = BridgeStats(links=1)
+        self.listeners: dict[str, tuple] = {}
+
+    def on_open(self, fn):
+        return Removal(lambda: None)
+
+    def subscribe(self, topic, callback, type=None, *, decode=None, **options):
+        self.listeners[topic] = (callback, decode)
+        return Removal(lambda: self.listeners.pop(topic))
+
+    def protect(self, topic, carries):
+        """Nobody publishes here."""
+
+    def say(self, topic, message):
+        callback, decode = self.listeners[topic]
+        callback(msgspec.convert(message, decode, strict=False))
+
+
+ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+HEADER = {"seq": 1, "stamp": {"secs": 5, "nsecs": 0}, "frame_id": "map"}
+POSE = {"pose": {"position": ZERO, "orientation": {**ZERO, "w": 1.0}}}
+ODOM = {
+    "header": HEADER,
+    "child_frame_id": "base_link",
+    "pose": {**POSE, "covariance": [0.0] * 36},
+    "twist": {"twist": {"linear": ZERO, "angular": ZERO}, "covariance": [0.0] * 36},
+}
+
+
+@pytest.fixture
+def link():
+    return Link()
+
+
+@pytest.fixture
+def robots():
+    robots = [Robot("Ann"), Robot("Bob")]
+    yield robots
+    for robot in robots:
+        robot.destroy()
+
+
+@pytest.fixture
+def log(caplog, monkeypatch):
+    """What the log has of robots, with a silence of a twentieth of a second."""
+    monkeypatch.setattr(silence, "LIMIT", 0.05)
+    caplog.set_level(logging.INFO, "webmap.robot")
+    return caplog
+
+
+async def lines_of(log, count: int) -> None:
+    """Wait for so many lines."""
+    async with asyncio.timeout(10):
+        while len(log.messages) < count:
+            await asyncio.sleep(0.005)
+
+
+def follow(robot, link, topic="/odom", type="nav_msgs/Odometry"):
+    robot.set_odometry_topic(link, topic, throttle=0, type=type)
+
+
+def test_a_robot_whose_odometry_ceases_has_a_line_in_the_log_and_one_when_it_is_back(
+    robots, link, log
+):
+    async def scenario() -> None:
+        follow(robots[1], link)
+        link.say("/odom", ODOM)
+        await lines_of(log, 1)
+        link.say("/odom", ODOM)
+
+    asyncio.run(scenario())
+    said = [re.sub(r"\d+ s", "N s", message) for message in log.messages]
+    assert [line.levelname for line in log.records] == ["WARNING", "INFO"]
+    assert said == [
+        "Bob: no pose for N s; they come from /odom on hall, and that link is open",
+        "Bob: poses again, after N s",
+    ]
+
+
+def test_a_process_that_stood_still_blames_no_robot(robots, link, log, monkeypatch):
+    monkeypatch.setattr(silence, "LATE", 0.1)
+
+    async def scenario() -> None:
+        follow(robots[1], link)
+        link.say("/odom", ODOM)
+        time.sleep(0.2)  # nothing is taken in, and nothing looked at
+        for _ in range(3):  # timers come before what a link has for them
+            await asyncio.sleep(0)
+        link.say("/odom", ODOM)
+
+    asyncio.run(scenario())
+    assert log.messages == []
+
+
+def test_a_robot_that_is_gone_or_is_heard_elsewhere_now_is_not_called_silent(
+    robots, link, log
+):
+    ann, bob = robots
+    gone = Robot("Cid")
+
+    async def scenario() -> None:
+        for robot in (gone, bob, ann):
+            follow(robot, link, f"/{robot.name}")
+            link.say(f"/{robot.name}", ODOM)
+        gone.destroy()
+        follow(bob, link, "/other")
+        await lines_of(log, 1)
+
+    asyncio.run(scenario())
+    (line,) = log.messages
+    assert line.startswith("Ann: no pose")
+
+
+def test_a_pose_that_comes_only_while_a_robot_moves_is_not_missed(robots, link, log):
+    ann, bob = robots
+
+    async def scenario() -> None:
+        follow(bob, link, "/amcl_pose", "geometry_msgs/PoseWithCovarianceStamped")
+        link.say("/amcl_pose", {"header": HEADER, "pose": POSE})
+        follow(ann, link)
+        link.say("/odom", ODOM)
+        await lines_of(log, 1)
+
+    asyncio.run(scenario())
+    assert bob.valid
+    (line,) = log.messages
+    assert line.startswith("Ann: no pose")
+
+
+def test_a_robot_that_is_found_by_its_frames_alone_is_missed_too(robots, link, log):
+    bob = robots[1]
+    transform = {
+        "header": HEADER,
+        "child_frame_id": "base_link",
+        "transform": {"translation": ZERO, "rotation": {**ZERO, "w": 1.0}},
+    }
+
+    async def scenario() -> None:
+        bob.set_tf(link, namespace="/bob")
+        link.say("/bob/tf", {"transforms": [transform]})
+        await lines_of(log, 1)
+
+    asyncio.run(scenario())
+    assert "they come from /bob/tf on hall" in log.messages[0]

@@ -1,0 +1,263 @@
+"""The type of a velocity topic is asked for until somebody knows it."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+
+from webmap import Bridge, Robot
+from webmap.core.motion import MotionRoad
+from webmap.poses.type_asking import FEW, LATER, SHARE, SOON
+from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.encode import Encoder
+from webmap.ros.rosbridge.server.graph import Graph
+from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.rosapi import Rosapi
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.rosbridge.server.server import RosbridgeServer
+from webmap.base.scope import Removal
+
+STAMPED = "geometry_msgs/msg/TwistStamped"
+
+
+class Link:
+    """A bridge whose rosapi says the type that it is told to say, and counts."""
+
+    url = "ws://test:9090"
+
+    def __init__(self) -> None:
+        self.type: str | None = None
+        self.asked = 0
+        self.state = "open"
+        self._opened: list = []
+
+    def on_open(self, fn):
+        self._opened.append(fn)
+        asyncio.get_running_loop().call_soon(fn)
+        return Removal(lambda: self._opened.remove(fn))
+
+    def open(self):
+        self.state = "open"
+        for fn in self._opened:
+            fn()
+
+    async def topic_type(self, topic):
+        self.asked += 1
+        return self.type
+
+    def protect(self, topic, carries):
+        pass
+
+
+class Gate:
+    """Notes the type that each declaration has."""
+
+    def __init__(self) -> None:
+        self.types: list[str] = []
+
+    def declare(self, spec):
+        self.types.append(spec.twist_type)
+
+    def forget(self, robot):
+        self.types.append("forgotten")
+
+
+class Time:
+    """Time that passes when it is told to, for what waits on a loop."""
+
+    def __init__(self, loop) -> None:
+        self.pauses: list[float] = []
+        self._next = None
+        loop.call_later = self._later
+
+    def _later(self, pause, fn, *args):
+        self.pauses.append(pause)
+        handle = asyncio.Handle(fn, args, asyncio.get_running_loop())
+        self._next = handle
+        return handle
+
+    async def passes(self):
+        handle, self._next = self._next, None
+        if handle is not None and not handle.cancelled():
+            handle._run()
+        await settle()
+
+
+async def settle():
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """Run what is done with a robot whose velocity topic nobody knows yet."""
+    gate = Gate()
+    monkeypatch.setattr(MotionRoad, "gate", gate)
+    clock = SimpleNamespace(monotonic=lambda: 0.0)  # an answer takes no time
+    monkeypatch.setattr("webmap.poses.type_asking.time", clock)
+
+    def run(scenario):
+        async def all_of_it():
+            time, link, robot = Time(asyncio.get_running_loop()), Link(), Robot("Bob")
+            robot.set_twist_topic(link, "/cmd_vel")
+            await settle()
+            await scenario(robot, link, time)
+            robot.destroy()
+            assert asyncio.all_tasks() == {asyncio.current_task()}
+
+        asyncio.run(all_of_it())
+        return gate.types
+
+    return run
+
+
+def test_a_base_that_starts_after_the_link_is_open_is_declared_with_its_type(told):
+    async def scenario(robot, link, time):
+        await time.passes()
+        link.type = STAMPED
+        await time.passes()
+        assert robot.motion.spec().twist_type == STAMPED
+
+    assert told(scenario)[:3] == ["geometry_msgs/Twist", STAMPED, "forgotten"]
+
+
+def test_until_it_is_known_the_type_is_said_to_be_assumed(told):
+    async def scenario(robot, link, time):
+        assert robot.motion.spec().twist_type_assumed
+        link.type = "geometry_msgs/Twist"
+        await time.passes()
+        await time.passes()
+        assert not robot.motion.spec().twist_type_assumed
+        robot.unadvertise_twist_topic()
+        robot.set_move_topic(link, "/goal")
+        assert not robot.motion.spec().twist_type_assumed
+
+    told(scenario)
+
+
+def test_it_is_asked_for_soon_at_first_and_then_rarely(told):
+    async def scenario(robot, link, time):
+        for _ in range(FEW + 3):
+            await time.passes()
+        assert time.pauses[: FEW + 1] == [*[SOON] * FEW, LATER]
+        assert time.pauses[-1] == LATER
+
+    told(scenario)
+
+
+def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(told, monkeypatch):
+    async def scenario(robot, link, time):
+        clock = SimpleNamespace(monotonic=iter([0.0, 5.0]).__next__)
+        with monkeypatch.context() as patch:
+            patch.setattr("webmap.poses.type_asking.time", clock)
+            await time.passes()
+        assert time.pauses[-1] == 5.0 * SHARE
+
+    told(scenario)
+
+
+def test_what_is_known_is_asked_for_no_more(told):
+    async def scenario(robot, link, time):
+        link.type = STAMPED
+        await time.passes()
+        pauses = len(time.pauses)
+        await time.passes()
+        assert (link.asked, len(time.pauses)) == (2, pauses)
+
+    told(scenario)
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda robot, link: robot.unadvertise_twist_topic(),
+        lambda robot, link: robot.destroy(),
+        lambda robot, link: robot.set_twist_topic(link, "/cmd_vel", type=STAMPED),
+        lambda robot, link: setattr(link, "state", "connecting"),
+    ],
+)
+def test_nobody_asks_for_a_topic_that_is_gone_or_over_a_link_that_is_down(told, end):
+    async def scenario(robot, link, time):
+        end(robot, link)
+        asked = link.asked
+        await time.passes()
+        await time.passes()
+        assert link.asked == asked
+
+    told(scenario)
+
+
+def test_a_link_that_opens_anew_is_asked_at_once_and_once(told):
+    async def scenario(robot, link, time):
+        link.state = "connecting"
+        await time.passes()
+        link.open()
+        await settle()
+        assert link.asked == 2
+        await time.passes()
+        assert link.asked == 3
+
+    told(scenario)
+
+
+def test_a_type_that_was_known_holds_while_the_base_is_away(told):
+    async def scenario(robot, link, time):
+        link.type = STAMPED
+        await time.passes()
+        link.type = None
+        link.open()
+        await settle()
+        asked = link.asked
+        await time.passes()
+        assert robot.motion.spec().twist_type == STAMPED
+        assert link.asked == asked
+
+    told(scenario)
+
+
+def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(told):
+    async def scenario(robot, link, time):
+        late = asyncio.get_running_loop().create_future()
+        link.topic_type = lambda topic: late
+        await time.passes()
+        robot.set_twist_topic(link, "/other", type="geometry_msgs/Twist")
+        late.set_result(STAMPED)
+        await settle()
+        assert robot.motion.spec().twist_type == "geometry_msgs/Twist"
+
+    told(scenario)
+
+
+def test_a_rosapi_that_comes_up_after_rosbridge_is_asked_too(monkeypatch):
+    monkeypatch.setattr("webmap.poses.type_asking.SOON", 0.05)
+
+    async def scenario():
+        quirks = parse_quirks("real", "ros2")
+        schema = Schema(Dialect("ros2"))
+        graph = Graph(schema)
+        base = object()
+        graph.subscribe(base, "/cmd_vel", lambda _: None, "geometry_msgs/TwistStamped")
+        server = RosbridgeServer(graph, Encoder(schema, quirks))
+        bridge = Bridge(await server.start("127.0.0.1", 0))
+        answers, ask = [], bridge.topic_type
+
+        async def topic_type(topic):
+            answers.append(await ask(topic))
+            return answers[-1]
+
+        bridge.topic_type = topic_type
+        robot = Robot("Bob")
+        robot.set_twist_topic(bridge, "/cmd_vel")
+        bridge.start(asyncio.get_running_loop())
+        async with asyncio.timeout(10):
+            while not answers:
+                await asyncio.sleep(0.01)
+            assert set(answers) == {None}
+            Rosapi(graph, quirks).start()
+            while robot.motion.spec().twist_type != STAMPED:
+                await asyncio.sleep(0.01)
+        robot.destroy()
+        await bridge.stop()
+        await server.stop()
+
+    asyncio.run(scenario())

@@ -1,0 +1,103 @@
+"""What holds for every file of the project."""
+
+import ast
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+# A path of somebody's machine: a home, a checkout, the root's own folder.
+MACHINE_PATH = re.compile(
+    r"(?<![\w./*])(?:/(?:home|Users)/\w+/|/(?:root|work)/\w|[A-Z]:\\Users\\\w)"
+)
+
+
+def project_files() -> list[Path]:
+    """Return what git knows of, or everything where there is no git (an sdist)."""
+    names: list[str] = []
+    if (ROOT / ".git").exists() and (git := shutil.which("git")):
+        done = subprocess.run(
+            [git, "ls-files", "-z"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        names = done.stdout.split("\0")[:-1]
+    files = [ROOT / name for name in names] or list((ROOT / "src").rglob("*"))
+    return [path for path in files if path.is_file()]
+
+
+def test_every_source_file_says_what_it_is_for() -> None:
+    silent = [
+        str(path.relative_to(ROOT))
+        for path in SOURCES
+        if not ast.get_docstring(ast.parse(path.read_text("utf-8")))
+    ]
+    assert not silent
+
+
+def test_no_file_names_a_path_of_a_machine() -> None:
+    found = []
+    for path in project_files():
+        try:
+            text = path.read_text("utf-8")
+        except UnicodeDecodeError:
+            continue
+        found += [
+            f"{path.relative_to(ROOT)}: {match[0]}"
+            for match in MACHINE_PATH.finditer(text)
+        ]
+    assert not found
+
+
+# In pieces, so that this file names none itself.
+@pytest.mark.parametrize("parts", [("/home", "ann", "x"), ("cd /root", "a")])
+def test_a_path_of_a_machine_would_be_seen(parts: tuple[str, ...]) -> None:
+    assert MACHINE_PATH.search("/".join(parts))
+
+
+# What only a rosbridge has: operations, encodings, fields, nodes and parameters.
+ROSBRIDGE_WORDS = re.compile(
+    r"rosapi|rosbridge_(?:suite|websocket|server|library)|max_message_size|cbor|"
+    r"fragment_size|throttle_rate|advertise_service|service_response|"
+    r"[\"'](?:subscribe|unsubscribe|advertise|unadvertise|publish|call_service)[\"']",
+    re.IGNORECASE,
+)
+ROSBRIDGE_ROOMS = (
+    "ros/rosbridge/",
+    "gate/",  # it has sockets of its own
+    "testing/",  # its peers are rosbridges
+)
+# People have to read of rosapi, since they have to start it; a replay starts it, too.
+ROSBRIDGE_TEXTS = {
+    "bags/replay.py": {"rosapi"},
+    "cli/doctor.py": {"rosapi"},
+    "fleet/find.py": {"rosapi"},
+    "cli/record.py": {"rosapi"},
+    "bags/record.py": {"rosapi"},
+    "cli/topic_list.py": {"rosapi"},
+    "features/doctor/doctor_panel.py": {"rosapi"},
+    "sim/process.py": {"rosapi"},
+}
+
+
+def test_rosbridge_is_spoken_in_one_room() -> None:
+    found = []
+    for path in SOURCES:
+        name = path.relative_to(ROOT / "src/webmap").as_posix()
+        if name.startswith(ROSBRIDGE_ROOMS):
+            continue
+        words = {word.lower() for word in ROSBRIDGE_WORDS.findall(path.read_text())}
+        found += [f"{name}: {w}" for w in words - ROSBRIDGE_TEXTS.get(name, set())]
+    assert not found, "speak of topics, messages and services; see webmap.ros.bridge"
+
+
+@pytest.mark.parametrize("text", ['"/rosapi/topics"', "'call_service'", "in CBOR"])
+def test_a_word_of_rosbridge_would_be_seen(text: str) -> None:
+    assert ROSBRIDGE_WORDS.search(text)
+    assert not ROSBRIDGE_WORDS.search("bridge.call_service(name)")

@@ -1,0 +1,371 @@
+"""The buffer of frames."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from webmap.base.geometry import Pose, Quaternion, Vector3
+from webmap.ros.tf import (
+    Buffer,
+    FrameMissing,
+    NotConnected,
+    NotKnownThen,
+    Transform,
+    TransformError,
+)
+from webmap.ros.tf.buffer import MOST_COMPARED, MOST_FRAMES
+
+
+def at(x, y=0.0, yaw=0.0):
+    return Transform.from_pose(Pose(x, y, yaw))
+
+
+@pytest.fixture
+def robot():
+    """A robot that drives along x at 1 m/s from 10 s to 12 s, ten times a second."""
+    buffer = Buffer()
+    buffer.add("map", "odom", at(100.0), 10.0)
+    buffer.add("map", "odom", at(100.0), 10.9)
+    buffer.add("map", "odom", at(100.0), 11.8)
+    for step in range(21):
+        buffer.add("odom", "base_link", at(step / 10), 10.0 + step / 10)
+    buffer.add("base_link", "laser", at(0.3, 0.0, math.pi), 0.0, static=True)
+    return buffer
+
+
+def place(transform):
+    return pytest.approx((transform.planar.x, transform.planar.y), abs=1e-9)
+
+
+def test_a_way_of_several_frames_is_put_together(robot):
+    assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
+    assert place(robot.lookup("map", "laser", 11.0)) == (101.3, 0.0)
+
+
+def test_between_two_transforms_there_is_one_in_between(robot):
+    assert place(robot.lookup("map", "base_link", 11.05)) == (101.05, 0.0)
+
+
+def test_without_a_time_it_is_the_newest_at_which_all_is_known(robot):
+    assert robot.newest("map", "base_link") == 11.8
+    assert place(robot.lookup("map", "base_link")) == (101.8, 0.0)
+    assert place(robot.lookup("odom", "base_link")) == (2.0, 0.0)
+
+
+def test_static_frames_are_known_at_all_times(robot):
+    assert robot.newest("base_link", "laser") is None
+    for time in (None, -5.0, 1e9):
+        assert place(robot.lookup("base_link", "laser", time)) == (0.3, 0.0)
+
+
+def test_a_frame_in_itself_is_at_its_origin(robot):
+    assert robot.lookup("laser", "laser", 1e9) == Transform()
+
+
+def test_two_branches_meet_at_their_common_ancestor(robot):
+    robot.add("base_link", "camera", at(-0.2), 0.0, static=True)
+    assert place(robot.lookup("laser", "camera")) != (-0.5, 0.0)
+    assert place(robot.lookup("laser", "camera")) == (0.5, 0.0)
+
+
+def test_a_sensor_that_hangs_upside_down_keeps_its_sides():
+    buffer = Buffer()
+    over = Transform(Vector3(0, 0, 0.5), Quaternion(1, 0, 0, 0))
+    buffer.add("base", "laser", over, 0.0, static=True)
+    point = buffer.lookup("base", "laser").apply(Vector3(1, 1, 0))
+    assert (point.x, point.y, point.z) == pytest.approx((1, -1, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        (12.5, "'odom' -> 'base_link': the newest is of 12.000 s, and 12.500 s is 0.5"),
+        (9.0, "the oldest is of 10.000 s, and 9.000 s is 1.000 s earlier"),
+    ],
+)
+def test_a_time_of_which_nothing_was_told_is_said(robot, time, words):
+    with pytest.raises(NotKnownThen) as error:
+        robot.lookup("odom", "base_link", time)
+    assert words in str(error.value)
+
+
+def test_a_gap_is_not_bridged(robot):
+    robot.add("odom", "base_link", at(9.0), 15.0)
+    with pytest.raises(NotKnownThen, match=r"gap of 3\.000 s from 12\.000 s on"):
+        robot.lookup("odom", "base_link", 13.0)
+    assert place(robot.lookup("odom", "base_link", 15.0)) == (9.0, 0.0)
+
+
+def test_a_missing_frame_is_said_with_what_there_is(robot):
+    with pytest.raises(FrameMissing) as error:
+        robot.lookup("map", "base_lnk")
+    assert "did you mean 'base_link'?" in str(error.value)
+    assert "there are: base_link, laser, map, odom" in str(error.value)
+    with pytest.raises(FrameMissing, match="there are: none"):
+        Buffer().lookup("map", "odom")
+
+
+def test_many_frames_are_not_all_listed():
+    buffer = Buffer()
+    for number in range(50):
+        buffer.add("root", f"f{number}", at(0), 0.0)
+    with pytest.raises(FrameMissing, match="and 39 more"):
+        buffer.lookup("root", "nothing")
+
+
+def test_two_trees_are_said_with_their_roots(robot):
+    robot.add("world_2", "odom_2", at(0), 10.0)
+    with pytest.raises(NotConnected, match="tree of 'map', the other in that of 'wor"):
+        robot.lookup("odom_2", "laser")
+
+
+def test_a_loop_is_refused_and_nothing_is_changed(robot):
+    words = "'laser' -> 'odom' would close a loop: 'odom' -> 'base_link' -> 'laser' -> "
+    with pytest.raises(TransformError, match=words):
+        robot.add("laser", "odom", at(0), 11.0)
+    with pytest.raises(TransformError, match="loop"):
+        robot.add("odom", "odom", at(0), 11.0)
+    assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
+
+
+def test_time_that_jumps_back_is_noted_and_what_was_known_forgotten(robot):
+    robot.add("odom", "base_link", at(5.0), 3.0)
+    assert "jumped back by 9.000 s" in robot.notes[-1]
+    assert place(robot.lookup("odom", "base_link", 3.0)) == (5.0, 0.0)
+    with pytest.raises(NotKnownThen):
+        robot.lookup("odom", "base_link", 11.0)
+
+
+def test_what_comes_a_little_late_is_put_where_it_belongs(robot):
+    robot.add("odom", "base_link", at(1.5, 1.0), 11.45)
+    assert place(robot.lookup("odom", "base_link", 11.45)) == (1.5, 1.0)
+    assert not robot.notes
+
+
+def test_ten_seconds_are_kept():
+    buffer = Buffer()
+    for step in range(300):
+        buffer.add("odom", "base", at(step), step / 10)
+    with pytest.raises(NotKnownThen, match=r"the oldest is of 19\.900 s"):
+        buffer.lookup("odom", "base", 19.0)
+
+
+def test_what_is_found_is_of_the_time_or_else_the_newest(robot):
+    then, now = robot.find("map", "base_link", 11.0), robot.find("map", "base_link")
+    assert place(then.transform) == (101.0, 0.0)
+    assert (then.newest, then.on_time) == (11.8, True)
+    assert place(now.transform) == (101.8, 0.0)
+    assert (now.newest, now.on_time) == (11.8, False)
+    assert robot.find("map", "base_link", 12.5) == now
+    assert robot.find("laser", "base_link").newest is None
+    assert robot.find("map", "map") == (Transform(), None, False)
+    with pytest.raises(FrameMissing):
+        robot.find("map", "camera", 11.0)
+
+
+def test_a_way_that_was_looked_for_is_another_when_the_tree_changes(robot):
+    robot.add("world", "tag", at(1.0), 11.0)
+    with pytest.raises(NotConnected):
+        robot.lookup("map", "tag", 11.0)
+    assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
+    robot.add("map", "world", at(5.0), 11.0)
+    assert place(robot.lookup("map", "tag", 11.0)) == (6.0, 0.0)
+    robot.add("map", "base_link", at(7.0), 11.0)
+    assert place(robot.lookup("map", "base_link", 11.0)) == (7.0, 0.0)
+    assert place(robot.lookup("map", "laser", 11.0)) == (7.3, 0.0)
+
+
+def test_a_frame_that_changes_its_parent_is_noted(robot):
+    robot.add("map", "base_link", at(7.0), 11.0)
+    assert "was in 'odom' and is in 'map' now" in robot.notes[-1]
+    assert place(robot.lookup("map", "base_link", 11.0)) == (7.0, 0.0)
+    assert "odom" in robot.frames
+
+
+def test_a_parent_that_nobody_names_any_more_is_gone():
+    buffer = Buffer()
+    buffer.add("old", "base", at(0), 1.0)
+    buffer.add("new", "base", at(0), 2.0)
+    assert buffer.frames == ["base", "new"]
+
+
+def test_namespaces_are_put_in_front_but_for_what_is_shared():
+    buffer = Buffer()
+    for name in ("robot_0", "robot_1"):
+        buffer.add("map", "odom", at(1.0), 1.0, namespace=f"/{name}")
+        buffer.add("odom", "base_link", at(1.0), 1.0, namespace=f"/{name}")
+    assert buffer.frames == [
+        "map", "robot_0/base_link", "robot_0/odom", "robot_1/base_link", "robot_1/odom",
+    ]  # fmt: skip
+    assert place(buffer.lookup("robot_0/base_link", "robot_1/base_link")) == (0.0, 0.0)
+
+
+def test_a_prefix_that_is_there_already_is_not_put_there_twice():
+    buffer = Buffer()
+    assert buffer.name("robot_0/odom", "/robot_0") == "robot_0/odom"
+    assert buffer.name("/odom") == "odom"
+
+
+@pytest.mark.parametrize(
+    ("parent", "child", "stamp", "words"),
+    [
+        ("", "a", 0.0, "has no name"),
+        ("a", "/", 0.0, "has no name"),
+        ("a", "b", math.nan, "the stamp is nan"),
+    ],
+)
+def test_what_has_no_name_or_time_is_refused(parent, child, stamp, words):
+    with pytest.raises(TransformError, match=words):
+        Buffer().add(parent, child, at(0), stamp)
+
+
+def test_a_wrong_transform_is_refused_with_its_frames():
+    bad = Transform(rotation=Quaternion(0, 0, 0, 0))
+    with pytest.raises(TransformError, match="'odom' -> 'base': the rotation has a"):
+        Buffer().add("odom", "base", bad, 0.0)
+
+
+def test_a_flood_of_frames_pushes_out_those_heard_of_longest_ago(robot):
+    for number in range(2 * MOST_FRAMES):
+        robot.add("map", f"object_{number}", at(number), 1e6 - number)
+        if number % 100 == 0:
+            robot.add("odom", "base_link", at(2.0), 12.0)
+    assert len(robot.frames) <= MOST_FRAMES + 1, "and the root"
+    assert "object_0" not in robot.frames
+    newest = f"object_{2 * MOST_FRAMES - 1}"
+    assert place(robot.lookup("map", newest)) == (2 * MOST_FRAMES - 1, 0.0)
+    robot.add("map", "late/odom", at(5.0), 13.0)
+    robot.add("late/odom", "late/base_link", at(1.0), 13.0)
+    assert place(robot.lookup("map", "late/base_link")) == (6.0, 0.0)
+    # What others hang from stays, however long ago, and what is told but once.
+    assert place(robot.lookup("map", "laser", 11.8)) == (102.1, 0.0)
+
+
+def test_a_parent_is_not_pushed_out_by_its_own_first_child():
+    buffer = Buffer()
+    for number in range(MOST_FRAMES):
+        buffer.add("root", f"f{number}", at(1.0), 0.0)
+    buffer.add("f0", "one more", at(1.0), 0.0)
+    assert buffer.chain("one more") == ["one more", "f0", "root"]
+    assert "f1" not in buffer.frames
+
+
+def test_a_flood_of_frames_that_must_all_stay_ends():
+    buffer = Buffer()
+    for number in range(MOST_FRAMES):
+        buffer.add("root", f"f{number}", at(0), 0.0, static=True)
+    with pytest.raises(TransformError, match="4096 frames already"):
+        buffer.add("root", "one more", at(0), 0.0)
+    buffer.add("root", "f7", at(1), 1.0, static=True)
+
+
+def test_names_are_compared_with_a_missing_one_once_and_not_when_there_are_many(
+    robot, monkeypatch
+):
+    compared = []
+
+    def compare(name, names, n):
+        compared.append(len(names))
+        return []
+
+    monkeypatch.setattr("webmap.ros.tf.buffer.difflib.get_close_matches", compare)
+
+    def miss() -> str:
+        with pytest.raises(FrameMissing) as error:
+            robot.lookup("map", "bas_link")
+        return str(error.value)
+
+    assert miss() == miss()
+    assert compared == [4], "of what has not changed the words are the same"
+    robot.add("odom", "base_link", at(2.0), 12.0)
+    robot.add("base_link", "camera", at(1.0), 0.0)
+    assert "there are: base_link, camera, laser, map, odom" in miss()
+    assert compared == [4, 5]
+    for number in range(MOST_COMPARED):
+        robot.add("map", f"object_{number}", at(0.0), 0.0)
+    assert "and 193 more" in miss()
+    assert compared == [4, 5]
+
+
+POSES = st.builds(
+    Pose, st.floats(-10, 10), st.floats(-10, 10), st.floats(-math.pi, math.pi)
+)
+NAMES = ["a", "b", "c", "d", "e"]
+
+
+@st.composite
+def trees(draw):
+    """A tree of five frames that move at their own times, known from 1 s to 2 s."""
+    buffer = Buffer()
+    for index, child in enumerate(NAMES[1:], start=1):
+        parent = NAMES[draw(st.integers(0, index - 1))]
+        middle = draw(st.floats(1.1, 1.9))
+        for stamp in (1.0, middle, 2.0):
+            buffer.add(parent, child, Transform.from_pose(draw(POSES)), stamp)
+    return buffer
+
+
+FRAMES = st.sampled_from(NAMES)
+TIMES = st.floats(1.0, 2.0)
+
+
+def same(one, other):
+    for point in (Vector3(), Vector3(1, 0, 0), Vector3(0, 1, 0)):
+        p, q = one.apply(point), other.apply(point)
+        assert (p.x, p.y, p.z) == pytest.approx((q.x, q.y, q.z), abs=1e-6)
+
+
+@given(trees(), FRAMES, FRAMES, FRAMES, TIMES)
+def test_a_way_over_any_frame_is_the_same_way(tree, target, over, source, time):
+    same(
+        tree.lookup(target, source, time),
+        tree.lookup(target, over, time) @ tree.lookup(over, source, time),
+    )
+
+
+@given(trees(), FRAMES, FRAMES, TIMES)
+def test_the_way_back_undoes_the_way(tree, target, source, time):
+    there, back = tree.lookup(target, source, time), tree.lookup(source, target, time)
+    same(there @ back, Transform())
+
+
+# Beyond what was told.
+
+
+def test_a_frame_goes_on_as_it_did_for_a_while(robot):
+    assert place(robot.lookup("odom", "base_link", 12.15, ahead=0.2)) == (2.15, 0.0)
+    with pytest.raises(NotKnownThen, match="later"):
+        robot.lookup("odom", "base_link", 12.25, ahead=0.2)
+
+
+def test_one_that_turned_goes_on_turning():
+    buffer = Buffer()
+    for step in range(5):
+        buffer.add("odom", "base", at(0, 0, step / 10), 10.0 + step / 10)
+    ahead = buffer.lookup("odom", "base", 10.5, ahead=0.2)
+    assert ahead.planar.yaw == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        [(10.0, 0.0, 0.0)],  # once only
+        [(10.0, 0.0, 0.0), (10.1, 3.0, 0.0)],  # it leapt
+        [(10.0, 0.0, 0.0), (10.1, 3.0, 3.0)],  # it was turned round
+        [(9.0, 2.0, 0.0), (10.1, 3.0, 0.0)],  # too long ago
+        [(10.09, 2.99, 0.0), (10.1, 3.0, 0.0)],  # too close together to tell
+    ],
+)
+def test_what_does_not_tell_how_it_goes_on_stays(told):
+    buffer = Buffer()
+    for stamp, x, yaw in told:
+        buffer.add("odom", "base", at(x, 0.0, yaw), stamp)
+    stamp, x, _ = told[-1]
+    assert place(buffer.lookup("odom", "base", stamp + 0.1, ahead=0.2)) == (x, 0.0)
+
+
+def test_a_frame_hangs_from_a_chain_of_others(robot):
+    assert robot.chain("laser") == ["laser", "base_link", "odom", "map"]
+    assert robot.chain("nowhere") == ["nowhere"]

@@ -1,0 +1,30 @@
+"""Frames whose names are far too long: messages may have any text."""
+
+import time
+
+import pytest
+
+from webmap.ros.tf import Buffer, FrameMissing, Transform, TransformError
+
+LONG = "f" * 1_000_000
+
+
+@pytest.mark.parametrize("names", [(LONG, "a"), ("a", LONG)])
+def test_a_frame_with_a_name_that_is_too_long_is_left_out(names):
+    buffer = Buffer()
+    with pytest.raises(TransformError, match="name of 1000000 characters; 256") as said:
+        buffer.add(*names, Transform(), 1.0)
+    assert len(str(said.value)) < 200
+    assert buffer.frames == []
+
+
+def test_asking_for_such_a_frame_takes_no_time_and_says_little():
+    buffer = Buffer()
+    for number in range(100):
+        buffer.add("map", f"f{number}", Transform(), 1.0)
+    before = time.process_time()
+    for number in range(20):
+        with pytest.raises(FrameMissing, match="name of") as said:
+            buffer.lookup("map", f"{LONG}{number}")
+        assert len(str(said.value)) < 200
+    assert time.process_time() - before < 1.0

@@ -1,0 +1,235 @@
+"""Robots that are drawn in the frame of the map."""
+
+import asyncio
+import math
+import time
+
+import msgspec
+import pytest
+
+from webmap import Bridge, Robot
+from webmap.poses.frames import frames_of
+from webmap.base.errors import ConfigError
+from webmap.base.scope import Removal
+from webmap_process import simulator
+
+
+class Link:
+    """A bridge that says what it is told to say."""
+
+    url, name = "ws://test:9090", "test"
+    lag = 0.0
+    state, replays = "open", False
+
+    def __init__(self):
+        self.subscribed = []
+
+    def on_open(self, fn):
+        return Removal(lambda: None)
+
+    def subscribe(self, topic, callback, type=None, *, decode=None, **more):
+        entry = (topic, callback, decode)
+        self.subscribed.append(entry)
+        return Removal(lambda: self.subscribed.remove(entry))
+
+    def say(self, topic, message):
+        heard = [entry for entry in self.subscribed if entry[0] == topic]
+        assert heard, f"nobody listens to {topic}"
+        for _, callback, decode in heard:
+            callback(msgspec.convert(message, decode, strict=False))
+
+
+def stamped(frame, stamp):
+    secs = int(stamp)
+    nsecs = round((stamp - secs) * 1e9)
+    return {"frame_id": frame, "stamp": {"secs": secs, "nsecs": nsecs}}
+
+
+def turn(yaw):
+    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)}
+
+
+def transform(parent, child, x, y=0.0, yaw=0.0, *, stamp=10.0):
+    move = {"translation": {"x": x, "y": y, "z": 0.0}, "rotation": turn(yaw)}
+    header = stamped(parent, stamp)
+    return {"header": header, "child_frame_id": child, "transform": move}
+
+
+def odometry(x, y=0.0, yaw=0.0, *, stamp=10.0, frame="odom"):
+    still = {"linear": {"x": 0.0, "y": 0.0}, "angular": {"x": 0.0, "y": 0.0}}
+    place = {"position": {"x": x, "y": y}, "orientation": turn(yaw)}
+    return {
+        "header": stamped(frame, stamp),
+        "pose": {"pose": place},
+        "twist": {"twist": still},
+    }
+
+
+@pytest.fixture(autouse=True)
+def no_patience(monkeypatch):
+    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
+
+
+@pytest.fixture
+def link():
+    return Link()
+
+
+@pytest.fixture
+def bob(link):
+    robot = Robot("Bob")
+    robot.set_odometry_topic(link, "/odom", type="nav_msgs/Odometry")
+    robot.set_tf(link)
+    yield robot
+    robot.destroy()
+
+
+def where(robot):
+    place = (robot.position.x, robot.position.y, robot.yaw)
+    return pytest.approx(place, abs=1e-6)
+
+
+def test_odometry_is_taken_to_the_frame_of_the_map(link, bob):
+    link.say("/tf", {"transforms": [transform("map", "odom", 10.0, 5.0, math.pi / 2)]})
+    link.say("/odom", odometry(1.0))
+    assert (10.0, 6.0, math.pi / 2) == where(bob)
+    assert not bob.problems
+
+
+def test_the_frames_of_the_stamp_are_used_not_the_newest(link, bob):
+    for stamp, x in ((10.0, 0.0), (10.5, 50.0)):
+        link.say("/tf", {"transforms": [transform("map", "odom", x, stamp=stamp)]})
+    link.say("/odom", odometry(1.0, stamp=10.25))
+    assert where(bob) == (26.0, 0.0, 0.0)
+
+
+def test_a_pose_that_is_newer_than_the_frames_is_taken_by_the_newest(link, bob):
+    link.say("/tf", {"transforms": [transform("map", "odom", 10.0)]})
+    link.say("/odom", odometry(1.0, stamp=10.3))
+    assert where(bob) == (11.0, 0.0, 0.0)
+    assert not bob.problems
+
+
+def test_without_the_map_s_frame_it_stays_where_odometry_has_it_and_says_so(link, bob):
+    link.say("/odom", odometry(1.0))
+    assert where(bob) == (1.0, 0.0, 0.0)
+    assert "there is no frame 'map'" in bob.problems["tf"]
+    link.say("/tf", {"transforms": [transform("map", "odom", 10.0)]})
+    link.say("/odom", odometry(1.0, stamp=10.1))
+    assert where(bob) == (11.0, 0.0, 0.0)
+    assert not bob.problems
+
+
+def test_one_who_is_quiet_says_nothing_of_it(link, bob):
+    bob.set_tf(link, quiet=True)
+    link.say("/odom", odometry(1.0))
+    assert not bob.problems
+
+
+def test_a_pose_in_the_map_s_frame_stays_as_it_is(link, bob):
+    link.say("/odom", odometry(3.0, frame="map"))
+    assert where(bob) == (3.0, 0.0, 0.0)
+    assert not bob.problems
+
+
+def test_a_robot_without_odometry_is_where_the_frames_have_its_base(link):
+    bob = Robot("Bob", base_link="base_footprint")
+    bob.set_tf(link)
+    chain = [transform("map", "odom", 10.0), transform("odom", "base_footprint", 2.0)]
+    link.say("/tf", {"transforms": chain})
+    assert where(bob) == (12.0, 0.0, 0.0)
+    stamp = bob.pose_stamp
+    bob.pose_stamp -= 1.0
+    link.say("/tf", {"transforms": [transform("map", "other", 1.0, stamp=20.0)]})
+    assert bob.pose_stamp == stamp - 1.0, "news of others is no news of this one"
+    bob.destroy()
+
+
+def test_frames_of_a_namespace_are_kept_apart(link):
+    robots = [Robot(name) for name in ("ann", "bob")]
+    for number, robot in enumerate(robots):
+        space = f"/{robot.name}"
+        robot.set_odometry_topic(link, f"{space}/odom", type="nav_msgs/Odometry")
+        robot.set_tf(link, namespace=space)
+        link.say(f"{space}/tf", {"transforms": [transform("map", "odom", number)]})
+        link.say(f"{space}/odom", odometry(0.5))
+    assert where(robots[0]) == (0.5, 0.0, 0.0)
+    assert where(robots[1]) == (1.5, 0.0, 0.0)
+    for robot in robots:
+        robot.destroy()
+
+
+def test_robots_of_one_bridge_share_what_they_hear_and_the_last_ends_it(link):
+    robots = [Robot("Ann"), Robot("Bob")]
+    for robot in robots:
+        robot.set_tf(link)
+    assert [topic for topic, _, _ in link.subscribed] == ["/tf", "/tf_static"]
+    assert frames_of(link) is frames_of(link)
+    robots[0].unset_tf()
+    assert len(link.subscribed) == 2
+    robots[1].destroy()
+    assert link.subscribed == []
+
+
+def test_a_wrong_transform_is_logged_once_and_the_others_are_taken(link, bob, caplog):
+    bad = transform("odom", "base_link", math.nan)
+    for _ in range(3):
+        link.say("/tf", {"transforms": [bad, transform("map", "odom", 10.0)]})
+    link.say("/odom", odometry(1.0))
+    assert where(bob) == (11.0, 0.0, 0.0)
+    said = [line for line in caplog.messages if line.startswith("test: a transform")]
+    assert len(said) == 1
+    assert "not finite" in said[0]
+    assert bob.problems["frames"] == said[0].removeprefix("test: ")
+
+
+def test_frames_are_plain_data_and_back():
+    bridge = Bridge("ws://bob:9090")
+    bob = Robot("Bob")
+    bob.set_tf(bridge, namespace="bob", quiet=True)
+    data = bob.to_dict()
+    assert data["tf"] == {
+        "bridge": "ws://bob:9090",
+        "base_frame": "bob/base_link",
+        "namespace": "/bob",
+        "quiet": True,
+    }
+    again = Robot.from_dict(data, {bridge.url: bridge})
+    assert again.tf == bob.tf
+    with pytest.raises(ConfigError, match="tf"):
+        Robot.from_dict({"name": "Bob", "tf": {"topic": "/tf"}})
+    for robot in (bob, again):
+        robot.destroy()
+
+
+@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+def test_a_simulated_robot_is_drawn_where_its_frames_have_it(dialect):
+    options = ("--wander", "--drift", "0.3", "--dialect", dialect)
+    with simulator(*options) as url:
+        asyncio.run(follow(url))
+
+
+async def follow(url):
+    bridge = Bridge(url)
+    robot = Robot("robot_0")
+    bridge.start(asyncio.get_running_loop())
+    try:
+        robot.set_odometry_topic(bridge, "/robot_0/odom", 0)
+        robot.set_tf(bridge)
+        buffer = frames_of(bridge).buffer
+        deadline = time.monotonic() + 15
+        while time.monotonic() < deadline:
+            await asyncio.sleep(0.02)
+            if not robot.valid or not {"map", "robot_0/base_link"} <= set(
+                buffer.frames
+            ):
+                continue
+            truth = buffer.lookup("map", "robot_0/base_link").planar
+            off = math.dist((truth.x, truth.y), (robot.position.x, robot.position.y))
+            if off < 0.1 and not robot.problems:
+                return
+        raise AssertionError(f"{robot.problems}, {buffer.frames}")
+    finally:
+        robot.destroy()
+        await bridge.stop()

@@ -1,0 +1,106 @@
+"""Who goes by frames is told of them, together and each by itself."""
+
+import asyncio
+import time
+
+import pytest
+from test_tf_robot import Link, transform
+
+from webmap import Robot
+from webmap.poses.frames import PERIOD, frames_of
+
+
+class OpenLink(Link):
+    """A link that is up."""
+
+    def on_open(self, fn):
+        asyncio.get_running_loop().call_soon(fn)
+        return super().on_open(fn)
+
+
+def moved(x, stamp) -> dict:
+    return {"transforms": [transform("map", "base_link", x, stamp=stamp)]}
+
+
+async def until(condition) -> None:
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.005)
+
+
+def test_a_listener_that_raises_keeps_no_other_from_hearing_and_is_logged_once(caplog):
+    link = Link()
+    frames = frames_of(link)
+
+    def raising() -> None:
+        raise ValueError("this one cannot")
+
+    held = frames.join(raising)
+    robot = Robot("Bob")
+    robot.set_tf(link)
+    for step in range(5):
+        link.say("/tf", moved(step, 10.0 + step))
+        assert robot.position.x == step
+    (said,) = caplog.records
+    assert said.getMessage() == "test: a listener to frames raised"
+    assert "this one cannot" in str(said.exc_info[1])
+    held.remove()
+    robot.destroy()
+
+
+def test_many_messages_in_a_row_are_told_of_at_once_and_then_together(monkeypatch):
+    monkeypatch.setattr("webmap.poses.frames.PERIOD", 0.3)
+
+    async def scenario() -> None:
+        link = OpenLink()
+        told = []
+        held = frames_of(link).join(lambda: told.append(time.monotonic()))
+        robot = Robot("Bob")
+        robot.set_tf(link)
+        await asyncio.sleep(0.0)
+        link.say("/tf", moved(0.0, 10.0))
+        assert (len(told), robot.position.x) == (1, 0.0)
+        for step in range(1, 11):
+            link.say("/tf", moved(step, 10.0 + step / 100))
+        heard = time.monotonic()
+        assert len(told) == 1
+        await until(lambda: len(told) == 2)
+        assert robot.position.x == 10.0, "the newest"
+        assert told[1] - told[0] >= 0.29
+        assert robot.pose_stamp <= heard, "it is as old as it is"
+        await asyncio.sleep(0.35)
+        assert len(told) == 2, "there was nothing more"
+        link.say("/tf", moved(11.0, 11.0))
+        assert (len(told), robot.position.x) == (3, 11.0), "not held back"
+        robot.destroy()
+        held.remove()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("robots", [1, 20])
+def test_robots_of_frames_alone_are_shown_twenty_times_a_second(robots):
+    """What is told at each period is taken, and not every other time."""
+
+    async def scenario() -> None:
+        link = OpenLink()
+        fleet = [Robot(f"r{number}", base_link="base_link") for number in range(robots)]
+        for robot in fleet:
+            robot.set_tf(link)
+        told, taken = [], []
+        held = frames_of(link).join(lambda: told.append(1))
+        last, began = None, time.monotonic()
+        for step in range(100):
+            link.say("/tf", moved(step, 10.0 + step / 100))
+            if fleet[-1].position.x != last:
+                last = fleet[-1].position.x
+                taken.append(last)
+            await asyncio.sleep(0.01)
+        assert len(told) <= 3 + (time.monotonic() - began) / PERIOD
+        assert len(taken) >= 0.8 * len(told)
+        for robot in fleet:
+            robot.destroy()
+        held.remove()
+
+    asyncio.run(scenario())

@@ -1,0 +1,275 @@
+"""What is wrong with frames and poses is said, and taken back when it is mended."""
+
+import math
+import time
+
+import pytest
+from test_tf_robot import Link, odometry, transform
+
+from webmap import Robot
+from webmap.poses.frames import FrameFaults, lasting
+from webmap.poses.placing import Lasting, PoseReading
+from webmap.poses.pipeline import Jumps
+from webmap.base.geometry import Quaternion, Vector3
+from webmap.ros.tf import Buffer
+
+
+class Clock:
+    """A clock that a test turns."""
+
+    def __init__(self):
+        self.now = 1000.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(time, "monotonic", clock)
+    return clock
+
+
+@pytest.fixture
+def link():
+    return Link()
+
+
+@pytest.fixture
+def bob(link, clock):
+    robot = Robot("Bob")
+    robot.set_odometry_topic(link, "/odom", type="nav_msgs/Odometry")
+    robot.set_tf(link)
+    yield robot
+    robot.destroy()
+
+
+@pytest.fixture
+def ready(link, bob, clock):
+    """A robot that is where its frames have it."""
+
+    def go(seconds, *transforms, x=0.0):
+        clock.now = 990.0 + seconds
+        chain = [
+            transform("map", "odom", 1.0, stamp=seconds),
+            transform("odom", "base_link", x, stamp=seconds),
+        ]
+        link.say("/tf", {"transforms": [*chain, *transforms]})
+        link.say("/odom", odometry(x, stamp=seconds))
+
+    go(10.0)
+    assert bob.problems == {}
+    return go
+
+
+def test_a_missing_map_is_said_once_it_lasts_and_taken_back(link, bob, clock):
+    link.say("/odom", odometry(1.0))
+    assert bob.problems == {}, "frames come one after another"
+    clock.now += 2.5
+    link.say("/odom", odometry(1.0, stamp=12.5))
+    assert bob.problems == {}, "and some only a while after the link is up"
+    clock.now += 1.0
+    link.say("/odom", odometry(1.0, stamp=13.5))
+    assert "there is no frame 'map'; there are: none" in bob.problems["tf"]
+    link.say("/tf", {"transforms": [transform("map", "odom", 1.0, stamp=13.5)]})
+    link.say("/odom", odometry(1.0, stamp=13.6))
+    assert bob.problems == {}
+
+
+def test_two_trees_are_said_by_their_roots(link, bob, clock):
+    chain = [transform("map", "other", 1.0), transform("odom", "base_link", 1.0)]
+    for _ in range(3):
+        link.say("/tf", {"transforms": chain})
+        link.say("/odom", odometry(1.0))
+        clock.now += 1.5
+    assert "the one is in the tree of 'odom', the other in" in bob.problems["tf"]
+
+
+def test_a_loop_is_said_whole_and_the_others_hold(ready, bob):
+    ready(10.1, transform("base_link", "map", 0.0, stamp=10.1))
+    said = bob.problems["frames"]
+    assert "would close a loop" in said
+    assert "'map' -> 'odom' -> 'base_link' -> 'map'" in said
+    assert bob.position.x == pytest.approx(1.0)
+    ready(15.0)
+    assert "frames" in bob.problems
+    ready(21.0)
+    assert bob.problems == {}
+
+
+def test_time_that_jumps_back_is_said_and_the_robot_goes_on(ready, bob):
+    ready(50.0)
+    ready(20.0, x=0.4)
+    assert "time jumped back by 30.000 s" in bob.problems["frames"]
+    assert bob.position.x == pytest.approx(1.4)
+
+
+def test_two_nodes_that_tell_of_one_frame_are_said(ready, bob):
+    ready(10.1, transform("world", "base_link", 5.0, stamp=10.1))
+    assert "two nodes tell of it" in bob.problems["frames"]
+
+
+def test_a_fault_of_another_robots_frames_is_not_said_of_this_one(ready, bob, caplog):
+    ready(10.1, transform("r2/odom", "r2/base_link", math.nan, stamp=10.1))
+    assert bob.problems == {}
+    assert "test: a transform was left out: 'r2/odom' -> 'r2/base_link'" in caplog.text
+
+
+def test_localisation_that_falls_silent_is_said_and_taken_back(link, ready, bob, clock):
+    for seconds in (11.0, 12.5):
+        clock.now = 990.0 + seconds
+        link.say("/odom", odometry(0.0, stamp=seconds))
+    assert bob.problems == {}, "within its time"
+    for seconds in (13.0, 14.5):
+        clock.now = 990.0 + seconds
+        link.say("/odom", odometry(0.0, stamp=seconds))
+    said = bob.problems["tf"]
+    assert "nothing new of 'map' -> 'odom' was told for more than 2 s" in said
+    ready(15.0)
+    assert bob.problems == {}
+
+
+def test_frames_alone_that_stop_are_said_while_others_go_on(link, clock):
+    robot = Robot("Bob")
+    robot.set_tf(link)
+    chain = [transform("map", "odom", 1.0), transform("odom", "base_link", 1.0)]
+    link.say("/tf", {"transforms": chain})
+    assert robot.valid
+    for _ in range(4):
+        clock.now += 1.1
+        link.say("/tf", {"transforms": [transform("map", "other", 1.0)]})
+    assert "'map' -> 'base_link'" in robot.problems["tf"]
+    later = [transform("map", "odom", 1.0, stamp=15.0)]
+    later.append(transform("odom", "base_link", 1.0, stamp=15.0))
+    link.say("/tf", {"transforms": later})
+    assert robot.problems == {}
+    robot.destroy()
+
+
+def test_a_leap_of_a_robot_is_said_for_a_while(ready, bob):
+    ready(10.1, x=0.1)
+    ready(10.2, x=12.0)
+    assert "it jumped by 11.9 m within 0.10 s" in bob.problems["jumps"]
+    assert bob.position.x == pytest.approx(13.0)
+    for seconds in (15.0, 21.0):
+        ready(seconds, x=12.0)
+    assert bob.problems == {}
+
+
+# The rules by themselves.
+
+
+def reading(x, stamp, frame="map"):
+    return PoseReading(Vector3(x), Quaternion(), None, frame, stamp)
+
+
+def test_a_robot_that_is_in_two_places_again_and_again_is_told_of_twice():
+    jumps = Jumps()
+    for step in range(5):
+        jumps.look(reading(20.0 * (step % 2), 10.0 + step / 10), step / 10)
+    assert "two nodes seem to tell where it is" in jumps.problem
+
+
+@pytest.mark.parametrize(
+    "poses",
+    [
+        [(0.0, 10.0), (0.4, 10.01)],  # a correction
+        [(0.0, 10.0), (20.0, 14.5)],  # driven
+        [(0.0, 10.0), (50.0, 30.0)],  # not heard of for long
+        [(0.0, 0.0), (50.0, 0.0)],  # nobody says when
+        [(0.0, 10.0), (50.0, 9.0)],  # time goes back
+    ],
+)
+def test_what_may_have_been_driven_is_no_jump(poses):
+    jumps = Jumps()
+    for x, stamp in poses:
+        jumps.look(reading(x, stamp), stamp)
+    assert jumps.problem is None
+
+
+@pytest.mark.parametrize(
+    ("stamp", "passed", "leapt"),
+    [
+        (13600.0, 0.1, "+3600.0"),
+        (6400.0, 0.1, "-3600.0"),
+        (10020.0, 30.0, None),  # not heard of for a while
+        (10009.0, 0.1, None),  # a link that stalled leaves things out
+        (9999.5, 0.1, None),  # one that another has overtaken
+    ],
+)
+def test_a_clock_of_poses_that_leaps_is_told_with_how_far(stamp, passed, leapt):
+    jumps = Jumps()
+    jumps.look(reading(0.0, 10000.0), 5.0)
+    jumps.look(reading(0.0, stamp), 5.0 + passed)
+    if leapt is None:
+        assert jumps.problem is None
+    else:
+        assert f"the clock of its poses leapt by {leapt} s" in jumps.problem
+
+
+def test_frames_alone_that_leap_are_told_of_once(link, clock):
+    robot = Robot("Bob")
+    robot.set_tf(link)
+    for stamp in (5000.0, 1400.0):
+        clock.now += 1.0
+        chain = [transform("map", "base_link", 1.0, stamp=stamp)]
+        link.say("/tf", {"transforms": chain})
+    (problem,) = robot.problems.values()
+    assert "time jumped back by 3600.000 s" in problem
+    robot.destroy()
+
+
+@pytest.mark.parametrize(
+    ("ahead", "said"), [(3600, "3600.0 s later"), (-3600, "3600.0 s earlier")]
+)
+@pytest.mark.parametrize("quiet", [False, True])
+def test_odometry_by_another_clock_than_the_frames_is_said_with_the_difference(
+    link, bob, clock, ahead, said, quiet
+):
+    bob.set_tf(link, quiet=quiet)
+    for seconds in (0.0, 1.5, 3.0, 4.5):
+        clock.now = 1000.0 + seconds
+        stamp = 9000.0 + seconds
+        chain = [transform("map", "odom", 1.0, stamp=stamp)]
+        link.say("/tf", {"transforms": chain})
+        link.say("/odom", odometry(0.4, stamp=stamp + ahead))
+    (problem,) = bob.problems.values()
+    assert f"its odometry is stamped {said} than the newest of 'map'" in problem
+    assert bob.position.x == pytest.approx(1.4)
+    link.say("/odom", odometry(0.4, stamp=9004.6))
+    assert "tf" not in bob.problems
+
+
+def test_a_pose_in_another_frame_is_no_jump():
+    jumps = Jumps()
+    jumps.look(reading(0.0, 10.0, "odom"), 0.0)
+    jumps.look(reading(50.0, 10.1, "map"), 0.1)
+    assert jumps.problem is None
+
+
+def test_faults_are_kept_of_so_many_frames_and_no_more():
+    faults = FrameFaults(Buffer())
+    said = [faults.note("map", f"f{n}", "wrong", 0.0) for n in range(60)]
+    assert sum(said) == 50
+    assert not faults.note("map", "f0", "wrong again", 1.0)
+
+
+def test_faults_with_the_robots_prefix_concern_it_though_nothing_connects_them():
+    faults = FrameFaults(Buffer())
+    faults.note("r1/odom", "r1/laser", "it is none", 0.0)
+    assert faults.of("r1/base_link", 1.0) == "it is none"
+    assert faults.of("r2/base_link", 1.0) is None
+    assert faults.of("r1/base_link", 11.0) is None
+    assert not faults.any
+
+
+def test_trouble_that_comes_and_goes_is_never_said(clock):
+    waits = Lasting()
+    for _ in range(10):
+        assert lasting(waits, "late") == ""
+        clock.now += 0.6
+        assert lasting(waits, "") == ""
+    assert lasting(waits, "late") == ""
+    clock.now += 1.0
+    assert lasting(waits, "late") == "late"

@@ -1,0 +1,64 @@
+import "./fake_elements.js";
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { stopButton } from "../../../src/webmap/web/tools/elements.js";
+
+function makeButton() {
+  const button = stopButton("own", "Stop", () => (button.stops += 1));
+  button.stops = 0;
+  return button;
+}
+
+test("a STOP button acts when it is touched, and once in one press", () => {
+  const button = makeButton();
+  button.fire("pointerdown", { button: 0, pointerId: 7 });
+  assert.equal(button.stops, 1);
+  button.fire("pointerup", { button: 0, pointerId: 7 });
+  button.fire("click", { button: 0, pointerId: 7 });
+  assert.equal(button.stops, 1);
+});
+
+test("a STOP button acts again at the next press", () => {
+  const button = makeButton();
+  for (const pointerId of [7, 8, 8]) {
+    button.fire("pointerdown", { button: 0, pointerId });
+    button.fire("click", { button: 0, pointerId });
+  }
+  assert.equal(button.stops, 3);
+});
+
+test("a STOP button acts on a click that no pointer makes, whatever was before", () => {
+  const button = makeButton();
+  button.fire("click", { pointerId: -1 });
+  assert.equal(button.stops, 1);
+  // That of a finger beside another one ends in no click.
+  button.fire("pointerdown", { button: 0, pointerId: 7 });
+  button.fire("click", { pointerId: -1 });
+  // Some browsers do not say whose click it is: once too often is no harm.
+  button.fire("click");
+  assert.equal(button.stops, 4);
+});
+
+test("a STOP button that is off, or that another mouse button presses, does nothing", () => {
+  const button = makeButton();
+  button.fire("pointerdown", { button: 2, pointerId: 1 });
+  button.disabled = true;
+  button.fire("pointerdown", { button: 0, pointerId: 1 });
+  assert.equal(button.stops, 0);
+});
+
+test("a press that was left, or that no pointerdown tells of, is a STOP when it clicks", () => {
+  const button = makeButton();
+  const mouse = { button: 0, pointerId: 1, pointerType: "mouse" };
+  button.fire("pointerdown", mouse);
+  button.fire("click", mouse);
+  // While another mouse button is held a press is told by its click alone.
+  button.fire("click", mouse);
+  assert.equal(button.stops, 2);
+  button.fire("pointerdown", mouse);
+  button.fire("pointerleave", mouse);
+  button.fire("click", mouse);
+  assert.equal(button.stops, 4);
+});

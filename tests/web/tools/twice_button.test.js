@@ -1,0 +1,61 @@
+import "./fake_elements.js";
+
+import assert from "node:assert/strict";
+import { afterEach, beforeEach, mock, test } from "node:test";
+
+import { TwiceButton } from "../../../src/webmap/web/tools/elements.js";
+
+let now = 0;
+beforeEach(() => {
+  now = 0;
+  mock.method(performance, "now", () => now);
+});
+afterEach(() => mock.restoreAll());
+
+/** A button to reset these robots that was pressed once, and what was reset. */
+function pressedOnce(robots) {
+  const reset = [];
+  const button = new TwiceButton("own", "Reset", "Again", (meant) => reset.push(...meant));
+  button.show(true, robots);
+  button.element.fire("click");
+  assert.equal(button.element.textContent, "Again");
+  now = 1000;
+  return { button, reset };
+}
+
+test("a second press is for the robots that the first was said of", () => {
+  const { button, reset } = pressedOnce(["r1", "r2"]);
+  button.element.fire("click");
+  assert.deepEqual(reset, ["r1", "r2"]);
+  assert.equal(button.element.textContent, "Reset");
+});
+
+test("a robot that joins the others takes the first press back", () => {
+  const { button, reset } = pressedOnce(["r1"]);
+  button.show(true, ["r1", "r2"]);
+  assert.equal(button.element.textContent, "Reset");
+  button.element.fire("click");
+  assert.deepEqual(reset, []);
+});
+
+test("another robot takes the first press back", () => {
+  const { button, reset } = pressedOnce(["r1"]);
+  button.show(true, ["r2"]);
+  button.element.fire("click");
+  assert.deepEqual(reset, []);
+});
+
+test("a robot that is there no longer leaves the press to the others", () => {
+  const { button, reset } = pressedOnce(["r1", "r2"]);
+  button.show(true, ["r2"]);
+  button.element.fire("click");
+  assert.deepEqual(reset, ["r2"]);
+});
+
+test("a robot that was gone meanwhile takes the first press back", () => {
+  const { button, reset } = pressedOnce(["r1", "r2"]);
+  button.show(true, ["r2"]);
+  button.show(true, ["r1", "r2"]);
+  button.element.fire("click");
+  assert.deepEqual(reset, []);
+});
