@@ -69,7 +69,7 @@ test-fast: $(DEV)
 ## test-web: the JavaScript that touches no DOM, in Node
 .PHONY: test-web
 test-web: $(NODE)
-	node --test $$(find tests/web -name '*.test.js' | sort)
+	node --test $$(find tests -name '*.test.js' | sort)
 
 ## test-gate: every branch of the gate, its sockets and process too, is taken by a test
 .PHONY: test-gate

@@ -15,11 +15,11 @@ from webmap.core.robot_state import WORDS
 from webmap.features.goals.goal_tool import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.ros.messages_log import LEVELS
+from webmap.scene.wire.messages import LONGEST_TEXTS, PAGE_ID
+from webmap.scene.wire.opcodes import TABLES, VERSION
 from webmap.server.access import CODE, KEY, PROTOCOL
 from webmap.server.html import FOLDER
 from webmap.server.page_socket import BROKEN_RULE, REPLACED
-from webmap.scene.wire.messages import LONGEST_TEXTS, PAGE_ID
-from webmap.scene.wire.opcodes import TABLES, VERSION
 
 WEB = Path(__file__).parent.parent / "src/webmap/web"
 
@@ -39,7 +39,8 @@ _ABOUT = {
 def opcodes_js() -> str:
     """Return the text of ``opcodes.js``."""
     parts = [
-        "// Made by tools/make_javascript.py from webmap/wire/opcodes.py: do not edit.",
+        "// Made by tools/make_javascript.py from webmap/scene/wire/opcodes.py: do not "
+        "edit.",
         "/** Changes with the tables, so that a page of another version notices. */\n"
         f"export const VERSION = {VERSION};",
     ]

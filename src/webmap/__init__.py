@@ -25,33 +25,33 @@ guard_loggers()
 
 if TYPE_CHECKING:
     from webmap import modules
-    from webmap.base import geometry
+    from webmap.base import errors, geometry
+    from webmap.base.errors import WebMapError
+    from webmap.base.identifiers import generate_id
     from webmap.config.robot import RobotConfig
-    from webmap.modules import drawing
-    from webmap.modules import layer_options as options
-    from webmap.poses.alignment import align_bridge
-    from webmap.modules.declaration import FoundTopic, TopicKind, layer
     from webmap.core.extendable import Extendable
     from webmap.core.layer import Layer
     from webmap.core.map import Map
-    from webmap.modules.map_layer import MapLayer
     from webmap.core.page import Page
     from webmap.core.pictures import Picture
-    from webmap.modules.placed import Placed
     from webmap.core.refused import refusals
     from webmap.core.registry import Namespace
     from webmap.core.robot import Robot
+    from webmap.modules import drawing
+    from webmap.modules import layer_options as options
+    from webmap.modules.declaration import FoundTopic, TopicKind, layer
+    from webmap.modules.map_layer import MapLayer
+    from webmap.modules.placed import Placed
     from webmap.modules.robot_layer import RobotLayer
-    from webmap.base.errors import WebMapError
-    from webmap.base.identifiers import generate_id
+    from webmap.poses.alignment import align_bridge
     from webmap.ros import messages
     from webmap.ros.bridge import Bridge
+    from webmap.ros.tf import Transform
     from webmap.scene import html, svg
     from webmap.scene.element import Element
     from webmap.scene.svg import namespace as svg_ns
     from webmap.scene.svg import xlink_namespace as xlink_ns
     from webmap.server.application import asgi_app, call, page, run, start, stop
-    from webmap.ros.tf import Transform
 
 __version__ = "0.1.0"
 
@@ -77,6 +77,7 @@ __all__ = [
     "asgi_app",
     "call",
     "drawing",
+    "errors",
     "generate_id",
     "geometry",
     "html",
@@ -116,6 +117,7 @@ _HOMES = {
     "asgi_app": "webmap.server.application:asgi_app",
     "call": "webmap.server.application:call",
     "drawing": "webmap.modules.drawing",
+    "errors": "webmap.base.errors",
     "generate_id": "webmap.base.identifiers:generate_id",
     "geometry": "webmap.base.geometry",
     "html": "webmap.scene.html",

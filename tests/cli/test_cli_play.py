@@ -10,8 +10,8 @@ import pytest
 
 from bag_making import ODOMETRY, TWIST, Made
 from webmap.bags import need_rosbags
-from webmap.cli.play import replay
 from webmap.base.errors import ConfigError
+from webmap.cli.play import replay
 
 COMMAND = [sys.executable, "-m", "webmap", "play", "--no-browser", "--port", "0"]
 

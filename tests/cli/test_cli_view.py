@@ -13,16 +13,16 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import Bridge
-from webmap.fleet.found import find_fleet
-from webmap.fleet.watch import LookingForLayers
-from webmap.fleet.overrides import Overruling, parse_setting
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.console import Console, make_robot
 from webmap.core.layer import Layer
 from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
+from webmap.fleet.found import find_fleet
+from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.shown import ShownRobots
+from webmap.fleet.stated import Candidate
+from webmap.fleet.watch import LookingForLayers
 from webmap_process import simulator
 
 pytestmark = pytest.mark.slow

@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap import Bridge, Robot, RobotConfig
+from webmap.base.errors import ConfigError
 from webmap.config.checks import Mistakes
 from webmap.config.motion import MotionConfig, TwistConfig
 from webmap.config.reading import read
 from webmap.config.robot import CameraConfig, ModuleConfig
 from webmap.core.configure import apply
-from webmap.base.errors import ConfigError
 from webmap.gate.specs import checked
 
 URL = "ws://robot:9090"

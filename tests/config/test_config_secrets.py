@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.fleet.made import prepare
 from webmap.config.secrets import readable_secret
+from webmap.fleet.made import prepare
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "b"\n'
 CAMERA = 'cameras = ["http://{}"]\n'

@@ -1,17 +1,18 @@
 """The half of the camera's panel that has the pictures, without a browser."""
 
-import re
 from pathlib import Path
 
 import pytest
 
 from webmap import Map, Robot
-from webmap.features.cameras.camera_panel import PARTS, CameraPanel, CameraViews, camera_number
-from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.core.page import Page, PageEntry, Viewer
+from webmap.features.cameras.camera_feed import CameraFeed
+from webmap.features.cameras.camera_panel import (
+    CameraPanel,
+    CameraViews,
+    camera_number,
+)
 from webmap.scene.wire.session import SceneSession
-
-CONSOLE = Path(__file__).parents[2] / "src" / "webmap" / "console"
 
 
 class Feed(CameraFeed):
@@ -59,16 +60,6 @@ def panel(map):
 @pytest.fixture
 def said(map):
     return map.page.channel.sent
-
-
-def test_every_file_that_it_imports_is_published():
-    assert all((CONSOLE / name).is_file() for name in PARTS)
-    imported = "".join(
-        (CONSOLE / f"camera_{n}.js").read_text() for n in ("panel", "view")
-    )
-    names = re.findall(r'^(?:import .*|\}) from "\./(.+)";$', imported, re.M)
-    assert names
-    assert set(names) <= set(PARTS)
 
 
 def test_the_page_hears_of_the_cameras_of_the_selected_robot(map, robot, panel, said):

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from webmap import Bridge
-from webmap.features.doctor.doctor_panel import Checkup, checkup_of, groups
 from webmap.discovery.doctor import Finding, MeantRobot, Observed
+from webmap.features.doctor.doctor_panel import Checkup, checkup_of, groups
 from webmap.ros.rosbridge.checks import LinkFacts
 
 

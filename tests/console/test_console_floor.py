@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 from webmap import console
-from webmap.console.floor import COLOURS, load_floor
 from webmap.base.errors import ConfigError
 from webmap.base.map_file import MAX_YAML
+from webmap.console.floor import COLOURS, load_floor
 
 WALL, UNKNOWN, FREE = 0, 205, 254
 

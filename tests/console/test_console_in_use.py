@@ -7,12 +7,12 @@ import pytest
 
 from webmap import Bridge, Map, Robot, RobotConfig
 from webmap.console import make_robot
-from webmap.features.doctor.doctor_panel import DoctorReports, checkup_of
-from webmap.features.doctor.in_use import in_use
 from webmap.core.page import Page, PageEntry, Viewer
 from webmap.discovery import discover
 from webmap.discovery.doctor import Observed
 from webmap.discovery.doctor.meant import lay_over
+from webmap.features.doctor.doctor_panel import DoctorReports, checkup_of
+from webmap.features.doctor.in_use import in_use
 from webmap.scene.events import Event
 from webmap.scene.wire.session import SceneSession
 

@@ -6,14 +6,14 @@ import pytest
 
 from webmap import Map, Robot
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.features.view.follow import Follow
 from webmap.features.goals.goal_tool import GoalTool
+from webmap.features.stop.stop_button import StopButton
+from webmap.features.view.follow import Follow
 from webmap.features.view.pointer_readout import PointerReadout
 from webmap.features.view.scale_bar import ScaleBar
-from webmap.features.stop.stop_button import StopButton
 from webmap.scene.wire.session import SceneSession
 
-WEB = Path(__file__).parents[2] / "src" / "webmap" / "web"
+PACKAGE = Path(__file__).parents[2] / "src" / "webmap"
 
 
 class Hearing:
@@ -48,8 +48,8 @@ def map():
 def test_a_module_names_files_that_are_there(map, factory):
     map.add_module(factory)
     _, _, script, _, style = map.page.channel.attached[0]
-    assert (WEB / script).is_file()
-    assert (WEB / style).is_file()
+    assert (PACKAGE / script).is_file()
+    assert (PACKAGE / style).is_file()
 
 
 @pytest.mark.parametrize(

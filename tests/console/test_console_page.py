@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from webmap import Bridge, Robot, RobotConfig
+from webmap.base.errors import ConfigError
 from webmap.console import Console, make_robot, open_console
 from webmap.console.page import build
 from webmap.core.page import Page, PageEntry, Viewer, site
-from webmap.base.errors import ConfigError
 from webmap.scene.element import Element
 from webmap.scene.wire.session import SceneSession
 

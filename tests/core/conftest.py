@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from webmap.core.page import Page, PageEntry
 from webmap.base.errors import ConfigError, WireError
+from webmap.core.page import Page, PageEntry
 
 
 @dataclass

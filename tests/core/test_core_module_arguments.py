@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, Protocol
 import numpy as np
 import pytest
 
+from webmap.base.errors import ConfigError
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.registry import Namespace
-from webmap.base.errors import ConfigError
 from webmap.ros.bridge import Bridge
 
 

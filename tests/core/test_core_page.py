@@ -5,13 +5,13 @@ import asyncio
 import pytest
 
 from webmap import Map, Robot, html, svg
+from webmap.base.lifecycle import lifecycle
+from webmap.base.scope import Scope
 from webmap.config.buttons import read_button
 from webmap.features.buttons import robot_button
-from webmap.features.buttons.robot_button import RobotButton
-from webmap.base.lifecycle import lifecycle
 from webmap.features.buttons.buttons import ButtonView
+from webmap.features.buttons.robot_button import RobotButton
 from webmap.scene.events import Event
-from webmap.base.scope import Scope
 
 
 def click(page, mount, element):

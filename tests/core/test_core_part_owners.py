@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.features.layers.diagnostics import PartOwners
 from webmap.base.scope import Scope
+from webmap.features.layers.diagnostics import PartOwners
 
 
 def owners(*namespaces: str) -> PartOwners:

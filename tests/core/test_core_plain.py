@@ -6,8 +6,8 @@ import tomllib
 import pytest
 
 from webmap import Bridge, Namespace, Robot, svg
-from webmap.core.motion import roads
 from webmap.base.errors import ConfigError
+from webmap.core.motion import roads
 
 
 def toml(value) -> str:

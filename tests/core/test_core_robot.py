@@ -9,12 +9,12 @@ import sys
 import pytest
 
 from webmap import Robot, svg
-from webmap.poses import type_asking
-from webmap.core.runtime import goal_message, twist_message
 from webmap.base.errors import ConfigError, MotionError
-from webmap.gate.messages import SentGoal, SentTwist
-from webmap.ros import messages
 from webmap.base.scope import Removal, Scope
+from webmap.core.runtime import goal_message, twist_message
+from webmap.gate.messages import SentGoal, SentTwist
+from webmap.poses import type_asking
+from webmap.ros import messages
 
 
 class Link:

@@ -3,8 +3,8 @@
 import pytest
 
 from webmap import Map, Robot, svg
-from webmap.core.page import Page
 from webmap.base.errors import ConfigError
+from webmap.core.page import Page
 
 
 @pytest.mark.parametrize("model", ["circle", 5, lambda: None])

@@ -3,10 +3,10 @@
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.core import runtime as runtime_module
-from webmap.core.runtime import Runtime
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
+from webmap.core import runtime as runtime_module
+from webmap.core.runtime import Runtime
 
 
 class Gate:

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.core.motion import MotionRoad
 from webmap.base.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
+from webmap.base.lifecycle import lifecycle
+from webmap.core.motion import MotionRoad
 from webmap.gate import framing
 from webmap.gate.messages import StopReport
 from webmap.gate.specs import checked
-from webmap.base.lifecycle import lifecycle
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
 E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}

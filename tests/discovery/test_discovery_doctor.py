@@ -10,6 +10,7 @@ from itertools import pairwise
 import pytest
 from frames_only import telling
 
+from webmap.base.geometry import Pose
 from webmap.discovery import discover
 from webmap.discovery.doctor import Heard, Observed, is_ready, judge
 from webmap.discovery.doctor.frames import FrameListening
@@ -18,7 +19,6 @@ from webmap.discovery.doctor.measure import observe
 from webmap.discovery.doctor.observed import Clock, Way
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
-from webmap.base.geometry import Pose
 from webmap.ros.rosbridge.checks import LinkFacts, is_loopback, listening_addresses
 from webmap.ros.rosbridge.events import Publish
 

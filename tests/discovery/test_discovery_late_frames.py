@@ -7,13 +7,13 @@ import pytest
 from frames_only import TF, telling
 
 from webmap import Bridge
-from webmap.fleet.watch import LookingForLayers, LookingForRobots
-from webmap.fleet.shown import ShownRobots
+from webmap.base.geometry import Pose
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.hearing import LateFrames, late_frames
 from webmap.discovery.tf_robots import Trees
-from webmap.base.geometry import Pose
+from webmap.fleet.shown import ShownRobots
+from webmap.fleet.watch import LookingForLayers, LookingForRobots
 
 CLOUD = "sensor_msgs/PointCloud2"
 

@@ -3,15 +3,11 @@
 import pytest
 
 from webmap import Bridge
-from webmap.modules.declaration import declarations
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules, robot_modules
-from webmap.discovery.layers import (
-    Drawing,
-    FoundLayer,
-    drawing,
-    find_layers,
-)
+from webmap.discovery.found import FoundLayer
+from webmap.discovery.layers import Drawing, drawing, find_layers
+from webmap.modules.declaration import declarations
 
 URL = "ws://hall:9090"
 FRAMES = {"map_frame": "map", "namespace": "/a"}

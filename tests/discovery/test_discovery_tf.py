@@ -10,12 +10,12 @@ import pytest
 from frames_only import telling
 
 from webmap import Bridge, Robot
+from webmap.base.geometry import Pose
 from webmap.config.robot import TfConfig
-from webmap.poses.frames import frames_of
 from webmap.discovery import discover
 from webmap.discovery.hearing import frame_topics, hear_frames
 from webmap.discovery.tf_robots import MOST_FRAMES, Trees, bases
-from webmap.base.geometry import Pose
+from webmap.poses.frames import frames_of
 
 ODOM, TWIST = "nav_msgs/Odometry", "geometry_msgs/Twist"
 TF = "tf2_msgs/TFMessage"

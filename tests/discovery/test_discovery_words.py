@@ -5,11 +5,11 @@ import tomllib
 from pathlib import Path
 
 from webmap.config.checks import same_name
-from webmap.modules.declaration import declarations
 from webmap.discovery import discover, rules
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.naming import unique_names
 from webmap.discovery.words import in_one_line, report
+from webmap.modules.declaration import declarations
 
 ODOM = "nav_msgs/Odometry"
 TOPICS = {

@@ -12,11 +12,11 @@ import cbor2
 import numpy as np
 from PIL import Image
 
-from webmap.core.pictures import pictures
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
-from webmap.ros.rosbridge.protocol import Protocol
 from webmap.base.scope import Removal, current_scope, keep, no_scope
+from webmap.core.pictures import pictures
+from webmap.ros.rosbridge.protocol import Protocol
 
 
 class Link:

@@ -5,11 +5,11 @@ import math
 import pytest
 
 from webmap import Robot
-from webmap.fleet.made import prepare, restore
-from webmap.poses.alignment import alignments
-from webmap.core.alignment_store import AlignmentStore
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
+from webmap.core.alignment_store import AlignmentStore
+from webmap.fleet.made import prepare, restore
+from webmap.poses.alignment import alignments
 
 FILE = """\
 [bridges]

@@ -2,10 +2,10 @@
 
 import pytest
 
-from webmap.fleet.made import prepare
+from webmap.base.errors import ConfigError
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.base.errors import ConfigError
+from webmap.fleet.made import prepare
 
 HEAD = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
 

@@ -6,15 +6,15 @@ from itertools import pairwise
 import pytest
 
 from webmap import Bridge
-from webmap.fleet.watch import LookingForLayers
-from webmap.fleet.overrides import Overruling, parse_setting
-from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.console import Console, make_robot
 from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.hearing import late_frames
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
+from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.shown import ShownRobot, ShownRobots
+from webmap.fleet.stated import Candidate
+from webmap.fleet.watch import LookingForLayers
 
 TF = {"/tf": "tf2_msgs/TFMessage"}
 ODOM = {"/bob/odom": "nav_msgs/Odometry"}

@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.fleet.made import prepare
 from webmap.base.errors import ConfigError
+from webmap.fleet.made import prepare
 
 HEAD = """
 [bridges]

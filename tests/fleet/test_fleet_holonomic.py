@@ -5,8 +5,9 @@ import re
 import time
 
 import pytest
-from cli_shown import shown
 from playwright.sync_api import expect
+
+from cli_shown import shown
 
 FLEET = """\
 [bridges]

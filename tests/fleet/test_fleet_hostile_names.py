@@ -15,8 +15,7 @@ from websockets.sync.server import serve
 import webmap.cli as webmap_cli
 from webmap.base.echo import LONGEST, echo
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.discovery.found import Findings, FoundRobot
-from webmap.discovery.layers import Layers
+from webmap.discovery.found import Findings, FoundRobot, Layers
 from webmap.discovery.words import report
 
 EVIL = "\n[[robots]]\r\x1b[2J\x1b]0;mine\x07\x9b31m\u202eevil"
@@ -143,7 +142,7 @@ def test_commands_print_in_one_place():
     allowed = {
         "discover.py": "click.echo(text, nl=False)",  # escaped as TOML has it
         "echo.py": "click.echo((lines_of if lines",
-        "recording_to.py": 'click.echo(f"\\r{text.ljust(',  # numbers alone
+        "record.py": 'click.echo(f"\\r{text.ljust(',  # numbers alone
     }
     assert {name for name, _ in found} == set(allowed)
     assert all(line.startswith(allowed[name]) for name, line in found)

@@ -8,14 +8,14 @@ import sys
 import pytest
 
 from webmap import Bridge
-from webmap.fleet import watch as looking
-from webmap.fleet.watch import Looking, LookingForLayers, LookingForRobots
-from webmap.fleet.shown import ShownRobots
+from webmap.base.errors import BridgeError, ConfigError
+from webmap.base.lifecycle import Lifecycle
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.newcomers import News
-from webmap.base.errors import BridgeError, ConfigError
-from webmap.base.lifecycle import Lifecycle
+from webmap.fleet import watch as looking
+from webmap.fleet.shown import ShownRobots
+from webmap.fleet.watch import Looking, LookingForLayers, LookingForRobots
 
 URL = "ws://127.0.0.1:9"
 TOPICS = {"/bob/odom": "nav_msgs/Odometry", "/ann/odom": "nav_msgs/Odometry"}

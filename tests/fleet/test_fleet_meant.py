@@ -3,10 +3,10 @@
 import click
 import pytest
 
-from webmap.fleet.diagnose import bridges_of
+from webmap.base.errors import ConfigError
 from webmap.discovery import discover
 from webmap.discovery.doctor.meant import lay_over
-from webmap.base.errors import ConfigError
+from webmap.fleet.diagnose import bridges_of
 
 URL = "ws://127.0.0.1:9090"
 TOPICS = {

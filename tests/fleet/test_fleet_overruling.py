@@ -6,10 +6,10 @@ import sys
 import pytest
 
 from webmap import Bridge
+from webmap.base.errors import ConfigError
+from webmap.discovery import discover
 from webmap.fleet.overrides import Overruling, parse_setting
 from webmap.fleet.stated import parse_robot
-from webmap.discovery import discover
-from webmap.base.errors import ConfigError
 
 URL = "ws://127.0.0.1:9090/"
 TOPICS = {

@@ -4,13 +4,13 @@ import io
 import time
 
 import pytest
-from cli_shown import shown
 from PIL import Image
 from playwright.sync_api import expect
 
-from webmap.fleet.made import prepare
-from webmap.core.pictures import pictures
+from cli_shown import shown
 from webmap.base.errors import ConfigError
+from webmap.core.pictures import pictures
+from webmap.fleet.made import prepare
 
 GOOD = """\
 [bridges]

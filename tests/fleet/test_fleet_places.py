@@ -6,8 +6,8 @@ import os
 import pytest
 from PIL import Image
 
-from webmap.fleet.made import prepare
 from webmap.base.errors import ConfigError
+from webmap.fleet.made import prepare
 
 HEAD = """\
 [bridges]

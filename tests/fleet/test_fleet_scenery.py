@@ -3,9 +3,9 @@
 import pytest
 from PIL import Image
 
-from webmap.fleet.made import prepare, show_scenery
-from webmap.console import Console
 from webmap.base.errors import ConfigError
+from webmap.console import Console
+from webmap.fleet.made import prepare, show_scenery
 
 BASE = """\
 [bridges]

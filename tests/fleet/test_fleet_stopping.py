@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from webmap.fleet.made import prepare
 from webmap.base.errors import ConfigError
+from webmap.fleet.made import prepare
 
 HEAD = """[bridges]
 hall = "ws://hall:9090"

@@ -8,10 +8,14 @@ from click.testing import CliRunner
 import webmap
 import webmap.console
 from webmap import Bridge
+from webmap.base.errors import ConfigError
+from webmap.cli.view import view
+from webmap.console import Console, make_robot
+from webmap.discovery import FoundRobot, Guess, discover
+from webmap.features.layers.on_maps import OnMaps
 from webmap.fleet import found as found_fleet
 from webmap.fleet.find import Found
 from webmap.fleet.found import FoundFleet
-from webmap.fleet.watch import LookingForLayers
 from webmap.fleet.shown import ShownRobot, ShownRobots
 from webmap.fleet.stated import (
     Candidate,
@@ -21,11 +25,7 @@ from webmap.fleet.stated import (
     same_robot,
     told_robots,
 )
-from webmap.cli.view import view
-from webmap.console import Console, make_robot
-from webmap.discovery import FoundRobot, Guess, discover
-from webmap.base.errors import ConfigError
-from webmap.features.layers.on_maps import OnMaps
+from webmap.fleet.watch import LookingForLayers
 
 URL = "ws://bob:9090"
 GRID = "nav_msgs/OccupancyGrid"

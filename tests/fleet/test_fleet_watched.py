@@ -1,12 +1,12 @@
 """Robots of a recording are seen, and nothing of them is told anything."""
 
 from webmap import Bridge
-from webmap.fleet.overrides import MOTION, Watched
-from webmap.fleet.shown import ShownRobots
 from webmap.config.motion import MotionConfig
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.newcomers import News
+from webmap.fleet.overrides import MOTION, Watched
+from webmap.fleet.shown import ShownRobots
 
 URL = "ws://127.0.0.1:9090"
 SEEN = {

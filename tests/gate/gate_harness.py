@@ -3,13 +3,13 @@
 import json
 from dataclasses import dataclass, field
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key, Press
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.lease import Epochs
 from webmap.gate.rules.ticks import Ticks
-from webmap.base.geometry import Twist
 
 URL = "ws://robot:9090"
 KEY = Key(URL, "/cmd_vel")

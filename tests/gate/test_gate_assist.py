@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec
 from webmap.gate.rules.assist import assist, free_way, inside, points_of, polygon_around
-from webmap.base.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 SPEC = AssistSpec(topic="/scan", footprint=BOX)

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
 from webmap.gate.lanes.scans import hear_scan
 from webmap.gate.messages import AssistSpec
 from webmap.gate.rules.assist import FREE, assist, free_way, points_of, polygon_around
 from webmap.gate.rules.folding import LIMIT, MOST, folded
-from webmap.base.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 SPEC = AssistSpec(topic="/scan", footprint=BOX)

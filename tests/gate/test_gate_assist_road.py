@@ -10,10 +10,10 @@ import time
 import pytest
 from gate_robot import eventually
 
+from webmap.base.geometry import Twist
 from webmap.gate.display.client import GateClient
 from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
-from webmap.base.geometry import Twist
 
 RADIUS = 0.25
 

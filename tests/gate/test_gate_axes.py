@@ -8,12 +8,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Twist
 from webmap.gate import events, messages
 from webmap.gate.events import Sweep
 from webmap.gate.limits import Axes, Speed, fit, ramp
 from webmap.gate.messages import PROGRAM, AssistSpec
 from webmap.gate.specs import checked
-from webmap.base.geometry import Twist
 
 FLYING = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
 EVERYTHING = Twist(0.1, 0.2, 0.3, vz=0.4, wx=0.05, wy=-0.06)

@@ -10,9 +10,9 @@ from gate_page import Page
 from gate_robot import FakeRobot, eventually
 
 from webmap.base.errors import ConfigError, MotionError, NoLease
+from webmap.base.geometry import Twist
 from webmap.gate import messages
 from webmap.gate.display.client import GateClient
-from webmap.base.geometry import Twist
 
 JITTER = 0.15
 """What the machine that runs the tests may add to a bound, in seconds."""

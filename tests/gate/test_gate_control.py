@@ -6,12 +6,12 @@ import json
 import pytest
 from link_bench import PONG, frame, in_loop, noting_bridge, raw_bridge, until
 
+from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import Alive, Echoed, Key, LinkDown, LinkUp
 from webmap.gate.lanes import control
 from webmap.gate.lanes.control import BUSY_PING, ECHO, IDLE_PING, ControlLane
 from webmap.gate.lanes.unproven import MOST
-from webmap.base.geometry import Twist
 
 ZERO, SLOW = Twist(), Twist(0.1)
 

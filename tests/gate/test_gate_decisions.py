@@ -6,10 +6,10 @@ import msgspec
 import pytest
 from gate_harness import KEY, URL, ZERO, Bench, spec
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key
 from webmap.gate.messages import PROGRAM
-from webmap.base.geometry import Twist
 
 
 @pytest.fixture

@@ -10,12 +10,12 @@ from gate_harness import Bench, spec
 from gate_robot import eventually
 
 from webmap.base.errors import ConfigError, MotionError, NoLease
+from webmap.base.geometry import Twist
 from webmap.gate import messages
 from webmap.gate.display import supervisor
 from webmap.gate.display.client import GateClient
 from webmap.gate.display.program import ProgramRoad
 from webmap.gate.messages import PROGRAM, Holder
-from webmap.base.geometry import Twist
 
 
 class FakeChild:

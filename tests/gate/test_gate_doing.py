@@ -3,10 +3,10 @@
 import pytest
 from gate_harness import KEY, Bench, spec
 
+from webmap.base.geometry import Twist
 from webmap.gate import events
 from webmap.gate.rules.goals import BRAKES
 from webmap.gate.rules.other_writer import GRACE
-from webmap.base.geometry import Twist
 
 OTHERS = Twist(0.1, 0.0, -0.2)
 

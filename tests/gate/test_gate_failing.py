@@ -7,8 +7,8 @@ import pytest
 from gate_page import Page
 from gate_robot import eventually
 
-from webmap.core.runtime import Runtime
 from webmap.base.errors import NoLease
+from webmap.core.runtime import Runtime
 from webmap.gate import messages
 from webmap.gate.display.client import GateClient
 

@@ -6,11 +6,11 @@ import pytest
 from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Key
 from webmap.gate.messages import AssistSpec
 from webmap.gate.specs import checked, key_of
-from webmap.base.geometry import Twist
 
 
 class TestSpecs:

@@ -5,11 +5,11 @@ import pytest
 from gate_harness import URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, messages
 from webmap.gate.rules.goals import ELSEWHERE, IN_VAIN
 from webmap.gate.rules.goals import MOVE_BASE as MOVE_BASE_TYPE
 from webmap.gate.specs import checked
-from webmap.base.geometry import Twist
 
 
 @pytest.fixture

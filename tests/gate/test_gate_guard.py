@@ -8,12 +8,12 @@ import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Twist
 from webmap.gate import events
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec
 from webmap.gate.rules.assist import free_way, points_of
 from webmap.gate.specs import checked
-from webmap.base.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 ASSIST = AssistSpec(topic="/scan", footprint=BOX)

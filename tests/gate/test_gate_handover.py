@@ -3,8 +3,8 @@
 import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
-from webmap.gate import actions, events, messages
 from webmap.base.geometry import Twist
+from webmap.gate import actions, events, messages
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ import pytest
 from gate_harness import KEY, Bench, spec
 from link_bench import in_loop, noting_bridge, until
 
+from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import LinkUp, Measured, Scanned
 from webmap.gate.lanes.witness import WitnessLane
-from webmap.base.geometry import Twist
 from webmap.testing import FaultProxy, Shape
 
 STANDING, CREEPING = Twist(), Twist(0.1)

@@ -3,12 +3,12 @@
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions
 from webmap.gate.clock import now
 from webmap.gate.events import Echoed, Key, LinkDown, LinkUp, Measured, Wrote
 from webmap.gate.lanes.links import Links
 from webmap.gate.messages import AssistSpec
-from webmap.base.geometry import Twist
 
 SLOW, ZERO = Twist(0.1), Twist()
 MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}

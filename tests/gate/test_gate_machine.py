@@ -35,6 +35,7 @@ from hypothesis.stateful import (
 )
 from machine_bench import PacedBench
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, messages
 from webmap.gate.events import Press
 from webmap.gate.messages import PROGRAM
@@ -42,7 +43,6 @@ from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.lease import Epochs
 from webmap.gate.rules.ticks import Ticks
 from webmap.gate.shell import STEP
-from webmap.base.geometry import Twist
 
 pytestmark = pytest.mark.slow
 

@@ -9,6 +9,7 @@ from gate_harness import KEY, Bench, spec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from webmap.base.geometry import Twist
 from webmap.gate import events, messages
 from webmap.gate.events import Key, LockState
 from webmap.gate.rules.other_writer import (
@@ -20,7 +21,6 @@ from webmap.gate.rules.other_writer import (
     WITHIN,
     OtherWriter,
 )
-from webmap.base.geometry import Twist
 
 OURS, THEIRS = Twist(0.5, 0.0, 0.25), Twist(0.1, 0.0, -0.2)
 SAID = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)"

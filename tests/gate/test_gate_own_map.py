@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Pose
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import Key
 from webmap.gate.lanes.own_map import in_own_map
 from webmap.gate.messages import RobotSpec
 from webmap.gate.specs import checked
-from webmap.base.geometry import Pose
 
 QUARTER = math.pi / 2
 KEY = Key("ws://robot:9090", "/cmd_vel")

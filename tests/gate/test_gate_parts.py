@@ -8,6 +8,7 @@ from gate_harness import spec
 from hypothesis import given
 from hypothesis import strategies as st
 
+from webmap.base.geometry import Twist
 from webmap.gate.limits import Cap, Speed, caps_of, fit, ramp, speed_in_force
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.burst import Burst
@@ -16,7 +17,6 @@ from webmap.gate.rules.deadman import DEADMAN, NEUTRAL, DeadMan
 from webmap.gate.rules.health import Health, Pulse
 from webmap.gate.rules.lease import Epochs, Lease, check_lease, check_role, check_take
 from webmap.gate.rules.ticks import Ticks
-from webmap.base.geometry import Twist
 
 axis = st.floats(-1e308, 1e308)
 positive = st.floats(0, 1e6)

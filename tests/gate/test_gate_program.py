@@ -5,9 +5,9 @@ import math
 import pytest
 from gate_harness import ZERO, Bench, spec
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions, messages
 from webmap.gate.messages import PROGRAM
-from webmap.base.geometry import Twist
 
 
 @pytest.fixture

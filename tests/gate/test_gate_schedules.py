@@ -10,9 +10,9 @@ import pytest
 from gate_harness import KEY, spec
 from machine_bench import PacedBench
 
+from webmap.base.geometry import Twist
 from webmap.gate import events, messages
 from webmap.gate.events import Press
-from webmap.base.geometry import Twist
 
 PEOPLE = ("a", "b")
 

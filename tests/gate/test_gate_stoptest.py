@@ -3,9 +3,9 @@
 import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, messages
 from webmap.gate.events import StopRecord
-from webmap.base.geometry import Twist
 
 
 class Base:

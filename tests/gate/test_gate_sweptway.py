@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec
 from webmap.gate.rules.assist import assist, polygon_around
 from webmap.gate.rules.sweptway import Fan, looks_ahead
-from webmap.base.geometry import Twist
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 PART = "scan assist: the scan covers a part of the way only"

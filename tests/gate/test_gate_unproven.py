@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.lanes.unproven import MOST, REMEMBERED, Unproven
 from webmap.base.geometry import Twist
+from webmap.gate.lanes.unproven import MOST, REMEMBERED, Unproven
 
 ZERO = Twist()
 AHEAD = Twist(0.5)

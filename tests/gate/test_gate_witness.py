@@ -3,9 +3,9 @@
 import cbor2
 from link_bench import in_loop, noting_bridge, until
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Key, LinkDown, LinkUp, Measured, Scanned
 from webmap.gate.lanes.witness import WitnessLane
-from webmap.base.geometry import Twist
 
 ANN, BEN = Key("ws://a", "/cmd_vel"), Key("ws://b", "/cmd_vel")
 MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}

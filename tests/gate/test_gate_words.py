@@ -6,9 +6,9 @@ import math
 import pytest
 from gate_harness import KEY, spec
 
+from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.lanes import words
-from webmap.base.geometry import Twist
 
 
 def said(data):

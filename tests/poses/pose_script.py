@@ -24,12 +24,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from webmap import Map, Robot
-from webmap.core.page import Page, PageEntry
 from webmap.base.errors import ProtocolError
+from webmap.base.scope import Removal, current_scope, keep, no_scope
+from webmap.core.page import Page, PageEntry
 from webmap.ros.bridge import BridgeStats
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.scene.fragment import Added, Changed
-from webmap.base.scope import Removal, current_scope, keep, no_scope
 
 BEGIN = 5000.0
 """Seconds of the virtual clock when a script begins."""

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import Robot
-from webmap.poses.frames import FrameFaults
-from webmap.poses.placing import Placing, PoseReading
-from webmap.poses.pipeline import PosePipeline
 from webmap.base.geometry import Pose, Quaternion, Vector3
+from webmap.poses.frames import FrameFaults
+from webmap.poses.pipeline import PosePipeline
+from webmap.poses.placing import Placing, PoseReading
 from webmap.ros.tf import Buffer, NotKnownThen, Transform
 
 

@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 from webmap import Robot
+from webmap.base.scope import Removal
 from webmap.poses import silence
 from webmap.poses.silence import AGAIN, LIMIT, Silence
 from webmap.ros.bridge import BridgeStats
-from webmap.base.scope import Removal
 
 
 @pytest.fixture

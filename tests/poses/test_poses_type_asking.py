@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import Bridge, Robot
+from webmap.base.scope import Removal
 from webmap.core.motion import MotionRoad
 from webmap.poses.type_asking import FEW, LATER, SHARE, SOON
 from webmap.ros.rosbridge.server.dialect import Dialect
@@ -15,7 +16,6 @@ from webmap.ros.rosbridge.server.quirks import parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer
-from webmap.base.scope import Removal
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from webmap.server.app import FOLDERS
+
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "src").rglob("*.py"))
 # A path of somebody's machine: a home, a checkout, the root's own folder.
@@ -80,7 +82,7 @@ ROSBRIDGE_TEXTS = {
     "fleet/find.py": {"rosapi"},
     "cli/record.py": {"rosapi"},
     "bags/record.py": {"rosapi"},
-    "cli/topic_list.py": {"rosapi"},
+    "cli/options.py": {"rosapi"},
     "features/doctor/doctor_panel.py": {"rosapi"},
     "sim/process.py": {"rosapi"},
 }
@@ -101,3 +103,22 @@ def test_rosbridge_is_spoken_in_one_room() -> None:
 def test_a_word_of_rosbridge_would_be_seen(text: str) -> None:
     assert ROSBRIDGE_WORDS.search(text)
     assert not ROSBRIDGE_WORDS.search("bridge.call_service(name)")
+
+
+IMPORTED = re.compile(r"""^(?:import|export|\}) .*?["'](\.[^"']+)["'];$""", re.M)
+
+
+def test_every_file_that_a_script_of_the_page_imports_is_served():
+    package = ROOT / "src" / "webmap"
+    scripts = {
+        file.resolve()
+        for folder in FOLDERS
+        for file in (package / folder).rglob("*.js")
+    }
+    imported = {
+        (file.parent / name).resolve()
+        for file in scripts
+        for name in IMPORTED.findall(file.read_text("utf-8"))
+    }
+    assert len(imported) > 50
+    assert imported <= scripts

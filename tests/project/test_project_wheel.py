@@ -80,8 +80,8 @@ LOADED = re.compile(
 def load(url: str) -> set[str]:
     """Load a page with all that it needs, as a browser would, and return the paths."""
     wanted = [
-        f"{below}{path.relative_to(SOURCE / 'webmap' / room).as_posix()}"
-        for room, below in (("web", "/_webmap/"), ("console", "/"))
+        f"/_webmap/{path.relative_to(SOURCE / 'webmap').as_posix()}"
+        for room in ("web", "features", "console")
         for path in (SOURCE / "webmap" / room).rglob("*")
         if path.suffix in {".js", ".css"}
     ]
@@ -115,7 +115,8 @@ def test_an_installed_wheel_shows_the_demo_and_all_that_its_page_loads(
             line = demo.stdout.readline()
             assert line.startswith("WebMap is ready at http://")
             loaded = load(line.split()[-1])
-            assert loaded >= {"/", "/map.css", "/_webmap/page.js", "/_webmap/icon.svg"}
+            own = {"web/page.js", "icon.svg", "features/drive/teleop.js"}
+            assert loaded >= {"/", "/map.css", *(f"/_webmap/{name}" for name in own)}
         finally:
             demo.terminate()
             assert demo.wait(10) == 0

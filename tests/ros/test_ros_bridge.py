@@ -18,11 +18,11 @@ from webmap.base.errors import (
     ProtocolError,
     ServiceError,
 )
+from webmap.base.scope import Scope
 from webmap.ros import backoff
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
 from webmap.ros.rosbridge import connection
-from webmap.base.scope import Scope
 
 
 class Text(msgspec.Struct):

@@ -7,6 +7,7 @@ import json
 import pytest
 from fake_rosbridge import bridged, until
 
+from webmap.base.scope import Scope
 from webmap.ros.bridge import Bridge
 from webmap.ros.rosbridge import wire_subscription
 from webmap.ros.rosbridge.server.dialect import Dialect
@@ -24,7 +25,6 @@ from webmap.ros.rosbridge.wire_subscription import (
     InJson,
     Silence,
 )
-from webmap.base.scope import Scope
 
 MAP = "nav_msgs/OccupancyGrid"
 LIMIT = 5000

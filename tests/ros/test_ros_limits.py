@@ -10,6 +10,7 @@ import cbor2
 import pytest
 from fake_rosbridge import bridged, until
 
+from webmap.base.scope import Scope
 from webmap.ros import limits, worker
 from webmap.ros.limits import (
     GENERAL,
@@ -27,7 +28,6 @@ from webmap.ros.rosbridge.frame_limits import (
     check_count,
 )
 from webmap.ros.rosbridge.protocol import Protocol
-from webmap.base.scope import Scope
 
 MIB = 1 << 20
 

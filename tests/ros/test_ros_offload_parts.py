@@ -10,8 +10,8 @@ import pytest
 from fake_rosbridge import until
 from test_ros_limits import publish, transforms
 
-from webmap.features.layers.markers.messages import MarkerArrayMsg
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
+from webmap.features.layers.markers.messages import MarkerArrayMsg
 from webmap.ros import offload, worker
 from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
 from webmap.ros.offload import Offload

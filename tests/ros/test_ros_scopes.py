@@ -7,10 +7,10 @@ from fake_rosbridge import FakeRosbridge, bridged, until
 
 from webmap.base.errors import BridgeClosed
 from webmap.base.lifecycle import Lifecycle
+from webmap.base.scope import Scope
 from webmap.ros import bridge as bridge_module
 from webmap.ros.bridge import Bridge
 from webmap.ros.callbacks import Callbacks
-from webmap.base.scope import Scope
 
 
 def run(scenario):

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from fake_rosbridge import bridged, until
 
-from webmap.discovery import discover
 from webmap.base.errors import ProtocolError, ServiceError
+from webmap.discovery import discover
 from webmap.ros.decoding import decode_json
 from webmap.ros.rosbridge.protocol import Protocol
 

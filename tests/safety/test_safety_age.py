@@ -25,7 +25,7 @@ ON_THE_WAY = 0.1
 """Seconds for the ways to and from the gate, and for both clocks to be compared."""
 
 DRIVE = """(async () => {
-    const { protocols } = await import("/_webmap/key.js");
+    const { protocols } = await import("/_webmap/web/key.js");
     const OFF = [0, 0];
     const PHASES = [
         [1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1],

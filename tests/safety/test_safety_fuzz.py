@@ -201,7 +201,7 @@ def test_one_good_command_among_bad_ones_moves_it_for_200_ms_at_most(kinds):
 FROM_THE_PAGE = """(async () => {
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
-    const { protocols } = await import("/_webmap/key.js");
+    const { protocols } = await import("/_webmap/web/key.js");
     const socket = new WebSocket(url, protocols());
     let tick = null, robot = null, epoch = null, seq = 0, refused = 0, closed = false;
     socket.onclose = () => { closed = true; };

@@ -7,9 +7,9 @@ import threading
 import time
 from pathlib import Path
 
+from webmap.base.tasks import spawn
 from webmap.core.page import PageEntry, Viewer
 from webmap.core.runtime import Runtime
-from webmap.base.tasks import spawn
 from webmap.server.files import Published
 from webmap.server.open_pages import OpenPages
 

@@ -1,8 +1,8 @@
 import pytest
 from server_fakes import TOKEN
 
-from webmap.core.page import Viewer
 from webmap.base.errors import ConfigError
+from webmap.core.page import Viewer
 from webmap.server.access import (
     AccessControl,
     Redirect,

@@ -56,7 +56,7 @@ def every_path(app):
         .replace("{path:path}", "x")
         for route in app.routes
     ]
-    return [*paths, "/", "/lab/", "/_webmap/page.js", "/_webmap/made_page.css"]
+    return [*paths, "/", "/lab/", "/_webmap/web/page.js", "/_webmap/made_page.css"]
 
 
 def test_every_route_needs_a_sign_in(app, stranger):
@@ -151,7 +151,7 @@ def test_a_made_page_is_served(client):
     answer = client.get("/lab/")
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
     assert "<title>The &lt;lab&gt;</title>" in answer.text
-    assert 'src="/_webmap/page.js"' in answer.text
+    assert 'src="/_webmap/web/page.js"' in answer.text
 
 
 def test_a_missing_or_additional_slash_leads_to_the_page(client, with_page):
@@ -162,7 +162,7 @@ def test_a_missing_or_additional_slash_leads_to_the_page(client, with_page):
 def test_the_users_own_page_is_served_with_the_files_beside_it(with_page):
     page = with_page.get("/own/page")
     assert "Grüße" in page.text
-    assert 'src="/_webmap/page.js"' in page.text
+    assert 'src="/_webmap/web/page.js"' in page.text
     sheet = with_page.get("/own/style.css")
     assert (sheet.status_code, sheet.text) == (200, "a{}")
     assert sheet.headers["content-type"] == "text/css; charset=utf-8"
@@ -202,7 +202,7 @@ def test_what_the_policy_will_block_is_logged_once(with_page, folder, caplog):
     [
         ("/_webmap/made_page.css", "text/css; charset=utf-8"),
         ("/_webmap/icon.svg", "image/svg+xml; charset=utf-8"),
-        ("/_webmap/drive.js", "text/javascript; charset=utf-8"),
+        ("/_webmap/web/drive.js", "text/javascript; charset=utf-8"),
     ],
 )
 def test_the_packages_own_files_are_served_with_their_type(client, path, media_type):
@@ -356,7 +356,7 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
     answer = client.get(location)
     assert "Path=/robots/;" in answer.headers["set-cookie"]
     key = key_in(answer.text)
-    assert 'src="/robots/_webmap/page.js"' in client.get("/robots/lab/").text
+    assert 'src="/robots/_webmap/web/page.js"' in client.get("/robots/lab/").text
     assert client.get("/robots/lab").headers["location"] == "/robots/lab/"
     assert client.get("/robots/_webmap/icon.svg").status_code == 200
     assert client.get("/robots/own/style.css").text == "a{}"

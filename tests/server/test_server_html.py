@@ -2,8 +2,8 @@ import pytest
 
 from webmap.server.html import base_of, make_page, prepare_page
 
-SHEET = '<link rel="stylesheet" href="/_webmap/webmap.css">'
-SCRIPT = '<script type="module" src="/_webmap/page.js"></script>'
+SHEET = '<link rel="stylesheet" href="/_webmap/web/webmap.css">'
+SCRIPT = '<script type="module" src="/_webmap/web/page.js"></script>'
 ICON = '<link rel="icon" href="/_webmap/icon.svg" type="image/svg+xml">'
 
 
@@ -57,9 +57,9 @@ def test_pages_of_every_shape_get_what_they_need(text, expected):
 
 def test_what_a_page_loads_by_itself_is_not_loaded_twice():
     text = (
-        '<head><link rel="stylesheet" href="_webmap/webmap.css">'
+        '<head><link rel="stylesheet" href="_webmap/web/webmap.css">'
         '<link rel="shortcut icon" href="me.png">'
-        '<script type="module" src="_webmap/page.js"></script></head>'
+        '<script type="module" src="_webmap/web/page.js"></script></head>'
     )
     assert prepare_page(text, base_of("")).text == text
 

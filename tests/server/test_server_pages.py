@@ -6,11 +6,11 @@ import pytest
 from page_loop import HELLO, make_model, objects_left, open_page, wait_for
 
 import webmap
+from webmap.base.scope import Removal, keep
 from webmap.core.layer import Layer
 from webmap.core.page import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
-from webmap.base.scope import Removal, keep
 from webmap.server import open_pages as host_module
 from webmap.testing.witness import WitnessRobot
 

@@ -8,9 +8,9 @@ from simulated import Bench
 from test_sim_feeds import heard
 
 from webmap.base.geometry import Quaternion, Vector3
+from webmap.ros.tf import Transform
 from webmap.sim.feeds.cloud import POINT
 from webmap.sim.feeds.depth import POINT as DEPTH
-from webmap.ros.tf import Transform
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 

@@ -16,9 +16,9 @@ from simulated import Bench
 from websockets.sync.client import connect
 
 from webmap import Robot
-from webmap.core.pictures import pictures
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
+from webmap.core.pictures import pictures
 from webmap.features.cameras import http_camera
 from webmap.ros.image_pull import Answer
 from webmap.sim import run_simulator

@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 HERE = Path(__file__).parent
-WEB = HERE.parents[1] / "src" / "webmap" / "web"
+PACKAGE = HERE.parents[1] / "src" / "webmap"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "img-src 'self' data:; require-trusted-types-for 'script'"
@@ -117,7 +117,7 @@ class FakeDrive:
             return None
         ours = path.startswith("/_webmap/")
         name = path.removeprefix("/_webmap/") if ours else path.strip("/")
-        file = (WEB if ours else HERE / "hands_page") / (name or "index.html")
+        file = (PACKAGE if ours else HERE / "hands_page") / (name or "index.html")
         if not file.is_file():
             return socket.respond(HTTPStatus.NOT_FOUND, f"no {path}\n")
         kind = mimetypes.guess_type(file.name)[0] or "application/octet-stream"

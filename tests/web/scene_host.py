@@ -17,18 +17,18 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from webmap.scene import svg
 from webmap.scene.bound import Document
 from webmap.scene.fragment import Fragment
-from webmap.server.security import CONTENT_SECURITY_POLICY
 from webmap.scene.wire.messages import Hello, read_message
 from webmap.scene.wire.session import SceneSession
+from webmap.server.security import CONTENT_SECURITY_POLICY
 
 HERE = Path(__file__).parent
-WEB = HERE.parents[1] / "src" / "webmap" / "web"
+PACKAGE = HERE.parents[1] / "src" / "webmap"
 HTML = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>test</title>
 <link rel="icon" href="_webmap/icon.svg">
-<link rel="stylesheet" href="_webmap/webmap.css">
+<link rel="stylesheet" href="_webmap/web/webmap.css">
 <link rel="stylesheet" href="test.css">
-<script type="module" src="_webmap/page.js"></script></head>
+<script type="module" src="_webmap/web/page.js"></script></head>
 <body><div id="map"></div><p id="log">own text</p><p id="label" class="own">old</p>
 </body></html>"""
 CSS = """
@@ -149,7 +149,7 @@ class SceneHost:
             Route("/_webmap/images/x.png", lambda r: self._answer("", "image/png")),
             WebSocketRoute("/_webmap/scene", self._scene),
             WebSocketRoute("/_webmap/drive", self._drive),
-            Mount("/_webmap", StaticFiles(directory=WEB)),
+            Mount("/_webmap", StaticFiles(directory=PACKAGE)),
         ]
         return Starlette(routes=[Mount("/under/prefix", routes=routes), *routes])
 

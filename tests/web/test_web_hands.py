@@ -374,7 +374,7 @@ def test_plus_minus_and_zero_work_on_the_focused_map(bench: Bench) -> None:
 
 
 def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
-    bench = open_bench("?modules=goal_tool,teleop,mouse_view_control")
+    bench = open_bench("?modules=goals/goal_tool,drive/teleop,view/mouse_view_control")
     box = bench.page.locator("#map1").bounding_box()
     bench.select("r1")
     bench.page.keyboard.press("g")
@@ -395,7 +395,7 @@ def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
 
 
 def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
-    bench = open_bench("?modules=goal_tool,teleop")
+    bench = open_bench("?modules=goals/goal_tool,drive/teleop")
     bench.select("r1")
     bench.page.keyboard.press("g")
     bench.page.keyboard.press("Escape")
@@ -406,7 +406,7 @@ def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
 
 
 def test_stop_all_says_what_became_of_it(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r2", measured=None)
     bench.page.get_by_role("button", name="Stop all").click()
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
@@ -420,7 +420,7 @@ UNCONFIRMED = CONFIRMED | {"confirmed": False, "why": "no link to ws://bob", "id
 
 
 def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.latching = True
     bench.drive()
     bench.page.keyboard.press("Space")
@@ -450,7 +450,7 @@ def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -
 
 
 def test_space_on_the_reset_button_is_stop(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", latched=True, state="stopped", stop=CONFIRMED)
     reset = bench.page.locator(".webmap-teleop .webmap-reset")
@@ -462,7 +462,7 @@ def test_space_on_the_reset_button_is_stop(open_bench) -> None:
 
 
 def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", latched=True, state="stopped", stop=UNCONFIRMED)
     bench.gate.change("r2", latched=True, state="stopped", stop=CONFIRMED)
@@ -488,7 +488,7 @@ STANDS = {"latched": True, "state": "stopped", "stop": CONFIRMED}
 def test_a_robot_that_is_stopped_meanwhile_takes_the_press_on_reset_back(
     open_bench,
 ) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", **STANDS)
     reset = bench.page.locator(".webmap-stop .webmap-reset")
     reset.click()
@@ -506,7 +506,7 @@ def test_a_robot_that_is_stopped_meanwhile_takes_the_press_on_reset_back(
 def test_a_newer_stop_of_somebody_else_takes_the_press_on_reset_back(
     open_bench, panel
 ) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", **STANDS)
     reset = bench.page.locator(f".webmap-{panel} .webmap-reset")
@@ -519,7 +519,7 @@ def test_a_newer_stop_of_somebody_else_takes_the_press_on_reset_back(
 
 
 def test_a_reset_that_the_gate_refuses_is_said_beside_the_button(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", **STANDS)
     why = "Ben pressed STOP meanwhile; look at the robot, then press Reset again"
     bench.gate.refuse("r1", "reset", why)
@@ -547,7 +547,7 @@ def test_another_selection_takes_the_press_on_reset_back(bench: Bench) -> None:
 
 @pytest.mark.parametrize("panel", ["stop", "teleop"])
 def test_a_stop_in_between_takes_the_press_on_reset_back(open_bench, panel) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", **STANDS)
     reset = bench.page.locator(f".webmap-{panel} .webmap-reset")
@@ -567,7 +567,7 @@ def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
 ) -> None:
     robots = dict(gate.robots)
     gate.robots.clear()
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.page.get_by_role("button", name="Stop all").click()
     verdicts = bench.page.locator(".webmap-stop-verdict")
     bench.until(lambda: "All robots: STOP NOT CONFIRMED" in verdicts.inner_text())
@@ -578,7 +578,7 @@ def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
 
 
 def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.latching = True
     bench.page.get_by_role("button", name="Stop all").click()
     verdicts = bench.page.locator(".webmap-stop-verdict")
@@ -594,7 +594,7 @@ def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
 
 
 def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", latched=False, stop=None)
     bench.select("r1")
     bench.until(lambda: bench.shown() == "free")
@@ -608,7 +608,7 @@ def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> No
 
 
 def test_a_robot_that_does_not_obey_covers_the_page(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", sent=[0.3, 0, 0], measured=[0.3, 0, 0], state="driving")
     bench.gate.change("r1", sent=[0, 0, 0], state="stopping")
     alarm = bench.page.get_by_role("alert")
@@ -620,8 +620,9 @@ def test_a_robot_that_does_not_obey_covers_the_page(open_bench) -> None:
 
 
 def test_readouts_follow_the_view_and_everything_goes_away(open_bench) -> None:
-    names = "teleop,mouse_view_control,goal_tool,stop,pointer_readout,scale_bar,follow"
-    bench = open_bench(f"?modules={names}")
+    view = "view/mouse_view_control,view/pointer_readout,view/scale_bar,view/follow"
+    tools = "drive/teleop,goals/goal_tool,stop/stop_button"
+    bench = open_bench(f"?modules={tools},{view}")
     box = bench.page.locator("#map1").bounding_box()
     bench.page.mouse.move(box["x"] + 440, box["y"] + 170)
     assert "x 1.00  y \u22120.50 m" in bench.page.inner_text(".webmap-pointer-readout")

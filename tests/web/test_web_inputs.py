@@ -53,7 +53,7 @@ class Finger:
 
 @pytest.fixture
 def touched(open_bench) -> Bench:
-    bench = open_bench("?modules=teleop,mouse_view_control", has_touch=True)
+    bench = open_bench("?modules=drive/teleop,view/mouse_view_control", has_touch=True)
     bench.select("r1")
     bench.page.locator(".webmap-stick").wait_for()
     return bench
@@ -207,7 +207,7 @@ def test_a_finger_that_rests_through_a_doubt_moves_nothing(
 def test_one_thumb_stops_while_the_other_holds_the_stick(
     open_bench, name: str, robot: str
 ) -> None:
-    bench = open_bench("?modules=stop,teleop", has_touch=True)
+    bench = open_bench("?modules=stop/stop_button,drive/teleop", has_touch=True)
     bench.gate.latching = True
     bench.select("r1")
     bench.page.locator(".webmap-stick").wait_for()
@@ -224,7 +224,7 @@ def test_one_thumb_stops_while_the_other_holds_the_stick(
 
 
 def test_a_tap_on_stop_is_one_stop(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop", has_touch=True)
+    bench = open_bench("?modules=stop/stop_button,drive/teleop", has_touch=True)
     bench.page.get_by_role("button", name="Stop all").tap()
     bench.page.wait_for_timeout(500)
     assert bench.gate.of("stop") == [{"op": "stop", "robot": "*"}]

@@ -29,7 +29,7 @@ def opened(host, tab):
 def view(tab):
     return tab.evaluate(
         """async () => {
-          const { page } = await import("/_webmap/page.js");
+          const { page } = await import("/_webmap/web/page.js");
           return Object.values(page.scene.maps[0].view);
         }"""
     )
@@ -44,7 +44,7 @@ def newest(host, name):
 def drag(tab, x):
     tab.evaluate(
         """async (x) => {
-          const [map] = (await import("/_webmap/page.js")).page.scene.maps;
+          const [map] = (await import("/_webmap/web/page.js")).page.scene.maps;
           map.setView({ ...map.view, e: map.view.e + x });
         }""",
         x,
@@ -178,7 +178,7 @@ def test_garbage_does_not_break_the_page(host, tab, opened, garbage):
 def test_no_more_than_two_frames_are_on_the_way(host, tab, opened):
     tab.evaluate(
         """async () => {
-          const { page } = await import("/_webmap/page.js");
+          const { page } = await import("/_webmap/web/page.js");
           page.send = () => {};
         }"""
     )

@@ -9,7 +9,7 @@ from webmap.scene.wire.messages import ModuleMessage, ModuleReady, Trouble, View
 
 pytestmark = pytest.mark.browser
 
-MAP = "(await import('/_webmap/page.js')).page.scene.maps[0]"
+MAP = "(await import('/_webmap/web/page.js')).page.scene.maps[0]"
 
 
 def on_map(tab, body):
@@ -273,7 +273,7 @@ def test_a_module_goes_with_its_map(host, tab, open_map):
     host.call(shown.session.unmount, shown.mount)
     tab.wait_for_selector("svg", state="detached")
     assert tab.evaluate(
-        "import('/_webmap/page.js').then(({ page }) => page.halves._attached.size)"
+        "import('/_webmap/web/page.js').then(({ page }) => page.halves._attached.size)"
     ) in (0, 1)
 
 

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.browser
 
 SHOW = """
 async (frames) => {
-  const { Scene } = await import("/_webmap/scene.js");
+  const { Scene } = await import("/_webmap/web/scene.js");
   const said = [];
   const scene = new Scene({
     send() {},

@@ -386,7 +386,7 @@ def test_nobody_hears_any_more_after_the_removal(host, tab):
     tab.wait_for_selector("#go[title=deaf]")
     tab.evaluate(
         """async () => {
-          const { page } = await import("/_webmap/page.js");
+          const { page } = await import("/_webmap/web/page.js");
           const send = page.send.bind(page);
           window.sent = [];
           page.send = (message) => { window.sent.push(message.op); send(message); };
@@ -429,7 +429,7 @@ def test_a_thousand_elements_come_and_go_and_leave_nothing(host, tab):
         wait(tab, "document.querySelectorAll('.robot').length === 0")
     left = tab.evaluate(
         """async () => {
-          const { scene } = (await import("/_webmap/page.js")).page;
+          const { scene } = (await import("/_webmap/web/page.js")).page;
           return [scene._mounts.size, scene._fragments.size, scene._ages._ages.size,
             scene._dots._all.size, document.querySelectorAll("svg *").length];
         }"""

@@ -106,7 +106,7 @@ def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
 
 
 def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> None:
-    bench = open_bench("?modules=stop,teleop")
+    bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
     alarm = bench.page.get_by_role("alert")
     alarm.wait_for(timeout=5000)
@@ -156,7 +156,9 @@ OPEN = """(kind) => {
 
 def test_the_alarm_lies_above_what_is_open_and_what_opens(open_bench) -> None:
     phone = {"width": 390, "height": 844}
-    bench = open_bench("?modules=stop,teleop", viewport=phone, has_touch=True)
+    bench = open_bench(
+        "?modules=stop/stop_button,drive/teleop", viewport=phone, has_touch=True
+    )
     bench.page.evaluate(OPEN, "auto")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
     alarm = bench.page.get_by_role("alert")
@@ -197,7 +199,7 @@ def test_the_alarms_of_two_maps_do_not_rise_above_each_other_for_ever(
 def test_a_robots_line_has_a_width_that_any_word_of_the_user_overrides(
     bench: Bench,
 ) -> None:
-    bench.page.add_style_tag(url="/_webmap/webmap.css")
+    bench.page.add_style_tag(url="/_webmap/web/webmap.css")
     widths = bench.page.evaluate(
         """() => {
             const robot = document.querySelector('[data-robot=r1]');

@@ -8,7 +8,7 @@ from hands_bench import Bench
 pytestmark = pytest.mark.browser
 
 LAY = """async () => {
-  const { lay } = await import("/_webmap/modules/overlay.js");
+  const { lay } = await import("/_webmap/web/tools/overlay.js");
   for (const name of ["One", "Two", "Three"]) {
     const tool = document.createElement("details");
     tool.className = "webmap-panel tool";
@@ -31,7 +31,7 @@ OPEN = "[...document.querySelectorAll('.tool')].map((e) => e.open)"
 def test_what_unfolds_moves_no_tool_and_folds_what_it_would_lie_over(
     open_bench: Callable[..., Bench],
 ) -> None:
-    bench = open_bench("?modules=stop")
+    bench = open_bench("?modules=stop/stop_button")
     bench.page.evaluate(LAY)
     bench.page.wait_for_function("document.styleSheets.length > 1")
     tools = bench.page.locator(".tool > summary")
@@ -90,13 +90,13 @@ def test_stop_of_the_driven_robot_does_not_move(
 
 
 WIDE_ROUTE = """async (width) => {
-  const { lay } = await import("/_webmap/modules/overlay.js");
+  const { lay } = await import("/_webmap/web/tools/overlay.js");
   const style = new CSSStyleSheet();
   style.replaceSync("svg { height: auto } input, select { min-height: 10px }");
   document.adoptedStyleSheets.push(style);
   const link = document.createElement("link");
   link.rel = "stylesheet";
-  link.href = "/_webmap/modules/route_tool.css";
+  link.href = "/_webmap/features/routes/route_tool.css";
   const loaded = new Promise((resolve) => link.addEventListener("load", resolve));
   document.head.append(link);
   await loaded;
@@ -124,7 +124,7 @@ WIDE_ROUTE = """async (width) => {
 def test_an_open_route_stays_on_the_map_and_rules_of_the_page_do_not_shrink_tools(
     open_bench: Callable[..., Bench], width: int
 ) -> None:
-    bench = open_bench("?modules=stop")
+    bench = open_bench("?modules=stop/stop_button")
     bench.page.evaluate(WIDE_ROUTE, width)
     map_box = bench.page.locator("svg.webmap").bounding_box()
     panel = bench.page.locator(".webmap-route").bounding_box()

@@ -6,7 +6,7 @@ import { OP, VERSION } from "../../src/webmap/web/opcodes.js";
 import { WireError, readFrame } from "../../src/webmap/web/wire.js";
 import { Tree, bufferOf } from "./tree.mjs";
 
-const GOLDEN = new URL("../wire/golden/", import.meta.url);
+const GOLDEN = new URL("../scene/wire/golden/", import.meta.url);
 const golden = readdirSync(GOLDEN).filter((name) => name.endsWith(".bin"));
 
 function read(name) {

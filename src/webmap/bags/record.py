@@ -13,8 +13,8 @@ from webmap.bags.listening import Listening
 from webmap.bags.recorder import Recorder
 from webmap.bags.types import Types
 from webmap.base.echo import echo
-from webmap.ros.asking import ask_topics
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
+from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import split_type
 from webmap.ros.rosbridge.server.dialect import DialectName

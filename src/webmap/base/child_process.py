@@ -1,4 +1,4 @@
-"""A process that runs beside a command, and ends with it however that ends."""
+"""A child process of a command, which ends when the command ends."""
 
 import subprocess
 from collections.abc import Iterator
@@ -8,19 +8,19 @@ from typing import IO, NamedTuple
 from webmap.base.children import GRACE, python_command
 
 
-class Beside(NamedTuple):
-    """What there is of a process that has said its first line."""
+class ChildProcess(NamedTuple):
+    """A process that has written its first line."""
 
     process: "subprocess.Popen[str]"
-    told: IO[str]
-    """Its standard input, whose end is its own."""
+    stdin: IO[str]
+    """Its standard input; the process ends when this ends."""
     line: str
-    """What it said first; empty if it ended without a word."""
+    """The first line that it wrote; empty if it ended before."""
 
 
 @contextmanager
-def beside(module: str, *arguments: object) -> Iterator[Beside]:
-    """Run a module as a process beside this one, until the block ends."""
+def child_process(module: str, *arguments: object) -> Iterator[ChildProcess]:
+    """Run a module in another Python until the block ends."""
     with subprocess.Popen(
         python_command(module, *arguments),
         stdin=subprocess.PIPE,
@@ -31,7 +31,7 @@ def beside(module: str, *arguments: object) -> Iterator[Beside]:
         assert process.stdout is not None
         assert process.stdin is not None
         try:
-            yield Beside(process, process.stdin, process.stdout.readline())
+            yield ChildProcess(process, process.stdin, process.stdout.readline())
         finally:
             process.terminate()
             try:

@@ -1,7 +1,10 @@
 """What commands print: names and texts of robots must not steer the terminal."""
 
+import contextlib
+
 import click
 
+from webmap.base.logs import budgets
 from webmap.base.outside_text import lines_of, one_line
 
 LONGEST = 10_000
@@ -18,3 +21,15 @@ def echo(text: object, *, err: bool = False, lines: bool = False) -> None:
 
     """
     click.echo((lines_of if lines else one_line)(text, LONGEST), err=err)
+
+
+def notify(text: str) -> None:
+    """Print a line on standard error, within the limit of a log.
+
+    Robots that appear cause such lines. A full disk and a closed pipe are ignored.
+    """
+    added = budgets.note(("say",), "")
+    if added is None:
+        return
+    with contextlib.suppress(OSError, ValueError):
+        echo(f"{text}{added}", err=True)

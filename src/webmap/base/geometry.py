@@ -171,6 +171,12 @@ class Affine:
     f: float = 0.0
 
     @classmethod
+    def of_pose(cls, pose: "Pose") -> "Affine":
+        """Return the map from the frame that has this pose to the frame around it."""
+        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+        return cls(cos, sin, -sin, cos, pose.x, pose.y)
+
+    @classmethod
     def translation(cls, x: float, y: float) -> "Affine":
         """Return the map that moves every point by ``(x, y)``."""
         return cls(e=x, f=y)

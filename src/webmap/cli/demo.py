@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from webmap.base.child_process import child_process
 from webmap.base.children import GRACE
-from webmap.base.child_process import beside
-from webmap.cli.options import PORT, simulator_options, web_options
 from webmap.base.errors import ConfigError
+from webmap.cli.options import PORT, simulator_options, web_options
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
@@ -140,7 +140,7 @@ def simulator(*arguments: object) -> Iterator[str]:
         ConfigError: If it does not come up.
 
     """
-    with beside("webmap", "sim", "--with-parent", *arguments) as started:
+    with child_process("webmap", "sim", "--with-parent", *arguments) as started:
         if not started.line.startswith(READY):
             _give_up(started.process.wait(GRACE))
         yield started.line.removeprefix(READY).strip()

@@ -6,8 +6,7 @@ import sys
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import verbose_option, wait_option
-from webmap.cli.topic_list import one_bridge, topics_option
+from webmap.cli.options import one_bridge, topics_option, verbose_option, wait_option
 
 
 @click.command(short_help="Print the robots behind a bridge, their topics, and why.")
@@ -28,9 +27,9 @@ def discover(
     webmap discover ws://robot:9090 --toml > fleet.toml
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
-    from webmap.fleet.find import find
     from webmap.discovery.fleet_toml import fleet_toml
     from webmap.discovery.words import report
+    from webmap.fleet.find import find
     from webmap.ros.names import normalise_url
 
     one_bridge(url, topics)

@@ -6,8 +6,13 @@ import sys
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import Finite, verbose_option, wait_option
-from webmap.cli.topic_list import one_bridge, topics_option
+from webmap.cli.options import (
+    Finite,
+    one_bridge,
+    topics_option,
+    verbose_option,
+    wait_option,
+)
 
 
 @click.command(short_help="Say what is in the way of driving the robots of a bridge.")
@@ -85,10 +90,10 @@ def doctor(
         from webmap.discovery.doctor.stop_test import find_out
 
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
-    from webmap.fleet.diagnose import bridges_of
     from webmap.discovery.doctor import is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report
+    from webmap.fleet.diagnose import bridges_of
 
     bridges = bridges_of(url, robots, settings)
     one_bridge([address for address, _ in bridges], topics)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from webmap.base.child_process import beside
+from webmap.base.child_process import child_process
 from webmap.base.echo import echo
-from webmap.cli.options import PORT, Finite, web_options
 from webmap.base.errors import ConfigError
+from webmap.cli.options import PORT, Finite, web_options
 
 if TYPE_CHECKING:
     from webmap import Bridge, Map
@@ -110,7 +110,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
     """
     from webmap.bags.__main__ import READY, WRONG
 
-    with beside("webmap.bags", "--with-parent", *arguments) as started:
+    with child_process("webmap.bags", "--with-parent", *arguments) as started:
         line = started.line
         if line.startswith(WRONG):
             raise ConfigError(line.removeprefix(WRONG).strip())
@@ -119,7 +119,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
 
         def begin_anew() -> None:
             try:  # past the buffer, which would keep it and fail once more at the end
-                os.write(started.told.fileno(), b"again\n")
+                os.write(started.stdin.fileno(), b"again\n")
             except (OSError, ValueError):
                 echo("The replay has ended: nothing is played", err=True)
 

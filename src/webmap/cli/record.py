@@ -5,9 +5,8 @@ from pathlib import Path
 
 import click
 
-from webmap.cli.options import Finite, verbose_option, wait_option
-from webmap.cli.topic_list import topics_option
 from webmap.base.errors import ConfigError
+from webmap.cli.options import Finite, topics_option, verbose_option, wait_option
 
 
 @click.command(short_help="Record what is behind a bridge into a bag.")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from webmap.cli.options import web_options
 from webmap.base.plain_files import refuse_special
+from webmap.cli.options import web_options
 
 
 @click.command(short_help="Serve your own pages, or the robots of a fleet file.")

@@ -3,8 +3,7 @@
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import Finite, web_options
-from webmap.cli.topic_list import one_bridge, topics_option
+from webmap.cli.options import Finite, one_bridge, topics_option, web_options
 
 
 @click.command()

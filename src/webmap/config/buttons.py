@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from webmap.config.checks import Mistakes, Way, did_you_mean
 from webmap.base.errors import ConfigError
+from webmap.config.checks import Mistakes, Way, did_you_mean
 from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import UnknownType
 from webmap.ros.message_forms import checked, fields_of

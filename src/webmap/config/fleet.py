@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from webmap.base.errors import ConfigError
+from webmap.base.outside_text import escaped
 from webmap.config import checks
 from webmap.config.checks import Mistakes, Way, same_name, show, way_in_words
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
@@ -19,8 +21,6 @@ from webmap.config.robot import (
     bridges_of,
     read_robot,
 )
-from webmap.base.errors import ConfigError
-from webmap.base.outside_text import escaped
 from webmap.ros.names import normalise_url
 
 

@@ -10,10 +10,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 
+from webmap.base.errors import ConfigError
 from webmap.config import checks
 from webmap.config.checks import Mistakes, Way
 from webmap.config.reading import Config
-from webmap.base.errors import ConfigError
 from webmap.ros.names import normalise_topic
 
 TWIST_TYPES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")

@@ -25,9 +25,9 @@ from typing import (
 
 import msgspec
 
+from webmap.base.errors import ConfigError
 from webmap.config import checks
 from webmap.config.checks import Mistakes, Way, checked, did_you_mean, show
-from webmap.base.errors import ConfigError
 
 ONE_OR_MORE = "one or more"
 """Among the annotations of a list: one value may stand for a list of one."""

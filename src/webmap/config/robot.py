@@ -9,12 +9,12 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
+from webmap.base.errors import ConfigError
 from webmap.config import checks
 from webmap.config.buttons import check_buttons
 from webmap.config.checks import Mistakes, Way
 from webmap.config.motion import MotionConfig, TopicConfig
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
-from webmap.base.errors import ConfigError
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import is_topic
 

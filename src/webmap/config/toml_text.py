@@ -10,10 +10,10 @@ import re
 import tomllib
 from pathlib import Path
 
-from webmap.config.checks import Mistakes, Way, way_in_words
 from webmap.base.errors import ConfigError
 from webmap.base.outside_text import one_line
 from webmap.base.plain_files import read_file
+from webmap.config.checks import Mistakes, Way, way_in_words
 
 LARGEST = 1 << 19
 """Bytes that a file may have."""

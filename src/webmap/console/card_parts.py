@@ -5,9 +5,9 @@ import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap import html, svg
-from webmap.features.doctor.doctor_panel import entry
-from webmap.console.words import UNKNOWN, number, sentence
 from webmap.base.geometry import Twist
+from webmap.console.words import UNKNOWN, number, sentence
+from webmap.features.doctor.doctor_panel import entry
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot

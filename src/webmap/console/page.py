@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import webmap
 from webmap.console.bar import BridgeList, RefusedList
-from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.console.card_parts import RobotHealth
-from webmap.features.doctor.doctor_panel import DoctorReports
 from webmap.console.fleet import make_robot
 from webmap.console.floor import Floor, load_floor
 from webmap.console.opened import Console
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
+from webmap.features.cameras.camera_panel import CameraPanel
+from webmap.features.doctor.doctor_panel import DoctorReports
 
 if TYPE_CHECKING:
     from webmap import Bridge, Map, Page, RobotConfig
@@ -165,9 +165,6 @@ MARGIN = 4.0
 DOT_PIXELS = 3.0
 """How large the dots of a scan are on the screen."""
 
-PARTS = ("card_actions.js", "dom.js", "view_tools.js")
-"""What console.js imports; a browser can load what was published."""
-
 PATIENCE = 12
 """Looks after which robots whose pose is unknown are waited for no longer."""
 
@@ -194,13 +191,8 @@ class Frame:
         self._looks = 0
         self._placed = False
         self._dot_size = 0.0
-        folder = Path(__file__).parent
-        for name in PARTS:
-            map.page.asset(folder / name)
         self.half = map.add_browser_half(
-            self,
-            folder / "console.js",
-            {"title": title, "bounds": self._bounds},
+            self, "console/console.js", {"title": title, "bounds": self._bounds}
         )
 
     def place(self) -> None:

@@ -4,10 +4,10 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
-from webmap.features.cameras.camera_panel import CameraViews
 from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
 from webmap.console.robot_list import AGE_LIMIT, StateShape
 from webmap.console.words import UNKNOWN, heading, icon, look_of, number, sentence
+from webmap.features.cameras.camera_panel import CameraViews
 
 if TYPE_CHECKING:
     from collections.abc import Callable

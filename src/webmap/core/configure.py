@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import msgspec
 
+from webmap.base.errors import ConfigError, ModuleNotFound, WebMapError
 from webmap.config import checks
 from webmap.config.checks import Mistakes, Way
 from webmap.config.robot import (
@@ -18,14 +19,13 @@ from webmap.config.robot import (
     TfConfig,
     is_link,
 )
-from webmap.poses.alignment import numbers
-from webmap.poses.frames import frames_of
 from webmap.core.module_arguments import WrongArgument, WrongArguments
 from webmap.core.robot_model import element_from_dict, element_to_dict
-from webmap.base.errors import ConfigError, ModuleNotFound, WebMapError
+from webmap.poses.alignment import numbers
+from webmap.poses.frames import frames_of
 from webmap.ros.bridge import Bridge
-from webmap.scene.element import Element
 from webmap.ros.tf import Buffer
+from webmap.scene.element import Element
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

@@ -5,6 +5,9 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
+from webmap.base.errors import ConfigError, MotionError
+from webmap.base.geometry import Quaternion, Twist
+from webmap.base.scope import no_scope
 from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
 from webmap.config.robot import LINKED, MOTION
 from webmap.core.call_arguments import sets_part
@@ -12,12 +15,9 @@ from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
 from webmap.core.motion import MotionRoad
 from webmap.core.registry import Namespace
-from webmap.base.errors import ConfigError, MotionError
 from webmap.gate.messages import RobotReport
 from webmap.gate.rules.goals import OVER
-from webmap.base.geometry import Quaternion, Twist
 from webmap.ros.bridge import Bridge
-from webmap.base.scope import no_scope
 
 
 class Driven(Extendable):

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from webmap.core.module_arguments import check_arguments
-from webmap.core.registry import Namespace
-from webmap.base.tasks import begin
 from webmap.base.errors import ConfigError
 from webmap.base.scope import Scope, no_scope
+from webmap.base.tasks import begin
+from webmap.core.module_arguments import check_arguments
+from webmap.core.registry import Namespace
 
 log = logging.getLogger("webmap.modules")
 

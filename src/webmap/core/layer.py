@@ -4,11 +4,11 @@ import logging
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from webmap.base.scope import Removal, Scope, keep, no_scope
 from webmap.core.problems import Problems
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.fragment import Fragment
-from webmap.base.scope import Removal, Scope, keep, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

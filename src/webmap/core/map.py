@@ -1,5 +1,6 @@
 """Maps: what one viewer sees, from above."""
 
+from webmap.base.scope import Removal, keep
 from webmap.core.layer import Layer
 from webmap.core.registry import Namespace, map_modules
 from webmap.core.robot import Robot
@@ -8,7 +9,6 @@ from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.events import Event
 from webmap.scene.fragment import Fragment
-from webmap.base.scope import Removal, keep
 
 LAYER_ORDER = 10.0
 ROBOT_ORDER = 100.0

@@ -25,8 +25,8 @@ from typing import (
     get_type_hints,
 )
 
-from webmap.config.checks import did_you_mean
 from webmap.base.errors import ConfigError
+from webmap.config.checks import did_you_mean
 from webmap.ros.names import normalise_topic
 
 Way: TypeAlias = tuple[str | int, ...]

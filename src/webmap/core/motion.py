@@ -11,6 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
+from webmap.base.errors import MotionError
+from webmap.base.geometry import Pose, Twist
+from webmap.base.lifecycle import lifecycle
+from webmap.base.tasks import spawn
 from webmap.config.checks import Mistakes
 from webmap.config.motion import (
     TWIST_TYPES,
@@ -21,15 +25,11 @@ from webmap.config.motion import (
     TwistConfig,
 )
 from webmap.config.reading import Config, read_part
-from webmap.base.tasks import spawn
-from webmap.poses.type_asking import TypeAsking
-from webmap.base.errors import MotionError
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
-from webmap.base.geometry import Pose, Twist
-from webmap.base.lifecycle import lifecycle
+from webmap.poses.type_asking import TypeAsking
 from webmap.ros.bridge import Bridge
 from webmap.ros.moving import STOP
 from webmap.ros.names import is_type

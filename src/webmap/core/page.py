@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.pictures import Publisher
-from webmap.base.tasks import begin
-from webmap.core.view import initial_view
 from webmap.base.errors import ConfigError
-from webmap.gate.messages import Role
 from webmap.base.plain_files import resolved
+from webmap.base.scope import Removal, Scope, current_scope
+from webmap.base.tasks import begin
+from webmap.core.pictures import Publisher
+from webmap.core.view import initial_view
+from webmap.gate.messages import Role
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.events import Event, Handler, Listener
 from webmap.scene.fragment import Fragment
-from webmap.base.scope import Removal, Scope, current_scope
 from webmap.scene.wire.session import SceneSession
 
 if TYPE_CHECKING:
@@ -355,8 +355,8 @@ class Page:
         """Return the URL of an ES module or a style sheet.
 
         Args:
-            file: The name of one that comes with WebMap, as ``"features/drive/teleop.js"``,
-                or the path of a file.
+            file: The name of one that comes with WebMap, as
+                ``"features/drive/teleop.js"``, or the path of a file.
 
         """
         return file if isinstance(file, str) else self.publisher.publish_file(file)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from webmap.base.geometry import Affine
-from webmap.scene import svg
 from webmap.base.scope import Removal, keep
+from webmap.scene import svg
 
 KEPT_FOR = 3.0
 """Seconds for which a picture is served after another took its place."""

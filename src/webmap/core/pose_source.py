@@ -4,21 +4,20 @@ What follows from a message is decided in :mod:`webmap.poses.pipeline`; here are
 subscriptions, the clock and the alignment.
 """
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from webmap.base.geometry import Affine, Pose
+from webmap.base.scope import Removal, no_scope
 from webmap.poses.alignment import HERE, alignments
 from webmap.poses.frames import Frames, frames_of
 from webmap.poses.odometry import ODOMETRY, OdometryFeed
-from webmap.poses.placing import Placing, PoseReading
 from webmap.poses.pipeline import PosePipeline, Problem, Step
+from webmap.poses.placing import Placing, PoseReading
 from webmap.poses.silence import SilenceWatch
-from webmap.base.geometry import Affine, Pose
 from webmap.ros.bridge import Bridge
-from webmap.base.scope import Removal, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -51,7 +50,7 @@ class PoseSource:
         self.expected_at: float | None = None
         """When the newest pose came that would also come from a robot at rest."""
         self._robot = robot
-        self._silence = SilenceWatch(robot)
+        self._silence = SilenceWatch(lambda: robot.name)
         self._problems: Mapping[str, Problem] = {}
         self._hears_frames = Removal(lambda: None)
         self._hears_alignment = Removal(lambda: None)
@@ -218,7 +217,7 @@ class PoseSource:
         """Move the robot, and what is drawn by its pose, to a new alignment."""
         own, pipeline = self.own_alignment, self.pipeline
         self.alignment = alignments.of(self.bridge) if own is None else own
-        self.common_from_own = affine(self.alignment)
+        self.common_from_own = Affine.of_pose(self.alignment)
         pipeline.alignment = self.alignment
         if pipeline.newest is not None:
             self._robot.show_pose(pipeline.on_map(pipeline.newest))
@@ -267,9 +266,3 @@ class PoseSource:
             if bridge is not None:
                 self._hears_alignment = alignments.on_change(bridge, self._on_alignment)
             self._on_alignment()
-
-
-def affine(pose: Pose) -> Affine:
-    """Return what takes coordinates of a pose's own frame to the outer one."""
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    return Affine(cos, sin, -sin, cos, pose.x, pose.y)

@@ -1,9 +1,11 @@
-"""Namespaces of modules: which class stands behind a module's name."""
+"""Namespaces of modules: the class for a module's name."""
 
 import difflib
+import importlib
 import logging
 import pkgutil
 from collections.abc import Callable, Iterator
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Any, TypeVar
@@ -15,17 +17,22 @@ log = logging.getLogger("webmap.modules")
 Factory = Callable[..., Any]
 T = TypeVar("T", bound=Factory)
 
+BUILT_IN = "webmap.features"
+"""The package of the built-in modules; each folder of it is a room."""
+
 
 class Namespace:
     """The modules that one kind of owner can add, by name.
 
-    A built-in module is the class that its file is named after: ``LaserScanner`` in
-    ``laser_scanner.py``. Another package has an entry point for each of its modules,
-    and a script calls :meth:`register`. A module is imported when it is first used.
+    Each module is registered by :meth:`register`. A built-in module is a class of
+    ``webmap.features`` in the file of its name: ``LaserScanner`` is in
+    ``laser_scanner.py``, which is imported when the name is first used. Another
+    package has an entry point for each of its modules.
 
     Args:
-        kind: What the owner is, for error messages.
-        group: The package of the built-in modules, and the group of the entry points.
+        kind: The kind of the owner, for error messages.
+        group: The group of the entry points; without it there are none, and no
+            built-in modules.
 
     """
 
@@ -49,13 +56,15 @@ class Namespace:
 
         """
         name = name or factory.__name__
+        if not factory.__module__.startswith(f"{BUILT_IN}."):
+            self._look_for(name)
+            found = self._other_packages().get(name)
+            if found is not None and not _provides(found, factory):
+                raise ValueError(
+                    f"the {self.kind} module {name!r} is already provided by "
+                    f"{found.value}: choose another name"
+                )
         known = self._registered.get(name)
-        found = None if known is not None else self._found().get(name)
-        if found is not None and not _provides(found, factory):
-            raise ValueError(
-                f"the {self.kind} module {name!r} is already provided by "
-                f"{found.value}: choose another name"
-            )
         if known is not None and not _same_source(known, factory):
             raise ValueError(
                 f"the {self.kind} module {name!r} is already registered as "
@@ -66,7 +75,9 @@ class Namespace:
 
     def names(self) -> list[str]:
         """Return the names of all modules there are, sorted."""
-        return sorted({*self._registered, *self._found()})
+        for name in _built_in_files():
+            self._look_for(name)
+        return sorted({*self._registered, *self._other_packages()})
 
     def __getitem__(self, name: str) -> Factory:
         """Return what makes the module ``name``.
@@ -75,17 +86,15 @@ class Namespace:
             ModuleNotFound: If there is none; the message lists what there is.
 
         """
-        if name in self._registered:
+        if name in self:
+            if name not in self._registered:
+                self._registered[name] = self._other_packages()[name].load()
             return self._registered[name]
-        entry_point = self._found().get(name)
-        if entry_point is None:
-            raise ModuleNotFound(self._not_found(name))
-        factory: Factory = entry_point.load()
-        self._registered[name] = factory
-        return factory
+        raise ModuleNotFound(self._not_found(name))
 
     def __contains__(self, name: object) -> bool:
-        return name in self._registered or name in self._found()
+        self._look_for(name)
+        return name in self._registered or name in self._other_packages()
 
     def __iter__(self) -> Iterator[Factory]:
         """Yield what makes each module; one that cannot be loaded is logged once."""
@@ -105,13 +114,18 @@ class Namespace:
         listed = ", ".join(names) or "none"
         return f"there is no {self.kind} module {name!r}.{hint} There are: {listed}."
 
-    def _found(self) -> dict[str, EntryPoint]:
+    def _look_for(self, name: object) -> None:
+        """Import the built-in file of that name, which registers its class."""
+        file = None if self._group is None else _built_in_files().get(name)
+        if file is not None and name not in self._registered:
+            importlib.import_module(file)
+
+    def _other_packages(self) -> dict[str, EntryPoint]:
         if self._entry_points is None:
-            self._entry_points = {} if self._group is None else _built_in(self._group)
-            own = f"{self._group}."
+            self._entry_points = {}
             for found in entry_points(group=self._group) if self._group else ():
                 other = self._entry_points.setdefault(found.name, found)
-                if other.value != found.value and not found.value.startswith(own):
+                if other.value != found.value:
                     raise ValueError(
                         f"two packages provide the {self.kind} module "
                         f"{found.name!r}: {other.value} and {found.value}"
@@ -119,15 +133,22 @@ class Namespace:
         return self._entry_points
 
 
-def _built_in(package: str) -> dict[str, EntryPoint]:
-    """Return where the modules of a package are, by the names of their classes."""
-    spec = find_spec(package)
-    found = {}
-    folders = None if spec is None else spec.submodule_search_locations
-    for file in pkgutil.iter_modules(folders or ()):
-        name = "".join(word.capitalize() for word in file.name.split("_"))
-        found[name] = EntryPoint(name, f"{package}.{file.name}:{name}", package)
-    return found
+@cache
+def _built_in_files() -> dict[object, str]:
+    """Return the files of all rooms of the built-in modules, by the names of classes.
+
+    Not every file has a class of its name: a room has other files too.
+    """
+    files: dict[object, str] = {}
+    rooms = find_spec(BUILT_IN)
+    assert rooms is not None
+    for room in pkgutil.iter_modules(rooms.submodule_search_locations):
+        spec = find_spec(f"{BUILT_IN}.{room.name}")
+        assert spec is not None
+        for file in pkgutil.iter_modules(spec.submodule_search_locations or ()):
+            name = "".join(word.capitalize() for word in file.name.split("_"))
+            files[name] = f"{BUILT_IN}.{room.name}.{file.name}"
+    return files
 
 
 def _provides(found: EntryPoint, factory: Factory) -> bool:

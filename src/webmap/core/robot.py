@@ -9,26 +9,26 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Quaternion, Twist, Vector3
+from webmap.base.scope import Removal, keep
 from webmap.config.reading import read_part
 from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
-from webmap.poses.alignment import alignment
 from webmap.core.call_arguments import sets_part
 from webmap.core.driven import Driven
-from webmap.poses.odometry import OdometryFeed
-from webmap.poses.placing import PoseReading
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
 from webmap.core.robot_model import ModelImages, checked_model
 from webmap.core.robot_state import Facts, RobotState, since_when, state_of
-from webmap.base.errors import ConfigError
 from webmap.gate.messages import RobotReport
-from webmap.base.geometry import Quaternion, Twist, Vector3
+from webmap.poses.alignment import alignment
+from webmap.poses.odometry import OdometryFeed
+from webmap.poses.placing import PoseReading
 from webmap.ros.bridge import Bridge
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.fragment import Fragment
-from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

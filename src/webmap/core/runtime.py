@@ -12,10 +12,13 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
+from webmap.base.geometry import Quaternion, Twist
+from webmap.base.lifecycle import lifecycle
+from webmap.base.scope import Removal
+from webmap.base.tasks import spawn
 from webmap.core.motion import MotionRoad, roads
 from webmap.core.refused import refusals
 from webmap.core.robot import robots
-from webmap.base.tasks import spawn
 from webmap.gate.messages import (
     GateDown,
     RefusedCount,
@@ -25,9 +28,6 @@ from webmap.gate.messages import (
     SentPose,
     SentTwist,
 )
-from webmap.base.geometry import Quaternion, Twist
-from webmap.base.lifecycle import lifecycle
-from webmap.base.scope import Removal
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import GateClient

@@ -6,18 +6,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Affine
+from webmap.base.scope import Removal, keep
 from webmap.core.extendable import Extendable
 from webmap.core.page import Page, page_of
 from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
 from webmap.core.view import Rect, apply_operation, initial_view
-from webmap.base.errors import ConfigError
-from webmap.base.geometry import Affine
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.events import Handler
 from webmap.scene.fragment import Fragment
-from webmap.base.scope import Removal, keep
 
 log = logging.getLogger("webmap.map")
 

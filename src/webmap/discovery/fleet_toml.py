@@ -6,8 +6,8 @@ from typing import Any
 from webmap.config.checks import Way
 from webmap.config.fleet import BridgeConfig, FleetConfig, MapConfig, dump
 from webmap.config.robot import ModuleConfig, RobotConfig
-from webmap.discovery.found import Findings, FoundRobot
-from webmap.discovery.layers import TRAIL, Layers, drawing, topic_of, with_layers
+from webmap.discovery.found import Findings, FoundRobot, Layers
+from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 
 HEAD = """\
 # A fleet file: webmap check FILE reads it, webmap run FILE shows it.

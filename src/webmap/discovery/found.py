@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 from webmap.config.motion import (
     InitialPoseConfig,
@@ -18,9 +18,6 @@ from webmap.config.robot import (
     TfConfig,
 )
 from webmap.discovery.tf_robots import MAP, WORLD
-
-if TYPE_CHECKING:
-    from webmap.discovery.layers import Layers
 
 Role: TypeAlias = Literal[
     "odometry",
@@ -50,6 +47,29 @@ ACTIONS = {
     "/goal": "move_base_msgs/MoveBaseAction",
 }
 """The topics by which actions are known, without the action's name, and their types."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundLayer:
+    """A topic that can be drawn."""
+
+    kind: str
+    """What the layer calls such a topic."""
+
+    topic: str
+    type: str
+    """The type as the bridge spells it."""
+
+    rule: str = ""
+    """The rule, in words."""
+
+
+class Layers(NamedTuple):
+    """What can be drawn of one robot, the best first."""
+
+    drawn: tuple[FoundLayer, ...] = ()
+    left_out: tuple[FoundLayer, ...] = ()
+    """What could be drawn too, but for its number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,5 +222,5 @@ class Findings:
     notes: tuple[str, ...] = ()
     """What holds for all of it, in sentences."""
 
-    layers: "Mapping[str, Layers]" = field(default_factory=dict)
+    layers: Mapping[str, Layers] = field(default_factory=dict)
     """What is drawn of each robot, and what is left out, by its namespace."""

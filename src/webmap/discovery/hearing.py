@@ -5,12 +5,12 @@ import weakref
 from collections.abc import Mapping
 from functools import partial
 
-from webmap.discovery.tf_robots import Trees
 from webmap.base.errors import BridgeClosed
+from webmap.base.scope import no_scope
+from webmap.discovery.tf_robots import Trees
 from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic
-from webmap.base.scope import no_scope
 
 SECONDS = 0.8
 """How long it listens: a robot that moves sends its frames ten times a second."""

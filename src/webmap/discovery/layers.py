@@ -10,41 +10,19 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import msgspec
 
-from webmap.config.robot import ModuleConfig, RobotConfig, is_link
-from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, declarations
-from webmap.discovery.grouping import inside, nearest
 from webmap.base.errors import ConfigError
+from webmap.config.robot import ModuleConfig, RobotConfig, is_link
+from webmap.discovery.found import FoundLayer, Layers
+from webmap.discovery.grouping import inside, nearest
+from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, declarations
 from webmap.ros.names import is_topic, normalise_topic, split_type
 
 TRAIL = ModuleConfig(name="Trail", options={"length": 10.0})
 """Where a robot was, which is drawn of every robot."""
-
-
-@dataclass(frozen=True, slots=True)
-class FoundLayer:
-    """A topic that can be drawn."""
-
-    kind: str
-    """What the layer calls such a topic."""
-
-    topic: str
-    type: str
-    """The type as the bridge spells it."""
-
-    rule: str = ""
-    """The rule, in words."""
-
-
-class Layers(NamedTuple):
-    """What can be drawn of one robot, the best first."""
-
-    drawn: tuple[FoundLayer, ...] = ()
-    left_out: tuple[FoundLayer, ...] = ()
-    """What could be drawn too, but for its number."""
 
 
 Place: TypeAlias = tuple[float, int, int, int]

@@ -10,8 +10,8 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from webmap.discovery.found import Role
 from webmap.base.errors import ConfigError
+from webmap.discovery.found import Role
 from webmap.ros.names import split_type
 
 PARTS = (

@@ -1,8 +1,8 @@
 """What was found, as a table for a terminal."""
 
-from webmap.discovery.found import ROLES, Findings, FoundRobot, Role
-from webmap.discovery.layers import Layers, drawing
 from webmap.base.outside_text import escaped
+from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
+from webmap.discovery.layers import drawing
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
 

@@ -59,8 +59,8 @@ def _always(robots: Sequence[MeantRobot]) -> Meant:
 
 
 def _of_file(file: Path) -> list[tuple[str, Meant]]:
-    from webmap.fleet.made import prepare
     from webmap.features.doctor.in_use import Made, in_use
+    from webmap.fleet.made import prepare
 
     ready = prepare(file)
     maps: list[Made] = []

@@ -8,14 +8,14 @@ from typing import Any
 
 import msgspec
 
+from webmap.base.errors import ConfigError
+from webmap.base.local_plane import LocalPlane
 from webmap.config.checks import Mistakes, Way
 from webmap.config.fleet import ImageConfig, TilesConfig
 from webmap.config.robot import PictureConfig
-from webmap.features.labels.label_store import label_file, read_labels
-from webmap.base.local_plane import LocalPlane
 from webmap.core.pictures import pictures
+from webmap.features.labels.label_store import label_file, read_labels
 from webmap.features.tiles.tile_source import open_tiles
-from webmap.base.errors import ConfigError
 
 MOST_PIXELS = 1 << 26
 """Pixels of a picture: a browser has four bytes for each."""

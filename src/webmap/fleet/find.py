@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from urllib.parse import urlsplit
 
 from webmap.base.echo import echo
+from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.discovery import Findings, discover
-from webmap.ros.asking import ask_topics
 from webmap.discovery.hearing import hear_frames
 from webmap.discovery.naming import free_name, unique_names
 from webmap.discovery.robots import host_name
-from webmap.base.errors import BridgeClosed, BridgeError
+from webmap.ros.asking import ask_topics
 
 TELL = (
     "Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN, "

@@ -6,18 +6,18 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from webmap.base.echo import echo
-from webmap.fleet.find import Found, find
-from webmap.fleet.watch import LookingForLayers, LookingForRobots, on_page
-from webmap.fleet.overrides import TOLD, Overruling
-from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.stated import Candidate, offer, set_twice
+from webmap.base.errors import BridgeClosed
+from webmap.base.outside_text import escaped
 from webmap.config.checks import same_name
 from webmap.discovery import FoundRobot
 from webmap.discovery.naming import free_name
 from webmap.discovery.rules import VELOCITY
 from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
-from webmap.base.errors import BridgeClosed
-from webmap.base.outside_text import escaped
+from webmap.fleet.find import Found, find
+from webmap.fleet.overrides import TOLD, Overruling
+from webmap.fleet.shown import ShownRobot, ShownRobots
+from webmap.fleet.stated import Candidate, offer, set_twice
+from webmap.fleet.watch import LookingForLayers, LookingForRobots, on_page
 from webmap.ros.names import is_topic, is_type, normalise_topic
 
 if TYPE_CHECKING:

@@ -8,6 +8,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import webmap
 from webmap import console
+from webmap.base.errors import ConfigError, WebMapError
+from webmap.base.map_file import read_map
+from webmap.config.checks import Mistakes, Way, WrongConfig
+from webmap.config.fleet import FleetConfig, read_fleet
+from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
+from webmap.config.secrets import readable_secret
+from webmap.config.toml_text import read_text
+from webmap.core.alignment_store import store
+from webmap.core.configure import module_call, wrong_argument
+from webmap.core.module_arguments import WrongArguments, check_arguments
+from webmap.core.registry import map_modules
 from webmap.fleet.files import (
     check_floor,
     check_images,
@@ -15,18 +26,7 @@ from webmap.fleet.files import (
     publish_picture,
     tile_options,
 )
-from webmap.config.checks import Mistakes, Way, WrongConfig
-from webmap.config.fleet import FleetConfig, read_fleet
-from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
-from webmap.config.secrets import readable_secret
-from webmap.config.toml_text import read_text
 from webmap.poses.alignment import align_bridge
-from webmap.core.alignment_store import store
-from webmap.core.configure import module_call, wrong_argument
-from webmap.core.module_arguments import WrongArguments, check_arguments
-from webmap.core.registry import map_modules
-from webmap.base.errors import ConfigError, WebMapError
-from webmap.base.map_file import read_map
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot

@@ -6,14 +6,22 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from webmap.fleet.stated import Candidate, check_name, set_twice
+from webmap.base.errors import ConfigError
 from webmap.config.checks import same_name
 from webmap.config.robot import RobotConfig, named_cameras
-from webmap.discovery.found import ACTIONS, ROLES, Findings, FoundRobot, Guess, Role
-from webmap.discovery.layers import Layers, is_own, role_of
+from webmap.discovery.found import (
+    ACTIONS,
+    ROLES,
+    Findings,
+    FoundRobot,
+    Guess,
+    Layers,
+    Role,
+)
+from webmap.discovery.layers import is_own, role_of
 from webmap.discovery.robots import host_name
 from webmap.discovery.rules import VELOCITY
-from webmap.base.errors import ConfigError
+from webmap.fleet.stated import Candidate, check_name, set_twice
 from webmap.ros.names import is_topic, is_type
 
 FORM = "ROBOT.ROLE=TOPIC, as in robot_1.scan=/robot_1/front/scan"

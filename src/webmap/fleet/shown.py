@@ -8,28 +8,22 @@ from urllib.parse import urlsplit
 
 import msgspec
 
-from webmap.fleet.watch import say
-from webmap.fleet.overrides import Overruling, shared_map
-from webmap.fleet.stated import Candidate
+from webmap.base.echo import notify
+from webmap.base.errors import WebMapError
+from webmap.base.scope import no_scope
 from webmap.config.checks import Mistakes, same_name
 from webmap.config.robot import RobotConfig, TfConfig
 from webmap.console import Console, make_robot
 from webmap.core.alignment_store import store
 from webmap.core.configure import apply
 from webmap.discovery import FoundRobot
-from webmap.discovery.found import Role
-from webmap.discovery.layers import (
-    TRAIL,
-    FoundLayer,
-    drawing,
-    topic_of,
-    with_layers,
-)
+from webmap.discovery.found import FoundLayer, Role
+from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 from webmap.discovery.naming import free_name
 from webmap.discovery.newcomers import News
 from webmap.discovery.words import in_one_line
-from webmap.base.errors import WebMapError
-from webmap.base.scope import no_scope
+from webmap.fleet.overrides import Overruling, shared_map
+from webmap.fleet.stated import Candidate
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
@@ -178,7 +172,7 @@ class ShownRobots:
             shown = self.get(bridge, robot.found.namespace)
             if shown is not None:  # else it was told by hand, with all that it has
                 for sentence in self._update(shown, robot.found, news):
-                    say(sentence)
+                    notify(sentence)
             return
         if any(other.is_also(robot) for other in self._told):
             return
@@ -187,7 +181,7 @@ class ShownRobots:
             wanted = f"{wanted} ({urlsplit(bridge.url).netloc})"
         named = replace(robot.found, name=free_name(wanted, self._names))
         self.add(Candidate(bridge, named))
-        say(f"A robot appeared behind {bridge.url}: {in_one_line(named)}")
+        notify(f"A robot appeared behind {bridge.url}: {in_one_line(named)}")
 
     def draw(
         self, shown: ShownRobot, layers: Iterable[FoundLayer], namespace: str

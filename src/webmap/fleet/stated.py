@@ -5,12 +5,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from webmap.base.errors import ConfigError
 from webmap.config.checks import LONGEST_NAME, is_name, same_name
 from webmap.discovery import Findings, FoundRobot, Guess
-from webmap.discovery.found import Role
-from webmap.discovery.layers import Layers, find_layers
+from webmap.discovery.found import Layers, Role
+from webmap.discovery.layers import find_layers
 from webmap.discovery.rules import PARTS
-from webmap.base.errors import ConfigError
 from webmap.ros.names import normalise_topic
 
 if TYPE_CHECKING:

@@ -1,7 +1,6 @@
 """Looking again and again what is behind a bridge: robots and what is drawn of them."""
 
 import asyncio
-import contextlib
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from webmap.base.echo import echo
-from webmap.fleet.overrides import MOST_CAMERAS
-from webmap.fleet.stated import Offer, offer
-from webmap.discovery import Findings, FoundRobot, discover
-from webmap.discovery.hearing import late_frames
-from webmap.discovery.layers import Layers, role_of
-from webmap.discovery.newcomers import Newcomers, News, leads_further
-from webmap.discovery.robots import host_name
+from webmap.base.echo import notify
 from webmap.base.errors import BridgeError
 from webmap.base.lifecycle import lifecycle
-from webmap.base.logs import budgets
+from webmap.discovery import Findings, FoundRobot, discover
+from webmap.discovery.found import Layers
+from webmap.discovery.hearing import late_frames
+from webmap.discovery.layers import role_of
+from webmap.discovery.newcomers import Newcomers, News, leads_further
+from webmap.discovery.robots import host_name
+from webmap.fleet.overrides import MOST_CAMERAS
+from webmap.fleet.stated import Offer, offer
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -95,18 +94,6 @@ class Looking(ABC):
         if self._told_topics is not None:
             return dict(self._told_topics)
         return await self.bridge.topics()
-
-
-def say(text: str) -> None:
-    """Print a line on standard error; that nobody reads it is no reason to stop.
-
-    Robots that appear cause such lines, so there is a limit as for a log.
-    """
-    added = budgets.note(("say",), "")
-    if added is None:
-        return
-    with contextlib.suppress(OSError, ValueError):  # a full disk, nobody at the pipe
-        echo(f"{text}{added}", err=True)
 
 
 class LookingForRobots(Looking):
@@ -222,7 +209,7 @@ class LookingForLayers(Looking):
         tf = msgspec.structs.replace(found.tf, quiet=True, map_frame=frame)
         moved = robot.move(tf, frame)
         if moved and known is not None:
-            say(moved)
+            notify(moved)
 
     def _draw(
         self,
@@ -245,7 +232,7 @@ class LookingForLayers(Looking):
         self._shown.draw(robot, drawn, namespace)
         new = robot.news_of_topics([*(layer.topic for layer in others), *cameras])
         if new:
-            say(
+            notify(
                 f"{robot.robot.name}: not drawn, since there are enough of their kind: "
                 f"{', '.join(new)}"
             )

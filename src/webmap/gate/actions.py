@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Key, Press
 from webmap.gate.messages import FromGate, RobotSpec, Way
-from webmap.base.geometry import Twist
 
 
 @dataclass(frozen=True, slots=True)

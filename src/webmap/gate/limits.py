@@ -8,9 +8,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import StopRecord
 from webmap.gate.messages import RobotSpec
-from webmap.base.geometry import Twist
 
 Vector = tuple[float, float, float]
 

@@ -15,6 +15,7 @@ import threading
 from types import FrameType
 
 from webmap.base.errors import WireError
+from webmap.base.logs import set_up_logging
 from webmap.gate import events, framing, messages
 from webmap.gate.kept.disk import Disk
 from webmap.gate.kept.locks import Locks, state_folder
@@ -22,7 +23,6 @@ from webmap.gate.kept.records import Records
 from webmap.gate.outbox import BackgroundHandler, Outbox
 from webmap.gate.priority import rise
 from webmap.gate.shell import Shell
-from webmap.base.logs import set_up_logging
 
 
 def main() -> int:

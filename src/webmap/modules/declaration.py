@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from webmap.core.registry import Namespace, map_modules, robot_modules
 from webmap.base.errors import ConfigError
+from webmap.core.registry import Namespace, map_modules, robot_modules
 from webmap.ros.names import same_type, split_type
 
 log = logging.getLogger("webmap.modules")

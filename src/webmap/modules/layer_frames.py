@@ -2,16 +2,15 @@
 
 from typing import TYPE_CHECKING
 
-from webmap.poses.alignment import alignments
-from webmap.poses.frames import Frames, frames_of, lasting
+from webmap.base.geometry import Affine, Pose
+from webmap.base.scope import keep
 from webmap.core.layer import Layer
 from webmap.modules.placed import put
-from webmap.poses.placing import Lasting
-from webmap.core.pose_source import affine
 from webmap.modules.sighting import newest_or_at
-from webmap.base.geometry import Affine, Pose
+from webmap.poses.alignment import alignments
+from webmap.poses.frames import Frames, frames_of, lasting
+from webmap.poses.lasting import Lasting
 from webmap.ros.bridge import Bridge
-from webmap.base.scope import keep
 from webmap.ros.tf import Transform, TransformError
 
 if TYPE_CHECKING:
@@ -159,4 +158,4 @@ class Anchored(LayerFrames):
         self._say("")
 
     def _align(self, aligned: Pose) -> None:
-        put(self._layer.svg, affine(aligned) @ self._offset)
+        put(self._layer.svg, Affine.of_pose(aligned) @ self._offset)

@@ -20,8 +20,8 @@ from typing import (
     get_origin,
 )
 
-from webmap.core.module_arguments import resolved
 from webmap.base.errors import ConfigError
+from webmap.core.module_arguments import resolved
 from webmap.ros.bridge import Bridge
 
 

@@ -7,8 +7,8 @@ in the group ``webmap.modules.map``.
 
 from typing import Any
 
-from webmap.core.registry import map_modules as namespace
 from webmap.base.errors import ModuleNotFound
+from webmap.core.registry import map_modules as namespace
 
 register = namespace.register
 

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from webmap.core.layer import Layer
+from webmap.core.registry import map_modules
 from webmap.modules.layer_frames import Anchored
 from webmap.modules.layer_options import Seconds
-from webmap.core.registry import map_modules
 from webmap.modules.topic_layer import LEVEL, TopicLayer, origin, short
 
 if TYPE_CHECKING:

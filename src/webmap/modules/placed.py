@@ -6,17 +6,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from webmap.poses.frames import lasting
-from webmap.poses.placing import Lasting
-from webmap.core.pose_source import affine
-from webmap.modules.sighting import Sighting, Sightings
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine, Pose, Vector3
-from webmap.scene import svg
-from webmap.scene.element import Child, Element
 from webmap.base.scope import Removal, keep
+from webmap.modules.sighting import Sighting, Sightings
+from webmap.poses.frames import lasting
+from webmap.poses.lasting import Lasting
 from webmap.ros.tf import Transform
 from webmap.ros.tf.transform import alike
+from webmap.scene import svg
+from webmap.scene.element import Child, Element
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -87,7 +86,7 @@ class Placed:
         self._seen: tuple[str, float] | None = None
         self._draw: Draw | None = None
         self._drawn: Transform | None = None
-        self._offset = affine(mount)
+        self._offset = Affine.of_pose(mount)
         """What takes the group's coordinates to those of the robot's own map, or to the
         robot's; or to the common map if no message was ever taken."""
         self._on_robot = frame == "robot"
@@ -188,7 +187,7 @@ class Placed:
             pose, tilt = found.offset.heading_and_tilt
             lift = Vector3(0.0, 0.0, tilt.translation.z - found.ground)
             self._tilt(self._draw, replace(tilt, translation=lift))
-            offset = affine(pose)
+            offset = Affine.of_pose(pose)
         # Only now, since drawing may fail: what was drawn before then stays in place.
         self._offset, self._on_robot = offset, found.on_robot
         self._settled = found.settled
@@ -205,7 +204,7 @@ class Placed:
         place = self._offset
         if not self._on_robot:
             at = self.robot.position
-            own = affine(Pose(at.x, at.y, self.robot.yaw))
+            own = Affine.of_pose(Pose(at.x, at.y, self.robot.yaw))
             if self._seen is not None:
                 place = self.robot.whereabouts.common_from_own @ place
             place = own.inverse @ place

@@ -7,8 +7,8 @@ in the group ``webmap.modules.robot``.
 
 from typing import Any
 
-from webmap.core.registry import robot_modules as namespace
 from webmap.base.errors import ModuleNotFound
+from webmap.core.registry import robot_modules as namespace
 
 register = namespace.register
 

@@ -3,9 +3,9 @@
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from webmap.core.registry import robot_modules
 from webmap.modules.layer_options import Seconds
 from webmap.modules.placed import Placed
-from webmap.core.registry import robot_modules
 from webmap.modules.topic_layer import LEVEL, E, TopicLayer, label, origin
 
 if TYPE_CHECKING:

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from webmap.poses.placing import OTHER_CLOCK, Placing
-from webmap.core.pose_source import PoseSource
 from webmap.base.geometry import Pose
+from webmap.core.pose_source import PoseSource
+from webmap.poses.placing import OTHER_CLOCK, Placing
 from webmap.ros.tf import Buffer, NotKnownThen, Transform, TransformError
 
 AHEAD = 0.2

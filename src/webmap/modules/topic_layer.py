@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import msgspec
 
-from webmap.modules.declaration import Declaration, FoundTopic, usual_options
-from webmap.modules.layer_options import LayerOptions
-from webmap.core.problems import Owner, Refusing
-from webmap.core.registry import Namespace
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.core.problems import Owner, Refusing
+from webmap.core.registry import Namespace
+from webmap.modules.declaration import Declaration, FoundTopic, usual_options
+from webmap.modules.layer_options import LayerOptions
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
 from webmap.ros.messages import Header
 from webmap.ros.subscriptions import Encoding
-from webmap.scene.element import Element
 from webmap.ros.tf import Transform
+from webmap.scene.element import Element
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
-from webmap.ros.bridge import Bridge
 from webmap.base.scope import Removal
+from webmap.ros.bridge import Bridge
 
 _numbers = itertools.count(1)
 

@@ -8,16 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from webmap.poses.placing import Lasting
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Quaternion, Vector3
+from webmap.base.scope import Removal, no_scope
+from webmap.poses.lasting import Lasting
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
-from webmap.base.scope import Removal, no_scope
 from webmap.ros.tf import Buffer, Transform, TransformError
 from webmap.ros.tf.buffer import LONGEST_NAME
 
 log = logging.getLogger("webmap.ros.tf")
+
 
 TYPE = "tf2_msgs/TFMessage"
 

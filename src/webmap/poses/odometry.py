@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
-from webmap.poses.placing import PoseReading
-from webmap.poses.type_asking import TypeAsking
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.scope import Removable, Scope, no_scope
+from webmap.poses.placing import PoseReading
+from webmap.poses.type_asking import TypeAsking
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
 from webmap.ros.views import (
@@ -15,7 +16,6 @@ from webmap.ros.views import (
     odometry_view,
     odometry_view_by_shape,
 )
-from webmap.base.scope import Removable, Scope, no_scope
 
 ODOMETRY = "nav_msgs/Odometry"
 """The type of poses that has a velocity too."""

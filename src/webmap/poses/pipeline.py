@@ -8,8 +8,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from webmap.poses.placing import CLOCKS, Lasting, Placing, PoseReading
 from webmap.base.geometry import Pose
+from webmap.poses.lasting import Lasting
+from webmap.poses.placing import CLOCKS, Placing, PoseReading
 from webmap.ros.tf import Transform
 from webmap.ros.tf.track import Track
 

@@ -22,11 +22,6 @@ CLOCKS = "clocks"
 """The kind of problem that poses and frames have different clocks."""
 
 
-PATIENCE = 1.0
-"""Seconds for which something is wrong before that is shown: when a link opens, frames
-come one after another, and that is no trouble."""
-
-
 class PoseReading(NamedTuple):
     """The pose of a robot in one message, and its velocity if the message has one."""
 
@@ -193,26 +188,3 @@ class Placing:
 
     def _wrong(self, error: TransformError, words: str) -> None:
         self.kind, self.problem = type(error).__name__, words
-
-
-class Lasting:
-    """Finds out when trouble has lasted for a while."""
-
-    def __init__(self) -> None:
-        self._since: float | None = None
-
-    def due(self, trouble: str, now: float, earliest: float) -> float | None:
-        """Return when trouble is to be shown; None if there is none.
-
-        Args:
-            trouble: Which kind there is now; empty if there is none.
-            now: The time, in seconds of any clock that only goes forward.
-            earliest: When it is to be shown at the earliest.
-
-        """
-        if not trouble:
-            self._since = None
-            return None
-        if self._since is None:
-            self._since = now
-        return max(self._since + PATIENCE, earliest)

@@ -4,12 +4,9 @@ import asyncio
 import logging
 import math
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from webmap.ros.bridge import Bridge
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.robot")
 
@@ -78,10 +75,14 @@ class SilenceWatch:
     """Writes to the log when a robot falls silent, and when its poses go on.
 
     It has one timer, from the first pose on. Without an event loop it writes nothing.
+
+    Args:
+        name: Returns the name of the robot for a line of the log.
+
     """
 
-    def __init__(self, robot: "Robot") -> None:
-        self._robot = robot
+    def __init__(self, name: Callable[[], str]) -> None:
+        self._name = name
         self._silence = Silence()
         self._bridge: Bridge | None = None
         self._topic = ""
@@ -115,7 +116,7 @@ class SilenceWatch:
         """
         took = self._silence.hear(now)
         if took is not None:
-            log.info("%s: poses again, after %.0f s", self._robot.name, took)
+            log.info("%s: poses again, after %.0f s", self._name(), took)
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:
@@ -145,7 +146,7 @@ class SilenceWatch:
             return
         log.warning(
             "%s: no pose for %.0f s; they come from %s on %s, and that link is open",
-            self._robot.name,
+            self._name(),
             silent,
             self._topic,
             bridge.name,

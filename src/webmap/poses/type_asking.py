@@ -4,9 +4,9 @@ import asyncio
 import time
 from collections.abc import Callable
 
+from webmap.base.scope import Removable
 from webmap.base.tasks import spawn
 from webmap.ros.bridge import Bridge
-from webmap.base.scope import Removable
 
 SOON, LATER = 2.0, 5.0
 """Seconds between two questions: the first few, and from then on."""

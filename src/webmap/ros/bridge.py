@@ -13,6 +13,7 @@ import msgspec
 
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.base.lifecycle import lifecycle
+from webmap.base.scope import Removal, keep, no_scope
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.definitions import Definitions
 from webmap.ros.fan_out import FanOut
@@ -28,7 +29,6 @@ from webmap.ros.subscriptions import (
     checked,
 )
 from webmap.ros.topic_faults import TopicFaults
-from webmap.base.scope import Removal, keep, no_scope
 
 log = logging.getLogger("webmap.ros")
 

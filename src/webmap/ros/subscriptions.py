@@ -8,11 +8,11 @@ from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 import msgspec
 
 from webmap.base.errors import BridgeError, ConfigError, ProtocolError
+from webmap.base.scope import Scope, current_scope
 from webmap.ros.callbacks import Callback
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
 from webmap.ros.names import is_type, same_type
 from webmap.ros.received import ReceivedMessage
-from webmap.base.scope import Scope, current_scope
 
 Encoding: TypeAlias = Literal["text", "binary", "raw"]
 

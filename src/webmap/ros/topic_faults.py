@@ -10,11 +10,11 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from webmap.base.errors import ProtocolError
+from webmap.base.scope import no_scope
 from webmap.ros.decoding import Unreadable
 from webmap.ros.limits import TooLarge
 from webmap.ros.names import is_type, same_type
 from webmap.ros.subscriptions import Topic
-from webmap.base.scope import no_scope
 
 log = logging.getLogger("webmap.ros")
 

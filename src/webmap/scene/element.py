@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any, ClassVar, Self
 
 from webmap.base.errors import SceneError
+from webmap.base.scope import Removal, current_scope, keep
 from webmap.scene.allowed import (
     attribute_name,
     check_event,
@@ -16,7 +17,6 @@ from webmap.scene.allowed import (
 from webmap.scene.events import Event, Handler, Listener, Report, Spawn
 from webmap.scene.live import Live, MapPlace
 from webmap.scene.node import Node, Text
-from webmap.base.scope import Removal, current_scope, keep
 
 
 class Classes:

@@ -27,8 +27,12 @@ log = logging.getLogger("webmap.server")
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
-# The browser's files of the whole package, and the few of this room.
-STATIC = (Path(__file__).parents[1] / "web", Path(__file__).parent / "assets")
+PACKAGE = Path(__file__).parents[1]
+
+FOLDERS = ("console/", "features/", "web/")
+"""Folders of the package with files for the browser, whose URLs are their paths."""
+
+ASSETS = Path(__file__).parent / "assets"
 
 
 class WebApp:
@@ -111,12 +115,7 @@ async def _key_fits(request: Request) -> Response:
 
 
 def _read_static(name: str) -> File:
-    for folder in STATIC:
-        try:
-            return read_below(folder, name)
-        except NoSuchFile:
-            continue
-    raise NoSuchFile
+    return read_below(PACKAGE if name.startswith(FOLDERS) else ASSETS, name)
 
 
 @asynccontextmanager

@@ -5,9 +5,9 @@ from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import ExitStack, asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
+from webmap.base.errors import WebMapError
 from webmap.core.page import site
 from webmap.core.runtime import runtime
-from webmap.base.errors import WebMapError
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import DriveConnection

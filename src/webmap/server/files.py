@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+from webmap.base.errors import ConfigError
 from webmap.core import pictures as drawn
 from webmap.core.pictures import Pictures
-from webmap.base.errors import ConfigError
 
 MAX_BYTES = 64 * 1024 * 1024
 

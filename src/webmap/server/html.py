@@ -22,9 +22,9 @@ _MADE = """<!doctype html>
   content="width=device-width, initial-scale=1, interactive-widget=resizes-content">
 <title>{title}</title>{key}
 <link rel="icon" href="{base}icon.svg" type="image/svg+xml">
-<link rel="stylesheet" href="{base}webmap.css">
+<link rel="stylesheet" href="{base}web/webmap.css">
 <link rel="stylesheet" href="{base}made_page.css">
-<script type="module" src="{base}page.js"></script>
+<script type="module" src="{base}web/page.js"></script>
 </head>
 <body>
 <div id="webmap_container"></div>
@@ -79,10 +79,10 @@ def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
     """
     seen = _Reader(text)
     first, last = _key_element(key), ""
-    if not seen.has("webmap.css"):
-        first += f'<link rel="stylesheet" href="{escape(base)}webmap.css">'
-    if not seen.has("page.js"):
-        last = f'<script type="module" src="{escape(base)}page.js"></script>'
+    if not seen.has("web/webmap.css"):
+        first += f'<link rel="stylesheet" href="{escape(base)}web/webmap.css">'
+    if not seen.has("web/page.js"):
+        last = f'<script type="module" src="{escape(base)}web/page.js"></script>'
     if not seen.icon:
         last += f'<link rel="icon" href="{escape(base)}icon.svg" type="image/svg+xml">'
     start, end = seen.head()

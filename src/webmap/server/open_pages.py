@@ -12,18 +12,17 @@ from collections.abc import Awaitable, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
+from webmap.base.errors import WireError
+from webmap.base.geometry import Affine
+from webmap.base.scope import Removal
+from webmap.base.tasks import begin
 from webmap.core.page import Page, PageEntry, Viewer
 from webmap.core.pictures import Publisher
 from webmap.core.refused import refusals
 from webmap.core.runtime import Runtime
-from webmap.base.tasks import begin
 from webmap.core.view import Rect
-from webmap.base.errors import WireError
 from webmap.gate.display.client import DriveConnection
-from webmap.base.geometry import Affine
 from webmap.scene.events import Event
-from webmap.base.scope import Removal
-from webmap.server.page_socket import FAILED, PageSocket
 from webmap.scene.wire.messages import (
     ElementEvent,
     Hello,
@@ -34,6 +33,7 @@ from webmap.scene.wire.messages import (
     ViewReport,
 )
 from webmap.scene.wire.session import SceneSession
+from webmap.server.page_socket import FAILED, PageSocket
 
 log = logging.getLogger("webmap.page")
 

@@ -2,14 +2,12 @@
 
 import uuid
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import GoalHandle, Respond
+from webmap.sim.graph_node import Node
 from webmap.sim.navigator import Goal, GoalState
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 _ACTIONLIB_STATUS = {
     GoalState.ACTIVE: 1,
@@ -37,7 +35,7 @@ class _Tracked:
 class ActionlibServer:
     """Takes goals and cancels by topic, and says how they go."""
 
-    def __init__(self, node: "RobotsNode", index: int, prefix: str) -> None:
+    def __init__(self, node: Node, index: int, prefix: str) -> None:
         self.node = node
         self.index = index
         self.topic = f"{prefix}/move_base"
@@ -166,7 +164,7 @@ class NavigateToPose:
 
     type = "nav2_msgs/NavigateToPose"
 
-    def __init__(self, node: "RobotsNode", index: int, prefix: str) -> None:
+    def __init__(self, node: Node, index: int, prefix: str) -> None:
         self.node = node
         self.index = index
         self.action = f"{prefix}/navigate_to_pose"

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose, Quaternion
 from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.tf import Transform
 from webmap.sim.maps import FloorPlan
 from webmap.sim.mounts import LASER_HEIGHT, mount
 from webmap.sim.planner import Point
 from webmap.sim.robot import Robot
 from webmap.sim.scanner import ScannerOptions
-from webmap.ros.tf import Transform
 
 Message = dict[str, Any]
 

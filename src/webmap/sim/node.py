@@ -1,24 +1,22 @@
 """The ROS node of the simulated robots: the world on one side, topics on the other."""
 
 import logging
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from webmap.base.geometry import Pose, Twist
 from webmap.ros.rosbridge.server.encode import Publication
-from webmap.ros.rosbridge.server.graph import Deliver, Graph, Respond
+from webmap.ros.rosbridge.server.graph import Graph, Respond
 from webmap.ros.rosbridge.server.quirks import Quirks
 from webmap.sim.actions import ActionlibServer, NavigateToPose
 from webmap.sim.feeds import Feeds, depth, sonar
-from webmap.sim.messages import Messages, read_pose
+from webmap.sim.graph_node import NODE, Node
 from webmap.sim.mounts import OVER, mount, overhead
 from webmap.sim.navigator import Goal
 from webmap.sim.world import World
 
 log = logging.getLogger("webmap.sim")
 
-NODE = "/robots"
 IMAGE = "camera/image_raw"
 """What the camera's image is called, below the robot's name."""
 
@@ -34,7 +32,7 @@ _STATUS_EVERY = 8
 _SLOW_EVERY = 40
 
 
-class RobotsNode:
+class RobotsNode(Node):
     """Publishes what robots do, and makes them do what they are told.
 
     Args:
@@ -59,15 +57,10 @@ class RobotsNode:
         extras: bool = True,
         tilted: bool = False,
     ) -> None:
-        self.world = world
-        self.tilted = tilted
-        self.graph = graph
-        self.messages = Messages(graph.schema.dialect, nan=world.options.scanner.nan)
+        super().__init__(world, graph, tilted=tilted)
         self._twist = twist
         self._quirks = quirks
         self._steps = 0
-        self.on_step: list[Callable[[], None]] = []
-        """Called five times a second: the actions say how their goals go."""
         self._paths_seen = [0 for _ in world.robots]
         self._feeds = Feeds(self, STEP) if extras else None
         if self._feeds is not None:
@@ -140,18 +133,6 @@ class RobotsNode:
         if self._feeds is None:
             return self.world.robots[index].pose
         return self._feeds.localizations.believed(index)
-
-    def target(self, pose_stamped: dict[str, Any], index: int) -> Pose | None:
-        """Return a goal in the map's frame; None if it is in no frame we know."""
-        at = read_pose(pose_stamped["pose"])
-        frame = pose_stamped["header"]["frame_id"].strip("/")
-        robot = self.world.robots[index]
-        if at is None or frame in ("", "map"):
-            return at
-        if frame in ("odom", f"{robot.frames}odom"):
-            return robot.pose @ robot.odometry.inverse @ at
-        log.warning("%s: a goal in an unknown frame %r", robot.name, frame)
-        return None
 
     # From the graph.
 
@@ -241,15 +222,3 @@ class RobotsNode:
             if (is_new or repeats) and self.graph.is_wanted(topic):
                 now = self.graph.clock()
                 self.publish(topic, self.messages.path(topic, now, navigator.path))
-
-    def publish(self, topic: str, message: dict[str, Any]) -> None:
-        """Publish on a topic of this node."""
-        self.graph.publish(self, topic, message)
-
-    def advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
-        """Let this node publish on a topic."""
-        self.graph.advertise(self, topic, type_name, node=NODE, latch=latch)
-
-    def subscribe(self, topic: str, type_name: str, callback: Deliver) -> None:
-        """Let this node hear a topic."""
-        self.graph.subscribe(self, topic, callback, type_name, node=NODE)

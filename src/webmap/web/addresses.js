@@ -1,7 +1,7 @@
 import { FOLDER } from "./constants.js";
 
-/** Where WebMap's own files and sockets are: beside this one. */
-export const BASE = new URL(".", import.meta.url);
+/** The URL below which WebMap serves its own files and sockets. */
+export const BASE = new URL("..", import.meta.url);
 
 /**
  * Resolve an address that the server gave for a file of the page.

@@ -1,4 +1,4 @@
-// Made by tools/make_javascript.py from webmap/wire/opcodes.py: do not edit.
+// Made by tools/make_javascript.py from webmap/scene/wire/opcodes.py: do not edit.
 
 /** Changes with the tables, so that a page of another version notices. */
 export const VERSION = 26537;

@@ -10,8 +10,8 @@ import pytest
 from module_fakes import header
 from PIL import Image
 
-from webmap.core.pictures import pictures
 from webmap.base.errors import ConfigError, ProtocolError
+from webmap.core.pictures import pictures
 from webmap.features.cameras.camera import Camera, ShownAnyImageMsg, ShownImageMsg
 from webmap.ros.messages_image import CompressedImageMsg, ImageMsg, size_of
 

@@ -11,15 +11,15 @@ from PIL import Image
 
 from camera_server import BOUNDARY, CameraServer, part
 from webmap import Robot
-from webmap.core.pictures import pictures
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
+from webmap.base.scope import Scope, current_scope
+from webmap.core.pictures import pictures
 from webmap.features.cameras import http_camera
 from webmap.features.cameras.http_camera import HttpCamera
 from webmap.ros import image_pull
 from webmap.ros.backoff import Backoff
 from webmap.ros.image_address import parse_address
-from webmap.base.scope import Scope, current_scope
 
 STREAM = "/stream?topic=/camera/image_raw&type=mjpeg"
 

@@ -5,6 +5,7 @@ import os
 
 import pytest
 
+from webmap.base.errors import ConfigError
 from webmap.features.labels.label_store import (
     ICONS,
     Label,
@@ -13,7 +14,6 @@ from webmap.features.labels.label_store import (
     new_label,
     read_labels,
 )
-from webmap.base.errors import ConfigError
 
 DOCK = {"name": "Dock", "x": 1, "y": -2.5, "icon": "charger", "kind": "a-b", "yaw": 3}
 

@@ -5,11 +5,11 @@ import warnings
 import numpy as np
 import pytest
 from module_fakes import header, pose
-from test_modules_cloud import cloud
-from test_modules_fix import DATUM, fix
-from test_modules_frames import tell, transform
-from test_modules_grid import CORNERS, grid
-from test_modules_markers import (
+from test_layers_cloud import cloud
+from test_layers_fix import DATUM, fix
+from test_layers_frames import tell, transform
+from test_layers_grid import CORNERS, grid
+from test_layers_markers import (
     ARROW,
     CUBE,
     CUBES,
@@ -21,9 +21,9 @@ from test_modules_markers import (
     TEXT,
     marker,
 )
-from test_modules_poses import ZEROS, covariance, doubtful, polygon, sonar
-from test_modules_robot import scan
-from test_modules_ways import path
+from test_layers_poses import ZEROS, covariance, doubtful, polygon, sonar
+from test_layers_robot import scan
+from test_layers_ways import path
 
 from webmap.features.layers.laser_scanner import scan_points
 

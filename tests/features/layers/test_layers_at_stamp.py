@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from module_fakes import dots, pose, to_root
-from test_modules_cloud import cloud
-from test_modules_frames import tell
-from test_modules_poses import sonar
+from test_layers_cloud import cloud
+from test_layers_frames import tell
+from test_layers_poses import sonar
 
 from webmap.base.geometry import Affine
 
@@ -74,7 +74,7 @@ def near(points):
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

@@ -10,16 +10,16 @@ import types
 import numpy as np
 import pytest
 from module_fakes import pose, to_root, typed
-from test_modules_frames import tell
+from test_layers_frames import tell
 from tilted_frames import frame
 
 import webmap
-from webmap.modules import declaration
-from webmap.modules.declaration import declarations
+from webmap.base.errors import ConfigError
 from webmap.core.registry import map_modules, robot_modules
 from webmap.discovery import discover
 from webmap.discovery.layers import find_layers
-from webmap.base.errors import ConfigError
+from webmap.modules import declaration
+from webmap.modules.declaration import declarations
 
 ROBOT = {"/a/odom": "nav_msgs/Odometry", "/a/cmd_vel": "geometry_msgs/Twist"}
 
@@ -228,7 +228,10 @@ def test_a_built_in_layer_is_made_of_public_names(declared):
     for node in ast.walk(ast.parse(inspect.getsource(file))):
         if not isinstance(node, ast.ImportFrom) or not node.module:
             continue
-        own = (file.__name__.rpartition(".")[0] + ".", "webmap.features.layers.grid_picture")
+        own = (
+            file.__name__.rpartition(".")[0] + ".",
+            "webmap.features.layers.grid_picture",
+        )
         errors = "webmap.base.errors"
         if not node.module.startswith("webmap") or node.module.startswith(errors):
             continue

@@ -27,7 +27,7 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 HELPERS = """
 const world = () => document.querySelector("svg.webmap .world");
 window.toWorld = (element, x, y) => {

@@ -11,7 +11,7 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "layers" / "layers.py"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "layers" / "layers.py"
 DRAWN = (
     ".occupancy-grid.map > image[href]",
     ".occupancy-grid.costmap > image[href]",

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from module_fakes import header, pose, to_root
-from test_modules_frames import tell, transform
+from test_layers_frames import tell, transform
 
 from webmap.base.errors import ConfigError
 

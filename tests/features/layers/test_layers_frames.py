@@ -4,13 +4,13 @@ import math
 
 import pytest
 from module_fakes import dots, header, image_of, numbers, pose, to_root
-from test_modules_cloud import cloud
-from test_modules_grid import BLACK, CORNERS, grid
-from test_modules_poses import sonar
-from test_modules_ways import in_world, near, path
+from test_layers_cloud import cloud
+from test_layers_grid import BLACK, CORNERS, grid
+from test_layers_poses import sonar
+from test_layers_ways import in_world, near, path
 
-from webmap.poses.frames import _heard
 from webmap.base.geometry import Affine
+from webmap.poses.frames import _heard
 
 
 def transform(parent, child, x, y, yaw, secs=3) -> dict:
@@ -29,7 +29,7 @@ def tell(link, *transforms, static=False) -> None:
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

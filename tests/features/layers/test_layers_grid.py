@@ -9,9 +9,9 @@ import pytest
 from module_fakes import header, image_of, pixel, pose, typed
 
 from webmap import Map
+from webmap.base.geometry import Affine
 from webmap.core.layer import Layer
 from webmap.core.pictures import pictures
-from webmap.base.geometry import Affine
 from webmap.features.layers import occupancy_grid as room
 from webmap.server.files import Published
 

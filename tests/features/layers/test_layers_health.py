@@ -7,9 +7,9 @@ from module_fakes import header
 
 from webmap import Robot
 from webmap.base.errors import ConfigError
+from webmap.base.scope import Scope
 from webmap.features.layers import diagnostics as room
 from webmap.scene import html
-from webmap.base.scope import Scope
 
 
 def status(name, level, message="", **values) -> dict:

@@ -15,7 +15,7 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 WALL, FREE, BLUE = (0, 0, 0), (255, 255, 255), (0, 0, 255)
 LETHAL = pytest.approx((255, 76, 255), abs=3)
 

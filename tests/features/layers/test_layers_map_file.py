@@ -13,10 +13,10 @@ import pytest
 from module_fakes import image_of, pixel
 from PIL import Image
 
-from webmap.core.layer import Layer
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
 from webmap.base.map_file import read_map
+from webmap.core.layer import Layer
 from webmap.sim.maps import load_map
 
 YAML = "image: {image}\nresolution: 0.05\norigin: [-1.25, 2.5, 0]\nnegate: 0\n"

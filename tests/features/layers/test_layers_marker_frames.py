@@ -4,20 +4,20 @@ import math
 
 import pytest
 from module_fakes import pose, to_root
-from test_modules_at_stamp import stamp, transform
-from test_modules_frames import tell
-from test_modules_markers import CUBE, TEXT, marker
+from test_layers_at_stamp import stamp, transform
+from test_layers_frames import tell
+from test_layers_markers import CUBE, TEXT, marker
 
-from webmap.poses.alignment import align_bridge
-from webmap.poses.frames import _heard
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
 from webmap.features.layers.markers import layer as markers
+from webmap.poses.alignment import align_bridge
+from webmap.poses.frames import _heard
 
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

@@ -11,7 +11,7 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 COUNT = """
 window.most = 0;

@@ -4,23 +4,23 @@ import json
 
 import pytest
 from module_fakes import header, pose
-from test_modules_cloud import POINTS, cloud
-from test_modules_fix import fix
-from test_modules_grid import CORNERS, grid, update
-from test_modules_health import array, status
-from test_modules_markers import CUBE, marker
-from test_modules_points import cells, point
-from test_modules_poses import FOOT, covariance, doubtful, polygon, sonar
-from test_modules_ways import path
+from test_layers_cloud import POINTS, cloud
+from test_layers_fix import fix
+from test_layers_grid import CORNERS, grid, update
+from test_layers_health import array, status
+from test_layers_markers import CUBE, marker
+from test_layers_points import cells, point
+from test_layers_poses import FOOT, covariance, doubtful, polygon, sonar
+from test_layers_ways import path
 
 from webmap import Bridge
-from webmap.core.layer import Layer
 from webmap.base.errors import ConfigError, ProtocolError
-from webmap.features.layers.markers.messages import MarkerArrayMsg
-from webmap.features.layers.occupancy_grid import OccupancyGridUpdateMsg
+from webmap.core.layer import Layer
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.grid_cells import GridCellsMsg
+from webmap.features.layers.markers.messages import MarkerArrayMsg
 from webmap.features.layers.nav_sat_fix import NavSatFixMsg
+from webmap.features.layers.occupancy_grid import OccupancyGridUpdateMsg
 from webmap.features.layers.point_cloud import PointCloud2Msg
 from webmap.features.layers.point_stamped import PointStampedMsg
 from webmap.features.layers.polygon import PolygonStampedMsg

@@ -4,9 +4,9 @@ import pytest
 from module_fakes import header, pose
 
 from webmap import Map, Robot
+from webmap.base.errors import ConfigError, ModuleNotFound
 from webmap.core.layer import Layer
 from webmap.modules.map_layer import ShownLayer
-from webmap.base.errors import ConfigError, ModuleNotFound
 
 
 def grids(map: Map) -> list:

@@ -48,7 +48,7 @@ def test_frames_that_are_missing_are_said_a_while_after_the_link_is_up(
 ):
     """Nothing ever comes of them, so nothing but the time makes anybody look."""
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.6)
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.1)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.1)
 
     async def scenario():
         urls, stop = [], asyncio.Event()

@@ -9,23 +9,23 @@ from pathlib import Path
 
 import pytest
 from module_fakes import header, pose, to_root
-from test_modules_frames import tell
+from test_layers_frames import tell
 from tilted_frames import frame
 
 from webmap import Bridge, Map
-from webmap.fleet.watch import LookingForLayers
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
+from webmap.base.errors import ConfigError
 from webmap.console import Console
 from webmap.core.layer import Layer
 from webmap.core.registry import map_modules, robot_modules
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.layers import find_layers
-from webmap.base.errors import ConfigError
 from webmap.features.view.layer_switches import all_layers
+from webmap.fleet.shown import ShownRobots
+from webmap.fleet.stated import Candidate
+from webmap.fleet.watch import LookingForLayers
 
-FILE = Path(__file__).with_name("own_layers.py")
+FILE = Path(__file__).parents[1] / "own_layers.py"
 URL = "ws://hall:9090"
 TOPICS = {
     f"{space}/{name}": type

@@ -6,8 +6,8 @@ import random
 import numpy as np
 import pytest
 from module_fakes import header, matrix_of, numbers, pose, to_root
-from test_modules_frames import tell
-from test_modules_tilted import MAP, SLOPE, mount, sensed
+from test_layers_frames import tell
+from test_layers_tilted import MAP, SLOPE, mount, sensed
 from tilted_frames import frame, taken
 
 from webmap.features.layers.grid_cells import rows_of

@@ -8,10 +8,10 @@ import pytest
 
 from webmap import Robot
 from webmap.base.errors import ProtocolError
+from webmap.base.scope import Removal, keep
 from webmap.features.layers.laser_scanner import check_rays, scan_points
 from webmap.ros.decoding import convert
 from webmap.ros.messages import BatteryStateMsg, LaserScanMsg
-from webmap.base.scope import Removal, keep
 
 
 class Link:

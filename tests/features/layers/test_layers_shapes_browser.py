@@ -15,7 +15,7 @@ from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 PIXELS = """(places) => {
   const m = document.querySelector("svg.webmap .world").getScreenCTM();

@@ -1,14 +1,14 @@
 """Stamps an hour off, over a real socket: drawn all the same, and said once.
 
 What is said names the difference. Stamps that are none at all are refused, which
-``test_modules_bad_from_robot`` has for most types.
+``test_layers_bad_from_robot`` has for most types.
 """
 
 import asyncio
 
 import pytest
 from module_fakes import header, pose
-from test_modules_bad_from_robot import (
+from test_layers_bad_from_robot import (
     DEADLINE,
     NANOSECONDS,
     Scene,
@@ -30,7 +30,7 @@ WAYS = {"ahead": HOUR, "behind": -HOUR}
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Let nothing be said because this process was held up for a second."""
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 60.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 60.0)
 
 
 def at(frame: str, seconds: float) -> dict:
@@ -63,7 +63,7 @@ def drawn_at(scene: Scene, x: float) -> bool:
 def test_a_scan_an_hour_off_is_drawn_and_the_hour_is_said_once(
     map, channel, monkeypatch, way
 ):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     off = scan(1.5, header=at("laser", NOW + WAYS[way]))
 
     async def scenario(scene: Scene) -> None:

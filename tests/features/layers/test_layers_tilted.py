@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from module_fakes import dots, numbers, to_root
-from test_modules_at_stamp import odometry, scan, stamp
-from test_modules_cloud import cloud
-from test_modules_frames import tell
-from test_modules_poses import sonar
-from test_modules_ways import in_world
+from test_layers_at_stamp import odometry, scan, stamp
+from test_layers_cloud import cloud
+from test_layers_frames import tell
+from test_layers_poses import sonar
+from test_layers_ways import in_world
 from tilted_frames import OPTICAL, OVER, frame, matrix, posed, quaternion, taken
 
 from webmap.base.geometry import Quaternion
@@ -24,7 +24,7 @@ POINTS = [[1.0, 0.2, 2.0], [-0.5, 0.1, 1.0], [0.3, -1.5, 3.0], [0.0, 0.3, 5.0]]
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

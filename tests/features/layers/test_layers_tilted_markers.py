@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from module_fakes import numbers, to_root
-from test_modules_at_stamp import stamp
-from test_modules_frames import tell
-from test_modules_markers import (
+from test_layers_at_stamp import stamp
+from test_layers_frames import tell
+from test_layers_markers import (
     ARROW,
     CUBE,
     CUBES,
@@ -22,7 +22,7 @@ from test_modules_markers import (
     marker,
     say,
 )
-from test_modules_tilted import TURNS
+from test_layers_tilted import TURNS
 from tilted_frames import OPTICAL, OVER, frame, matrix, posed, taken
 
 BODY = frame("map", "base_link", (3.0, 1.0, 0.2), (0.05, 0.1, 2.0), 100.0)
@@ -35,7 +35,7 @@ CORNERS = [(1.0, 0.2, 2.0), (-0.5, 0.1, 1.0), (0.3, -1.5, 3.0)]
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

@@ -3,8 +3,8 @@
 import pytest
 from module_fakes import header
 
-from webmap.scene import html
 from webmap.base.scope import Scope
+from webmap.scene import html
 
 ROS1 = {"debug": 1, "info": 2, "warn": 4, "error": 8, "fatal": 16}
 ROS2 = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}

@@ -34,7 +34,7 @@ def state(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def url(state) -> Iterator[str]:
     where = {"WEBMAP_STATE_DIR": str(state)}
-    with page_of(Path(__file__).with_name("page_of_route.py"), **where) as url:
+    with page_of(Path(__file__).parents[1] / "page_of_route.py", **where) as url:
         yield url
 
 
@@ -127,7 +127,7 @@ def test_points_outlive_a_link_that_breaks_for_a_moment(tab):
     expect(tab.locator(".webmap-route-point")).to_have_count(6)
     # What is there now goes with the map that is drawn anew.
     tab.evaluate("document.querySelector('.webmap-route').dataset.old = 'yes'")
-    tab.evaluate("import('/_webmap/page.js').then(({page}) => page._link.renew())")
+    tab.evaluate("import('/_webmap/web/page.js').then(({page}) => page._link.renew())")
     expect(tab.locator(".webmap-route[open]:not([data-old])")).to_be_visible()
     expect(tab.locator(".webmap-route-point")).to_have_count(6)
     expect(tab.locator(".webmap-route-list li")).to_have_count(6)

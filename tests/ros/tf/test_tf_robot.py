@@ -8,9 +8,9 @@ import msgspec
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.poses.frames import frames_of
 from webmap.base.errors import ConfigError
 from webmap.base.scope import Removal
+from webmap.poses.frames import frames_of
 from webmap_process import simulator
 
 
@@ -67,7 +67,7 @@ def odometry(x, y=0.0, yaw=0.0, *, stamp=10.0, frame="odom"):
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.placing.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

@@ -7,10 +7,10 @@ import pytest
 from test_tf_robot import Link, odometry, transform
 
 from webmap import Robot
-from webmap.poses.frames import FrameFaults, lasting
-from webmap.poses.placing import Lasting, PoseReading
-from webmap.poses.pipeline import Jumps
 from webmap.base.geometry import Quaternion, Vector3
+from webmap.poses.frames import FrameFaults, Lasting, lasting
+from webmap.poses.pipeline import Jumps
+from webmap.poses.placing import PoseReading
 from webmap.ros.tf import Buffer
 
 

@@ -22,7 +22,7 @@ from webmap.scene.wire.session import SceneSession
 
 HERE = Path(__file__).parent
 GOLDEN = HERE / "golden"
-DECODER = HERE.parent / "web" / "decode.mjs"
+DECODER = HERE.parents[1] / "web" / "decode.mjs"
 
 
 class Decoder:

@@ -9,7 +9,13 @@ from webmap.scene import html, svg
 from webmap.scene.allowed import ATTRIBUTES
 from webmap.scene.bound import Document
 from webmap.scene.fragment import Fragment
-from webmap.scene.wire.encode import _SLOTS, encode_changes, encode_snapshot, string, varint
+from webmap.scene.wire.encode import (
+    _SLOTS,
+    encode_changes,
+    encode_snapshot,
+    string,
+    varint,
+)
 from webmap.scene.wire.opcodes import TAGS, Op
 
 

@@ -1,7 +1,7 @@
 // Maps as the scene makes them, with the modules under test and a fake of the gate.
 
-import { Drive } from "/_webmap/drive.js";
-import { MapCanvas } from "/_webmap/map.js";
+import { Drive } from "/_webmap/web/drive.js";
+import { MapCanvas } from "/_webmap/web/map.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const query = new URLSearchParams(location.search);
@@ -116,10 +116,10 @@ async function makeMap(number) {
   map.halves = [];
   const styles = [];
   for (const name of modules) {
-    const { default: attach } = await import(`/_webmap/modules/${name}.js`);
+    const { default: attach } = await import(`/_webmap/features/${name}.js`);
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.href = `/_webmap/modules/${name}.css`;
+    link.href = `/_webmap/features/${name}.css`;
     styles.push(new Promise((resolve) => link.addEventListener("load", resolve)));
     document.head.append(link);
     map.halves.push(attach(map, options, (message) => map.sent.push(message)));

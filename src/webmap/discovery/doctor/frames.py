@@ -1,8 +1,8 @@
 """Whether the frames lead from the map to a robot; without I/O."""
 
-from webmap.discovery.tf_robots import MAP
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Quaternion, Vector3
+from webmap.discovery.tf_robots import MAP
 from webmap.ros.messages import TFMessage
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.tf import Buffer, Transform, TransformError

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import msgspec
 
+from webmap.base.errors import ProtocolError
+from webmap.base.scope import no_scope
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.observed import Heard
-from webmap.base.errors import ProtocolError
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.subscriptions import Encoding
-from webmap.base.scope import no_scope
 
 ENOUGH = 4
 """Messages after which a topic is left: three times between two of them."""

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from webmap.base.errors import ConfigError
 from webmap.discovery.found import Findings, FoundRobot, Guess, Role
 from webmap.discovery.naming import free_name
 from webmap.discovery.rules import VELOCITY
-from webmap.base.errors import ConfigError
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.tf import Buffer
 

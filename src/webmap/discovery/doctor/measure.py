@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
-from webmap.ros.asking import ask_topics
+from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import listen, sample
 from webmap.discovery.doctor.meant import MeantRobot, lay_over
@@ -20,7 +20,7 @@ from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.found import Findings, FoundRobot
 from webmap.discovery.hearing import LateFrames, frame_topics
 from webmap.discovery.robots import discover, host_name
-from webmap.base.errors import BridgeClosed, BridgeError
+from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.names import is_type
 from webmap.ros.received import ReceivedMessage
@@ -114,7 +114,9 @@ async def observe(
                 progress("Asking for the time, and who writes and who listens.")
                 seen = await _ask(seen, bridge)
                 if ask_parameters:
-                    link = await checks.asked_about_threads(seen.link, bridge)
+                    link = await checks.asked_about_threads(
+                        seen.link, bridge.call_service
+                    )
                     seen = replace(seen, link=link)
             if try_call:
                 progress(TRYING)

@@ -16,14 +16,14 @@ from typing import Any, Literal, TypeAlias
 import click
 
 from webmap.base.echo import echo
-from webmap.discovery import FoundRobot, discover
-from webmap.ros.asking import ask_topics
-from webmap.discovery.robots import host_name
 from webmap.base.errors import BridgeError, ConfigError
+from webmap.base.outside_text import escaped
+from webmap.discovery import FoundRobot, discover
+from webmap.discovery.robots import host_name
 from webmap.gate.display.client import GateClient
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.stoptest import MOVES_ON
-from webmap.base.outside_text import escaped
+from webmap.ros.asking import ask_topics
 from webmap.ros.names import normalise_url
 
 PERIOD = 0.05

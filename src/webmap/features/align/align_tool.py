@@ -4,6 +4,11 @@ import asyncio
 import logging
 from typing import TYPE_CHECKING, Any
 
+from webmap.base.errors import ConfigError
+from webmap.base.geometry import Pose
+from webmap.base.tasks import spawn
+from webmap.core.alignment_store import name_of, store
+from webmap.core.registry import map_modules
 from webmap.poses.alignment import (
     align_bridge,
     alignment,
@@ -11,10 +16,6 @@ from webmap.poses.alignment import (
     numbers,
     toml_line,
 )
-from webmap.core.alignment_store import name_of, store
-from webmap.base.tasks import spawn
-from webmap.base.errors import ConfigError
-from webmap.base.geometry import Pose
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -28,6 +29,7 @@ MOVING = ("driving", "stopping")
 """The states of a robot that somebody drives."""
 
 
+@map_modules.register
 class AlignTool:
     """Lays the map of the selected robot, or of all behind its bridge, onto the map.
 

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from webmap.base.errors import ConfigError, WebMapError
+from webmap.base.scope import Removable, Removal, Scope, keep
+from webmap.base.tasks import spawn
 from webmap.config.buttons import read_buttons
 from webmap.core.page import page_of
+from webmap.core.registry import robot_modules
 from webmap.features.buttons.robot_button import RobotButton, declared_motion, values_of
-from webmap.base.tasks import spawn
-from webmap.base.errors import ConfigError, WebMapError
 from webmap.ros.bridge import Bridge
 from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
@@ -18,7 +20,6 @@ from webmap.ros.message_forms import entry_of, filled_in, hint, initial, leaves
 from webmap.scene import html
 from webmap.scene.element import Element
 from webmap.scene.events import Event
-from webmap.base.scope import Removable, Removal, Scope, keep
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -314,6 +315,7 @@ def _at(message: Mapping[str, Any], path: str) -> Any:
     return value
 
 
+@robot_modules.register
 class Buttons:
     """Offers buttons: each calls a service, publishes a message or sets a parameter.
 

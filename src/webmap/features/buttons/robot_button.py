@@ -6,14 +6,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+from webmap.base.errors import MotionRefused, ServiceError, WebMapError
+from webmap.base.scope import Removable, Removal, keep
 from webmap.config.buttons import ButtonSpec, motion_of, value_kind
 from webmap.core.motion import roads
-from webmap.base.errors import MotionRefused, ServiceError, WebMapError
 from webmap.ros.bridge import Bridge
 from webmap.ros.definitions import Field
 from webmap.ros.message_forms import checked, fields_of
 from webmap.ros.names import same_type
-from webmap.base.scope import Removable, Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

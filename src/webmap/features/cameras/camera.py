@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import msgspec
 
-from webmap.features.cameras.camera_feed import CameraFeed
-from webmap.core.problems import refusing
-from webmap.base.tasks import spawn
 from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.scope import Scope, no_scope
+from webmap.base.tasks import spawn
+from webmap.core.problems import refusing
+from webmap.core.registry import robot_modules
+from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_image import AnyImageMsg, CompressedImageMsg, ImageMsg
 from webmap.ros.names import split_type
-from webmap.base.scope import Scope, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -72,6 +73,7 @@ PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
 """Names of raw pictures, by the convention of image_transport."""
 
 
+@robot_modules.register
 class Camera(CameraFeed):
     """Takes the newest picture of a camera, for everybody who watches it.
 

@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from webmap.core.pictures import pictures
 from webmap.base.scope import Removable, Removal, current_scope, keep, no_scope
+from webmap.core.pictures import pictures
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

@@ -4,17 +4,13 @@ import itertools
 import math
 import time
 import weakref
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
-from webmap.console.robot_list import AGE_LIMIT
+from webmap.features.cameras.camera_feed import AGE_LIMIT
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
-
-PARTS = ("camera_view.js", "dom.js")
-"""What camera_panel.js imports; a browser can load what was published."""
 
 _numbers = itertools.count(1)
 _number_of: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
@@ -99,11 +95,11 @@ class CameraPanel:
         self._told: dict[str, Any] | None = None
         self._watched: Any = None
         self._watching: Any = None
-        folder = Path(__file__).parent
-        for name in PARTS:
-            map.page.asset(folder / name)
         self.half = map.add_browser_half(
-            self, folder / "camera_panel.js", {}, folder / "cameras.css"
+            self,
+            "features/cameras/camera_panel.js",
+            {},
+            "features/cameras/cameras.css",
         )
 
     def destroy(self) -> None:

@@ -2,9 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.lifecycle import lifecycle
+from webmap.core.registry import robot_modules
+from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import Pull
 from webmap.ros.messages_image import CompressedImageMsg
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 
+@robot_modules.register
 class HttpCamera(CameraFeed):
     """Pulls the pictures of a camera over HTTP, once for everybody who watches.
 

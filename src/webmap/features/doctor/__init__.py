@@ -1,1 +1,5 @@
-"""doctor."""
+"""The diagnosis of a bridge on the page.
+
+Open ``doctor_panel.py`` first. The rules of the diagnosis are in
+``webmap.discovery.doctor``.
+"""

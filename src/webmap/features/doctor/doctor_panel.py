@@ -7,15 +7,13 @@ import math
 import time
 import weakref
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from webmap import html, svg
-from webmap.features.doctor.in_use import in_use
-from webmap.console.words import icon
 from webmap.discovery.doctor import Finding, MeantRobot, Observed, judge
 from webmap.discovery.doctor.measure import TRYING, observe, tried
 from webmap.discovery.doctor.verdict import report as report_text
+from webmap.features.doctor.in_use import in_use
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Map
@@ -50,8 +48,12 @@ class DoctorReports:
         self, map: "Map", element: "Element", bridges: Sequence["Bridge"]
     ) -> None:
         self.map = map
-        folder = Path(__file__).parent
-        map.add_browser_half(self, folder / "doctor.js", {}, folder / "doctor.css")
+        map.add_browser_half(
+            self,
+            "features/doctor/doctor_panel.js",
+            {},
+            "features/doctor/doctor_panel.css",
+        )
         self._reports = [Report(bridge, map) for bridge in bridges]
         self.buttons = [report.opener for report in self._reports]
         """For each bridge what opens its report, and makes the first."""
@@ -84,9 +86,7 @@ class Report:
         self.opener.set("popovertarget", where)
         self.opener.set("aria-label", f"Check {name}: what is in the way of driving")
         self.opener.on("click", lambda event: self._opened())
-        close = html.button(
-            icon("icon-close"), type="button", class_="button square quiet"
-        )
+        close = html.button(_close_icon(), type="button", class_="button square quiet")
         close.set("popovertarget", where).set("aria-label", "Close the report")
         self._doing = html.span()
         self._age = html.span(class_="age")
@@ -164,6 +164,12 @@ def line(finding: "Finding") -> "Element":
     """Return one finding: a shape, a word, what is so, and what to do."""
     return entry(
         finding.level, f"{WORDS[finding.level]}: ", finding.words, finding.advice
+    )
+
+
+def _close_icon() -> "Element":
+    return svg.svg(svg.use(href="#icon-close"), class_="icon").set(
+        "aria-hidden", "true"
     )
 
 

@@ -3,10 +3,13 @@
 import math
 from typing import TYPE_CHECKING, Any
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class Teleop:
     """W, A, S and D, or the arrows, drive the selected robot of this map.
 

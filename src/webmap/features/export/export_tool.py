@@ -2,12 +2,15 @@
 
 from typing import TYPE_CHECKING, Any
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 MAX_WORDS = 200
 
 
+@map_modules.register
 class ExportTool:
     """Saves what is seen of the map as SVG or PNG, on the viewer's own machine.
 

@@ -1,1 +1,4 @@
-"""goals."""
+"""Goals and initial poses: an operator points on the map, and the robot gets a pose.
+
+Open ``goal_tool.js`` first. The gate sends goals to robots.
+"""

@@ -4,6 +4,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.given_pose import robot_and_pose
+from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -16,6 +17,7 @@ SPACING = (0.3, 20.0)
 """Metres between robots that are sent together, the least and the most."""
 
 
+@map_modules.register
 class GoalTool:
     """A press on the map is where the selected robot goes, a drag how it stands there.
 

@@ -4,6 +4,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from webmap.core.given_pose import robot_and_pose
+from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.modules.initial_pose")
 
 
+@map_modules.register
 class InitialPoseTool:
     """A press on the map is where the selected robot is, a drag which way it looks.
 

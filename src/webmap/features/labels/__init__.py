@@ -1,1 +1,4 @@
-"""labels."""
+"""Labels: named places on the map, which operators add, move and remove.
+
+Open ``labels.py`` first; ``label_store.py`` reads and writes the files.
+"""

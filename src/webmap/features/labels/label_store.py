@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from webmap.config.checks import did_you_mean
 from webmap.base.errors import ConfigError
 from webmap.base.identifiers import generate_id
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
+from webmap.config.checks import did_you_mean
 
 ICONS = {
     "pin": "M12 21c-4-4.4-6-7.7-6-10.800a6 6 0 0 1 12 0c0 3.1-2 6.4-6 10.800z"

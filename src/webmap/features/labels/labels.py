@@ -6,7 +6,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from webmap.base.errors import ConfigError
+from webmap.base.scope import Removal, keep
+from webmap.base.tasks import spawn
 from webmap.core.given_pose import robot_and_pose
+from webmap.core.layer import Layer
+from webmap.core.registry import map_modules
 from webmap.features.labels.label_store import (
     ICONS,
     MAX_LABELS,
@@ -18,13 +23,9 @@ from webmap.features.labels.label_store import (
     new_label,
     read_labels,
 )
-from webmap.core.layer import Layer
-from webmap.base.tasks import spawn
-from webmap.base.errors import ConfigError
 from webmap.gate.kept.locks import state_folder
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -262,6 +263,7 @@ MAY_ADD = ("operator", "admin")
 """Roles of viewers who may."""
 
 
+@map_modules.register
 class Labels:
     """Shows places with their names, upright and as large at every zoom.
 

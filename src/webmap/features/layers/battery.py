@@ -4,9 +4,10 @@ import math
 import time
 from typing import TYPE_CHECKING
 
+from webmap.base.scope import Removal, keep
+from webmap.core.registry import robot_modules
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import BatteryStateMsg
-from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -15,6 +16,7 @@ FULL = 1.2
 """What a full battery may say at the most: gauges that are not calibrated say more."""
 
 
+@robot_modules.register
 class Battery:
     """Follows a ``sensor_msgs/BatteryState`` and fires ``on_battery_update``.
 

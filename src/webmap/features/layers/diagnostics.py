@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 import msgspec
 
-from webmap.modules.declaration import FoundTopic, TopicKind, layer
-from webmap.core.problems import refusing
 from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.scope import Removal, keep
+from webmap.core.problems import refusing
+from webmap.core.registry import robot_modules
+from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Stamped
 from webmap.scene import html, svg
 from webmap.scene.element import Element
-from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -174,6 +175,7 @@ class Health:
     """Whether several robots follow the topic and its name is of none of them."""
 
 
+@robot_modules.register
 @layer(
     "diagnostic_msgs/DiagnosticArray",
     view=DiagnosticArrayMsg,

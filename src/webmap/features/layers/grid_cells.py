@@ -3,15 +3,15 @@
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, in_space, thinned
 from webmap.modules.layer_options import Count, Frame
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST
 from webmap.ros.messages import PointMsg, Stamped
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 if TYPE_CHECKING:
     import numpy as np

@@ -4,16 +4,16 @@ import math
 from dataclasses import KW_ONLY
 from typing import TYPE_CHECKING, Annotated, Any
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST
 from webmap.config.robot import scan_name
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.drawing import in_units, levelled
 from webmap.modules.layer_options import Limit
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST
 from webmap.ros.messages import LaserScanMsg
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 if TYPE_CHECKING:
     import numpy as np

@@ -4,17 +4,24 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from webmap.features.layers.grid_picture import Palette, check_palette, draw_aside, place_grid
-from webmap.core.layer import Layer
-from webmap.core.pictures import Picture
-from webmap.base.tasks import spawn
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.map_file import MapImage, read_map
+from webmap.base.tasks import spawn
+from webmap.core.layer import Layer
+from webmap.core.pictures import Picture
+from webmap.core.registry import map_modules
+from webmap.features.layers.grid_picture import (
+    Palette,
+    check_palette,
+    draw_aside,
+    place_grid,
+)
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class MapFile:
     """Draws a map that ROS's map_server would serve: a YAML file and its image.
 

@@ -5,11 +5,11 @@ import time
 
 import msgspec
 
-from webmap.modules.declaration import TopicKind, layer
-from webmap.base.local_plane import LocalPlane
-from webmap.modules.robot_layer import RobotLayer
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.local_plane import LocalPlane
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.robot_layer import RobotLayer
 from webmap.ros.messages import Stamped
 from webmap.scene import svg
 

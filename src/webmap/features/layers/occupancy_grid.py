@@ -4,7 +4,11 @@ import asyncio
 import math
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from webmap.modules.declaration import FoundTopic, TopicKind, layer
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST
+from webmap.base.tasks import spawn
+from webmap.core.pictures import Picture
+from webmap.core.problems import refusing
 from webmap.features.layers.grid_picture import (
     Palette,
     check_palette,
@@ -12,12 +16,8 @@ from webmap.features.layers.grid_picture import (
     grid_png,
     place_grid,
 )
+from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.map_layer import MapLayer
-from webmap.core.pictures import Picture
-from webmap.core.problems import refusing
-from webmap.base.tasks import spawn
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST
 from webmap.ros.messages import (
     Int8s,
     MapMetaDataMsg,

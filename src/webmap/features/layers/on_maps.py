@@ -3,15 +3,16 @@
 import inspect
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.module_arguments import check_arguments
-from webmap.core.registry import map_modules
 from webmap.base.errors import ModuleNotFound, WebMapError
+from webmap.core.module_arguments import check_arguments
+from webmap.core.registry import map_modules, robot_modules
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
     from webmap.core.robot import Robot
 
 
+@robot_modules.register
 class OnMaps:
     """Gives every map that shows the robot a module, as long as it shows it.
 

@@ -4,14 +4,14 @@ import math
 from itertools import pairwise
 from typing import Annotated
 
+from webmap.base.geometry import Vector3
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space, rounded, thinned
 from webmap.modules.layer_options import Limit
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.geometry import Vector3
 from webmap.ros.messages import PathMsg
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 
 @layer(

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import msgspec
 
+from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.geometry import FARTHEST
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import in_units, levelled
 from webmap.modules.layer_options import Count, Frame, Limit
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ConfigError, ProtocolError
-from webmap.base.geometry import FARTHEST
 from webmap.ros.messages import Numbers, Stamped
+from webmap.ros.tf import Transform
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.ros.tf import Transform
 
 if TYPE_CHECKING:
     import numpy as np

@@ -2,15 +2,15 @@
 
 import math
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Vector3
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import flat, rounded
 from webmap.modules.layer_options import Frame, Metres
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST, Vector3
 from webmap.ros.messages import PointMsg, Stamped
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 
 class PointStampedMsg(Stamped, frozen=True, kw_only=True):

@@ -2,16 +2,16 @@
 
 import msgspec
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import Vector3
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space, rounded
 from webmap.modules.layer_options import Frame, Seconds
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import Vector3
 from webmap.ros.limits import check_items
 from webmap.ros.messages import PointMsg, Stamped
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 MAX_POINTS = 10_000
 

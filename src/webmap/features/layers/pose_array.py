@@ -4,14 +4,14 @@ import math
 
 import msgspec
 
+from webmap.base.geometry import Pose
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import thinned
 from webmap.modules.layer_options import Count, Frame, Metres
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.geometry import Pose
 from webmap.ros.messages import PoseMsg, Stamped
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 
 class PoseArrayMsg(Stamped, frozen=True, kw_only=True):

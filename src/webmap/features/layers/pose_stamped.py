@@ -2,13 +2,13 @@
 
 import math
 
+from webmap.base.geometry import Pose
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.layer_options import Frame, Metres
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.geometry import Pose
 from webmap.ros.messages import PoseStampedMsg
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 
 @layer(

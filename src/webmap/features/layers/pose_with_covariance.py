@@ -5,15 +5,15 @@ from typing import Annotated
 
 import msgspec
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Pose
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import sector
 from webmap.modules.layer_options import Limit
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST, Pose
 from webmap.ros.messages import PoseMsg, Stamped
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 AMCL, ODOMETRY = "geometry_msgs/PoseWithCovarianceStamped", "nav_msgs/Odometry"
 

@@ -3,14 +3,14 @@
 import math
 from dataclasses import KW_ONLY
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import cone, sector
 from webmap.modules.robot_layer import RobotLayer
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST
 from webmap.ros.messages import Stamped
-from webmap.scene import svg
 from webmap.ros.tf import Transform
+from webmap.scene import svg
 
 LEVEL = 0.02
 """Sine of the angle up or down below which a sensor is said to look ahead."""

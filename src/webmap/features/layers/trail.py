@@ -4,9 +4,10 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
+from webmap.base.errors import ConfigError
+from webmap.core.registry import robot_modules
 from webmap.modules.drawing import rounded
 from webmap.modules.placed import Placed
-from webmap.base.errors import ConfigError
 from webmap.scene import svg
 from webmap.scene.element import Element
 
@@ -17,6 +18,7 @@ PIECE = 50
 """Points after which a piece of the trail is done with and never sent again."""
 
 
+@robot_modules.register
 class Trail:
     """Draws where the robot was, as a line behind it.
 

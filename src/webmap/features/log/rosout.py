@@ -5,13 +5,14 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from webmap.core.problems import refusing
 from webmap.base.errors import ConfigError
+from webmap.base.scope import Removal, keep
+from webmap.core.problems import refusing
+from webmap.core.registry import robot_modules
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_log import LEVELS, LogMsg
 from webmap.scene import html
 from webmap.scene.element import Element
-from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -38,6 +39,7 @@ class Line:
     """When it came, in monotonic seconds."""
 
 
+@robot_modules.register
 class Rosout:
     """Follows what nodes log, keeps the newest lines, and fires ``on_rosout(line)``.
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from webmap.base.errors import ConfigError
+from webmap.base.scope import Removable, Removal, keep, no_scope
+from webmap.core.registry import map_modules
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_log import LEVELS, LogMsg
-from webmap.base.scope import Removable, Removal, keep, no_scope
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -120,6 +121,7 @@ PERIOD = 0.25
 """Seconds between two looks for new lines, while the panel is open."""
 
 
+@map_modules.register
 class RosoutPanel:
     """A panel that unfolds into the newest lines of ``/rosout``, of each bridge.
 

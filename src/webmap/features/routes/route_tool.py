@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from webmap.base.tasks import spawn
 from webmap.base.errors import ConfigError
-from webmap.gate.kept.locks import state_folder
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
+from webmap.base.tasks import spawn
+from webmap.core.registry import map_modules
+from webmap.gate.kept.locks import state_folder
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -170,6 +171,7 @@ class RouteStore:
             raise ConfigError(f"{self.file} cannot be written: {error}") from error
 
 
+@map_modules.register
 class RouteTool:
     """Routes of waypoints: drawn on the map, kept by name, gone along by a robot.
 

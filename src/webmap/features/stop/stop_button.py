@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class StopButton:
     """A large red button that stops robots, whoever drives them.
 
@@ -21,5 +24,8 @@ class StopButton:
     def __init__(self, map: "Map", *, place: str = "") -> None:
         self.map = map
         self.half = map.add_browser_half(
-            self, "features/stop/stop_button.js", {"place": place}, "features/stop/stop_button.css"
+            self,
+            "features/stop/stop_button.js",
+            {"place": place},
+            "features/stop/stop_button.css",
         )

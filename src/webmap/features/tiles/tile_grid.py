@@ -8,8 +8,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from webmap.base.local_plane import REACH, LocalPlane
 from webmap.base.geometry import Affine
+from webmap.base.local_plane import REACH, LocalPlane
 
 MAX_ZOOM = 24
 WORLD = 40_075_016.686

@@ -5,16 +5,17 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from webmap.base.errors import ConfigError
 from webmap.base.local_plane import LocalPlane
-from webmap.core.pictures import pictures
+from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
+from webmap.core.pictures import pictures
+from webmap.core.registry import map_modules
 from webmap.features.tiles.tile_grid import OVERLAP, Tile, TileGrid
 from webmap.features.tiles.tile_source import open_tiles
-from webmap.base.errors import ConfigError
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.fragment import Fragment
-from webmap.base.scope import Removal, keep
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -34,6 +35,7 @@ class _Shown(NamedTuple):
     url: str
 
 
+@map_modules.register
 class TileLayer:
     """Draws satellite or street tiles from a folder or an MBTiles file.
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from webmap.features.tiles.tile_grid import MAX_ZOOM, Tile
 from webmap.base.errors import ConfigError
+from webmap.features.tiles.tile_grid import MAX_ZOOM, Tile
 
 LARGEST = 4 << 20
 """Bytes that one tile may have."""

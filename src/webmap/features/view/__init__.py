@@ -1,1 +1,4 @@
-"""view."""
+"""The view: moving and zooming, following a robot, grid, scale bar and layer switches.
+
+Open ``mouse_view_control.js`` first. The map itself is in ``web/map.js``.
+"""

@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING, Any
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class Follow:
     """A button that keeps the selected robot where it is on the screen.
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from webmap.modules.declaration import declarations
 from webmap.base.errors import ConfigError
+from webmap.core.registry import map_modules
+from webmap.modules.declaration import declarations
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -43,6 +44,7 @@ def all_layers() -> dict[str, str]:
     return {name: ", ".join(said) for name, said in selectors.items()}
 
 
+@map_modules.register
 class LayerSwitches:
     """A list of what the map shows, each to be switched on and off.
 

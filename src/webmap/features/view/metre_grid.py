@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class MetreGrid:
     """Draws quiet lines under the map, a round number of metres apart.
 
@@ -26,5 +29,8 @@ class MetreGrid:
             raise ValueError(f"MetreGrid: least must be at least 4 pixels, got {least}")
         self.map = map
         self.half = map.add_browser_half(
-            self, "features/view/metre_grid.js", {"least": least}, "features/view/metre_grid.css"
+            self,
+            "features/view/metre_grid.js",
+            {"least": least},
+            "features/view/metre_grid.css",
         )

@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class MouseViewControl:
     """Drag moves the view, the wheel zooms, shift and the wheel turn.
 

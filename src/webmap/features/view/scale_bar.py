@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from webmap.core.registry import map_modules
+
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class ScaleBar:
     """Shows how long a round number of metres is at the current zoom.
 
@@ -23,5 +26,8 @@ class ScaleBar:
             raise ValueError(f"ScaleBar: width must be at least 20 pixels, got {width}")
         self.map = map
         self.half = map.add_browser_half(
-            self, "features/view/scale_bar.js", {"width": width}, "features/view/scale_bar.css"
+            self,
+            "features/view/scale_bar.js",
+            {"width": width},
+            "features/view/scale_bar.css",
         )

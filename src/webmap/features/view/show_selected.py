@@ -2,12 +2,14 @@
 
 from typing import TYPE_CHECKING
 
+from webmap.core.registry import map_modules
 from webmap.scene.element import Element
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
 
+@map_modules.register
 class ShowSelected:
     """Shows the name of the selected robot in an element of the page.
 

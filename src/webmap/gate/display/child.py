@@ -13,9 +13,9 @@ import msgspec
 
 from webmap.base.children import python_command
 from webmap.base.errors import WireError
+from webmap.base.outside_text import one_line
 from webmap.gate import framing
 from webmap.gate.messages import FromGate
-from webmap.base.outside_text import one_line
 
 log = logging.getLogger("webmap.gate")
 

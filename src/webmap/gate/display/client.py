@@ -13,6 +13,8 @@ import time
 from collections.abc import Callable
 
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Twist
+from webmap.base.scope import Removal
 from webmap.gate import commands, framing, messages
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramRoad
@@ -22,8 +24,6 @@ from webmap.gate.malformed_stop import begins_like_stop, robot_in
 from webmap.gate.messages import FromGate, Report, RobotSpec, Role
 from webmap.gate.refusal import Refusal
 from webmap.gate.specs import checked
-from webmap.base.geometry import Twist
-from webmap.base.scope import Removal
 
 __all__ = ["DriveConnection", "GateClient"]
 

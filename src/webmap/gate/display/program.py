@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable
 
 from webmap.base.errors import MotionError, NoLease
+from webmap.base.geometry import Twist
 from webmap.gate import messages
 from webmap.gate.messages import PROGRAM
-from webmap.base.geometry import Twist
 
 LEAST_PAUSE = 0.01
 """The least time between two velocities for one robot, in seconds; a program that gives

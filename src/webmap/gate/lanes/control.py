@@ -3,12 +3,12 @@
 import math
 from collections.abc import Callable
 
+from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import Alive, Echoed, Event, Key, LinkDown, LinkUp
 from webmap.gate.lanes import words
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.unproven import Unproven
-from webmap.base.geometry import Twist
 from webmap.ros.rosbridge import ops
 
 BUSY_PING = 0.05

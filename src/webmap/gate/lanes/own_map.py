@@ -3,9 +3,9 @@
 from dataclasses import replace
 from typing import TypeVar
 
+from webmap.base.geometry import Pose
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.messages import RobotSpec
-from webmap.base.geometry import Pose
 
 Place = TypeVar("Place", SendGoal, TellPose)
 

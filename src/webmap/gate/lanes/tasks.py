@@ -14,6 +14,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable
 
+from webmap.base.identifiers import generate_id
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
 from webmap.gate.lanes import navigation, words
@@ -23,7 +24,6 @@ from webmap.gate.lanes.own_map import in_own_map
 from webmap.gate.lanes.sockets import Ears, Socket
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.goals import is_move_base
-from webmap.base.identifiers import generate_id
 from webmap.ros.rosbridge import ops
 
 log = logging.getLogger("webmap.gate")

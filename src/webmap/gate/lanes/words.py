@@ -11,10 +11,10 @@ from typing import Any
 
 import msgspec
 
+from webmap.base.geometry import Quaternion, Twist
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.lanes.reading import check_parts, plain, too_deep
 from webmap.gate.messages import RobotSpec
-from webmap.base.geometry import Quaternion, Twist
 from webmap.ros.names import is_type
 from webmap.ros.rosbridge import ops
 

@@ -18,12 +18,12 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
 from webmap.gate.messages import AssistSpec, Point
 from webmap.gate.rules import folding
 from webmap.gate.rules.sweptway import Fan, looks_ahead
 from webmap.gate.rules.touching import time_straight, time_turning
-from webmap.base.geometry import Twist
 
 FRESH = 0.3
 """The oldest scan that counts, in seconds since it arrived."""

@@ -18,6 +18,7 @@ until a reset, which leads to *free*.
 
 from typing import Literal
 
+from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, Say
 from webmap.gate.events import Key, LockState, Press, Wrote, WroteGoal
 from webmap.gate.messages import RobotSpec, SentTwist
@@ -37,7 +38,6 @@ from webmap.gate.rules.sight import Sight
 from webmap.gate.rules.speeds import Speeds
 from webmap.gate.rules.standing import StandingStop
 from webmap.gate.rules.stoptesting import StopTesting
-from webmap.base.geometry import Twist
 
 OWED_PATIENCE = 60.0
 """Seconds for which a robot that was removed is kept for a zero that it is owed. After

@@ -1,5 +1,6 @@
 """Whether a machine has stopped after STOP: confirmed, not confirmed, not known yet."""
 
+from webmap.base.geometry import Twist
 from webmap.gate.rules.standstill import (
     GAP,
     STILL_FOR,
@@ -8,7 +9,6 @@ from webmap.gate.rules.standstill import (
     Standstill,
     moves,
 )
-from webmap.base.geometry import Twist
 
 PATIENCE = 2.0
 """Seconds after STOP until "not known yet" becomes "not confirmed"."""

@@ -1,5 +1,6 @@
 """What the commands of a machine's driver come to. No I/O."""
 
+from webmap.base.geometry import Twist
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.arming import Arming
 from webmap.gate.rules.hands import Hands
@@ -8,7 +9,6 @@ from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.robots import Robots
 from webmap.gate.rules.stoptest import CREEP, StopTest
 from webmap.gate.rules.stoptesting import StopTesting
-from webmap.base.geometry import Twist
 
 
 class Driving:

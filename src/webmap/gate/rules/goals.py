@@ -2,13 +2,13 @@
 
 import msgspec
 
+from webmap.base.identifiers import generate_id
 from webmap.gate.actions import CancelGoals, Emit, SendGoal, TellPose
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, WroteGoal
 from webmap.gate.messages import GoalReport, RobotSpec, Way
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.motion import WAIT_LIMIT
-from webmap.base.identifiers import generate_id
 from webmap.ros.names import is_type
 
 MOVE_BASE = "move_base_msgs/MoveBaseAction"

@@ -2,10 +2,10 @@
 
 import msgspec
 
+from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
 from webmap.gate.rules.assist import FREE, Verdict, assist
 from webmap.gate.rules.robots import Robots
-from webmap.base.geometry import Twist
 
 MIXED = 2.0
 """Seconds for which no scan of a topic counts after its frame was seen to change."""

@@ -9,10 +9,10 @@
 While it changes hands nobody has it, and zero is all that is written.
 """
 
+from webmap.base.geometry import Twist
 from webmap.gate.refusal import Refusal
 from webmap.gate.rules.connection import Connection
 from webmap.gate.rules.standstill import Standstill
-from webmap.base.geometry import Twist
 
 ASKING = 10.0
 """Seconds after which a holder who does not answer has granted it."""

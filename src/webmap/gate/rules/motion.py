@@ -6,13 +6,13 @@ The only thing that a timer writes here is zero.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
 from webmap.gate.events import Key, Wrote
 from webmap.gate.limits import PLANE, Axes, Speed, fit, ramp
 from webmap.gate.rules.burst import HELD_LENGTH, HELD_PERIOD, NEW_LINK_LENGTH, Burst
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.lease import Lease
-from webmap.base.geometry import Twist
 
 WRITE_INTERVAL = 0.02
 """The shortest time between two moving commands on the wire, in seconds."""

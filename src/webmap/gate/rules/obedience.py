@@ -2,8 +2,8 @@
 
 import math
 
-from webmap.gate.rules.standstill import Standstill, moves
 from webmap.base.geometry import Twist
+from webmap.gate.rules.standstill import Standstill, moves
 
 GRACE = 1.0
 """Seconds after zero until a machine that moves on is said not to obey."""

@@ -2,6 +2,7 @@
 
 import logging
 
+from webmap.base.geometry import Twist
 from webmap.gate.commands import (
     Ask,
     Command,
@@ -24,7 +25,6 @@ from webmap.gate.rules.fleet import Fleet
 from webmap.gate.rules.latch import new_press
 from webmap.gate.rules.lease import check_lease, check_role, check_take
 from webmap.gate.rules.ticks import Ticks
-from webmap.base.geometry import Twist
 
 log = logging.getLogger("webmap.gate")
 

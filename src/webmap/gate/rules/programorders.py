@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from webmap.base.geometry import Twist
 from webmap.gate import messages
 from webmap.gate.actions import Emit, Say
 from webmap.gate.messages import PROGRAM
@@ -12,7 +13,6 @@ from webmap.gate.rules.fleet import Fleet
 from webmap.gate.rules.lease import check_lease
 from webmap.gate.rules.orders import Orders
 from webmap.gate.rules.people import People
-from webmap.base.geometry import Twist
 
 Vector = tuple[float, float, float]
 

@@ -4,6 +4,7 @@ from typing import Literal
 
 import msgspec
 
+from webmap.base.geometry import Twist
 from webmap.gate.messages import (
     AskerReport,
     Doing,
@@ -19,7 +20,6 @@ from webmap.gate.rules.health import Health
 from webmap.gate.rules.loopage import reaction
 from webmap.gate.rules.obedience import MOVES, TURNS
 from webmap.gate.rules.standstill import moves
-from webmap.base.geometry import Twist
 
 INTERVAL = 0.1
 """The shortest time between two reports that differ only in numbers that flow."""

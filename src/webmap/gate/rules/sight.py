@@ -1,9 +1,9 @@
 """What is heard of a machine, while there is a reason to listen. No I/O."""
 
+from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, Watch
 from webmap.gate.events import Key
 from webmap.gate.rules.standstill import moves
-from webmap.base.geometry import Twist
 
 BLIND_LIMIT = 1.0
 """The oldest velocity that odometry told, or picture, with which a machine is driven,

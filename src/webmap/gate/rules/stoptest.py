@@ -19,8 +19,8 @@ its steps. The base stopped when a standstill began that lasted.
 from collections import Counter
 from typing import Literal
 
-from webmap.gate.rules.standstill import Standstill
 from webmap.base.geometry import Twist
+from webmap.gate.rules.standstill import Standstill
 
 CREEP = Twist(0.1)
 """How fast it creeps."""

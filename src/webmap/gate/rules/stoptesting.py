@@ -1,5 +1,6 @@
 """The stop tests of one machine, and how it is halted while one goes on. No I/O."""
 
+from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, KeepStopTest
 from webmap.gate.events import Key
 from webmap.gate.refusal import Refusal
@@ -7,7 +8,6 @@ from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.sight import Sight
 from webmap.gate.rules.standstill import moves
 from webmap.gate.rules.stoptest import StopTest
-from webmap.base.geometry import Twist
 
 
 class StopTesting:

@@ -9,8 +9,8 @@ out: it was farther ahead a moment ago, and most scanners cannot see their own b
 import math
 from collections.abc import Iterator, Sequence
 
-from webmap.gate.messages import Point
 from webmap.base.geometry import Twist
+from webmap.gate.messages import Point
 
 _STEP = 0.1
 """Metres, or radians of a turn, between two places on the way that are asked for."""

@@ -5,8 +5,8 @@ All is in the robot's own frame, where the robot stands and the points move.
 
 import math
 
-from webmap.gate.messages import Point
 from webmap.base.geometry import Twist
+from webmap.gate.messages import Point
 
 _TOUCHING = 1e-9
 

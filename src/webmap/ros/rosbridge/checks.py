@@ -9,15 +9,14 @@ import json
 import secrets
 import struct
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from webmap.base.errors import BridgeError
-from webmap.ros.bridge import Bridge
 from webmap.ros.limits import MAX_FRAME
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.rosbridge import ops
@@ -95,13 +94,13 @@ async def look(url: str) -> LinkFacts:
     return LinkFacts(peer, listens, deflate)
 
 
-async def asked_about_threads(facts: LinkFacts, bridge: Bridge) -> LinkFacts:
+async def asked_about_threads(
+    facts: LinkFacts, call_service: Callable[..., Awaitable[Any]]
+) -> LinkFacts:
     """Return the facts with what rosbridge says of how it calls services."""
     request = {"name": PARAMETER, "default_value": "", "default": ""}
     try:
-        answer = await bridge.call_service(
-            "/rosapi/get_param", request, timeout=PATIENCE
-        )
+        answer = await call_service("/rosapi/get_param", request, timeout=PATIENCE)
     except BridgeError:
         return facts
     value = answer.get("value", "") if isinstance(answer, Mapping) else ""

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Awaitable, Callable, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -11,9 +11,6 @@ from webmap.ros.decoding import convert
 from webmap.ros.definitions import Definitions
 from webmap.ros.messages import Time
 from webmap.ros.names import split_type
-
-if TYPE_CHECKING:
-    from webmap.ros.rosbridge.link import RosbridgeLink
 
 ACTIONS = {"navigate_to_pose": "nav2_msgs/action/NavigateToPose"}
 """Actions by the name that their servers have everywhere: rosapi tells no types."""
@@ -164,6 +161,54 @@ class Graph:
             if type is not None
         }
 
+    async def is_ros2(self) -> bool | None:
+        """Return whether the types are those of ROS 2; None if that is not known."""
+        try:
+            types = (await self.topics()).values()
+        except BridgeError:
+            return None
+        slashes = {type.count("/") for type in types if type}
+        if 2 in slashes:
+            return True
+        return False if 1 in slashes else None
+
+    async def definitions(self, type: str, kind: str) -> Definitions:
+        """Return the definitions of a type and of all its parts, and the shipped ones.
+
+        A rosapi of ROS 2 may end for good when it is asked for definitions, so only
+        a bridge that is known to be of ROS 1 is asked.
+
+        Args:
+            type: The type.
+            kind: ``"msg"``, or ``"srv"`` for the request of a service.
+
+        Raises:
+            ServiceError: If it may not be asked, or does not answer what makes sense.
+            BridgeClosed: If there is no link.
+
+        """
+        ros2 = await self.is_ros2()
+        if ros2 is not False:
+            why = (
+                "a ROS 2 bridge is not" if ros2 else "one whose ROS nobody knows is not"
+            )
+            raise ServiceError(
+                f"{why} asked for the fields of {type}, since that can end its rosapi: "
+                "write the values into the button's configuration"
+            )
+        name = str(split_type(type))
+        answer = await self._call(QUESTIONS[kind], {"type": name})
+        try:
+            parts = convert(answer, _Answer).typedefs
+            if not parts or len(parts) > MAX_PARTS:
+                raise ProtocolError(f"got {len(parts)} definitions")
+            texts = {part.type: _text(part) for part in parts}
+        except (ProtocolError, ValueError) as error:
+            raise ServiceError(f"{QUESTIONS[kind]} made no sense: {error}") from None
+        # The first is the one that was asked for; of a service it is called ...Request.
+        texts[name] = texts[parts[0].type]
+        return Definitions(texts, ros2=False)
+
 
 class _ActionServers(msgspec.Struct):
     action_servers: list[str]
@@ -193,55 +238,6 @@ class _Part(msgspec.Struct):
 
 class _Answer(msgspec.Struct):
     typedefs: list[_Part]
-
-
-async def is_ros2(link: "RosbridgeLink") -> bool | None:
-    """Tell by the topics whether a bridge is of ROS 2; None if that is not known."""
-    try:
-        types = (await link.graph.topics()).values()
-    except BridgeError:
-        return None
-    slashes = {type.count("/") for type in types if type}
-    if 2 in slashes:
-        return True
-    return False if 1 in slashes else None
-
-
-async def ask_definitions(link: "RosbridgeLink", type: str, kind: str) -> Definitions:
-    """Return the definitions of a type and of all its parts, and the shipped ones.
-
-    A rosapi of ROS 2 may end for good when it is asked for them, so none ever is: not
-    where a topic is spelled as ROS 2 spells it, nor where that cannot be told.
-
-    Args:
-        link: The link to the bridge.
-        type: The type.
-        kind: ``"msg"``, or ``"srv"`` for the request of a service.
-
-    Raises:
-        ServiceError: If it may not be asked, or does not answer what makes sense.
-        BridgeClosed: If there is no link.
-
-    """
-    ros2 = await is_ros2(link)
-    if ros2 is not False:
-        why = "a ROS 2 bridge is not" if ros2 else "one whose ROS nobody knows is not"
-        raise ServiceError(
-            f"{why} asked for the fields of {type}, since that can end its rosapi: "
-            "write the values into the button's configuration"
-        )
-    name = str(split_type(type))
-    answer = await link.call_service(QUESTIONS[kind], {"type": name})
-    try:
-        parts = convert(answer, _Answer).typedefs
-        if not parts or len(parts) > MAX_PARTS:
-            raise ProtocolError(f"got {len(parts)} definitions")
-        texts = {part.type: _text(part) for part in parts}
-    except (ProtocolError, ValueError) as error:
-        raise ServiceError(f"{QUESTIONS[kind]} made no sense: {error}") from None
-    # The first is the one that was asked for; of a service it is called ...Request.
-    texts[name] = texts[parts[0].type]
-    return Definitions(texts, ros2=False)
 
 
 def _text(part: _Part) -> str:

@@ -19,7 +19,7 @@ from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane
 from webmap.ros.rosbridge.events import CallService, Event, Malformed, Publish, Status
-from webmap.ros.rosbridge.graph import Graph, ask_definitions
+from webmap.ros.rosbridge.graph import Graph
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.ros.rosbridge.wire_subscription import (
     IN_CBOR,
@@ -172,7 +172,7 @@ class RosbridgeLink:
             BridgeClosed: If there is no link.
 
         """
-        return await ask_definitions(self, type, kind)
+        return await self.graph.definitions(type, kind)
 
     def _send(self, frame: bytes) -> None:
         """Send what a new link will be told anyway; nothing happens while closed."""

@@ -12,11 +12,11 @@ from collections.abc import Awaitable, Callable, Iterable
 from typing import Literal, NamedTuple
 
 from webmap.base.identifiers import generate_id
+from webmap.base.scope import no_scope
 from webmap.ros.names import is_type, split_type
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.subscriptions import Topic
-from webmap.base.scope import no_scope
 
 COMPRESSION = {"text": "none", "binary": "cbor", "raw": "cbor-raw"}
 """What rosbridge calls the encodings of a subscription."""

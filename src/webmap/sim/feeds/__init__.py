@@ -5,8 +5,6 @@ markers, health and logs, under the names that Nav2 and move_base give them. All
 advertised for each robot, and published when they are due.
 """
 
-from typing import TYPE_CHECKING
-
 from webmap.sim.feeds.cloud import Clouds
 from webmap.sim.feeds.depth import DepthClouds
 from webmap.sim.feeds.feed import Feed
@@ -16,9 +14,7 @@ from webmap.sim.feeds.logs import Logs
 from webmap.sim.feeds.marks import Marks
 from webmap.sim.feeds.navigation import CostmapTopics, Footprints, Lookaheads
 from webmap.sim.feeds.sonar import Sonars
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
+from webmap.sim.graph_node import Node
 
 
 class Feeds:
@@ -30,7 +26,7 @@ class Feeds:
 
     """
 
-    def __init__(self, node: "RobotsNode", step: float) -> None:
+    def __init__(self, node: Node, step: float) -> None:
         self._node = node
         self._step = step
         self.localizations = Localizations(node)

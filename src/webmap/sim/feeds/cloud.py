@@ -1,17 +1,14 @@
 """A lidar of several rings, whose cloud has walls, robots and the floor."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from webmap.sim.feeds.feed import Feed
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message
 from webmap.sim.mounts import LASER_HEIGHT
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 RINGS = np.radians([-6.0, 0.0, 6.0, 12.0])
 """How far each ring looks up from level."""
@@ -34,7 +31,7 @@ _DATATYPES = {"<f4": 7, "<u2": 4}
 class Clouds:
     """Makes ``sensor_msgs/PointCloud2``, in the frame of the scanner."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed("points", "sensor_msgs/PointCloud2", 0.2, self._make)
 

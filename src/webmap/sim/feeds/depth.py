@@ -1,7 +1,6 @@
 """A depth camera that looks down a little, and whose cloud is in its optical frame."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +8,10 @@ from numpy.typing import NDArray
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.cloud import cloud_message
 from webmap.sim.feeds.feed import Feed
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message
 from webmap.sim.mounts import OPTICAL, mount, seen_from
 from webmap.sim.scanner import cast_rays, shade
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 FRAME = "camera_optical"
 AHEAD, HEIGHT = 0.2, 0.4
@@ -42,7 +39,7 @@ POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
 class DepthClouds:
     """Makes ``sensor_msgs/PointCloud2`` as a camera's driver does."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed("camera/points", "sensor_msgs/PointCloud2", 0.2, self._make)
 

@@ -1,12 +1,8 @@
 """What the parts of the robots say of their health, on one topic for all."""
 
-from typing import TYPE_CHECKING
-
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message
 from webmap.sim.robot import Robot
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 TOPIC = "/diagnostics"
 OK, WARN, ERROR = 0, 1, 2
@@ -17,7 +13,7 @@ LOW, EMPTY = 0.3, 0.1
 class Health:
     """Publishes ``diagnostic_msgs/DiagnosticArray``, a message for each robot."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
 
     def start(self) -> None:

@@ -1,7 +1,7 @@
 """Where robots believe to be: a pose, how sure, particles, and a satellite fix."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 from webmap.base.geometry import Pose, normalize_angle
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.sim.feeds.feed import Feed
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message, pose, read_pose
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 PARTICLES = 150
 SURE = (0.12, 0.05, 0.06)
@@ -100,7 +98,7 @@ class Belief:
 class Localizations:
     """Publishes ``amcl_pose`` and ``particlecloud``, and takes ``initialpose``."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self._beliefs = [Belief() for _ in node.world.robots]
         self._random = np.random.default_rng(node.world.options.seed)
@@ -162,7 +160,7 @@ class Localizations:
 class Satellites:
     """Makes ``sensor_msgs/NavSatFix`` of where robots truly are."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed("fix", "sensor_msgs/NavSatFix", 0.5, self._make)
 

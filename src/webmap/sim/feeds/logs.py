@@ -1,14 +1,11 @@
 """What the nodes of the robots log: that they run, goals, plans, bumps, the battery."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from webmap.sim.feeds.health import LOW
+from webmap.sim.graph_node import Node
 from webmap.sim.navigator import Goal, GoalState
 from webmap.sim.robot import Robot
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 TOPIC = "/rosout"
 INFO, WARN, ERROR = "info", "warn", "error"
@@ -30,7 +27,7 @@ class _Before:
 class Logs:
     """Publishes ``rosgraph_msgs/Log``, which ROS 2 calls ``rcl_interfaces/Log``."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self._before = [_Before() for _ in node.world.robots]
         self._was_wanted = False

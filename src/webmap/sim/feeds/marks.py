@@ -1,14 +1,12 @@
 """Markers: the goal of a robot, and the other robots that it sees."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message, pose
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 ARROW, CYLINDER, TEXT = 0, 3, 9
 ADD, DELETE = 0, 2
@@ -24,7 +22,7 @@ GREEN, ORANGE, INK = (0.1, 0.6, 0.3), (0.9, 0.45, 0.1), (0.2, 0.25, 0.3)
 class Marks:
     """Makes ``visualization_msgs/MarkerArray`` in the map's frame."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed("markers", "visualization_msgs/MarkerArray", 0.2, self._make)
 

@@ -7,18 +7,15 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message, float32, vector
 from webmap.sim.obstacles import Obstacles
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 LETHAL, INSCRIBED, UNKNOWN = 100, 99, -1
 INFLATION = 0.55
@@ -205,7 +202,7 @@ class Published:
 class CostmapTopics:
     """Publishes ``nav_msgs/OccupancyGrid`` and ``map_msgs/OccupancyGridUpdate``."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         ros2 = node.messages.dialect.is_ros2
         self._above = "" if ros2 else "move_base/"
@@ -298,7 +295,7 @@ class CostmapTopics:
 class Footprints:
     """Makes ``geometry_msgs/PolygonStamped`` in the frame of odometry."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         name = (
             "local_costmap/published_footprint"
@@ -327,7 +324,7 @@ def outline(at: Pose, radius: float) -> list[tuple[float, float]]:
 class Lookaheads:
     """Makes ``geometry_msgs/PointStamped`` in the frame of the base, as Nav2 does."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed(
             "lookahead_point", "geometry_msgs/PointStamped", 0.2, self._make

@@ -1,17 +1,14 @@
 """A sonar in front, which measures one distance."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
+from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message, float32
 from webmap.sim.scanner import cast_rays, shade
-
-if TYPE_CHECKING:
-    from webmap.sim.node import RobotsNode
 
 FRAME = "sonar"
 MOUNTED = Pose(0.25)
@@ -26,7 +23,7 @@ _ULTRASOUND = 0
 class Sonars:
     """Makes ``sensor_msgs/Range``: how near the nearest thing in its cone is."""
 
-    def __init__(self, node: "RobotsNode") -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, self._make)
 

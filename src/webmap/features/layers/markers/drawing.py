@@ -5,6 +5,10 @@ from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Affine, Vector3
+from webmap.features.layers.markers import messages as kinds
+from webmap.features.layers.markers.messages import ColorMsg, MarkerMsg
 from webmap.modules.drawing import (
     Point,
     box,
@@ -15,13 +19,9 @@ from webmap.modules.drawing import (
     in_space,
     rounded,
 )
-from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST, Affine, Vector3
-from webmap.features.layers.markers import messages as kinds
-from webmap.features.layers.markers.messages import ColorMsg, MarkerMsg
+from webmap.ros.tf import Transform
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.ros.tf import Transform
 
 SHADES = 16
 """How finely the colours of single points are told apart, from 0 to 1."""

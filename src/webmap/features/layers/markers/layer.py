@@ -7,11 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from webmap.modules.declaration import TopicKind, layer
-from webmap.modules.layer_frames import LayerFrames, not_known
-from webmap.modules.map_layer import MapLayer
 from webmap.base.errors import ProtocolError, WebMapError
 from webmap.base.geometry import Pose
+from webmap.base.scope import Removal, keep
 from webmap.features.layers.markers.messages import (
     ADD,
     DELETE,
@@ -19,10 +17,17 @@ from webmap.features.layers.markers.messages import (
     MarkerArrayMsg,
     MarkerMsg,
 )
-from webmap.features.layers.markers.shapes import lies_unturned, look_of, place, shape_of
-from webmap.scene.element import Element
-from webmap.base.scope import Removal, keep
+from webmap.features.layers.markers.shapes import (
+    lies_unturned,
+    look_of,
+    place,
+    shape_of,
+)
+from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.layer_frames import LayerFrames, not_known
+from webmap.modules.map_layer import MapLayer
 from webmap.ros.tf import Transform, TransformError
+from webmap.scene.element import Element
 
 log = logging.getLogger("webmap.modules")
 

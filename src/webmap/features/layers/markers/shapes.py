@@ -2,16 +2,16 @@
 
 import math
 
-from webmap.modules.drawing import check_finite, flat, in_space
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine, Pose, Quaternion
 from webmap.features.layers.markers import messages as kinds
 from webmap.features.layers.markers.drawing import CLASSES, LETTERS, draw, sizes
 from webmap.features.layers.markers.messages import MarkerMsg
+from webmap.modules.drawing import check_finite, flat, in_space
 from webmap.ros.messages import PoseMsg, QuaternionMsg
+from webmap.ros.tf import Transform
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.ros.tf import Transform
 
 MAX_POINTS = 20_000
 """The most points that one marker may have."""

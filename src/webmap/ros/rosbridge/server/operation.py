@@ -5,8 +5,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from webmap.ros.rosbridge.server.encode import Publication
-from webmap.ros.rosbridge.server.graph import GraphError
+from webmap.ros.rosbridge.server.encode import Encoder, Publication
+from webmap.ros.rosbridge.server.graph import Graph, GraphError
 
 Operation = dict[str, Any]
 Handlers = dict[str, Callable[[Operation], None]]
@@ -96,3 +96,30 @@ class Outbox:
         """Drop what waits of a topic that the client unsubscribed."""
         if self._topics.pop(topic, None):
             self._order = deque(entry for entry in self._order if entry != topic)
+
+
+class Client:
+    """One client of the server: the graph that it sees, and what goes out to it.
+
+    Args:
+        graph: The ROS graph that the client sees.
+        encoder: Makes the frames; its quirks are those of the client's server.
+        clock: Returns monotonic seconds.
+        wake: Called when the outbox or a throttled subscription has something.
+
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        encoder: Encoder,
+        clock: Callable[[], float],
+        wake: Callable[[], None],
+    ) -> None:
+        self.graph = graph
+        self.encoder = encoder
+        self.now = clock
+        self.wake = wake
+        self.outbox = Outbox()
+        self.spinning = False
+        """Whether the whole server hangs because of this client."""

@@ -11,7 +11,7 @@ from typing import Any
 from webmap.ros.rosbridge.server.dialect import canonical, resolve
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import GoalHandle, Graph, GraphError, Respond
-from webmap.ros.rosbridge.server.operation import Handlers, Operation, Outbox, text
+from webmap.ros.rosbridge.server.operation import Client, Handlers, Operation, text
 from webmap.ros.rosbridge.server.topics import Topics
 
 log = logging.getLogger("webmap.sim")
@@ -19,7 +19,7 @@ log = logging.getLogger("webmap.sim")
 _MOST_INPUT = 10_000
 
 
-class Session:
+class Session(Client):
     """Takes a client's frames, and has the frames that go to it.
 
     Args:
@@ -38,18 +38,12 @@ class Session:
         clock: Callable[[], float],
         wake: Callable[[], None],
     ) -> None:
-        self.graph = graph
-        self.encoder = encoder
-        self.outbox = Outbox()
-        self._clock = clock
-        self._wake = wake
+        super().__init__(graph, encoder, clock, wake)
         self._incoming = IncomingText()
         self._queued: deque[Operation] = deque()
         self._blocked_by: object | None = None
         self._running = False
         self._closed = False
-        self.spinning = False
-        """Whether the server does nothing else any more because of this client."""
         self._topics = Topics(self)
         self._services = Services(self)
         self._handlers: Handlers = {
@@ -112,19 +106,7 @@ class Session:
         else:
             frames = [frame]
         self.outbox.reply(frames)
-        self._wake()
-
-    def wake(self) -> None:
-        """Say that the outbox or a throttled subscription has something."""
-        self._wake()
-
-    def now(self) -> float:
-        """Return monotonic seconds."""
-        return self._clock()
-
-    def spin(self) -> None:
-        """Let the whole server hang for good."""
-        self.spinning = True
+        self.wake()
 
     def block(self) -> Callable[[], None]:
         """Hold the client's next operations back until the result is called."""

@@ -5,21 +5,18 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 from webmap.ros.rosbridge.server.dialect import resolve
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import GraphError
 from webmap.ros.rosbridge.server.operation import (
     DEFAULT_DEPTH,
+    Client,
     Handlers,
     Operation,
     text,
     whole_number,
 )
-
-if TYPE_CHECKING:
-    from webmap.ros.rosbridge.server.session import Session
 
 log = logging.getLogger("webmap.sim")
 
@@ -120,7 +117,7 @@ _COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 class Topics:
     """One client's publishers and subscriptions."""
 
-    def __init__(self, client: "Session") -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
         self._graph = client.graph
         self._advertised: set[str] = set()
@@ -255,7 +252,7 @@ class Topics:
                 "from now on, as rosbridge 2.1.0 does (quirk spinning_queue)",
                 topic,
             )
-            self._client.spin()
+            self._client.spinning = True
 
     def _deliver(self, subscription: Subscription, publication: Publication) -> None:
         subscription.offer(publication, self._client.now())

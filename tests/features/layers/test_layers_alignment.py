@@ -4,13 +4,13 @@ import math
 
 import pytest
 from module_fakes import Link, pose, to_root
-from test_modules_frames import tell, transform
-from test_modules_grid import CORNERS, grid
+from test_layers_frames import tell, transform
+from test_layers_grid import CORNERS, grid
 
 from webmap import Robot
-from webmap.poses.alignment import align_bridge, toml_line
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
+from webmap.poses.alignment import align_bridge, toml_line
 
 QUARTER = math.pi / 2
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from scene_of_tiles import DATUM, EAST, made_tiles, number
 
-from webmap.core.pictures import pictures
 from webmap.base.errors import ConfigError
+from webmap.core.pictures import pictures
 from webmap.features.tiles import tile_layer
 
 

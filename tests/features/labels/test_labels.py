@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from webmap import Map
-from webmap.core.page import Page, PageEntry
 from webmap.base.errors import ConfigError
+from webmap.core.page import Page, PageEntry
 
 DESK = {"name": "Desk", "x": 1.0, "y": 2.0, "icon": "desk"}
 

@@ -22,7 +22,7 @@ from webmap_process import page_of
 # Alone, as the gate takes no goal that is older than 0.3 s when it comes.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 OUTSIDE = (1180, 400)
 """A place on the screen that is outside of the house."""
 

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from test_modules_at_stamp import stamp
+from test_layers_at_stamp import stamp
 
 OPTICAL = (-math.pi / 2, 0.0, -math.pi / 2)
 """Of a camera that looks ahead: x to the right, y down and z forward (REP 103)."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 from running_simulators import simulators
-from test_modules_drawn_from_simulator import HELPERS, until
+from test_layers_drawn_from_simulator import HELPERS, until
 
 from real_browser import watched_tab
 from webmap.base.geometry import Pose

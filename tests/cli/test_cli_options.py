@@ -6,8 +6,8 @@ import tomllib
 
 import pytest
 
-from webmap.cli.topic_list import parse_topics
 from webmap.base.errors import ConfigError
+from webmap.cli.options import parse_topics
 
 TOPICS = "/bob/odom [nav_msgs/msg/Odometry]\n/bob/cmd_vel [geometry_msgs/msg/Twist]\n"
 

@@ -16,7 +16,7 @@ from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 SVG = "{http://www.w3.org/2000/svg}"
 SIZE = (900, 700)
 

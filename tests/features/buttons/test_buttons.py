@@ -12,9 +12,9 @@ import pytest
 from button_robot import robot_node
 
 from webmap import Bridge, Robot
+from webmap.base.errors import ConfigError
 from webmap.config.buttons import ButtonMistake, read_button
 from webmap.core.page import Page, PageEntry
-from webmap.base.errors import ConfigError
 from webmap.scene.events import Event
 from webmap_process import simulator
 

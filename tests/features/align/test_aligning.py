@@ -18,7 +18,7 @@ from webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 
-PAGE = Path(__file__).with_name("page_of_aligning.py")
+PAGE = Path(__file__).parents[1] / "page_of_aligning.py"
 GOAL = "/robot_0/move_base_simple/goal"
 """Why the gate takes no goal from a busy machine; a person sends it once more."""
 

@@ -10,11 +10,11 @@ import pytest
 from module_fakes import Channel, Link, Someone, pose
 
 from webmap import Map, Robot
+from webmap.base.geometry import Pose
 from webmap.core import alignment_store
-from webmap.poses.alignment import align_bridge, alignments
 from webmap.core.alignment_store import AlignmentStore, name_of
 from webmap.core.page import Page, PageEntry
-from webmap.base.geometry import Pose
+from webmap.poses.alignment import align_bridge, alignments
 
 NAME = "ws://test:9090 Bob"
 
