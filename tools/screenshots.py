@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import which
@@ -58,9 +58,7 @@ class Picture:
     @property
     def size(self) -> tuple[int, int]:
         """The size of the page, in CSS pixels."""
-        if self.phone:
-            return 390, 844
-        return (1120, 700) if self.step else (1440, 900)
+        return (390, 844) if self.phone else (1440, 900)
 
 
 SCENES: tuple[Literal["console", "layers"], ...] = ("console", "layers")
@@ -94,6 +92,12 @@ def demo(robots: int = 6) -> Iterator[str]:
     """Run the demo and give its page's address."""
     with running("demo", "--no-browser", "--robots", str(robots)) as url:
         yield url
+
+
+@contextmanager
+def nothing() -> Iterator[str]:
+    """Run nothing, for pictures that each start a demo of their own."""
+    yield ""
 
 
 @contextmanager
@@ -247,13 +251,13 @@ STEPS: dict[str, Callable[[Page, Browser, Picture, str], None]] = {
     "request": show_request,
     "phone": show_phone,
 }
-"""The pictures of the operator's manual, each of a page on which ``ROBOT`` is selected."""
+"""What each picture of the operator's manual shows, after ``ROBOT`` was selected."""
 
 PICTURES += [Picture("manual", step=step, phone=step == "phone") for step in STEPS]
 
 
-def take_manual(browser: Browser, picture: Picture, url: str | None) -> None:
-    """Take one picture of the manual, with 128 colours so that its file is small."""
+def take_manual(browser: Browser, picture: Picture, url: str) -> None:
+    """Take one picture of the manual, with 256 colours so that its file is small."""
     with demo(robots=3) as own:
         page = open_page(browser, picture, own)
         select(page, ROBOT)
@@ -261,7 +265,10 @@ def take_manual(browser: Browser, picture: Picture, url: str | None) -> None:
         shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
         for context in browser.contexts:
             context.close()
-    shot.quantize(128, dither=Image.Dither.NONE).save(picture.file, optimize=True)
+    few = shot.quantize(
+        256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+    )
+    few.save(picture.file, optimize=True)
 
 
 def drive(page: Page) -> None:
@@ -292,7 +299,7 @@ def main(names: list[str]) -> None:
         for scene, show, shoot in (
             ("console", demo, take),
             ("layers", everything, take_layers),
-            ("manual", nullcontext, take_manual),
+            ("manual", nothing, take_manual),
         ):
             mine = [picture for picture in wanted if picture.scene == scene]
             if not mine:
