@@ -216,11 +216,12 @@ def show_goal(page: Page, browser: Browser, picture: Picture, url: str) -> None:
 
 def show_request(page: Page, browser: Browser, picture: Picture, url: str) -> None:
     """Take control, and request it from a second page."""
-    page.locator(".webmap-teleop-lease").click()
-    page.locator('.webmap-teleop[data-state="ready"]').wait_for()
     other = open_page(browser, picture, url)
     select(other, ROBOT)
     page.bring_to_front()
+    page.locator(".webmap-teleop-lease").click()
+    page.locator('.webmap-teleop[data-state="ready"]').wait_for()
+    page.wait_for_timeout(1000)
     other.locator(".webmap-teleop-lease").dispatch_event("click")
     page.locator(".webmap-request").wait_for()
 
