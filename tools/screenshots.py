@@ -1,23 +1,25 @@
-"""Take the pictures of the documentation from what really runs, into docs/images.
+"""Take the pictures of the documentation from running programs, into docs/images.
 
 Usage: tools/screenshots.py [NAME ...]
 
-``console-...`` shows the demo while a robot is driven, ``layers-...`` all that robots
-of the simulator say, as ``webmap view`` draws it. Needs Chromium; without names all
-pictures are taken.
+``console-...`` shows the demo while a robot is driven, ``layers-...`` all layers of
+``webmap view``, ``manual-...`` the steps of the operator's manual. Needs Chromium.
+Without names, all pictures are taken.
 """
 
+import io
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import which
 from typing import Literal
 
+from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
@@ -35,19 +37,28 @@ CALM = """() => {
 class Picture:
     """One picture."""
 
-    scene: Literal["console", "layers"]
-    scheme: Literal["light", "dark"]
+    scene: Literal["console", "layers", "manual"]
+    scheme: Literal["light", "dark"] = "light"
     phone: bool = False
+    step: str = ""
+    """The step of the manual: a key of ``STEPS``."""
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The name of the file, without its suffix."""
+        if self.step:
+            return f"{self.scene}-{self.step}"
         return f"{self.scene}-{'phone-' if self.phone else ''}{self.scheme}"
 
     @property
     def file(self) -> Path:
-        """Where it goes."""
+        """The file."""
         return FOLDER / f"{self.name}.png"
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The size of the page, in CSS pixels."""
+        return (390, 844) if self.phone else (1440, 900)
 
 
 SCENES: tuple[Literal["console", "layers"], ...] = ("console", "layers")
@@ -77,10 +88,16 @@ def running(*arguments: str) -> Iterator[str]:
 
 
 @contextmanager
-def demo() -> Iterator[str]:
+def demo(robots: int = 6) -> Iterator[str]:
     """Run the demo and give its page's address."""
-    with running("demo", "--no-browser", "--robots", "6") as url:
+    with running("demo", "--no-browser", "--robots", str(robots)) as url:
         yield url
+
+
+@contextmanager
+def nothing() -> Iterator[str]:
+    """Run nothing, for pictures that each start a demo of their own."""
+    yield ""
 
 
 @contextmanager
@@ -95,12 +112,11 @@ def everything() -> Iterator[str]:
 
 def open_page(browser: Browser, picture: Picture, url: str) -> Page:
     """Open the console in the picture's size and colours."""
+    width, height = picture.size
     context = browser.new_context(
         color_scheme=picture.scheme,
-        viewport={"width": 390, "height": 844}
-        if picture.phone
-        else {"width": 1440, "height": 900},
-        device_scale_factor=2,
+        viewport={"width": width, "height": height},
+        device_scale_factor=1 if picture.step and not picture.phone else 2,
         has_touch=picture.phone,
     )
     page = context.new_page()
@@ -167,6 +183,95 @@ def take(browser: Browser, picture: Picture, url: str) -> None:
     page.context.close()
 
 
+def select(page: Page, name: str) -> None:
+    """Select a robot by a click on the map."""
+    page.locator(f'.robot[data-name="{name}"] .hit').click()
+    page.locator("#card h2", has_text=name).wait_for(state="attached")
+
+
+def show_driving(page: Page, browser: Browser, picture: Picture, url: str) -> None:
+    """Drive a robot."""
+    drive(page)
+
+
+def show_stop(page: Page, browser: Browser, picture: Picture, url: str) -> None:
+    """Stop a robot that is driven, and wait until odometry confirms the STOP."""
+    drive(page)
+    page.keyboard.press("Space")
+    page.locator('.webmap-stop-verdict[data-state="confirmed"]').wait_for()
+    page.keyboard.up("w")
+
+
+def show_goal(page: Page, browser: Browser, picture: Picture, url: str) -> None:
+    """Send a robot to a pose."""
+    page.locator("[data-act=send]").click()
+    x, y = picture.size[0] * 0.62, picture.size[1] * 0.553
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 50, y, steps=5)
+    page.mouse.up()
+    page.locator('#card[data-state^="navigating"]').wait_for()
+    page.wait_for_timeout(1000)
+
+
+def show_request(page: Page, browser: Browser, picture: Picture, url: str) -> None:
+    """Take control, and request it from a second page."""
+    other = open_page(browser, picture, url)
+    select(other, ROBOT)
+    page.bring_to_front()
+    page.locator(".webmap-teleop-lease").click()
+    page.locator('.webmap-teleop[data-state="ready"]').wait_for()
+    page.wait_for_timeout(1000)
+    other.locator(".webmap-teleop-lease").dispatch_event("click")
+    page.locator(".webmap-request").wait_for()
+
+
+def show_phone(page: Page, browser: Browser, picture: Picture, url: str) -> None:
+    """Look at a robot closely, and hold the stick."""
+    page.locator("[data-act=follow]").dispatch_event("click")
+    page.locator("[data-act=follow][aria-pressed=true]").wait_for(state="attached")
+    for _ in range(3):
+        page.locator("#zoom-in").click()
+    knob = page.locator(".webmap-stick-knob").bounding_box()
+    assert knob is not None
+    x, y = knob["x"] + knob["width"] / 2, knob["y"] + knob["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 10, y - 40, steps=5)
+    page.locator('.webmap-teleop[data-state="driving"]').wait_for()
+    page.wait_for_timeout(1000)
+
+
+ROBOT = "Robot 1"
+
+STEPS: dict[str, Callable[[Page, Browser, Picture, str], None]] = {
+    "select": lambda page, browser, picture, url: page.wait_for_timeout(1000),
+    "driving": show_driving,
+    "stop": show_stop,
+    "goal": show_goal,
+    "request": show_request,
+    "phone": show_phone,
+}
+"""What each picture of the operator's manual shows, after ``ROBOT`` was selected."""
+
+PICTURES += [Picture("manual", step=step, phone=step == "phone") for step in STEPS]
+
+
+def take_manual(browser: Browser, picture: Picture, url: str) -> None:
+    """Take one picture of the manual, with 256 colours so that its file is small."""
+    with demo(robots=3) as own:
+        page = open_page(browser, picture, own)
+        select(page, ROBOT)
+        STEPS[picture.step](page, browser, picture, own)
+        shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+        for context in browser.contexts:
+            context.close()
+    few = shot.quantize(
+        256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+    )
+    few.save(picture.file, optimize=True)
+
+
 def drive(page: Page) -> None:
     """Hold a key until the robot is in motion; the page before may still hold it."""
     driving = page.locator('.webmap-teleop[data-state="driving"]')
@@ -195,6 +300,7 @@ def main(names: list[str]) -> None:
         for scene, show, shoot in (
             ("console", demo, take),
             ("layers", everything, take_layers),
+            ("manual", nothing, take_manual),
         ):
             mine = [picture for picture in wanted if picture.scene == scene]
             if not mine:

@@ -1,4 +1,4 @@
-"""The tutorial of layers: all that a robot says, drawn on a map.
+"""The layer tutorial: all layers of a robot on a map.
 
 Start the simulator, and then this::
 

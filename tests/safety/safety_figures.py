@@ -1,9 +1,9 @@
-"""The figures of a run, and the table of them that the documentation shows.
+"""The figures of a run, and their table in the documentation.
 
-The tests write what they measure as lines of JSON into the file that the environment
-names by WEBMAP_SAFETY_FIGURES, each as soon as its scenario has ended, so that a run
-may be cut and resumed. ``python tests/safety/safety_figures.py FILE`` makes
-``docs/safety-figures.md`` and ``docs/safety-figures.json`` of them.
+The environment variable WEBMAP_SAFETY_FIGURES names a file. Each test appends its
+figure to this file as a line of JSON when its scenario ends, so that an interrupted run
+can continue. ``python tests/safety/safety_figures.py FILE`` writes
+``docs/safety-figures.md`` and ``docs/safety-figures.json`` from it.
 """
 
 import json
@@ -18,13 +18,13 @@ from typing import Any
 from safety_run import TRIALS, version
 
 DOCS = Path(__file__).parents[2] / "docs"
-FIRST_PAGE = Path(__file__).with_name("safety_first_page.py")
-"""Writes the worst of them into the README."""
+PROMISES = Path(__file__).with_name("safety_promises.py")
+"""Writes the worst figures into docs/safety.md and README.md."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """What was measured of one fault; times in seconds."""
+    """The measured times of one fault, in seconds."""
 
     name: str
     stops_by: str
@@ -34,12 +34,12 @@ class Figure:
     trials: int
     version: str = field(default_factory=version)
     asked: int = TRIALS
-    """How many trials the whole run was asked for."""
+    """The number of trials that the run was started with."""
 
 
 @dataclass(frozen=True)
 class Soak:
-    """What half an hour of everything at once has shown; see the unit."""
+    """A result of the half hour under full load, in its unit."""
 
     soak: str
     unit: str
@@ -49,7 +49,7 @@ class Soak:
 
 
 def note(figure: Figure | Soak) -> None:
-    """Keep a figure, if this run is one that keeps them."""
+    """Append a figure to the file of figures, if there is one."""
     print(figure)
     if path := os.environ.get("WEBMAP_SAFETY_FIGURES"):
         with Path(path).open("a") as file:
@@ -57,7 +57,7 @@ def note(figure: Figure | Soak) -> None:
 
 
 def machine() -> dict[str, Any]:
-    """Return what the figures depend on, and nothing that tells whose it is."""
+    """Return the properties of the machine that the figures depend on."""
     return {
         "processors": os.cpu_count(),
         "python": platform.python_version(),
@@ -66,17 +66,17 @@ def machine() -> dict[str, Any]:
 
 
 def table(figures: list[Figure], soaks: list[Soak], measured_on: dict[str, Any]) -> str:
-    """Return the figures as tables in Markdown, and a line on the machine."""
+    """Return the figures as tables in Markdown, and a line about the machine."""
     lines = [
         "---",
         "orphan: true",
         "---",
         "",
-        "| what fails while W is held | stopped by | promised | worst measured "
-        "| machine late by | trials | version |",
+        "| fault while W is held | stopped by | promised | worst measured "
+        "| delay of the machine | trials | version |",
         "|---|---|---|---|---|---|---|",
     ]
-    by = {"zero": "a zero", "itself": "its own timeout", "key": "a zero"}
+    by = {"zero": "zero", "itself": "command timeout", "key": "zero"}
     lines += [
         f"| {f.name} | {by[f.stops_by]} | {f.promised * 1000:.0f} ms "
         f"| {f.worst * 1000:.0f} ms | {f.jitter * 1000:.0f} ms | {f.trials} "
@@ -86,7 +86,7 @@ def table(figures: list[Figure], soaks: list[Soak], measured_on: dict[str, Any])
     if soaks:
         lines += [
             "",
-            "| half an hour of everything at once | promised | measured | version |",
+            "| half an hour under full load | promised | measured | version |",
             "|---|---|---|---|",
         ]
     for soak in soaks:
@@ -104,12 +104,12 @@ def table(figures: list[Figure], soaks: list[Soak], measured_on: dict[str, Any])
 
 
 def newest(type: Any, key: str, noted: list[dict[str, Any]]) -> list[Any]:
-    """Return the last figure of each name, of one of the types."""
+    """Return the newest figure of each name, of one type."""
     return list({f[key]: type(**f) for f in noted if key in f}.values())
 
 
 def main() -> None:
-    """Write the table and the figures where the documentation includes them."""
+    """Write the tables and the figures into the documentation."""
     noted = [json.loads(line) for line in Path(sys.argv[1]).read_text().splitlines()]
     figures = newest(Figure, "name", noted)
     soaks = newest(Soak, "soak", noted)
@@ -120,7 +120,7 @@ def main() -> None:
     }
     (DOCS / "safety-figures.md").write_text(table(figures, soaks, content["machine"]))
     (DOCS / "safety-figures.json").write_text(json.dumps(content, indent=2) + "\n")
-    subprocess.run([sys.executable, FIRST_PAGE], check=True)
+    subprocess.run([sys.executable, PROMISES], check=True)
 
 
 if __name__ == "__main__":

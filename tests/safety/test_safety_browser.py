@@ -17,7 +17,7 @@ PROMISED = 0.3
 
 
 def test_a_key_that_is_let_go_stops_the_robot(bench):
-    bench.prove("the key is let go", bench.let_go, within=0.1, held_after=False)
+    bench.prove("the key is released", bench.let_go, within=0.1, held_after=False)
 
 
 def test_a_killed_renderer_stops_the_robot(bench):
@@ -84,7 +84,7 @@ def test_navigation_stops_the_robot(bench):
         bench.open_page()
 
     bench.prove(
-        "the page is left for another",
+        "the page opens another page",
         lambda: bench.tab.go("about:blank"),
         within=PROMISED,
         back=back,
@@ -93,7 +93,7 @@ def test_navigation_stops_the_robot(bench):
 
 def test_another_tab_in_front_stops_the_robot(bench):
     bench.prove(
-        "another tab comes in front",
+        "another tab comes to the front",
         bench.look_away,
         within=PROMISED,
         back=bench.look_back,
@@ -163,7 +163,7 @@ def test_stop_on_the_keyboard_stops_the_robot_and_the_reset_moves_nothing(bench)
         bench.reset_stop()
 
     bench.prove(
-        "STOP by the space bar, with W held on",
+        "STOP by the space bar while W is held",
         lambda: bench.space("keyDown"),
         within=0.1,
         back=back,

@@ -1,10 +1,10 @@
-"""The table that the documentation shows of a run."""
+"""The tables of figures in the documentation."""
 
 import json
 import re
 
 from safety_figures import DOCS, Figure, Soak, note, table
-from safety_first_page import BEGIN, END, README, first_page, kept_figures
+from safety_promises import BEGIN, END, PAGE, kept_figures, promise_table
 from safety_run import TRIALS, is_measured
 
 MACHINE = {"processors": 2, "kernel": "Linux 6.1", "python": "3.11.2"}
@@ -14,17 +14,17 @@ def test_a_figure_is_a_line_in_milliseconds():
     figure = Figure("the page is frozen", "zero", 0.3, 0.0124, 0.0081, 50, "1.0 (a1b)")
     lines = table([figure], [], MACHINE).splitlines()
     assert lines[-3] == (
-        "| the page is frozen | a zero | 300 ms | 12 ms | 8 ms | 50 | 1.0 (a1b) |"
+        "| the page is frozen | zero | 300 ms | 12 ms | 8 ms | 50 | 1.0 (a1b) |"
     )
     assert lines[-1] == "Measured on 2 processors, Linux 6.1, Python 3.11.2."
 
 
-def test_what_nobody_can_stop_is_told_from_what_gets_a_zero():
+def test_a_stop_by_the_command_timeout_is_shown_as_such():
     figure = Figure("the gate is killed", "itself", 0.55, 0.51, 0.0, 1)
-    assert "| its own timeout | 550 ms |" in table([figure], [], MACHINE)
+    assert "| command timeout | 550 ms |" in table([figure], [], MACHINE)
 
 
-def test_the_table_in_the_documentation_is_that_of_the_figures_beside_it():
+def test_the_table_in_the_documentation_shows_the_kept_figures():
     content = json.loads((DOCS / "safety-figures.json").read_text())
     figures = [Figure(**figure) for figure in content["figures"]]
     soaks = [Soak(**soak) for soak in content["soak"]]
@@ -33,18 +33,16 @@ def test_the_table_in_the_documentation_is_that_of_the_figures_beside_it():
     )
 
 
-def test_the_table_on_the_first_page_is_that_of_the_figures_and_says_what_failed():
-    table = first_page(kept_figures())
-    assert BEGIN + table + END in README.read_text()
-    doubt = (
-        r"another tab comes in front|the tab is closed|an alert is shown|the page is .*"
-    )
+def test_the_table_of_promises_shows_the_kept_figures_and_the_faults():
+    table = promise_table(kept_figures())
+    assert BEGIN + table + END in PAGE.read_text()
+    doubt = r"another tab comes .*|the tab is closed|an alert is shown|the page is .*"
     assert re.search(rf"ms: ({doubt}) \| `test_doubt", table)
     gate = r"is killed|is stopped \(SIGSTOP\) for 1\.5 s"
     assert re.search(rf"ms: the gate ({gate}) \| `test_a_base", table)
 
 
-def test_what_half_an_hour_has_shown_stands_in_a_table_of_its_own():
+def test_the_half_hour_under_full_load_has_its_own_table():
     soaks = [Soak("memory", "%", 10, 1.26, "1.0"), Soak("late", "ms", None, 3.0, "1.0")]
     lines = table([], soaks, MACHINE).splitlines()
     assert lines[-4:-2] == [

@@ -94,8 +94,8 @@ NARROW = 1500
 
 SPOILT = {
     "becomes narrow, 1.5 kB/s": Shape(bandwidth=NARROW),
-    "comes in slices of 40 bytes": Shape(slice_size=40, slice_gap=0.1),
-    "comes by fits and starts": Shape(latency=0.16, jitter=0.3),
+    "is cut into slices of 40 bytes": Shape(slice_size=40, slice_gap=0.1),
+    "gets irregular latency": Shape(latency=0.16, jitter=0.3),
 }
 """What else networks do to a link; none of them is cut, and nobody can drive by any."""
 
@@ -106,7 +106,7 @@ def smooth(bench, hop):
     hop.shape(Shape())
 
 
-HOW = [pytest.param(how, marks=[] if "starts" in how else LONG) for how in SPOILT]
+HOW = [pytest.param(how, marks=[] if "irregular" in how else LONG) for how in SPOILT]
 
 
 @pytest.mark.parametrize("how", HOW)
@@ -215,7 +215,7 @@ def test_a_robot_that_falls_silent_is_stopped(bench):
         bench.robot.sends_telemetry = True
 
     bench.prove(
-        "odometry ceases",
+        "odometry stops",
         fall_silent,
         within=1.0 + 0.05,
         back=back,

@@ -20,7 +20,7 @@ def loaded(bench):
 def test_under_load_letting_go_stops_the_robot_as_quickly(loaded):
     with maps_coming(loaded):
         loaded.prove(
-            f"the key is let go; {UNDER_LOAD}",
+            f"the key is released; {UNDER_LOAD}",
             loaded.let_go,
             within=0.1,
             held_after=False,
@@ -52,7 +52,7 @@ def test_under_load_stop_stops_the_robot_as_quickly(loaded):
 
     with maps_coming(loaded):
         loaded.prove(
-            f"STOP by the space bar, with W held on; {UNDER_LOAD}",
+            f"STOP by the space bar while W is held; {UNDER_LOAD}",
             lambda: loaded.space("keyDown"),
             within=0.1,
             back=back,

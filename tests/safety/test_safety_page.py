@@ -1,12 +1,20 @@
-"""What the documentation says is shown is shown: every test that it names is there."""
+"""docs/safety.md and README.md name tests that exist and the newest figures."""
 
 import ast
 import re
 
 from safety_figures import DOCS, Figure
-from safety_first_page import PROMISES, README, first_page, kept_figures, worst
+from safety_promises import PAGE as FILE
+from safety_promises import (
+    PROMISES,
+    README,
+    in_short,
+    kept_figures,
+    promise_table,
+    worst,
+)
 
-PAGE = (DOCS / "safety.md").read_text()
+PAGE = FILE.read_text()
 TESTS = DOCS.parent / "tests"
 
 
@@ -39,9 +47,9 @@ NUMBERS = list(range(1, 21))
 
 
 def test_every_promise_names_a_test_and_none_is_missing():
-    """Each is a term with its number and what holds, and ends with its tests."""
+    """Each is a term with its number, a definition, and the names of its tests."""
     begin = PAGE.index("## What is promised")
-    promised = PAGE[begin : PAGE.index("## What is not", begin)]
+    promised = PAGE[begin : PAGE.index("## What is not promised", begin)]
     promises = re.findall(r"\n([A-Z][^\n]+)\n: (.*?)(?=\n\n)", promised, re.DOTALL)
     numbers = [int(n) for term, _ in promises for n in re.findall(r"\bS(\d+)", term)]
     assert sorted(numbers) == NUMBERS
@@ -49,24 +57,33 @@ def test_every_promise_names_a_test_and_none_is_missing():
     assert without == []
 
 
-def test_the_first_page_has_each_promise_its_figure_and_its_test():
+def test_the_table_has_each_promise_its_figure_and_its_test():
     assert sorted({promise.number for promise in PROMISES}) == NUMBERS
     assert {promise.shown_by for promise in PROMISES} - functions() == set()
-    assert first_page(kept_figures()) in README.read_text(), (
-        "run python tests/safety/safety_first_page.py"
+    assert promise_table(kept_figures()) in PAGE, (
+        "run python tests/safety/safety_promises.py"
     )
 
 
-def test_every_pattern_of_the_first_page_finds_a_figure():
+def test_the_readme_has_five_of_the_promises_with_the_same_figures():
+    lines = in_short(kept_figures())
+    assert lines.count("\n") == 5
+    assert lines in README.read_text(), "run python tests/safety/safety_promises.py"
+    rows = promise_table(kept_figures())
+    for number, figure in re.findall(r"S(\d+): .+ measured: (.+)\.\n", lines):
+        assert re.search(rf"\| S{number} \| .* \| {re.escape(figure)} \|", rows)
+
+
+def test_every_pattern_of_the_table_finds_a_figure():
     names = [figure.name for figure in kept_figures()]
     patterns = [promise.figures for promise in PROMISES if promise.figures]
     found = {p for p in patterns for name in names if re.fullmatch(p, name)}
     assert set(patterns) - found == set()
 
 
-def test_the_first_page_shows_what_comes_nearest_to_its_bound_and_what_misses_it():
+def test_the_table_shows_the_figure_nearest_to_its_limit_and_a_missed_limit():
     stop = next(p for p in PROMISES if p.number == 8)
-    figure = Figure("STOP by the space bar, with W held on", "zero", 0.1, 0.017, 0, 50)
+    figure = Figure("STOP by the space bar while W is held", "zero", 0.1, 0.017, 0, 50)
     assert worst(stop, [figure]) == f"17 of 100 ms: {figure.name}"
     late = Figure(figure.name, "zero", 0.1, 0.203, 0, 50)
     assert worst(stop, [figure, late]) == f"203 of 100 ms, **missed**: {figure.name}"

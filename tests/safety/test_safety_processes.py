@@ -77,7 +77,7 @@ def test_letting_go_stops_the_robot_while_user_code_blocks(bench):
         assert bench.steady(), "the robot does not go on while user code blocks"
 
     bench.prove(
-        "user code blocks for 2 s, then the key is let go",
+        "user code blocks for 2 s, then the key is released",
         let_go_while_it_blocks,
         before=block,
         within=0.1,
@@ -99,7 +99,7 @@ def test_letting_go_stops_the_robot_while_a_service_call_hangs(bench):
         bench.robot.unblock()
 
     bench.prove(
-        "a service call hangs, then the key is let go",
+        "a service call hangs, then the key is released",
         bench.let_go,
         before=call,
         within=0.1,

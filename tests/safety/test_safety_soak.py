@@ -108,9 +108,9 @@ def test_half_an_hour_of_everything_grows_nothing_and_delays_no_zero(bench):
                 100 * (size / before[name] - 1),
             )
         )
-    note(Soak("a zero of STOP was late by, at most", "ms", 50, 1000 * most))
-    note(Soak("a zero of STOP was late by, 99.9 % of them", "ms", 20, 1000 * usual))
-    note(Soak("the machine was late by, at most", "ms", None, 1000 * jitter))
+    note(Soak("delay of a zero of STOP, maximum", "ms", 50, 1000 * most))
+    note(Soak("delay of a zero of STOP, 99.9 % of them", "ms", 20, 1000 * usual))
+    note(Soak("delay of the machine, maximum", "ms", None, 1000 * jitter))
     assert alive == pids, "none has died"
     for name, size in kept.items():
         assert size <= before[name] * (1 + GROWTH), (name, before, kept, UNDER_LOAD)
