@@ -1,6 +1,8 @@
-"""How Sphinx builds this documentation; ``make docs`` calls it with ``-n -W``."""
+"""Configuration of Sphinx; ``make docs`` runs it with ``-n -W``."""
 
 from importlib.metadata import version as installed_version
+
+from sphinx.errors import ExtensionError
 
 import webmap
 
@@ -10,7 +12,8 @@ copyright = "The WebMap authors"
 release = version = installed_version("webmap")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["_build"]
+# Sphinx includes safety-figures.md in safety.md; it is no page of its own.
+exclude_patterns = ["_build", "safety-figures.md"]
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
@@ -21,11 +24,11 @@ autodoc_typehints_format = "short"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 
-# Every reference to a name of ours has to lead somewhere. Names of others are not
-# checked, because their inventories would have to be fetched for each build.
+# Every reference to a name of WebMap must resolve. Names of other projects are not
+# checked, because each build would have to fetch their inventories.
 nitpick_ignore_regex = [
     ("py:.*", r"(?!webmap\b).*"),
-    # Types in signatures that nobody makes or holds.
+    # Types in signatures that programs neither make nor keep.
     ("py:class", r"webmap\.core\.page\.PageEntry"),
     ("py:class", r"webmap\.core\.pictures\.Publisher"),
     ("py:class", r"webmap\.wire\.session\.SceneSession"),
@@ -37,7 +40,7 @@ nitpick_ignore_regex = [
 html_theme = "furo"
 html_title = f"WebMap {release}"
 
-# Where the public names live, by the place in which they are documented.
+# The public name of each object, by the module and name that define it.
 PUBLIC = {
     home.replace(":", "."): f"webmap.{name}" for name, home in webmap._HOMES.items()
 }
@@ -58,6 +61,21 @@ def lead_to_the_public_name(app, env, node, content):
     return None
 
 
+def require_titles(app, env):
+    """Fail if a page has no title: the search would list it as ``<no title>``."""
+    untitled = [
+        name
+        for name in sorted(env.found_docs)
+        if name not in env.titles or env.titles[name].astext() == "<no title>"
+    ]
+    if untitled:
+        raise ExtensionError(
+            f"these pages have no title: {', '.join(untitled)}; begin each with '# ', "
+            "or exclude it in docs/conf.py if another page includes it"
+        )
+
+
 def setup(app):
-    """Connect the above; Sphinx calls this."""
+    """Connect the functions above; Sphinx calls this."""
     app.connect("missing-reference", lead_to_the_public_name)
+    app.connect("env-check-consistency", require_titles)

@@ -1,4 +1,4 @@
-"""Write the reference of layers from their declarations.
+"""Write docs/reference/layers.md from the declarations of layers.
 
 python tools/make_layers_page.py           write the page
 python tools/make_layers_page.py --check   fail if the page is out of date
@@ -17,18 +17,18 @@ from webmap.modules.layer_options import LayerOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "layers.md"
 
-MARK = "<!-- What follows is written by tools/make_layers_page.py. -->"
+MARK = "<!-- tools/make_layers_page.py writes everything below. -->"
 
 
 RULES = """\
 Discovery draws a topic by the first row that fits its type and its name.
-The names are regular expressions, which are searched in the whole name of the topic.
-A robot gets at most so many topics of a row, the best first, since each costs its link
-something."""
+The names are regular expressions, searched in the whole name of the topic.
+The last column is the greatest number of topics of a row for one robot, the best first,
+because each topic uses the robot's network."""
 
 
 def page() -> str:
-    """Return the whole page, of which the part above the mark stays as it is."""
+    """Return the whole page; the part above the mark is not changed."""
     head = PAGE.read_text("utf-8").partition(MARK)[0]
     layers = [each for each in declarations() if each.built_in]
     rows = ["| layer | draws | switch |", "|---|---|---|"]
@@ -38,11 +38,11 @@ def page() -> str:
     rows += [
         "",
         "(layer-rules)=",
-        "## Which topics they draw",
+        "## Rules for topics",
         "",
         RULES,
         "",
-        "| type | names, the best first | layer, with options | for a robot |",
+        "| type | names, the best first | layer, with options | most |",
         "|---|---|---|---|",
     ]
     rows += [_rule(each, kind) for each in layers for kind in each.kinds]
@@ -82,12 +82,12 @@ def _has_options(declared: Declaration) -> bool:
 def _described(declared: Declaration) -> str:
     layer = declared.layer
     owner = "maps" if declared.of_maps else "robots"
-    lines = [f"## {declared.name}", "", f"A layer of {owner}.", ""]
+    lines = [f"## {declared.name}", "", f"Layer of {owner}.", ""]
     lines += [_markdown(inspect.getdoc(layer) or ""), ""]
     signature = inspect.signature(layer)
     first = signature.parameters["topic"].default
     usual = "" if first is inspect.Parameter.empty else f", by default `{first}`"
-    lines.append(f"After the bridge comes the topic{usual}.")
+    lines.append(f"The arguments are the bridge and the topic{usual}.")
     by_place = [
         f"`{each.name}`"
         for each in list(signature.parameters.values())[3:]
@@ -95,8 +95,8 @@ def _described(declared: Declaration) -> str:
     ]
     if by_place:
         listed = ", ".join(by_place)
-        lines.append(f"These may also be given by place, in this order: {listed}.")
-    lines += ["", "| option | default | |", "|---|---|---|"]
+        lines.append(f"These options may also be positional, in this order: {listed}.")
+    lines += ["", "| option | default | meaning |", "|---|---|---|"]
     for each in list(signature.parameters.values())[3:]:
         said = " ".join(option_doc(layer, each.name).split())
         default = f"`{_shown(each.default)}`"
@@ -105,7 +105,7 @@ def _described(declared: Declaration) -> str:
 
 
 def option_doc(layer: type, option: str) -> str:
-    """Return what the class of a layer, or one above it, says below an option."""
+    """Return the docstring of an option, of the layer's class or a base class."""
     for each in layer.__mro__:
         if option in inspect.get_annotations(each):
             found = _docs_of(each).get(option)

@@ -1,21 +1,46 @@
 """The public names, and the version that is said in several places."""
 
+import inspect
 import re
 import subprocess
 import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 
 import click
 import pytest
 
 import webmap
+from webmap import errors, geometry, testing, tf
 from webmap.cli import cli
 
+TagMaker = type(webmap.svg.g).__mro__[1]
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "docs" / "reference").glob("*.md")
 REFERENCE = "\n".join(page.read_text("utf-8") for page in PAGES)
+OTHER_PAGES = "\n".join(
+    (ROOT / "docs" / "reference" / name).read_text("utf-8")
+    for name in ("modules.md", "layers.md")
+)
+API = (ROOT / "docs" / "reference" / "api.md").read_text("utf-8")
+
+
+def made_here(module: ModuleType) -> list[str]:
+    """Return the public classes and functions that a module defines."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_")
+        and getattr(value, "__module__", None) == module.__name__
+        and (inspect.isclass(value) or inspect.isfunction(value))
+    ]
+
+
+def tags(module: ModuleType) -> list[str]:
+    """Return the names of the functions that make elements."""
+    return [name for name, value in vars(module).items() if isinstance(value, TagMaker)]
 
 
 @pytest.mark.parametrize("name", webmap.__all__)
@@ -24,8 +49,43 @@ def test_every_public_name_can_be_had(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", webmap.__all__)
-def test_every_public_name_stands_in_the_reference(name: str) -> None:
-    assert f"webmap.{name}" in REFERENCE
+def test_every_public_name_is_in_the_api_reference(name: str) -> None:
+    assert re.search(rf"webmap\.{name}\b", API)
+
+
+def test_every_public_name_is_listed_once() -> None:
+    assert sorted(webmap._HOMES) == sorted(webmap.__all__)
+
+
+@pytest.mark.parametrize("name", ["drawing", "messages", "options"])
+def test_every_name_for_layers_is_in_the_api_reference(name: str) -> None:
+    names = made_here(getattr(webmap, name))
+    assert names
+    assert not [each for each in names if f":: webmap.{name}.{each}\n" not in API]
+
+
+@pytest.mark.parametrize("module", [errors, geometry, testing, tf])
+def test_every_name_of_a_module_is_in_the_api_reference(module: ModuleType) -> None:
+    directive = f".. automodule:: {module.__name__}\n   :members:\n"
+    assert directive in API
+
+
+@pytest.mark.parametrize("name", ["svg", "html"])
+def test_every_tag_is_in_the_api_reference(name: str) -> None:
+    listed = API.partition(f"\n`webmap.{name}`\n: ")[2].partition("\n")[0]
+    assert sorted(tags(getattr(webmap, name))) == re.findall(r"`(\w+)`", listed)
+
+
+@pytest.mark.parametrize("name", ["map", "robot"])
+def test_every_module_is_in_the_api_reference(name: str) -> None:
+    listed = API.partition(f"\n`webmap.modules.{name}`\n: ")[2].partition("\n")[0]
+    modules = getattr(webmap.modules, name).namespace
+    assert modules.names() == re.findall(r"`(\w+)`", listed)
+    assert not [each for each in modules.names() if f"`{each}" not in OTHER_PAGES]
+
+
+def test_both_groups_of_entry_points_are_in_the_api_reference() -> None:
+    assert "`webmap.modules.map` and `webmap.modules.robot`" in API
 
 
 def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
