@@ -31,7 +31,7 @@ nitpick_ignore_regex = [
     # Types in signatures that programs neither make nor keep.
     ("py:class", r"webmap\.core\.page\.PageEntry"),
     ("py:class", r"webmap\.core\.pictures\.Publisher"),
-    ("py:class", r"webmap\.wire\.session\.SceneSession"),
+    ("py:class", r"webmap\.scene\.wire\.session\.SceneSession"),
     ("py:class", r"webmap\.core\.given_pose\.(Position|Orientation)"),
     ("py:class", r"webmap\.scene\.(node\.Node|live\.Live)"),
     ("py:class", r"webmap(\.\w+)+\.[A-Z]"),  # type variables
