@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from webmap.modules.placed import Placed
     from webmap.modules.robot_layer import RobotLayer
     from webmap.poses.alignment import align_bridge
-    from webmap.ros import messages
+    from webmap.ros import messages, tf
     from webmap.ros.bridge import Bridge
     from webmap.ros.tf import Transform
     from webmap.scene import html, svg
@@ -92,6 +92,7 @@ __all__ = [
     "stop",
     "svg",
     "svg_ns",
+    "tf",
     "xlink_ns",
 ]
 
@@ -132,6 +133,7 @@ _HOMES = {
     "stop": "webmap.server.application:stop",
     "svg": "webmap.scene.svg",
     "svg_ns": "webmap.scene.svg:namespace",
+    "tf": "webmap.ros.tf",
     "xlink_ns": "webmap.scene.svg:xlink_namespace",
 }
 

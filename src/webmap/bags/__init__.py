@@ -1,8 +1,8 @@
-"""Recordings: bags of ROS 1 and ROS 2 that are played, and that are written.
+"""Recordings: bags of ROS 1 and ROS 2, played and written.
 
-A recording that is played stands in for a rosbridge and the robots behind it, as the
-simulator does. What is here knows nothing of the display, and nobody else knows
-rosbags, which is installed with ``webmap[bags]``.
+A recording that is played replaces a rosbridge and its robots, as the simulator does.
+This is the only folder that uses rosbags, which ``webmap[bags]`` installs. It knows
+nothing of the display. Open ``player`` first, then ``recorder``.
 """
 
 from importlib.util import find_spec

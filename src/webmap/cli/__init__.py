@@ -1,4 +1,8 @@
-"""The command line: ``webmap demo``, ``view``, ``discover``, ``run`` and ``sim``."""
+"""The command line: one file for each command, named as the command.
+
+A command reads its options and calls another folder; robots and fleets are made in
+``webmap.fleet``. ``options`` has the options of several commands. Open ``view`` first.
+"""
 
 import signal
 import sys

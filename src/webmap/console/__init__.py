@@ -1,6 +1,8 @@
 """The console: the ready-made page that ``webmap demo`` and ``webmap view`` open.
 
-It is built with WebMap's public API alone, so it is also the longest example of it.
+It is made of WebMap's public API and of ``webmap.features``, so it is also the longest
+example of the API. Open ``page`` first, then ``console.html``. What an operator can use
+on other pages too belongs in ``webmap.features``.
 """
 
 from webmap.console.fleet import make_robot

@@ -1,5 +1,7 @@
-"""Maps, robots and the modules that extend them: what a user of WebMap holds.
+"""Maps, robots, pages and the modules that extend them.
 
-Everything here lives in the model's thread. It knows the scene and the bridges, and
-of the browser only the session of a page, ``webmap.scene.wire.session.SceneSession``.
+Everything here runs in the model's thread. It knows the scene, the bridges and, of the
+browser, the session of a page. Open ``extendable`` first, then ``robot`` and ``map``.
+What draws one kind of message belongs in ``webmap.features``; how a pose is computed,
+in ``webmap.poses``.
 """

@@ -1,7 +1,8 @@
-"""Discovery: from the topics of a ROS system to the robots behind it.
+"""Discovery: from the topics of a ROS system to its robots and layers.
 
-The rules are plain functions of names and types, so that they can be read, shown and
-overruled. They are written down for people in ``docs/howto/connect-a-robot.md``.
+The rules are plain functions of names and types, without I/O; open ``rules`` first.
+``docs/reference/discovery.md`` lists them. What the commands do with the robots belongs
+in ``webmap.fleet``.
 """
 
 from webmap.discovery.found import Findings, FoundRobot, Guess

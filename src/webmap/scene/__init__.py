@@ -1,5 +1,5 @@
-"""The scene: SVG and HTML elements as a tree in Python that says what changed.
+"""The scene: SVG and HTML elements as a tree in Python that records its changes.
 
-Begin with ``element``; ``fragment`` keeps the changes, and ``svg`` and ``html`` make
+Open ``element`` first; ``fragment`` keeps the changes, and ``svg`` and ``html`` make
 elements. Nothing here knows a browser, a robot or a map.
 """

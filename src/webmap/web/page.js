@@ -1,3 +1,11 @@
+/**
+ * The page: its socket to the display, the scene, the maps and the parts of modules.
+ *
+ * This folder is the browser engine. Open this file first, then `scene.js` and `map.js`.
+ * `motion/` sends commands to the gate, `inputs/` reads keys, gamepads and the stick,
+ * and `tools/` has what tools share. What an operator can name is in `../features`.
+ */
+
 import { BASE, pagePath, socketAddress } from "./addresses.js";
 import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";

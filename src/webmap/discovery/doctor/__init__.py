@@ -1,8 +1,8 @@
-"""The readiness check: what would be in the way of driving, and what to do about it.
+"""The diagnosis of a bridge: what prevents driving, and what to do about it.
 
-:func:`~webmap.discovery.doctor.measure.observe` looks, and
-:func:`~webmap.discovery.doctor.verdict.judge` decides; what it decides is plain data,
-so that a terminal and a page say the same.
+``measure`` asks and listens, ``verdict`` decides; open ``verdict`` first. The findings
+are plain data, so that a terminal and a page show the same. Checks of rosbridge itself
+are in ``webmap.ros.rosbridge``.
 """
 
 from webmap.discovery.doctor.meant import MeantRobot

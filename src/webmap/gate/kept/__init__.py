@@ -1,1 +1,4 @@
-"""What outlives the gate: a STOP that stands, who was driven, whose a robot is."""
+"""Files that outlive the gate: active STOPs, results of stop tests, lock files.
+
+Open ``disk`` first. What the files mean is decided in ``webmap.gate.rules``.
+"""

@@ -1,7 +1,7 @@
-"""Frames: where each is in another, at a time.
+"""Frames (``tf``): the transform between two frames at a time.
 
 A :class:`Buffer` takes the transforms of ``/tf`` and ``/tf_static`` and returns those
-between any two frames. It knows no sockets, no clocks and no messages.
+between any two frames. It does no I/O and asks no clock. Open ``buffer`` first.
 """
 
 from webmap.ros.tf.buffer import Buffer, Found

@@ -1,5 +1,5 @@
-"""Bytes between the display process and a browser page, without any socket.
+"""Bytes between the display and a page, without any socket.
 
-Begin with ``session``, which is one page's; ``messages`` are what the page sends, and
-``encode`` makes the frames that it gets.
+Open ``session`` first, which is the state of one page; ``messages`` are read from the
+page, and ``encode`` makes the frames for it.
 """

@@ -1,8 +1,8 @@
-"""What robots say beside odometry and scans, worked out only while somebody listens.
+"""Topics of simulated robots besides odometry and scans.
 
-Costmaps, clouds, footprints, particles, doubts, look-ahead points, sonars, fixes,
-markers, health and logs, under the names that Nav2 and move_base give them. All are
-advertised for each robot, and published when they are due.
+Costmaps, clouds, footprints, particles, covariances, look-ahead points, sonars, fixes,
+markers, diagnostics and logs, under the names of Nav2 and move_base. Each is advertised
+for each robot, and computed only while somebody subscribes. Open ``feed`` first.
 """
 
 from webmap.sim.feeds.cloud import Clouds

@@ -1,4 +1,7 @@
-"""The cameras over HTTP, at the addresses that ``web_video_server`` gives them."""
+"""Camera pictures over HTTP, with the addresses of ``web_video_server``.
+
+For tests and the demo of cameras over HTTP. Open ``server`` first.
+"""
 
 from webmap.sim.web_video.server import WebVideoServer
 

@@ -1,3 +1,10 @@
+/**
+ * Which map of the page is driven, and the devices that drive it.
+ *
+ * This folder reads keys, gamepads and the on-screen stick. Open this file first. What
+ * becomes of the inputs is decided in `../motion`.
+ */
+
 import { Gamepads } from "./pads.js";
 import { Keys } from "./keys.js";
 

@@ -1,3 +1,11 @@
+/**
+ * The page's half of motion, without sockets and timers: inputs and messages in,
+ * commands and news out.
+ *
+ * This folder decides what the page sends to the gate. Open this file first, then
+ * `pilot.js` and `stream.js`. What reads the devices is in `../inputs`.
+ */
+
 import { Asking } from "./asking.js";
 import { Hands } from "./hands.js";
 import { Loop } from "./loop.js";

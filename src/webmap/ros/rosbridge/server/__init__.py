@@ -1,1 +1,5 @@
-"""A rosbridge v2.1 server over a small ROS graph that lives in this process."""
+"""A rosbridge v2.1 server over a small ROS graph that is in this process.
+
+For the simulator, recordings and tests. Open ``server`` first, then ``session``, which
+is one client.
+"""

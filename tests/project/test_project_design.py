@@ -1,0 +1,61 @@
+"""The design page names files, and each folder has a description."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "src" / "webmap"
+DESIGN = (ROOT / "docs" / "explanation" / "design.md").read_text("utf-8")
+FOLDERS = sorted(file.parent for file in PACKAGE.rglob("__init__.py"))
+MOST_FILES = 28
+
+
+def section(title: str) -> str:
+    """Return the text of a section of the design page."""
+    return re.split(r"^###? ", DESIGN.partition(f"## {title}\n")[2], flags=re.M)[0]
+
+
+def test_every_file_that_the_design_names_is_there():
+    named = set(re.findall(r"`([a-z_]+/[\w/]+\.(?:py|js))`", DESIGN))
+    assert len(named) > 30
+    assert sorted(name for name in named if not (PACKAGE / name).is_file()) == []
+
+
+@pytest.mark.parametrize("title", ["The path of a command", "The path of a pose"])
+def test_the_paths_of_the_design_are_lists_of_files(title):
+    steps = re.findall(r"^\d+\. (.*(?:\n   .*)*)", section(title), re.M)
+    assert len(steps) > 5
+    assert all(re.search(r"`[a-z_]+/[\w/]+\.(?:py|js)`", step) for step in steps)
+
+
+def test_the_design_describes_every_folder_of_the_package():
+    rows = re.findall(r"^\| `([a-z]+)` \|", section("Folders"), re.M)
+    folders = {file.name for file in PACKAGE.iterdir() if file.is_dir()}
+    assert set(rows) == folders - {"__pycache__"}
+
+
+def test_the_folders_are_in_the_order_of_the_contract():
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    layers = contracts["tool"]["importlinter"]["contracts"][0]["layers"]
+    order = [set(re.findall(r"webmap\.([a-z]+)", layer)) for layer in layers]
+    assert set().union(*order) == {
+        folder.name for folder in FOLDERS if folder.parent == PACKAGE
+    }
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda each: each.name)
+def test_each_folder_opens_with_a_description(folder):
+    text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8")))
+    assert text is not None
+    assert len(text.split()) >= 12, text
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda each: each.name)
+def test_no_folder_is_a_heap(folder):
+    gate_is_last = "gate" in folder.parts
+    files = [file for file in folder.iterdir() if file.is_file()]
+    assert gate_is_last or len(files) <= MOST_FILES, len(files)
