@@ -10,6 +10,9 @@ SHELL := /bin/bash
 BIN := .venv/bin
 PY := $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# The tests start hundreds of processes. Without bytecode on disk each of them compiles
+# all modules that it imports, which takes longer than the import.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Stamps lie in the folders that they vouch for and go with them.
 MADE := .venv/.made
