@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 
@@ -57,7 +58,17 @@ def log_budgets() -> None:
     budgets.clear()
 
 
-@pytest.fixture(scope="module")
+def of_browsers(fixture_name: str, config: pytest.Config) -> str:
+    """Return for how long a browser runs.
+
+    Other tests of the same worker need the thread for asyncio, so a browser ends with
+    its module. Where only tests with a browser run, one serves all of a worker's.
+    """
+    alone = re.match(r"browser\b(?!.* or )", config.getoption("markexpr"))
+    return "session" if alone else "module"
+
+
+@pytest.fixture(scope=of_browsers)
 def chromium() -> Iterator[Browser]:
     with launched() as browser:
         yield browser
