@@ -10,6 +10,9 @@ SHELL := /bin/bash
 BIN := .venv/bin
 PY := $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# The tests start hundreds of processes. Without bytecode on disk each of them compiles
+# all modules that it imports, which takes longer than the import.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Stamps lie in the folders that they vouch for and go with them.
 MADE := .venv/.made
@@ -17,8 +20,10 @@ INSTALLED := .venv/.installed
 DEV := .venv/.installed-dev
 NODE := node_modules/.installed
 
-# More at once take as long on two processors, and make tests that need a browser in time fail.
+# More tests with a browser at once take as long on two processors, and some of them fail.
+# Tests without a browser wait for half of their time.
 JOBS ?= 2
+WAITING_JOBS ?= 4
 ARGS ?=
 
 ## help: list what there is
@@ -64,7 +69,7 @@ contracts: $(DEV)
 ## test-fast: the tests that need neither a browser nor a peer nor a quiet machine
 .PHONY: test-fast
 test-fast: $(DEV)
-	$(BIN)/pytest -q -n $(JOBS) --dist loadfile -m "not browser and not peer and not serial and not slow"
+	$(BIN)/pytest -q -n $(WAITING_JOBS) --dist loadfile -m "not browser and not peer and not serial and not slow"
 
 ## test-web: the JavaScript that touches no DOM, in Node
 .PHONY: test-web
@@ -83,17 +88,20 @@ test-gate: $(DEV)
 .PHONY: test-python test-parallel test-serial
 OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
+WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-parallel: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py $(JOBS) -m "not serial" $(addprefix --ignore ,$(OF_GATE))
+	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" $(addprefix --ignore ,$(OF_GATE))
+	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
 # Tests that measure time wait most of the time: two files of them run side by side, on
 # any machine. The trials of motion grant what the machine was late by; the others get a
-# second look. The trials under load run alone.
-BESIDE := $(filter-out %_load.py %_soak.py,$(wildcard tests/safety/test_*.py))
-OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*.py' 'mark\.serial' tests)))
+# second look. The longest files come first, and the trials under load run alone.
+SERIAL_JOBS ?= 2
+ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
+LONG = $(ONE_LANE) $(OTHER_LANE)
+OF_TIME := $(sort $(shell grep -rl --include='test_*.py' 'mark\.serial' tests))
 test-serial: $(DEV) $(NODE)
-	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(BESIDE)
-	$(BIN)/pytest -q -m serial $(addprefix --ignore ,$(BESIDE)) tests/safety
-	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
+	$(PY) tools/pytest_beside.py $(SERIAL_JOBS) -m serial $(LONG) $(filter-out $(LONG) $(ALONE),$(OF_TIME))
+	$(BIN)/pytest -q -m serial $(ALONE)
 
 ## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety

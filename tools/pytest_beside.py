@@ -3,7 +3,7 @@
 A browser that shares two cores with another one may be held up for seconds where a
 test allows for less, and a shared machine may stop for a moment. So a few tests that
 fail get a second look. What fails then too has failed, and what passes is named: it
-waits for too little, which is to be mended.
+waits for too little, which is to be mended. A proof of safety gets no second look.
 
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
 """
@@ -27,17 +27,20 @@ class Failed:
     Attributes:
         tests: Their ids, each once.
         uncollected: Whether there is anything that could not be collected.
+        unsafe: Whether a test with the mark ``safety`` is among them.
 
     """
 
     def __init__(self) -> None:
         self.tests: dict[str, None] = {}
         self.uncollected = False
+        self.unsafe = False
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Take what became of a part of a test."""
         if report.failed:
             self.tests[report.nodeid] = None
+            self.unsafe = self.unsafe or "safety" in report.keywords
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Take what became of a file."""
@@ -62,7 +65,7 @@ def main(jobs: str, *arguments: str) -> int:
         return status
     tests = list(failed.tests)
     print(f"\n{len(tests)} failed at first:", *tests, sep="\n  ", flush=True)
-    if not 0 < len(tests) <= MOST:
+    if failed.unsafe or not 0 < len(tests) <= MOST:
         return status
     print("\nNow a second time, alone:", flush=True)
     status = subprocess.call([sys.executable, "-m", "pytest", "-q", "-rA", *tests])

@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+from cli_inside import run_inside
 
 import webmap
 
@@ -54,7 +55,7 @@ def test_help_names_every_command():
     commands = ("demo", "view", "discover", "doctor", "play", "record", "run", "check")
     for command in (*commands, "sim"):
         assert re.search(rf"^  {command} ", said.stdout, re.M)
-        assert run(command, "--help").returncode == 0
+        assert run_inside(command, "--help").returncode == 0
 
 
 def test_version_is_the_packages():
@@ -83,7 +84,7 @@ def test_version_is_the_packages():
     ],
 )
 def test_a_wrong_argument_is_one_sentence_and_exit_code_2(arguments, said):
-    result = run(*arguments)
+    result = run_inside(*arguments)
     assert result.returncode == 2, result.stderr
     [error] = [line for line in result.stderr.splitlines() if not is_logged(line)]
     assert error.startswith("Error: ")

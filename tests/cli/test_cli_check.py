@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 
+from cli_inside import run_inside
+
 
 def webmap(*arguments):
     return subprocess.run(
@@ -43,7 +45,7 @@ def test_a_wrong_file_is_refused_with_exit_code_2_by_both(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text('[bridges]\na = "ws://a"\n[[robots]]\nnmae = "Bob"\n')
     for command in ("check", "run"):
-        said = webmap(command, file)
+        said = run_inside(command, file)
         assert said.returncode == 2
         assert f'{file}:4: robots[0].nmae: there is no key "nmae" here' in said.stderr
         assert said.stdout == ""
@@ -52,6 +54,6 @@ def test_a_wrong_file_is_refused_with_exit_code_2_by_both(tmp_path):
 
 def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    said = webmap("check", tmp_path / "pipe")
+    said = run_inside("check", tmp_path / "pipe")
     assert said.returncode == 2
     assert f"{tmp_path / 'pipe'}: expected a file, got a pipe" in said.stderr

@@ -5,6 +5,7 @@ import sys
 import tomllib
 
 import pytest
+from cli_inside import run_inside
 
 from webmap.base.errors import ConfigError
 from webmap.cli.options import parse_topics
@@ -25,7 +26,7 @@ def webmap(*arguments, told=""):
 
 def test_robots_of_a_list_are_found_without_asking_the_bridge():
     command = ("discover", "ws://127.0.0.1:1", "--topics", "-", "--toml")
-    said = webmap(*command, told=TOPICS)
+    said = run_inside(*command, told=TOPICS)
     assert said.returncode == 0, said.stderr
     (robot,) = tomllib.loads(said.stdout)["robots"]
     assert robot["name"] == "bob"
@@ -42,13 +43,13 @@ def test_a_list_is_of_one_bridge(tmp_path):
     topics = tmp_path / "topics.txt"
     topics.write_text(TOPICS)
     for command in ("discover", "doctor"):
-        said = webmap(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
+        said = run_inside(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
         assert said.returncode == 2
         assert "one bridge, and 2 were given" in said.stderr
 
 
 def test_help_shows_each_example_on_a_line_of_its_own():
-    lines = webmap("discover", "--help").stdout.splitlines()
+    lines = run_inside("discover", "--help").stdout.splitlines()
     assert "  webmap discover ws://robot:9090 --toml > fleet.toml" in lines
 
 
@@ -66,7 +67,7 @@ def test_a_list_that_is_not_utf_8_is_refused_with_a_sentence(tmp_path):
 
 
 def test_a_program_without_an_end_is_refused():
-    said = webmap("run", "/dev/zero", "--no-browser")
+    said = run_inside("run", "/dev/zero", "--no-browser")
     assert said.returncode == 2
     assert "/dev/zero: expected a file or a folder, got a device" in said.stderr
 

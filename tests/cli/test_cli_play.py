@@ -7,6 +7,7 @@ import sys
 
 import psutil
 import pytest
+from cli_inside import run_inside
 
 from bag_making import ODOMETRY, TWIST, Made
 from webmap.bags import need_rosbags
@@ -45,7 +46,7 @@ def assert_refused(done, words):
 
 
 def test_a_file_that_is_not_there_is_one_sentence_and_exit_code_2(tmp_path):
-    done = run(tmp_path / "gone.bag")
+    done = run_inside("play", tmp_path / "gone.bag")
     assert_refused(done, "gone.bag: there is no such file or folder")
     assert len(done.stderr.splitlines()) == 1
 
@@ -68,7 +69,7 @@ def test_a_file_that_is_cut_off_is_one_sentence_and_exit_code_2(bag):
     ],
 )
 def test_a_pace_that_makes_no_sense_is_exit_code_2(bag, options, words):
-    assert_refused(run(bag, *options), words)
+    assert_refused(run_inside("play", bag, *options), words)
 
 
 def test_a_replay_that_has_ended_is_said_and_no_error(bag, capfd):

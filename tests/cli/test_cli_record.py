@@ -10,6 +10,7 @@ import threading
 import time
 
 import pytest
+from cli_inside import run_inside
 from rosbags.highlevel import AnyReader
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -175,7 +176,8 @@ def test_a_bag_that_exists_is_left_as_it_is(ros1, tmp_path):
     ],
 )
 def test_a_wrong_argument_of_record_is_one_sentence(arguments, words, tmp_path):
-    assert_refused(run(*arguments, "--out", tmp_path / "bag"), words)
+    done = run_inside("record", *arguments, "--out", tmp_path / "bag")
+    assert_refused(done, words)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,9 +1,7 @@
 """What is said with ``--set`` comes before what is guessed."""
 
-import subprocess
-import sys
-
 import pytest
+from cli_inside import run_inside
 
 from webmap import Bridge
 from webmap.base.errors import ConfigError
@@ -142,8 +140,7 @@ def test_a_robot_that_is_not_there_is_refused_unless_it_may_still_come():
 
 
 def view(*arguments):
-    command = [sys.executable, "-m", "webmap", "view", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    return run_inside("view", *arguments)
 
 
 def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):

@@ -24,7 +24,7 @@ def test_once():
 def run(tmp_path):
     def run(source: str) -> tuple[int, str]:
         (tmp_path / "test_it.py").write_text(source)
-        (tmp_path / "pytest.ini").write_text("[pytest]\n")
+        (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  safety\n")
         command = [sys.executable, str(TOOL), "2", "-p", "xdist", "test_it.py"]
         done = subprocess.run(
             command,
@@ -50,6 +50,12 @@ def test_what_fails_alone_too_has_failed(run):
     assert status == 1
     assert "2 failed at first" in said
     assert "to be mended" not in said
+
+
+def test_a_proof_of_safety_gets_no_second_look(run):
+    status, said = run("import pytest\npytestmark = pytest.mark.safety\n" + ONCE)
+    assert status == 1
+    assert "Now a second time" not in said
 
 
 def test_many_failures_get_no_second_look(run):

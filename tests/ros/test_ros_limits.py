@@ -109,14 +109,17 @@ def test_items_of_cbor_are_counted_whatever_they_are():
 
 
 @pytest.mark.parametrize(
-    "frame",
-    [
-        publish('{"transforms":[' + "[]," * 10 * MAX_VALUES + "1]}"),
-        cbor2.dumps({"op": "publish", "topic": "/t", "msg": [[]] * 10 * MAX_VALUES}),
+    "make",
+    [  # each takes long, so it is made when its test runs
+        lambda: publish('{"transforms":[' + "[]," * 10 * MAX_VALUES + "1]}"),
+        lambda: cbor2.dumps(
+            {"op": "publish", "topic": "/t", "msg": [[]] * 10 * MAX_VALUES}
+        ),
     ],
     ids=["json", "cbor"],
 )
-def test_the_worker_builds_nothing_of_what_it_refuses(frame):
+def test_the_worker_builds_nothing_of_what_it_refuses(make):
+    frame = make()
     asked = worker.Request(len(frame), "/t", worker.view_name(Publish))
     tracemalloc.start()
     try:

@@ -456,22 +456,22 @@ def test_braces_cost_next_to_no_time(map, channel):
 
 
 SIDE = 4096
-HUGE = publish(
-    "/map", grid(0, width=SIDE, height=SIDE, resolution=0.05, data=[-7])
-).replace("[-7]", "[" + "-1," * (SIDE * SIDE - 1) + "100]")
 
 
 @pytest.mark.slow
 @pytest.mark.serial
 def test_a_map_of_fifty_megabytes_is_drawn_while_the_rest_goes_on(map, channel):
+    text = publish("/map", grid(0, width=SIDE, height=SIDE, resolution=0.05, data=[-7]))
+    huge = text.replace("[-7]", "[" + "-1," * (SIDE * SIDE - 1) + "100]")
+
     async def scenario(scene: Scene) -> None:
         mine = await scene.say_good(0, 1.0)
-        assert len(HUGE) > 48_000_000
+        assert len(huge) > 48_000_000
         seen: list[float] = []
         scene.bridges[1].subscribe(
             "/odom", lambda message: seen.append(time.monotonic())
         )
-        sending = asyncio.create_task(scene.servers[0].send(HUGE))
+        sending = asyncio.create_task(scene.servers[0].send(huge))
         while scene.state(0)["/map"] == mine["/map"]:
             await scene.servers[1].send(publish("/odom", odometry(4.0)))
             await asyncio.sleep(0.01)

@@ -1,0 +1,57 @@
+"""The command line in this process, for commands that end by themselves.
+
+A process of its own takes half a second to start. Each command is also tested as one.
+"""
+
+import io
+import logging
+import signal
+import sys
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from unittest.mock import patch
+
+from webmap.cli import main
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+LOGGERS = ("websockets", "uvicorn", "asyncio", "PIL")
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended, as ``subprocess.run`` returns it."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run_inside(*arguments: object, told: str = "") -> Done:
+    """Run a command.
+
+    Args:
+        *arguments: What follows ``webmap``.
+        told: Its standard input.
+
+    """
+    out, err = io.StringIO(), io.StringIO()
+    with ExitStack() as after:
+        for number in SIGNALS:
+            after.callback(signal.signal, number, signal.getsignal(number))
+        for name in LOGGERS:
+            logger = logging.getLogger(name)
+            after.callback(logger.setLevel, logger.level)
+        words = ["webmap", *map(str, arguments)]
+        after.enter_context(patch.object(sys, "argv", words))
+        stdin = io.TextIOWrapper(io.BytesIO(told.encode()), "utf-8")
+        after.enter_context(patch.object(sys, "stdin", stdin))
+        after.enter_context(redirect_stdout(out))
+        after.enter_context(redirect_stderr(err))
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+        else:
+            code = 0
+    assert isinstance(code, int)
+    return Done(code, out.getvalue(), err.getvalue())
