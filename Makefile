@@ -93,15 +93,16 @@ test-parallel: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" $(addprefix --ignore ,$(OF_GATE))
 	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
 # Tests that measure time wait most of the time: two files of them run side by side, on
-# any machine. The trials of motion grant what the machine was late by; the others get a
-# second look. The longest files come first, and the trials under load run alone.
-SERIAL_JOBS ?= 2
+# any machine, the longest first. The trials of motion grant what the machine was late by
+# and get no second look; the others get one. The trials under load run alone.
 ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
 LONG = $(ONE_LANE) $(OTHER_LANE)
-OF_TIME := $(sort $(shell grep -rl --include='test_*.py' 'mark\.serial' tests))
+OF_MOTION = $(LONG) $(filter-out $(LONG) $(ALONE),$(wildcard tests/safety/test_*.py))
+OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*.py' 'mark\.serial' tests)))
 test-serial: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py $(SERIAL_JOBS) -m serial $(LONG) $(filter-out $(LONG) $(ALONE),$(OF_TIME))
+	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(OF_MOTION)
 	$(BIN)/pytest -q -m serial $(ALONE)
+	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
 
 ## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety
