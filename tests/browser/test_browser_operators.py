@@ -58,7 +58,7 @@ def test_anybody_stops_a_robot_that_somebody_else_drives(server, witness, tab, o
     other.goto(server.url)
     row = other.locator("#robots .row")
     expect(row).to_contain_text(re.compile("drives|holds it"))
-    other.get_by_role("button", name="Stop all").click()
+    other.get_by_role("button", name="STOP ALL").click()
     wait_until(lambda: standing(witness), what="standing still")
     expect(row).to_contain_text("Stopped")
     tab.wait_for_timeout(700)

@@ -30,7 +30,7 @@ def test_a_page_whose_token_is_of_the_past_is_told_to_open_the_new_address(
     with running(*command, 0, pattern=WEB) as first:
         tab.goto(first.url)
         tab.wait_for_selector("svg.webmap")
-    expect(status).to_contain_text("No connection to the server")
+    expect(status).to_contain_text("No connection to WebMap")
     with running(*command, urlsplit(first.url).port, pattern=WEB) as second:
         expect(status).to_contain_text("Open the address that WebMap printed")
         tab.goto(second.url)

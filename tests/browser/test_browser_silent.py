@@ -39,7 +39,7 @@ def test_a_robot_whose_odometry_ceases_looks_old_everywhere_and_the_log_says_so(
     drawn = {name: tab.locator(f'.robot[data-name="{name}"]') for name in rows}
     rows["Bob"].locator("button").click()
     expect(tab.locator("#card h2")).to_have_text("Bob")
-    old = [rows["Bob"].get_by_text("Old data"), tab.locator("#card .state .old")]
+    old = [rows["Bob"].get_by_text("Stale data"), tab.locator("#card .state .old")]
 
     def bob_looks(*, is_old: bool) -> None:
         for word in old:
@@ -50,7 +50,7 @@ def test_a_robot_whose_odometry_ceases_looks_old_everywhere_and_the_log_says_so(
             expect(drawn["Bob"]).not_to_have_class(STALE)
         # The other goes on.
         expect(drawn["Ann"]).not_to_have_class(STALE)
-        expect(rows["Ann"].get_by_text("Old data")).to_be_hidden()
+        expect(rows["Ann"].get_by_text("Stale data")).to_be_hidden()
         expect(rows["Ann"].locator(".age")).to_have_text(re.compile(r"^0\.\d s$"))
 
     bob_looks(is_old=False)

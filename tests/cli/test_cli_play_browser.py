@@ -29,7 +29,7 @@ def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
         card = page.locator("#card")
         expect(card.locator("h2")).to_have_text("office")
         expect(card.locator(".facts").first).to_contain_text("1.50")
-        expect(card.locator(".state")).to_contain_text("Watched only")
+        expect(card.locator(".state")).to_contain_text("View only")
         expect(card.locator(".age")).not_to_contain_text(re.compile(r"[1-9]\d+ s"))
         expect(page.locator("#title")).to_have_text(
             re.compile(r"Recording office: \d+\.\d of 19\.9 s, 2 times as fast")
@@ -42,7 +42,7 @@ def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
         page.keyboard.down("w")
         expect(page.locator("#title")).to_have_text(re.compile("Recording office"))
         page.keyboard.up("w")
-        expect(card.locator(".state")).to_contain_text("Watched only")
+        expect(card.locator(".state")).to_contain_text("View only")
 
 
 def test_a_round_of_a_recording_is_no_jump(chromium, tmp_path):

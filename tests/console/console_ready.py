@@ -39,7 +39,7 @@ PLACES = f"""() => {{
 """Places of the window beside other robots, where the map is to be seen; the farthest
 from the selected robot first."""
 
-UNDER_WAY = re.compile("Goal under way.*to go")
+UNDER_WAY = re.compile("Navigating to goal.*to go")
 
 
 def send_away(page: Page) -> None:

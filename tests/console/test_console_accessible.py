@@ -55,7 +55,7 @@ def test_twelve_states_have_no_violation(open_console):
     expect(page.locator("#card")).to_be_visible()
     look("a robot is selected")
     you = page.locator("#card .state .you")
-    hold(page.keyboard, "a", lambda: you.text_content() == "You drive")
+    hold(page.keyboard, "a", lambda: you.text_content() == "You are driving")
     look("it is driven")
     page.keyboard.up("a")
     page.get_by_role("button", name="Send to").click()
@@ -86,7 +86,7 @@ def test_twelve_states_have_no_violation(open_console):
     look("the camera is large")
     page.locator(".camera-close").click()
     page.keyboard.press("Escape")
-    expect(page.locator("#card .state .holder")).to_have_text("Stopped")
+    expect(page.locator("#card .state .holder")).to_have_text("STOP active")
     look("it is stopped")
     assert looker.states == 12
     assert looker.found == []

@@ -26,7 +26,7 @@ def bridge(state="open", lag=0.0, trouble=None):
         (
             bridge("connecting", trouble="no answer within 5 s", lag=9.0),
             "lost",
-            "cannot be reached: no answer within 5 s; trying again",
+            "no connection: no answer within 5 s; reconnecting",
         ),
     ],
 )
@@ -39,8 +39,8 @@ def test_a_bridge_is_open_late_connecting_or_lost(bridge, link, text):
     [
         (["open"], "Bridge open"),
         (["late"], "Bridge late"),
-        (["lost"], "No bridge"),
-        (["connecting"], "Bridge connecting"),
+        (["lost"], "No connection to the bridge"),
+        (["connecting"], "Connecting to the bridge"),
         (["open", "open"], "2 bridges open"),
         (["open", "lost"], "1 of 2 bridges open"),
         (["open", "late", "lost"], "2 of 3 bridges open, 1 late"),

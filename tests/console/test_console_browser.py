@@ -27,7 +27,7 @@ def test_a_robot_that_is_clicked_on_the_map_has_its_card(open_console):
     page.locator('.robot[data-name="Robot 1"] .hit').click()
     expect(page.locator("#card h2")).to_have_text("Robot 1")
     expect(page.locator("#card dd.age")).not_to_have_class(re.compile("stale"))
-    page.get_by_role("button", name="Select no robot").click()
+    page.get_by_role("button", name="Deselect the robot").click()
     expect(page.locator("#card")).to_be_hidden()
 
 
@@ -44,22 +44,22 @@ def test_who_holds_a_robot_reads_you_and_others_read_a_name(open_console):
     row(mine, "Robot 2").click()
     you = mine.locator("#card .state .you:visible")
     for _ in range(5):  # a page that is too busy is refused
-        mine.get_by_role("button", name="Take Robot 2").click()
+        mine.get_by_role("button", name="Take control of Robot 2").click()
         with suppress(AssertionError):
-            expect(you).to_have_text("You hold it", timeout=3000)
+            expect(you).to_have_text("You have control", timeout=3000)
             break
-    expect(you).to_have_text("You hold it")
+    expect(you).to_have_text("You have control")
     other = theirs.locator('#robots [aria-pressed]:has-text("Robot 2") .holder')
     expect(other).to_contain_text("holds it")
     expect(other).to_be_visible()
-    mine.get_by_role("button", name="Hand back", exact=True).click()
+    mine.get_by_role("button", name="Release control", exact=True).click()
     expect(mine.locator("#card .state .holder")).to_have_text("Free")
 
 
 @pytest.mark.parametrize("size", ["desk", "phone"])
 def test_stop_is_in_sight_and_large(open_console, size):
     page = open_console(size)
-    stop = page.get_by_role("button", name="Stop all")
+    stop = page.get_by_role("button", name="STOP ALL")
     expect(stop).to_be_in_viewport(ratio=1)
     assert stop.bounding_box()["height"] >= 56
     row_ = page.locator("#sheet")
@@ -409,7 +409,7 @@ def test_the_log_unfolds_into_what_robots_say_and_shows_the_level_that_is_chosen
     page = open_console()
     log = page.locator(".webmap-rosout")
     log.locator("summary").click()
-    expect(log.locator(".webmap-rosout-count")).to_have_text("Nothing was said yet.")
+    expect(log.locator(".webmap-rosout-count")).to_have_text("No log lines yet.")
     page.locator("#robots .row").first.click()
     send_away(page)
     line = log.locator(".webmap-rosout-line", has_text="goal").last

@@ -226,7 +226,7 @@ def test_wherever_it_is_neither_stop_nor_the_stick_is_covered(open_page, size):
         page.get_by_role("button", name="Stick").click()
     for dock in docks:
         panel.get_by_role("button", name=dock).click()
-        can_be_pressed(page.get_by_role("button", name="Stop all"))
+        can_be_pressed(page.get_by_role("button", name="STOP ALL"))
         can_be_pressed(page.get_by_role("button", name="Stop Bob"))
         can_be_pressed(stick)
         can_be_pressed(panel.get_by_role("button", name="Close the camera"))

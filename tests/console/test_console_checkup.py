@@ -68,7 +68,7 @@ def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
 @pytest.mark.parametrize(
     ("levels", "words"),
     [
-        (["good", "note", "good"], "Nothing is in the way: 1 note, 2 good"),
+        (["good", "note", "good"], "No problems: 1 note, 2 good"),
         (["good", "wrong", "warning", "warning"], "1 wrong, 2 warnings, 1 good"),
     ],
 )

@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 def open_report(page):
     page.locator("#bridges summary").click()
     page.get_by_role(
-        "button", name=re.compile("^Check .*in the way of driving$")
+        "button", name=re.compile("^Check .* for problems with driving$")
     ).click()
     return page.locator(".doctor:popover-open")
 
@@ -44,7 +44,7 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
     )
     assert good != note, "not by colour alone"
     expect(report.get_by_role("heading", name="Robot 9")).to_be_attached()
-    expect(page.get_by_role("button", name="Stop all")).to_be_in_viewport(ratio=1)
+    expect(page.get_by_role("button", name="STOP ALL")).to_be_in_viewport(ratio=1)
 
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     report.get_by_role("button", name="Copy as text").click()
@@ -60,7 +60,7 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
     report = open_report(other)
     expect(report.locator(".finding").first).to_be_visible()
     expect(report.locator(".status")).to_contain_text("Checked")
-    expect(other.get_by_role("button", name="Stop all")).to_be_in_viewport(ratio=1)
+    expect(other.get_by_role("button", name="STOP ALL")).to_be_in_viewport(ratio=1)
     assert other.evaluate("document.documentElement.scrollWidth") == 390
 
 
@@ -68,11 +68,11 @@ def test_a_call_is_tried_from_the_report_and_what_that_told_stands_in_it(open_co
     page = open_console()
     report = open_report(page)
     expect(report.locator(".status")).to_contain_text("Checked", timeout=20_000)
-    report.get_by_role("button", name="Try a call").click()
-    question = report.get_by_role("group", name="Try a call that hangs")
+    report.get_by_role("button", name="Test slow call").click()
+    question = report.get_by_role("group", name="Test slow call")
     expect(question).to_contain_text("offers a service of its own")
-    expect(question).to_contain_text("try it while nobody drives")
-    question.get_by_role("button", name="Try it").click()
+    expect(question).to_contain_text("test while nobody drives")
+    question.get_by_role("button", name="Run test").click()
     told = report.locator(".finding").filter(has_text="blocks no socket (tried)")
     expect(told).to_have_attribute("data-level", "good")
     expect(question).to_be_hidden()

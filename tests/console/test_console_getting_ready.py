@@ -37,7 +37,7 @@ def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
     row.click()
     expect(row).to_have_attribute("aria-pressed", "true")
     expect(words).to_be_visible()
-    expect(words).to_contain_text("Getting ready")
+    expect(words).to_contain_text("Preparing input")
     page.keyboard.down("w")
     come.set()
     for route in held:
@@ -46,7 +46,7 @@ def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
     title = page.locator(".webmap-teleop-title")
     expect(title).to_have_text("Free")
     page.keyboard.down("w")  # as the keyboard repeats it
-    expect(title).to_have_text("Let go, then press again")
+    expect(title).to_have_text("Input blocked: release all keys, then press again")
     page.keyboard.up("w")
     expect(title).to_have_text("Free")
     context.close()
@@ -62,10 +62,10 @@ def test_the_first_press_drives_as_soon_as_the_page_does_not_say_so(chromium, de
     page.keyboard.down("a")
     title = page.locator(".webmap-teleop-title")
     seen, deadline = set(), time.monotonic() + 10
-    while "You drive" not in seen:
+    while "You are driving" not in seen:
         assert time.monotonic() < deadline, seen
         seen.add(title.text_content())
         page.wait_for_timeout(20)
-    assert "Let go, then press again" not in seen
+    assert "Input blocked: release all keys, then press again" not in seen
     page.keyboard.up("a")
     context.close()

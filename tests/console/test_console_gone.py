@@ -73,7 +73,7 @@ def test_a_robot_that_is_gone_fades_and_can_be_removed_until_it_is_back(
                 page.goto(address)
                 expect(page.locator(".robot:not(.unplaced)")).to_have_count(2)
                 row.locator("button").first.click()
-                expect(page.locator("#card .state")).to_contain_text("Watched only")
+                expect(page.locator("#card .state")).to_contain_text("View only")
                 expect(remove).to_be_hidden()
             since = re.compile(r"Gone since \d\d:\d\d")
             inner = {"use_inner_text": True}

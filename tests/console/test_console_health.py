@@ -48,7 +48,7 @@ def test_what_is_not_well_is_listed_by_word_and_shape_the_worst_first(map):
     assert health.element.get("hidden") is None
     assert said(health) == [
         ("wrong", "Error: motors: <b>hot</b>"),
-        ("note", "Silent: laser"),
+        ("note", "Stale: laser"),
         ("warning", "Warning: battery: low"),
     ]
     first = health.element.children[1].children[0]
@@ -56,7 +56,7 @@ def test_what_is_not_well_is_listed_by_word_and_shape_the_worst_first(map):
     assert health.element.children[1].children[0] is first, "nothing is new"
     diagnosing.parts = diagnosing.parts[3:]
     health.poll()
-    assert said(health) == [("good", "All is well: 1 part")]
+    assert said(health) == [("good", "All OK: 1 part")]
     map.selected = None
     health.on_select()
     assert health.element.get("hidden") is not None
@@ -70,7 +70,7 @@ def test_a_robot_without_diagnostics_has_no_health(map):
     assert health.element.get("hidden") is not None
 
 
-UNHEARD = ("note", "Unheard: no part of this robot says how it is")
+UNHEARD = ("note", "No data: no diagnostics of this robot received yet")
 
 
 @pytest.mark.parametrize("parts", [[], [("base: Motors", "ok", "fine", "nobody's")]])
@@ -89,8 +89,8 @@ def test_a_part_that_may_be_another_robots_is_listed_as_such_if_it_is_not_well(m
     chosen(map, Diagnosing(*nobodys, ("robot_0/base: Battery", "ok", "full")))
     health = RobotHealth(map, html.section())
     assert said(health) == [
-        ("wrong", "Error: base: Motors (of some robot here): hot"),
-        ("note", "Silent: base: Laser (of some robot here)"),
+        ("wrong", "Error: base: Motors (robot unknown): hot"),
+        ("note", "Stale: base: Laser (robot unknown)"),
     ]
 
 

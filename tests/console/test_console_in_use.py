@@ -211,9 +211,9 @@ def test_only_an_operator_may_have_a_call_tried(bridge, checkup, role, may):
         map, report = report_for(Viewer("v1", "Ann", role), bridge)
         press(report, "Check again")
         await until(lambda: not checkup.is_running)
-        asking = press(report, "Try a call")
+        asking = press(report, "Test slow call")
         assert (asking.get("hidden") is None) is may
-        press(report, "Try it")
+        press(report, "Run test")
         await until(lambda: not checkup.is_running)
         map.page.close()
 
@@ -229,10 +229,10 @@ def test_a_call_is_not_tried_before_what_it_does_was_said(bridge, checkup):
         divs = [each for each in report.walk() if getattr(each, "tag", "") == "div"]
         (question,) = [each for each in divs if each.get("role") == "group"]
         assert question.get("hidden") is not None
-        press(report, "Try a call")
+        press(report, "Test slow call")
         assert question.get("hidden") is None
-        assert "try it while nobody drives" in question.text
-        press(report, "Not now")
+        assert "test while nobody drives" in question.text
+        press(report, "Cancel")
         assert question.get("hidden") is not None
         map.page.close()
 

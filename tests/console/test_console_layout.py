@@ -74,8 +74,8 @@ def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(
     found = view_of(page)
     row = page.locator("#robots .row", has_text="Robot 2").locator("button").first
     row.click()
-    page.get_by_role("button", name="Take Robot 2").click()
-    expect(page.locator("#card .state .you")).to_have_text("You hold it")
+    page.get_by_role("button", name="Take control of Robot 2").click()
+    expect(page.locator("#card .state .you")).to_have_text("You have control")
     page.locator(".webmap-layers > summary").click()
     page.get_by_label("Scans", exact=True).uncheck()
     page.locator("svg.webmap").focus()
@@ -98,8 +98,8 @@ def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(
     # What follows is the layout's doing alone.
     page.evaluate(LISTEN)
     word = page.locator(".webmap-layout-word")
-    page.get_by_role("button", name="As it was found").press("Enter")
-    expect(word).to_have_text("The page is as it was found.")
+    page.get_by_role("button", name="Reset layout").press("Enter")
+    expect(word).to_have_text("The layout is reset.")
     expect_view(page, found)
     expect(page.locator(".webmap-layers")).not_to_have_attribute("open", "")
     expect(log).not_to_have_attribute("open", "")
@@ -117,7 +117,7 @@ def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(
     expect(page.locator(".laserscan").first).to_be_visible()
 
     load(page, tmp_path / FILE)
-    expect(word).to_have_text(f"Loaded {FILE}. No robot was told anything.")
+    expect(word).to_have_text(f"Loaded {FILE}. No command was sent to a robot.")
     expect_view(page, left)
     expect(page.locator(".laserscan").first).to_be_hidden()
     expect(log).to_have_attribute("open", "")

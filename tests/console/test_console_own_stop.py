@@ -27,23 +27,23 @@ def words(robot) -> str:
 
 def test_the_bound_is_the_robot_s_timeout_and_its_braking_from_the_speed_in_force():
     assert bound(0.25, "stated", 0.2, 0.5) == (
-        "stands within 0.65 s",
-        " 0.25 s (stated) + 0.40 s of braking from 0.20 m/s",
+        "stops within 0.65 s",
+        " 0.25 s command timeout (stated) + 0.40 s of braking from 0.20 m/s",
     )
 
 
 def test_it_is_that_of_the_page_s_own_limit_where_the_robot_allows_more():
-    assert words(report()).startswith("stands within 2.25 s|")
+    assert words(report()).startswith("stops within 2.25 s|")
 
 
 def test_the_result_of_a_stop_test_is_shown_with_its_date():
     said = words(report(stop_time=0.31, stop_source="tested", stop_date="2026-11-21"))
-    assert "0.31 s (tested 2026-11-21)" in said
+    assert "0.31 s command timeout (tested 2026-11-21)" in said
 
 
 @pytest.mark.parametrize(
     ("source", "text"),
-    [(None, NOBODY_KNOWS), ("tested", "It does not stop by itself.")],
+    [(None, NOBODY_KNOWS), ("tested", "The base does not stop.")],
 )
 def test_a_robot_without_a_bound_is_said_to_have_none(source, text):
     said = words(report(stop_time=None, stop_source=source, stop_date="2026-11-21"))
@@ -51,9 +51,9 @@ def test_a_robot_without_a_bound_is_said_to_have_none(source, text):
 
 
 def test_a_test_that_failed_says_why():
-    failed = SimpleNamespace(state="failed", text="it did not move within 1.5 s")
+    failed = SimpleNamespace(state="failed", text="the robot did not move within 1.5 s")
     assert words(report(test=failed)).endswith(
-        "|Stop test: It did not move within 1.5 s."
+        "|Stop test: The robot did not move within 1.5 s."
     )
 
 

@@ -42,8 +42,8 @@ def assert_free(what: Locator, reach: float = 0.9) -> None:
 @pytest.mark.parametrize("size", ["desk", "phone", "on its side", "small phone"])
 def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     page = open_console(size)
-    every = page.get_by_role("button", name="Stop all")
-    one = page.get_by_role("button", name="Stop Robot 1", exact=True)
+    every = page.get_by_role("button", name="STOP ALL")
+    one = page.get_by_role("button", name="STOP Robot 1", exact=True)
     stops = [every] if size == "desk" else [every, one]
     if size != "desk":
         page.locator("#sheet").click()
@@ -82,7 +82,7 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     expect(help_).to_be_hidden()
     expect(page.locator("#card .state .holder")).to_have_text("Free")
     page.keyboard.press("Escape")
-    expect(page.locator("#card .state .holder")).to_have_text("Stopped")
+    expect(page.locator("#card .state .holder")).to_have_text("STOP active")
     expect(page.locator(".webmap-stop-standing")).to_contain_text("Robot 1 stays")
     reset()
 
@@ -100,7 +100,7 @@ def test_a_keyboard_on_the_screen_leaves_stop_in_reach(open_console, size, keybo
     # This browser has none; what it would leave of the page is known.
     left = page.viewport_size["height"] - keyboard
     page.set_viewport_size({"width": page.viewport_size["width"], "height": left})
-    for name in ("Stop all", "Stop Robot 1"):
+    for name in ("STOP ALL", "STOP Robot 1"):
         stop = page.get_by_role("button", name=name, exact=True)
         assert_free(stop)
         assert stop.bounding_box()["width"] >= 44
@@ -128,9 +128,9 @@ def test_the_card_tests_whether_a_robot_of_which_that_is_stated_stops(open_conso
     expect(test).to_have_text(re.compile("Take it to test its stop"))
     expect(test).to_be_disabled()
     bound = page.locator("#card .own-stop")
-    expect(bound).to_contain_text(re.compile(r"stands within \d\.\d\d s"))
+    expect(bound).to_contain_text(re.compile(r"stops within \d\.\d\d s"))
     expect(bound).to_contain_text("(stated)")
-    page.get_by_role("button", name="Take Robot 2").click()
+    page.get_by_role("button", name="Take control of Robot 2").click()
     # With a camera above them the figures would lie below the edge of the card.
     expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
     page.wait_for_function(
@@ -141,7 +141,7 @@ def test_the_card_tests_whether_a_robot_of_which_that_is_stated_stops(open_conso
     assert_free(figures)
     tested = re.compile(r"\(tested \d{4}-\d\d-\d\d\)")
     for _ in range(8):
-        for words in ("Test its stop", "It will creep: press again"):
+        for words in ("Run stop test", "Robot will move slowly: press again"):
             button = page.get_by_role("button", name=words, exact=True)
             page.wait_for_timeout(450)
             button.click()
@@ -154,5 +154,5 @@ def test_the_card_tests_whether_a_robot_of_which_that_is_stated_stops(open_conso
         if tested.search(bound.inner_text()):
             break
     expect(bound).to_contain_text(tested)
-    expect(page.get_by_role("button", name="Test its stop", exact=True)).to_be_enabled()
-    page.get_by_role("button", name="Hand back", exact=True).last.click()
+    expect(page.get_by_role("button", name="Run stop test", exact=True)).to_be_enabled()
+    page.get_by_role("button", name="Release control", exact=True).last.click()

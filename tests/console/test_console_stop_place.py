@@ -166,7 +166,7 @@ def test_both_stops_are_hit_and_do_not_move_in_every_state(open_console):
     page.keyboard.up("a")
     in_one_state_each(page, walk.look)
     page.keyboard.press("Escape")
-    expect(page.locator("#card .state .holder")).to_have_text("Stopped")
+    expect(page.locator("#card .state .holder")).to_have_text("STOP active")
     walk.look("stopped")
     page.evaluate(DRIVE, {"alarm": "moves at 1.00 m/s although it was sent zero"})
     expect(page.locator(".webmap-alarm")).to_be_visible()
@@ -200,8 +200,8 @@ def test_the_alarm_s_own_stop_is_at_the_same_place_and_stops(open_console, size)
     twins = alarm.locator(".webmap-stop-twin")
     expect(twins).to_have_count(2)
     # There is one STOP ALL, and not another one elsewhere.
-    expect(alarm.get_by_role("button", name="Stop all")).to_have_count(1)
-    seen = alarm.get_by_role("button", name="I have seen this")
+    expect(alarm.get_by_role("button", name="STOP ALL")).to_have_count(1)
+    seen = alarm.get_by_role("button", name="Acknowledge")
     expect(seen).to_be_in_viewport(ratio=1)
     sent = """async () => {
       const { page } = await import(document.querySelector("script[type=module]").src);

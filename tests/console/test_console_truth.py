@@ -53,13 +53,13 @@ def test_the_bar_the_card_and_the_list_have_the_same_words(open_console):
     page = open_console()
     select(page, "Robot 1")
     same_word(page, "Free")
-    page.get_by_role("button", name="Take Robot 1").click()
-    same_word(page, "You hold it")
-    hold(page.keyboard, "a", lambda: title(page).text_content() == "You drive")
-    same_word(page, "You drive")
+    page.get_by_role("button", name="Take control of Robot 1").click()
+    same_word(page, "You have control")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    same_word(page, "You are driving")
     page.keyboard.up("a")
-    same_word(page, "You hold it")
-    back = page.get_by_role("button", name="Hand back", exact=True)
+    same_word(page, "You have control")
+    back = page.get_by_role("button", name="Release control", exact=True)
     back.evaluate("e => e.click()")  # it moves while the words beside it change
     same_word(page, "Free")
 
@@ -73,7 +73,7 @@ def test_a_robot_with_a_goal_navigates_and_one_s_own_cancel_is_named(open_consol
     goal = page.locator("#card .goal")
     expect(goal).to_contain_text("Goal cancelled: by ")
     expect(goal).not_to_contain_text("another program")
-    same_word(page, "You hold it")
+    same_word(page, "You have control")
 
 
 def test_the_card_of_the_selected_robot_is_there_after_a_reload(open_console):
@@ -83,7 +83,7 @@ def test_the_card_of_the_selected_robot_is_there_after_a_reload(open_console):
     wait_until_ready(page)
     expect(page.locator("#card h2")).to_have_text("Robot 3")
     expect(page.locator("#card")).to_be_visible()
-    page.get_by_role("button", name="Select no robot").click()
+    page.get_by_role("button", name="Deselect the robot").click()
     expect(page.locator("#card")).to_be_hidden()
     select(page, "Robot 3")
 
@@ -169,9 +169,9 @@ def test_escape_is_stop_while_this_page_drives_whatever_is_open(open_console):
     page = open_console()
     select(page, "Robot 7")
     page.locator(".webmap-layers summary").click()
-    hold(page.keyboard, "a", lambda: title(page).text_content() == "You drive")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
     page.keyboard.press("Escape")
-    same_word(page, "Stopped")
+    same_word(page, "STOP active")
     page.keyboard.up("a")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
     expect(shown_state(page)).to_have_text("Free")
@@ -185,7 +185,7 @@ def test_escape_is_stop_while_this_page_holds_the_robot_that_goes_somewhere(
     send_away(page)
     page.locator(".webmap-layers summary").click()
     page.keyboard.press("Escape")
-    same_word(page, "Stopped")
+    same_word(page, "STOP active")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
 
 
@@ -196,7 +196,7 @@ def test_the_space_bar_is_stop_again_after_escape_closed_a_menu(open_console):
     page.keyboard.press("Escape")
     expect(page.locator(".webmap-layers[open]")).to_have_count(0)
     page.keyboard.press("Space")
-    same_word(page, "Stopped")
+    same_word(page, "STOP active")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
 
 
@@ -240,8 +240,12 @@ def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     select(page, "Robot 9")
     words = title(page)
     for _ in range(8):  # a page that is too busy lets go
-        hold(page.keyboard, "w", lambda: words.text_content() in ("You drive", BLOCKED))
-        while words.text_content() == "You drive":
+        hold(
+            page.keyboard,
+            "w",
+            lambda: words.text_content() in ("You are driving", BLOCKED),
+        )
+        while words.text_content() == "You are driving":
             page.wait_for_timeout(100)
         with suppress(AssertionError):
             same_word(page, BLOCKED, patience=2.0)
@@ -254,7 +258,7 @@ def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     page.keyboard.up("w")
     hold(page.keyboard, "s", lambda: "-" in MINUS.sub("-", detail.text_content()))
     page.keyboard.up("s")
-    page.get_by_role("button", name="Hand back", exact=True).click()
+    page.get_by_role("button", name="Release control", exact=True).click()
 
 
 def test_an_exported_picture_has_no_handle_of_a_tool(open_console, tmp_path):

@@ -97,8 +97,8 @@ def test_a_charge_that_is_not_known_is_not_shown():
     ("links", "text"),
     [
         (["open"], "Bridge open"),
-        (["lost"], "No bridge"),
-        (["connecting"], "Bridge connecting"),
+        (["lost"], "No connection to the bridge"),
+        (["connecting"], "Connecting to the bridge"),
         (["open", "open"], "2 bridges open"),
         (["open", "lost"], "1 of 2 bridges open"),
         ([], "0 bridges open"),

@@ -44,11 +44,15 @@ def test_every_state_of_the_gate_has_words_and_a_look():
     ("doing", "text", "mine"),
     [
         ("free", "Free", "Free"),
-        ("held", "Ann holds it", "You hold it"),
-        ("driven", "Ann drives", "You drive"),
-        ("navigating_held", "Navigating, Ann holds it", "Navigating, you hold it"),
+        ("held", "Ann has control", "You have control"),
+        ("driven", "Ann is driving", "You are driving"),
+        (
+            "navigating_held",
+            "Navigating (Ann has control)",
+            "Navigating (you have control)",
+        ),
         ("blocked", "Not moving: blocked?", "Not moving: blocked?"),
-        ("stopped", "Stopped", "Stopped"),
+        ("stopped", "STOP active", "STOP active"),
     ],
 )
 def test_the_words_name_who_holds_the_robot(doing, text, mine):
@@ -58,7 +62,7 @@ def test_the_words_name_who_holds_the_robot(doing, text, mine):
 
 def test_somebody_without_a_name_has_the_name_of_the_connection():
     holder = SimpleNamespace(connection="c7", name="")
-    assert state_of(robot("driven", holder=holder)).text == "c7 drives"
+    assert state_of(robot("driven", holder=holder)).text == "c7 is driving"
 
 
 @pytest.mark.parametrize(
@@ -71,8 +75,8 @@ def test_somebody_without_a_name_has_the_name_of_the_connection():
         ({"seen": MOVES, "age": None}, "Free"),
         ({"seen": MOVES, "measured": (0.0,) * 6}, "Free"),
         ({"seen": MOVES, "doing": "barred"}, "Moving, not by WebMap"),
-        ({"seen": MOVES, "doing": "down"}, "No way to drive it"),
-        ({"seen": MOVES, "doing": "held", "holder": ANN}, "Ann holds it"),
+        ({"seen": MOVES, "doing": "down"}, "No connection for commands"),
+        ({"seen": MOVES, "doing": "held", "holder": ANN}, "Ann has control"),
         ({"seen": MOVES, "goal": SimpleNamespace(state="sent")}, "Navigating"),
         ({"seen": MOVES, "goal": SimpleNamespace(state="reached")}, "Moving, not by"),
         ({"seen": MOVES, "over": 1.0}, "Still moving"),
@@ -84,8 +88,8 @@ def test_the_display_sees_motion_that_the_gate_does_not_look_at(changes, text):
 
 
 def test_a_robot_that_the_gate_does_not_know_is_only_watched():
-    assert state_of(robot(None)).text == "Watched only"
-    assert state_of(robot(None, seen=MOVES)).text == "Watched only"
+    assert state_of(robot(None)).text == "View only"
+    assert state_of(robot(None, seen=MOVES)).text == "View only"
 
 
 @pytest.mark.parametrize("doing", [None, "free", "barred", "down"])
@@ -94,14 +98,14 @@ def test_a_bridge_that_is_lost_has_words_of_its_own(doing):
     one.bridge.state = "connecting"
     assert state_of(one).text == "Connecting"
     one.bridge.lost = True
-    assert state_of(one).text == "No bridge"
+    assert state_of(one).text == "No connection to the bridge"
 
 
 def test_a_robot_whose_poses_ceased_is_gone_since_then():
     one = robot(silent=31.0)
     then = datetime.now() - timedelta(seconds=31)
     assert state_of(one).text in {
-        f"Gone since {then + timedelta(seconds=s):%H:%M}" for s in (0, 1)
+        f"No pose since {then + timedelta(seconds=s):%H:%M}" for s in (0, 1)
     }
     assert state_of(robot(silent=29.0)).text == "Free"
     assert state_of(robot(None, silent=31.0)).name == "gone"
@@ -117,7 +121,7 @@ def test_a_robot_that_sends_poses_seldom_or_only_in_motion_is_not_gone():
 def test_a_robot_of_a_recording_that_ended_is_not_gone():
     one = robot(None, silent=100.0)
     one.bridge.replays = True
-    assert state_of(one).text == "Watched only"
+    assert state_of(one).text == "View only"
 
 
 @pytest.mark.parametrize("doing", ["held", "driven", "stopping", "stopped"])

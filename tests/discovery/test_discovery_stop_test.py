@@ -62,7 +62,7 @@ def test_a_base_without_a_timeout_is_found_although_it_passed_before(folder):
         Records(folder).keep_stop_test(key, StopRecord(0.3, TODAY))
         said = run(url, "robot_0", "--yes")
     assert said.returncode == 1, said.stdout + said.stderr
-    assert "no more commands: does it stop?" in said.stdout
+    assert "no more commands: waiting until the base stops" in said.stdout
     assert f"Result of {TODAY}: it does NOT stop by itself" in said.stdout
     assert Records(folder).stop_test_of(key).seconds is None
 
@@ -226,7 +226,7 @@ def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
     [
         ({"state": "failed", "text": MOVES_ON}, 0.3, None, GOES_ON),
         (
-            {"state": "done", "text": "stopped by itself after 0.26 s"},
+            {"state": "done", "text": "the base stopped after 0.26 s"},
             None,
             0.264,
             STOPS,

@@ -3,6 +3,6 @@
 import re
 
 TOO_LATE = re.compile(
-    "older than|too old|is silent|take it first|held up|have the robot"
+    "older than|too old|does not respond|take control first|held up|have the robot"
 )
 """Why a goal was not taken that is taken when it is sent again."""

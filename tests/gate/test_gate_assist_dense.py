@@ -145,7 +145,7 @@ class TestRefused:
     def test_many_beams_that_go_round_and_round_are_no_scan(self):
         sweep = heard(dense([5.0] * 16_000, span=3 * math.tau))
         assert assist(SPEC, sweep, AHEAD, 0.1).why == (
-            "scan assist: the 16000 beams of the scan go round more than twice"
+            "scan assist: the 16000 beams of the scan cover more than two turns"
         )
 
 

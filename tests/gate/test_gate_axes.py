@@ -254,7 +254,7 @@ class TestStanding:
 
         bench.run(0.5, each)
         bench.say("a", op="stop-test", robot="r1")
-        assert bench.refusals("a")[-1].why == "it moves already"
+        assert bench.refusals("a")[-1].why == "the robot is already moving"
 
     def test_a_stop_test_waits_until_it_climbs_no_more(self, bench):
         bench.take("a")
@@ -274,4 +274,4 @@ class TestStanding:
         bench.run(1.0, each)
         assert bench.report().test.state == "waiting"
         bench.run(2.5, each)
-        assert bench.report().test.text == "it did not stop by itself within 3 s"
+        assert bench.report().test.text == "the base did not stop within 3 s"

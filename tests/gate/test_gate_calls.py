@@ -72,7 +72,7 @@ async def test_a_call_that_finds_no_bridge_is_said_to_have_failed(caplog):
         made = Calls(url)
         made.call(request("a"), "a", "/e_stop")
         await made.settle()
-        assert caplog.text.count("/e_stop: no link: ") == 1
+        assert caplog.text.count("/e_stop: no connection: ") == 1
         assert "503" in caplog.text
 
 
@@ -85,7 +85,7 @@ async def test_a_call_whose_link_is_lost_is_waited_for_no_longer(caplog):
         await until(lambda: bridge.of("call_service"), "the call")
         bridge.transport_of(1).abort()
         await made.settle()
-        assert "/e_stop: no answer, for the link is lost" in caplog.text
+        assert "/e_stop: no answer: connection lost" in caplog.text
         bridge.unblock()
 
 

@@ -69,7 +69,7 @@ def test_one_that_is_told_to_end_ends_and_is_told_nothing_more(run):
     mirror = run("/bin/cat")
     mirror.child.stop(30.0)
     assert mirror.ends == [mirror.child]
-    assert mirror.child.epitaph == "exit code 0, without a word"
+    assert mirror.child.epitaph == "exit code 0, no message"
     mirror.child.send(Ready(1))
     assert mirror.heard == []
 
@@ -94,13 +94,13 @@ def test_one_that_was_killed_is_said_to_have_been(run):
     gate = run(*shell("kill -9 $$"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
-    assert gate.child.epitaph == "it was ended by SIGKILL"
+    assert gate.child.epitaph == "ended by SIGKILL"
 
 
 def test_one_that_does_not_end_is_killed(run, caplog):
     gate = run(*ENDLESS)
     gate.child.stop(0.05)
-    assert gate.child.epitaph == "it was ended by SIGKILL"
+    assert gate.child.epitaph == "ended by SIGKILL"
     assert "it has not ended within 0.05 s" in caplog.text
 
 
@@ -147,7 +147,7 @@ def test_one_that_talks_nonsense_is_killed(run, caplog):
     gate = run(*shell(r"printf '\377\377\377\377'; exec sleep 600"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
-    assert gate.child.epitaph == "it was ended by SIGKILL"
+    assert gate.child.epitaph == "ended by SIGKILL"
     assert "a message of 4294967295 bytes" in caplog.text
 
 
@@ -163,7 +163,7 @@ def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
     gate.start()
     assert ended.wait(30)
     gate.stop(30.0)
-    assert gate.epitaph == "it was ended by SIGKILL"
+    assert gate.epitaph == "ended by SIGKILL"
     assert "the gate's words could not be dealt with" in caplog.text
     assert "LookupError: Ready(pid=5)" in caplog.text
 
@@ -179,7 +179,7 @@ def test_a_gate_that_its_display_cannot_deal_with_ends_in_good_order():
     gate.start()
     assert ended.wait(60)
     gate.stop(30.0)
-    assert gate.epitaph == "exit code 0, without a word"
+    assert gate.epitaph == "exit code 0, no message"
 
 
 def test_who_hears_of_its_end_may_stop_it_there_and_then():

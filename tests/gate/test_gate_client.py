@@ -115,7 +115,7 @@ class TestPages:
         assert not other.robot()["mine"]
         other.say(op="take", robot="r1")
         refused = eventually(lambda: other.of("refused"), "a refusal")
-        assert refused[0]["why"] == "Ann drives it"
+        assert refused[0]["why"] == "Ann has control"
         other.end()
 
     def test_garbage_moves_nothing_and_much_of_it_ends_the_connection(self, page, fake):
@@ -353,7 +353,7 @@ class TestProgram:
 
     def test_a_robot_that_is_driven_is_not_to_be_had(self, client, page, fake):
         page.drive_off(fake)
-        with pytest.raises(NoLease, match="Ann drives it"):
+        with pytest.raises(NoLease, match="Ann has control"):
             client.take("r1").result(5)
 
     def test_an_operator_takes_over_and_python_is_refused_from_then_on(
@@ -381,7 +381,7 @@ class TestProgram:
 
     def test_a_gate_that_does_not_run_gives_no_lease(self):
         client = GateClient()
-        with pytest.raises(NoLease, match="does not run"):
+        with pytest.raises(NoLease, match="is not running"):
             client.take("r1").result(1)
         client.stop_robot("r1")
         client.stop()

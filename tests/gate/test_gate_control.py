@@ -220,7 +220,7 @@ async def test_an_answer_to_a_ping_makes_room_and_a_new_link_begins_anew():
             pass
         lane.lane.hurry(0.01)
         await until(lambda: lane.write("/cmd_vel", SLOW), "room for one more")
-        lane.lane.cut("it carries nothing")
+        lane.lane.cut("no longer used")
         assert noting.events[-1] == LinkDown(bridge.url, "control")
         assert not lane.write("/cmd_vel", SLOW), "there is no link"
         await until(lambda: len(noting.of(LinkUp)) == 2, "another link")

@@ -33,7 +33,7 @@ class TestTaking:
     def test_another_does_not_get_it(self, bench):
         bench.take("a")
         assert bench.take("b") is None
-        assert bench.refusals("b")[-1].why == "A drives it"
+        assert bench.refusals("b")[-1].why == "A has control"
 
     def test_a_viewer_does_not_get_it(self, bench):
         bench.join("v", "viewer")
@@ -56,7 +56,7 @@ class TestTaking:
         ("bench", "why"),
         [
             (Bench(lock_held=False), "another has it"),
-            (Bench(beating=False), "the display process is silent"),
+            (Bench(beating=False), "the display process does not respond"),
         ],
     )
     def test_a_robot_that_cannot_be_driven_says_why(self, bench, why):
@@ -90,7 +90,7 @@ class TestDriving:
         bench.take()
         bench.hold(0.5, x=1.0)
         assert bench.written == []
-        assert bench.refusals()[-1].why == "release every input first"
+        assert bench.refusals()[-1].why == "release all inputs first"
 
     def test_idle_hands_write_nothing(self, bench):
         bench.take()
@@ -235,7 +235,7 @@ class TestFreshness:
 
     @pytest.mark.parametrize("x", [0.5, 0.0])
     @pytest.mark.parametrize(
-        ("tick", "why"), [(-7, "more than 300 ms"), (-4000, "another session")]
+        ("tick", "why"), [(-7, "over 300 ms"), (-4000, "another session")]
     )
     def test_an_old_tick_is_refused_and_zero_goes_at_once(self, driving, x, tick, why):
         driving.drive(x=x, tick=driving.tick + tick)
@@ -295,11 +295,11 @@ class TestFreshness:
     def test_another_connection_is_refused(self, driving):
         driving.drive("b", x=0.5)
         assert driving.since(self.at) == []
-        assert driving.refusals("b")[-1].why == "A drives it"
+        assert driving.refusals("b")[-1].why == "A has control"
 
     def test_a_driver_without_a_lease_is_refused(self, bench):
         bench.drive(x=0.5)
-        assert "take it first" in bench.refusals()[-1].why
+        assert "take control first" in bench.refusals()[-1].why
 
     def test_what_is_refused_does_not_feed_the_dead_man(self, bench):
         bench.drive_off()
@@ -517,13 +517,13 @@ class TestLinks:
         assert max(w.at for w in moving) <= at + 0.31
         assert bench.since(at)[len(moving)].twist == ZERO
         assert bench.did(actions.CutLink) == [actions.CutLink(URL)]
-        assert "no link" in bench.refusals()[-1].why
+        assert "no connection" in bench.refusals()[-1].why
 
     def test_a_link_that_answers_again_before_it_is_cut_needs_a_new_press(self, bench):
         bench.drive_off()
         bench.answering = False
         bench.hold(0.6, x=1.0)
-        assert bench.report().reason == f"{URL} does not answer"
+        assert bench.report().reason == f"no answer from {URL}"
         bench.answering = True
         at = bench.now
         bench.hold(1.0, x=1.0)
@@ -570,7 +570,7 @@ class TestLinks:
         bench.hold(0.5, x=1.0)
         assert bench.moving_since(at) == []
         assert bench.dropped
-        assert "backed up" in bench.refusals()[-1].why
+        assert "held up" in bench.refusals()[-1].why
         bench.clear = True
         bench.hold(0.1, x=1.0)
         assert len(bench.moving_since(at)) <= 2

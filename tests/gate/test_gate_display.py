@@ -22,7 +22,7 @@ class FakeChild:
     """A gate's process that notes what it is told."""
 
     pid = 4711
-    epitaph = "it was ended by SIGKILL"
+    epitaph = "ended by SIGKILL"
     made: list["FakeChild"] = []
 
     def __init__(self, hear, ended):
@@ -159,9 +159,9 @@ class TestProgram:
     def test_a_lease_is_asked_for_and_refused(self, client, gate):
         future = client.take("r1")
         (asked,) = gate.of(messages.ProgramTake)
-        gate.say(messages.TakeReply(asked.request, "r1", None, "Ann drives it"))
+        gate.say(messages.TakeReply(asked.request, "r1", None, "Ann has control"))
         gate.say(messages.TakeReply(99, "r1", None, "nobody asked"))
-        with pytest.raises(NoLease, match="Ann drives it"):
+        with pytest.raises(NoLease, match="Ann has control"):
             future.result(1)
 
     def test_whose_a_robot_is_the_reports_tell(self, client, gate):
@@ -181,7 +181,7 @@ class TestProgram:
 
     def test_before_the_gate_runs_nothing_is_had(self, made):
         client = GateClient()
-        with pytest.raises(NoLease, match=r"does not run \(yet\)"):
+        with pytest.raises(NoLease, match="is not running"):
             client.take("r1").result(1)
         client.reset("r1", "s1")
         client.stop()
@@ -193,7 +193,7 @@ class TestProgram:
         gate.die()
         gate.die()
         assert gate.stopped
-        with pytest.raises(NoLease, match="has ended: it was ended by SIGKILL"):
+        with pytest.raises(NoLease, match="has ended: ended by SIGKILL"):
             future.result(1)
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
@@ -335,7 +335,7 @@ class TestLife:
     def test_a_gate_that_says_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)
         eventually(lambda: gate.killed, "its end")
-        assert gate.killed[0] == "it says nothing"
+        assert gate.killed[0] == "it does not respond"
 
     def test_reports_come_until_they_are_no_longer_wanted(self, client, gate, caplog):
         reports = []

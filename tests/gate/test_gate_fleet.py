@@ -75,7 +75,7 @@ class TestDeclaring:
         bench.tell(spec(v_max=0.5))
         assert bench.written[-1].twist == ZERO
         assert bench.report().holder is None
-        assert bench.refusals()[-1].why == "the robot was declared anew"
+        assert bench.refusals()[-1].why == "the robot was declared again"
         bench.drive_off()
         assert bench.written[-1].twist == Twist(0.5)
 
@@ -169,7 +169,7 @@ class TestSharing:
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
         at = bench.now
         assert bench.written[-1].twist == ZERO
-        assert "is gone" in bench.refusals()[-1].why
+        assert "was removed" in bench.refusals()[-1].why
         bench.hold(0.5, x=1.0)
         assert bench.moving_since(at) == []
         bench.drive_off(robot="r1")

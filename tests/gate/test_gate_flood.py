@@ -193,7 +193,7 @@ async def test_headers_without_end_are_refused(header):
             await asyncio.sleep(0)
 
     async with raw_bridge(talk) as url:
-        with pytest.raises(BridgeClosed, match="no WebSocket there"):
+        with pytest.raises(BridgeClosed, match="no WebSocket at this address"):
             await open_socket(url, Heard().ears, Budget())
 
 
@@ -230,7 +230,7 @@ async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
         await until(lambda: heard.lost, "the drop")
     assert link.flooded
     assert heard.lost == [
-        "what it sent cannot be dealt with: "
+        "invalid data from the bridge: "
         "RecursionError('maximum recursion depth exceeded')"
     ]
 
@@ -265,9 +265,9 @@ async def test_a_lane_that_is_cut_while_it_is_behind_counts_as_flooded(caplog):
             await until(lambda: happened[-1:] == [b"{}"], "the flood")
             link = await until(lambda: lane._socket, "the link")
             await until(lambda: link.is_behind, "more than was dealt with")
-            lane.cut("it carries nothing")
+            lane.cut("no longer used")
             assert link.flooded
-            await until(lambda: "more than can be dealt with" in caplog.text, "a line")
+            await until(lambda: "more than WebMap can process" in caplog.text, "a line")
 
 
 @in_loop

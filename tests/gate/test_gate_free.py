@@ -73,7 +73,7 @@ def test_a_page_is_told_so_when_it_is_taken_too():
 def test_a_page_that_asks_for_another_speed_is_told_at_once(pages):
     connection, said = join(pages)
     pages.hear_robot(free(v_max=None, w_max=None))
-    assert cap_of(said) == (0.3, 0.6, ["no limit was stated"])
+    assert cap_of(said) == (0.3, 0.6, ["no limit stated"])
     connection.set_speeds(0.8, 1.2)
     assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
 

@@ -45,7 +45,7 @@ def test_the_holder_of_the_lease_sends_a_goal(bench):
 )
 def test_a_goal_needs_lease_epoch_and_a_fresh_tick(bench, changes, why):
     bench.goal()
-    assert "take it first" in bench.refusals()[-1].why
+    assert "take control first" in bench.refusals()[-1].why
     bench.take()
     bench.hold(0.1)
     bench.goal(**changes)
@@ -138,7 +138,7 @@ def test_without_a_link_goals_are_refused_and_the_cancel_is_kept(bench):
     bench.tell(events.LinkDown(URL, "tasks"))
     bench.goal()
     assert goals(bench) == []
-    assert "no link" in bench.refusals()[-1].why
+    assert "no connection" in bench.refusals()[-1].why
     bench.say("a", op="cancel", robot="r1")
     assert cancels(bench) == 0
     bench.tell(events.LinkUp(URL, "tasks"))
@@ -169,7 +169,7 @@ def test_a_goal_that_could_not_be_written_is_told(bench):
     bench.take()
     bench.clear = False
     bench.goal()
-    assert "backed up" in bench.refusals()[-1].why
+    assert "held up" in bench.refusals()[-1].why
     assert bench.of(messages.SentGoal) == []
     bench.tell(messages.Disconnect("a"))
     bench.tell(events.WroteGoal("r1", "g", 0, 0, 0, "a", False))
@@ -179,7 +179,7 @@ def test_a_robot_without_ways_for_goals_says_so():
     bench = Bench().begin(spec(goal_topic=None, cancel_topic=None))
     bench.take()
     bench.goal()
-    assert bench.refusals()[-1].why == "no goal topic is known"
+    assert bench.refusals()[-1].why == "no goal topic and no action is set"
     bench.say("a", op="cancel", robot="r1")
     assert "no cancel topic" in bench.refusals()[-1].why
     bench.say("a", op="stop", robot="r1")
@@ -342,7 +342,7 @@ class TestWay:
         )
         report = bench.report()
         assert report.goal.state == "failed"
-        assert report.goal.why == "too old; the next one goes to /goal"
+        assert report.goal.why == "too old; the next goal goes to /goal"
         assert report.way == "topic"
         assert len(goals(bench)) == 1, "nothing is sent by itself"
         bench.goal()
@@ -410,7 +410,7 @@ class TestHowItGoes:
         assert self.tell(bench, active=True).state == "failed"
 
     def test_a_failure_without_a_reason_says_that(self, bench):
-        assert self.end(bench, "failed", "").why == "the robot does not say why"
+        assert self.end(bench, "failed", "").why == "the robot gave no reason"
 
     def test_a_cancel_is_under_way_until_the_robot_says_so(self, bench):
         bench.say("b", op="cancel", robot="r1")
@@ -463,7 +463,7 @@ class TestHowItGoes:
             (lambda bench: bench.say("b", op="stop", robot="r1"), "STOP"),
             (
                 lambda bench: (bench.hold(0.3), bench.hold(0.1, x=1.0)),
-                "somebody drives the robot",
+                "the robot is being driven",
             ),
         ],
     )
@@ -530,7 +530,7 @@ class TestHowItGoes:
         bench = Bench().begin()
         bench.take()
         bench.goal()
-        assert bench.report().goal.why == "this robot does not say how it goes"
+        assert bench.report().goal.why == "this robot reports no progress"
         bench.tell(events.LinkDown(URL, "tasks"))
         bench.say("a", op="cancel", robot="r1")
         assert bench.report().goal.state == "cancelling"
@@ -613,7 +613,7 @@ class TestWhereItIs:
     )
     def test_it_needs_lease_epoch_and_a_fresh_tick(self, bench, changes, why):
         assert self.locate(bench) == []
-        assert "take it first" in self.why(bench)
+        assert "take control first" in self.why(bench)
         bench.take()
         bench.hold(0.1)
         assert self.locate(bench, **changes) == []
@@ -624,7 +624,7 @@ class TestWhereItIs:
         bench.take()
         bench.goal()
         assert self.locate(bench) == []
-        assert "follows a goal" in self.why(bench)
+        assert "is navigating" in self.why(bench)
         bench.say("a", op="cancel", robot="r1")
         assert len(self.locate(bench)) == 1
 
@@ -633,7 +633,7 @@ class TestWhereItIs:
         assert self.locate(bench) == []
         bench.drive()
         assert self.locate(bench) == []
-        assert "is driven" in self.why(bench)
+        assert "is moving" in self.why(bench)
         bench.hold(1.0)
         assert len(self.locate(bench)) == 1
 
@@ -641,7 +641,7 @@ class TestWhereItIs:
         bench.take()
         bench.tell(events.LinkDown(URL, "tasks"))
         assert self.locate(bench) == []
-        assert "no link" in self.why(bench)
+        assert "no connection" in self.why(bench)
         bench.tell(events.LinkUp(URL, "tasks"))
         bench.say("a", op="stop", robot="r1")
         assert self.locate(bench) == []
@@ -657,7 +657,7 @@ class TestWhereItIs:
         bench.take()
         assert not bench.report().locates
         assert self.locate(bench) == []
-        assert "no topic for its initial pose" in self.why(bench)
+        assert "no topic for the initial pose" in self.why(bench)
 
     def test_a_goal_without_an_end_does_not_forbid_it_for_ever(self):
         bench = Bench().begin(spec(pose_topic="/initialpose", cancel_topic=None))
@@ -708,7 +708,7 @@ class TestGoalsOnly:
         bench.hold(0.3)
         bench.hold(0.3, x=1.0)
         assert bench.written == []
-        assert bench.refusals()[-1].why == "it has no velocity topic"
+        assert bench.refusals()[-1].why == "the robot has no velocity topic"
 
     def test_stop_cancels_and_writes_no_velocity(self, bench):
         bench.say("b", op="stop", robot="*")
@@ -724,4 +724,4 @@ class TestGoalsOnly:
     def test_one_that_takes_nothing_cannot_be_had(self):
         bench = Bench().begin(spec(twist_topic=None, goal_topic=None))
         assert bench.take() is None
-        assert "neither" in bench.report().reason
+        assert "no velocity topic and no goal topic" in bench.report().reason

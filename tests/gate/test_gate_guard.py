@@ -142,7 +142,7 @@ def test_two_scanners_on_one_topic_stop_the_robot_as_neither_is_where_it_is_said
     under_way(bench)
     see_frames(bench, frames, 1.0)
     assert see_frames(bench, frames, 4.0) == []
-    assert "scan assist: scans of two frames come" in bench.report().why
+    assert "scan assist: the scans have two different frames" in bench.report().why
 
 
 def test_a_scanner_that_is_started_anew_in_another_frame_is_believed_after_2_s(bench):
@@ -163,10 +163,10 @@ def test_a_scan_of_another_frame_than_was_asked_for_is_no_sight():
     start = bench.now
     bench.run(0.3, lambda: (scan(bench, math.inf, "camera"), bench.drive(x=1.0)))
     assert bench.moving_since(start + 0.05) == []
-    said = "scan assist: the scan names frame 'camera', expected 'laser'"
+    said = "scan assist: the scan has frame 'camera', expected 'laser'"
     assert said in bench.report().why
     bench.run(0.3, lambda: (scan(bench, math.inf, ""), bench.drive(x=1.0)))
-    said = "scan assist: the scan names no frame, expected 'laser'"
+    said = "scan assist: the scan has no frame, expected 'laser'"
     assert said in bench.report().why
 
 

@@ -72,7 +72,7 @@ class TestAsking:
         bench.say("a", op="deny", robot="r1")
         assert bench.report().asker is None
         refused = bench.refusals("b")[-1]
-        assert (refused.what, refused.why) == ("ask", "A keeps it")
+        assert (refused.what, refused.why) == ("ask", "A keeps control")
         bench.hold(12.0, x=1.0)
         assert holder(bench) == "a"
 
@@ -86,7 +86,7 @@ class TestAsking:
         bench.join("c")
         ask(bench)
         ask(bench, "c")
-        assert bench.refusals("c")[-1].why == "B is asking already"
+        assert bench.refusals("c")[-1].why == "B has already requested control"
 
     def test_the_question_can_be_taken_back(self, bench):
         ask(bench)
@@ -126,23 +126,26 @@ class TestAsking:
         ask(bench, "v")
         assert "operator" in bench.refusals("v")[-1].why
         ask(bench, "a")
-        assert bench.refusals("a")[-1].why == "you have it already"
+        assert bench.refusals("a")[-1].why == "you already have control"
         grant(bench)
-        assert bench.refusals("a")[-1].why == "nobody asks for it"
+        assert bench.refusals("a")[-1].why == "nobody requests control"
         grant(bench, "b")
-        assert bench.refusals("b")[-1].why == "only who has it can answer"
+        assert (
+            bench.refusals("b")[-1].why
+            == "only the operator who has control can answer"
+        )
         bench.say("a", op="release", robot="r1")
         ask(bench)
-        assert bench.refusals("b")[-1].why == "no person has it: take it"
+        assert bench.refusals("b")[-1].why == "no operator has control: take control"
         bench.say("a", op="stop", robot="r1")
         ask(bench)
-        assert "STOP by A stands" in bench.refusals("b")[-1].why
+        assert "STOP by A is active" in bench.refusals("b")[-1].why
 
     def test_an_asker_without_a_name_is_called_by_its_connection(self, bench):
         bench.tell(messages.Connect("c9", "", "operator"))
         ask(bench, "c9")
         ask(bench, "b")
-        assert bench.refusals("b")[-1].why == "c9 is asking already"
+        assert bench.refusals("b")[-1].why == "c9 has already requested control"
 
 
 class TestChanging:
@@ -154,8 +157,8 @@ class TestChanging:
         assert bench.written[before].twist == ZERO
         report = bench.report()
         assert (report.changing, report.holder, report.armable) == (True, None, False)
-        assert report.reason == "it goes to B as soon as it stands"
-        assert bench.refusals("a")[-1].why == "B gets it"
+        assert report.reason == "control goes to B when the robot has stopped"
+        assert bench.refusals("a")[-1].why == "control goes to B"
         at = bench.now
         bench.run(1.1, lambda: bench.drive("a", x=1.0, epoch=first))
         assert bench.moving_since(at) == []
@@ -209,9 +212,12 @@ class TestChanging:
         ask(bench)
         grant(bench)
         bench.take("c")
-        assert bench.refusals("c")[-1].why == "it goes to B as soon as it stands"
+        assert (
+            bench.refusals("c")[-1].why
+            == "control goes to B when the robot has stopped"
+        )
         ask(bench, "c")
-        assert "it goes to B" in bench.refusals("c")[-1].why
+        assert "control goes to B" in bench.refusals("c")[-1].why
         bench.tell(messages.ProgramTake(1, "r1"))
         assert bench.of(messages.TakeReply)[-1].epoch is None
 
@@ -241,7 +247,7 @@ class TestChanging:
         grant(bench)
         bench.break_links()
         bench.run(0.1)
-        assert "no link" in bench.refusals("b")[-1].why
+        assert "no connection" in bench.refusals("b")[-1].why
         assert not bench.report().changing
 
     def test_a_robot_that_takes_goals_only_changes_hands_too(self):

@@ -34,14 +34,14 @@ class TestAnswer:
             ({"result": False}, "refused"),
             ({"result": False, "values": {"success": True}}, "refused"),
             ({"result": False, "values": NO_SUCH}, REFUSED),
-            ({"values": {"success": False}}, "answered that it failed"),
+            ({"values": {"success": False}}, "the service reported a failure"),
             (
                 {"result": True, "values": {"success": False, "message": "no power"}},
-                "answered that it failed (no power)",
+                "the service reported a failure (no power)",
             ),
             (
                 {"values": {"success": False, "message": 7}},
-                "answered that it failed",
+                "the service reported a failure",
             ),
             ({"op": "status", "level": "error", "msg": "what?"}, "refused (what?)"),
         ],
@@ -100,7 +100,7 @@ class TestCall:
             await made.settle()
         (why,) = ended
         assert why.startswith("no ")
-        assert "link" in why
+        assert "no connection" in why
 
 
 class Doing:
@@ -150,10 +150,10 @@ class TestLinks:
     @in_loop
     async def test_tell_that_a_flag_had_no_link_to_go_over(self, caplog):
         async with noting_bridge() as bridge, Doing(bridge.url) as doing:
-            doing.links._tasks[bridge.url].lane.cut("it carries nothing")
+            doing.links._tasks[bridge.url].lane.cut("no longer used")
             doing.run(LOCK, 1)
             (ended,) = doing.of(events.HookEnded)
-            assert ended.why == "not sent, for want of a link"
+            assert ended.why == "not sent: no connection"
             assert f"stop hook /lock: {ended.why}" in caplog.text
 
 
@@ -217,7 +217,7 @@ class TestReport:
     def test_says_that_there_is_no_link_until_the_hooks_are_said(self, bench):
         bench.tell(events.LinkDown(URL, "tasks"))
         stop(bench)
-        why = "not told yet, for want of a link"
+        why = "not sent yet: no connection"
         assert bench.report().hooks == (
             f"stop hook /lock: {why}",
             f"stop hook /e_stop: {why}",
@@ -232,11 +232,11 @@ class TestReport:
         stop(bench)
         bench.break_links()
         reset(bench)
-        why = "not told yet, for want of a link"
+        why = "not sent yet: no connection"
         assert bench.report().hooks == (f"reset of stop hook /lock: {why}",)
         bench.tell(events.LinkUp(URL, "tasks"))
-        end(bench, LOCK, "not sent, for want of a link")
-        words = "reset of stop hook /lock: not sent, for want of a link"
+        end(bench, LOCK, "not sent: no connection")
+        words = "reset of stop hook /lock: not sent: no connection"
         assert bench.report().hooks == (words,)
         bench.tell(events.LinkUp(URL, "tasks"))
         end(bench, LOCK)

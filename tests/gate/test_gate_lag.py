@@ -47,7 +47,7 @@ class TestDriving:
 
     def test_what_is_later_than_that_is_none_and_is_said_so(self, bench):
         assert not under_way(bench, lag=1.1)
-        assert bench.report().reason == "odometry comes more than 1 s late"
+        assert bench.report().reason == "odometry is more than 1 s late"
 
     def test_a_robot_whose_odometry_lags_is_stopped_though_it_goes_on_coming(
         self, bench

@@ -144,12 +144,12 @@ async def test_a_lane_that_is_cut_while_there_is_no_link_goes_on_trying(
     async with noting_bridge() as bridge:
         await bridge.stop()
         with noting_lane(bridge.url, happened) as lane:
-            await until(lambda: "no link" in caplog.text, "an attempt")
-            lane.cut("it carries nothing")
+            await until(lambda: "no connection" in caplog.text, "an attempt")
+            lane.cut("no longer used")
             assert happened == []
             await bridge.start()
             await until(lambda: happened == ["up"], "the link")
-            lane.cut("it carries nothing")
+            lane.cut("no longer used")
             assert happened == ["up", "down"]
             await until(lambda: happened == ["up", "down", "up"], "another")
 
@@ -169,7 +169,9 @@ async def test_that_there_is_no_link_is_said_once_for_each_reason(monkeypatch, c
     async with raw_bridge(talk) as url:
         with noting_lane(url, []):
             await until(lambda: len(attempts) > 6, "seven attempts")
-    complaints = [r.getMessage() for r in caplog.records if "no link" in r.getMessage()]
+    complaints = [
+        r.getMessage() for r in caplog.records if "no connection" in r.getMessage()
+    ]
     assert ["HTTP 403" in text for text in complaints] == [True, False]
 
 

@@ -30,7 +30,7 @@ def test_a_machine_belongs_to_who_came_first(locks, folder):
     assert locks.acquire(KEY).held
     other = Locks(folder).acquire(KEY)
     assert (other.held, other.elsewhere) == (False, True)
-    assert other.why == "another WebMap on this computer has it"
+    assert other.why == "another WebMap on this computer drives it"
     locks.release(KEY)
     second = Locks(folder)
     assert second.acquire(KEY).held
@@ -43,7 +43,9 @@ def test_a_machine_of_this_computer_is_had_once_however_that_is_spelled(locks):
     assert locks.acquire(one).held
     other = locks.acquire(two)
     assert (other.held, other.elsewhere) == (False, True)
-    assert other.why == "it is driven as /cmd_vel of ws://127.0.0.1:9090 here"
+    assert (
+        other.why == "this WebMap already drives it as /cmd_vel of ws://127.0.0.1:9090"
+    )
     locks.release(two)
     assert not locks.acquire(two).held, "who does not have it lets nothing go"
     locks.release(one)

@@ -134,9 +134,9 @@ class TestTopics:
             (2, "preempted", "cancelled", "preempted"),
             (3, "Goal reached.", "reached", ""),
             (4, "no path to the goal", "failed", "no path to the goal"),
-            (5, "", "failed", "the robot refused it"),
+            (5, "", "failed", "the robot refused the goal"),
             (8, "", "cancelled", ""),
-            (9, "", "failed", "the robot lost it"),
+            (9, "", "failed", "the robot lost the goal"),
         ],
     )
     def test_status_and_result_end_it(self, status, text, outcome, why):

@@ -259,7 +259,7 @@ class TestReport:
         assert bench.report().other_writer == SAID
 
     def test_what_another_gate_on_this_computer_drives_is_its_own(self, bench):
-        why = "another WebMap on this computer has it"
+        why = "another WebMap on this computer drives it"
         bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
         publish(bench, 5.0)
         assert bench.report().other_writer is None

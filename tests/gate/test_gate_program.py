@@ -37,7 +37,7 @@ def test_a_program_takes_and_is_answered(bench):
 def test_a_program_does_not_get_what_an_operator_has(bench):
     bench.take("a")
     assert take(bench).epoch is None
-    assert take(bench).why == "A drives it"
+    assert take(bench).why == "A has control"
 
 
 def test_an_operator_gets_what_a_program_has(bench):
@@ -50,7 +50,7 @@ def test_an_operator_gets_what_a_program_has(bench):
     assert bench.report().holder.connection == "a"
     twist(bench, 0.5, 0.0, 0.0, epoch=epoch)
     assert bench.written[-1].twist == ZERO
-    assert bench.refusals(PROGRAM)[-1].why == "A drives it"
+    assert bench.refusals(PROGRAM)[-1].why == "A has control"
 
 
 def test_a_velocity_is_written_once_within_the_limits(bench):
@@ -103,7 +103,7 @@ def test_doubt_while_it_drives_ends_its_lease(bench):
     bench.break_links()
     assert bench.report().holder is None
     lost = bench.refusals(PROGRAM)[-1]
-    assert (lost.what, "no link" in lost.why) == ("lease", True)
+    assert (lost.what, "no connection" in lost.why) == ("lease", True)
 
 
 def test_doubt_that_a_command_meets_first_ends_its_lease_too(bench):
@@ -138,7 +138,7 @@ def test_doubt_while_nothing_moves_only_refuses(bench):
     bench.run(0.4)
     twist(bench, 0.5, 0.0, 0.0)
     assert bench.written == []
-    assert "does not answer" in bench.refusals(PROGRAM)[-1].why
+    assert "no answer from" in bench.refusals(PROGRAM)[-1].why
     assert bench.report().holder is not None
 
 
@@ -167,7 +167,7 @@ class TestTheAnswerToATake:
         self.ask(bench)
         bench.say("a", op="take", robot="r1")
         bench.run(0.02)
-        assert "nobody has taken it" in bench.of(messages.TakeReply)[-1].why
+        assert "nobody has control" in bench.of(messages.TakeReply)[-1].why
 
     def test_comes_at_once_for_a_robot_that_takes_goals_only(self):
         bench = Bench().begin(spec(twist_topic=None))

@@ -12,7 +12,7 @@ def test_a_robot_can_be_taken_again_as_soon_as_the_display_is_back(taken):
     bench.beating = False
     bench.run(2.0)
     assert not bench.report().armable
-    assert bench.report().reason == "the display process is silent"
+    assert bench.report().reason == "the display process does not respond"
     bench.beating = True
     bench.run(0.05)
     assert bench.report().armable, "pages would not even ask for it"

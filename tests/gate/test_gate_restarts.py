@@ -59,7 +59,7 @@ class TestRestarts:
         assert in_words("no disk", spoke=False).startswith(
             "The gate does not start: no disk. "
         )
-        assert "ends again and again: no disk" in in_words("no disk", spoke=True)
+        assert "ended repeatedly: no disk" in in_words("no disk", spoke=True)
 
 
 class TestUnheard:

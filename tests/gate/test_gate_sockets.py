@@ -167,7 +167,7 @@ class TestRefused:
             await forever(link)
 
         async with raw_bridge(talk) as url:
-            with pytest.raises(BridgeClosed, match="no WebSocket there"):
+            with pytest.raises(BridgeClosed, match="no WebSocket at this address"):
                 await opened(url, heard)
         assert heard.lost == [], "what was never open cannot be lost"
 
@@ -258,13 +258,13 @@ class TestEnd:
             while not link.unsent:
                 link.send(b"x" * (1 << 20))
                 sent += 1 << 20
-            link.abort("it carries nothing")
-            assert heard.lost == ["it carries nothing"]
+            link.abort("no longer used")
+            assert heard.lost == ["no longer used"]
             go_on.set()
             await until(lambda: "reset" in arrived, "the reset")
             assert sum(arrived[:-1]) < sent
             link.abort("again")
-        assert heard.lost == ["it carries nothing"], "it is lost once"
+        assert heard.lost == ["no longer used"], "it is lost once"
 
     @in_loop
     async def test_a_goodbye_is_said_and_what_comes_after_it_is_heard_by_nobody(self):
@@ -297,7 +297,7 @@ class TestEnd:
         async with raw_bridge(talk) as url:
             await opened(url, heard)
             await until(lambda: heard.lost, "the loss")
-            assert heard.lost == ["the bridge closed the link"]
+            assert heard.lost == ["the bridge closed the connection"]
 
     @in_loop
     async def test_a_bridge_that_only_stops_sending_is_lost(self):
@@ -310,7 +310,9 @@ class TestEnd:
 
         async with raw_bridge(talk) as url:
             await opened(url, heard)
-            await until(lambda: heard.lost == ["the bridge closed the link"], "it")
+            await until(
+                lambda: heard.lost == ["the bridge closed the connection"], "it"
+            )
 
     @in_loop
     async def test_a_bridge_that_dies_is_lost_with_the_reason_of_the_system(self):

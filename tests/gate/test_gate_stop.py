@@ -57,7 +57,7 @@ class TestLatch:
         report = bench.report()
         assert (report.latched, report.state) == (True, "stopped")
         assert not report.armable
-        assert report.reason == "STOP by B stands: reset it first"
+        assert report.reason == "STOP by B is active: reset it first"
         assert bench.take("a") is None
         bench.run(5.0)
         assert bench.take("b") is None
@@ -153,7 +153,7 @@ class TestLatch:
     def test_reset_needs_an_operator_and_a_stop(self, bench):
         bench.join("v", "viewer")
         reset(bench)
-        assert bench.refusals("b")[-1].why == "no STOP stands"
+        assert bench.refusals("b")[-1].why == "no STOP is active"
         stop(bench, "v")
         reset(bench, "v")
         assert "operator" in bench.refusals("v")[-1].why
@@ -228,7 +228,7 @@ class TestLatch:
         bench.tell(events.LinkDown(URL, "tasks"))
         stop(bench)
         bench.run(0.2)
-        assert bench.report().stop.why == f"no link to {URL}"
+        assert bench.report().stop.why == f"no connection to {URL}"
         assert bench.written == bench.dropped == []
 
 
@@ -433,7 +433,7 @@ class TestConfirmation:
         told = seen.report().stop
         assert (told.confirmed, told.why) == (
             False,
-            f"it stood, but since then no link to {URL}",
+            f"it stopped, but since then: no connection to {URL}",
         )
         seen.connect_links()
         watch_it(seen, 0.4, 0.0)
@@ -452,14 +452,14 @@ class TestConfirmation:
         for _ in range(4):
             watch_it(seen, 0.01, 0.0)
             seen.run(0.99)
-        too_seldom = "only one odometry message arrives in 1.0 s"
+        too_seldom = "only one odometry message in 1.0 s"
         assert verdict(seen) == ("B", False, too_seldom)
 
     def test_one_that_has_only_just_come_to_a_standstill_says_so(self, seen):
         stop(seen)
         watch_it(seen, 1.9, 0.4)
         watch_it(seen, 0.2, 0.0)
-        assert verdict(seen) == ("B", False, "it has not been still for 0.3 s yet")
+        assert verdict(seen) == ("B", False, "not yet still for 0.3 s")
         watch_it(seen, 0.2, 0.0)
         assert seen.report().stop.confirmed is True
 
@@ -469,7 +469,7 @@ class TestConfirmation:
         watch_it(seen, 0.4, 0.0)
         seen.run(60.0)
         assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, True)
-        since = "it stood, but since then no odometry"
+        since = "it stopped, but since then: no odometry"
         assert verdict(seen) == ("B", False, since)
         watch_it(seen, 0.2, 0.4)
         assert verdict(seen) == ("B", False, "still moving at 0.40 m/s")
@@ -530,7 +530,7 @@ class TestConfirmation:
     ):
         seen.break_links()
         stop(seen)
-        assert verdict(seen) == ("B", False, f"no link to {URL}")
+        assert verdict(seen) == ("B", False, f"no connection to {URL}")
         seen.connect_links()
         assert seen.report().stop.confirmed is None
         watch_it(seen, 0.6, 0.0)
@@ -552,7 +552,7 @@ class TestConfirmation:
         confirmation = Confirmation()
         confirmation.begin(0.0)
         confirmation.judge(None, delivered=False, now=2.5)
-        assert confirmation.why == "its bridge does not answer"
+        assert confirmation.why == "no answer from the bridge"
 
 
 class TestHooks:

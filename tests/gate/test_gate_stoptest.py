@@ -77,11 +77,11 @@ class TestRunning:
         base.run(0.6)
         report = bench.report()
         assert report.test.state == "done"
-        assert "stopped by itself after 0.3" in report.test.text
+        assert "the base stopped after 0.3" in report.test.text
         assert report.stop_time == pytest.approx(0.35, abs=0.05)
         assert (report.stop_source, report.stop_date) == ("tested", "2026-11-21")
         assert report.v > 0.3
-        assert "unverified stop" not in report.why
+        assert "stop not verified" not in report.why
         assert bench.written[-1].twist == ZERO
 
     def test_each_creeping_command_answers_one_of_the_drivers(self, bench, base):
@@ -104,18 +104,18 @@ class TestRunning:
         assert bench.written[-1].twist == ZERO
         report = bench.report()
         assert report.test == messages.TestReport(
-            "failed", "it did not stop by itself within 3 s"
+            "failed", "the base did not stop within 3 s"
         )
         assert (report.stop_time, report.stop_source) == (None, "tested")
         assert report.v == 0.3
-        assert report.why == ("did not stop by itself when tested on 2026-11-21",)
+        assert report.why == ("stop test failed on 2026-11-21",)
 
     def test_a_coarse_encoder_does_not_stop_a_base_that_moves_on(self, bench):
         base = Base(bench, timeout=None)
         base.coarse = 6
         begin(bench)
         base.run(3.5)
-        assert bench.report().test.text == "it did not stop by itself within 3 s"
+        assert bench.report().test.text == "the base did not stop within 3 s"
         assert bench.report().stop_time is None
 
     def test_it_stopped_when_the_standstill_began_that_lasted(self, bench):
@@ -133,7 +133,7 @@ class TestRunning:
         base.run(3.1)
         assert state(bench) == "waiting"
         base.run(0.3)
-        assert bench.report().test.text.startswith("stopped by itself after 2.8")
+        assert bench.report().test.text.startswith("the base stopped after 2.8")
 
     @pytest.mark.parametrize("foreign", [ZERO, Twist(0.2), Twist(0.1)])
     def test_what_another_commands_meanwhile_makes_it_void(self, bench, base, foreign):
@@ -144,7 +144,7 @@ class TestRunning:
             bench.tell(events.Echoed(KEY, write.twist))
         assert state(bench) == "waiting", "those are ours"
         bench.tell(events.Echoed(KEY, foreign))
-        assert "another commanded it" in bench.report().test.text
+        assert "another program sent commands" in bench.report().test.text
         assert state(bench) == "failed"
         assert bench.written[-1].twist == ZERO
         assert bench.did(actions.KeepStopTest) == []
@@ -160,13 +160,13 @@ class TestRunning:
         base.run(1.5)
         assert state(bench) == "done"
         assert bench.report().v <= 0.3
-        assert "stops by itself only after 1" in bench.report().why[0]
+        assert "command timeout of the base over 0.5 s: 1" in bench.report().why[0]
 
     def test_a_base_that_does_not_move_proves_nothing(self, bench):
         base = Base(bench, timeout=0.0)
         begin(bench)
         base.run(1.6)
-        assert bench.report().test.text == "it did not move within 1.5 s"
+        assert bench.report().test.text == "the robot did not move within 1.5 s"
         assert bench.did(actions.KeepStopTest) == []
         assert bench.written[-1].twist == ZERO
         assert bench.report().stop_source is None
@@ -210,14 +210,14 @@ class TestDoubt:
         ("doubt", "text"),
         [
             ("key", "a key was pressed"),
-            ("silence", "the driver fell silent"),
+            ("silence", "the page stopped sending commands"),
             ("stop", "STOP by B"),
-            ("release", "the driver let go of it"),
-            ("page", "the driver let go of it"),
+            ("release", "control was released"),
+            ("page", "control was released"),
             ("blind", "no odometry for 1 s"),
             ("goal", "a goal was sent"),
-            ("display", "the display process is silent"),
-            ("link", "no link to ws://robot:9090"),
+            ("display", "the display process does not respond"),
+            ("link", "no connection to ws://robot:9090"),
         ],
     )
     def test_ends_it_with_zero(self, bench, phase, doubt, text):
@@ -267,14 +267,14 @@ class TestDoubt:
         bench.tell(messages.Heartbeat())
         bench.tell(events.Alive(KEY.url, bench.now))
         bench.drive(x=0.0)
-        assert bench.report().test.text == "the driver fell silent"
+        assert bench.report().test.text == "the page stopped sending commands"
         assert bench.written[-1].twist == ZERO
 
     def test_its_driver_must_let_go_again_after_pressing(self, bench, base):
         begin(bench)
         base.run(0.1)
         base.run(0.5, x=1.0)
-        assert "release every input first" in bench.refusals()[-1].why
+        assert "release all inputs first" in bench.refusals()[-1].why
         assert bench.written[-1].twist == ZERO
         base.run(0.4)
         base.run(0.1, x=1.0)
@@ -290,20 +290,20 @@ class TestRefused:
         return refused.why
 
     def test_without_the_lease(self, bench):
-        assert self.why(bench, "b") == "take it first"
+        assert self.why(bench, "b") == "take control first"
 
     def test_without_hands_that_were_seen_to_be_off(self, bench, base):
         base.run(0.3, x=None)
-        assert self.why(bench) == "release every input first"
+        assert self.why(bench) == "release all inputs first"
 
     def test_while_it_is_driven(self, bench, base):
         base.run(0.2, x=1.0)
-        assert self.why(bench) == "release every input first"
+        assert self.why(bench) == "release all inputs first"
 
     @pytest.mark.parametrize("motion", [Twist(0.2), Twist(0.0, 0.0, 0.3)])
     def test_while_something_else_moves_it(self, bench, motion):
         bench.tell(events.Measured(KEY, motion))
-        assert self.why(bench) == "it moves already"
+        assert self.why(bench) == "the robot is already moving"
 
     def test_without_odometry(self):
         bench = Bench().begin(spec(stops_within=None))
@@ -313,13 +313,13 @@ class TestRefused:
 
     def test_in_doubt(self, bench):
         bench.break_links()
-        assert "no link" in self.why(bench)
+        assert "no connection" in self.why(bench)
 
     def test_while_one_goes_on(self, bench, base):
         begin(bench)
         base.run(0.05)
         begin(bench)
-        assert bench.refusals()[-1].why == "a stop test is going on"
+        assert bench.refusals()[-1].why == "a stop test is running"
 
 
 class TestKept:

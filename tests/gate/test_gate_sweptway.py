@@ -14,7 +14,7 @@ from webmap.gate.rules.assist import assist, polygon_around
 from webmap.gate.rules.sweptway import Fan, looks_ahead
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
-PART = "scan assist: the scan covers a part of the way only"
+PART = "scan assist: the scan covers only a part of the path"
 AHEAD = Twist(0.5)
 
 

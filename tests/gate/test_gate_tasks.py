@@ -113,7 +113,7 @@ class TestTopicGoals:
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             assert noting.tasks.send(spec(), goal("g1"))
             await until(lambda: bridge.of("publish", "/goal"), "the goal")
-            noting.tasks.lane.cut("it carries nothing")
+            noting.tasks.lane.cut("no longer used")
             assert noting.events[-1] == LinkDown(bridge.url, "tasks")
             assert not noting.tasks.send(spec(), goal("g2"))
             await noting.up(2)
@@ -225,7 +225,7 @@ class TestActionGoals:
             bridge.transport_of(sent.link).abort()
             (lost,) = await until(lambda: noting.of(GoalLost), "the word of it")
             assert (lost.robot, lost.id) == ("r1", "g1")
-            assert lost.why.startswith("the link is lost: ")
+            assert lost.why.startswith("connection lost: ")
 
     @in_loop
     async def test_of_too_many_goals_the_oldest_is_followed_no_longer(
@@ -284,7 +284,7 @@ class TestMoveBase:
     @in_loop
     async def test_without_a_link_nothing_is_sent_and_nothing_followed(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
-            noting.tasks.lane.cut("it carries nothing")
+            noting.tasks.lane.cut("no longer used")
             assert not noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             await noting.up(2)
             assert bridge.told == []
@@ -296,7 +296,7 @@ class TestMoveBase:
             noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             await until(lambda: bridge.of("publish"), "the goal")
             bridge.transport_of(1).abort()
-            why = f"no link to {bridge.url}"
+            why = f"no connection to {bridge.url}"
             await until(lambda: noting.of(GoalLost), "the word of it")
             assert noting.of(GoalLost) == [GoalLost("r1", "g1", why)]
             await until(lambda: len(bridge.of("subscribe")) == 6, "that it listens")

@@ -93,7 +93,7 @@ class TestAlarm:
         self.run(bench, 1.2, 0.31, x=0.0)
         bench.hold(1.5)
         assert bench.report().alarm == (
-            "zero sent, still moving at 0.31 m/s, and odometry has ceased since"
+            "zero sent, still moving at 0.31 m/s, then odometry ended"
         )
         self.run(bench, 0.2, 0.3, x=0.0)
         assert bench.report().alarm == "zero sent, still moving at 0.30 m/s"
@@ -224,7 +224,9 @@ class TestLoopAge:
     def test_a_slow_link_is_said_even_if_it_takes_nothing(self):
         slow = Speed(0.1, 0.6, ())
         assert governed(slow, None, 0.25) is slow
-        assert governed(slow, 0.172, 0.25) == Speed(0.1, 0.6, ("slow link: 180 ms",))
+        assert governed(slow, 0.172, 0.25) == Speed(
+            0.1, 0.6, ("slow connection: 180 ms",)
+        )
 
     def test_reaction_counts_the_hand_the_loop_and_the_base(self):
         assert reaction(None, None) == pytest.approx(0.7)
@@ -244,7 +246,7 @@ class TestLoopAge:
         bench.run(0.5, lambda: each(1.0))
         report = bench.report()
         assert 200 <= report.age <= 250
-        assert any(why.startswith("slow link: 2") for why in report.why)
+        assert any(why.startswith("slow connection: 2") for why in report.why)
         bound = 0.25 / (report.age / 1000 + 0.2 + 0.25)
         assert bench.written[-1].twist.vx <= bound
         assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
@@ -271,7 +273,7 @@ class TestLoopAge:
         report = bench.report()
         assert rtt * 1000 <= report.age <= rtt * 1000 + 50
         slow = report.age > 150
-        assert any(why.startswith("slow link") for why in report.why) == slow
+        assert any(why.startswith("slow connection") for why in report.why) == slow
         bound = 0.25 / (report.age / 1000 + 0.45) if slow else 2.0
         assert bench.written[-1].twist.vx == report.v == pytest.approx(bound, abs=0.01)
         assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
@@ -280,7 +282,7 @@ class TestLoopAge:
         bench = Bench(rtt=0.9).begin()
         bench.drive_off()
         assert bench.moving_since(0.0) == []
-        assert "does not answer" in bench.report().reason
+        assert "no answer from" in bench.report().reason
 
     def test_brakes_are_what_was_stated_or_little(self):
         assert Bench().begin().report().brake == 0.5

@@ -28,7 +28,7 @@ def owner():
 def onlooker():
     """One that does not."""
     bench = Bench().begin()
-    why = "another WebMap on this computer has it"
+    why = "another WebMap on this computer drives it"
     bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
     return bench
 
@@ -92,7 +92,7 @@ class TestTheOther:
         assert onlooker.written[-1].twist == ZERO
         onlooker.say("a", op="reset", robot="r1")
         assert onlooker.refusals()[-1].why == (
-            "another WebMap on this computer has it: reset its STOP there"
+            "another WebMap on this computer drives it: reset its STOP there"
         )
         assert onlooker.stops == {KEY: "A"}
 
@@ -195,7 +195,7 @@ def test_a_stop_to_the_other_gate_stops_who_drives(client, page, robot_spec, fak
     second.start()
     second.declare(robot_spec)
     other = Page(second, name="Ben")
-    reason = "another WebMap on this computer has it"
+    reason = "another WebMap on this computer drives it"
     eventually(lambda: other.robot().get("reason") == reason, "the other's reason")
     other.say(op="stop", robot="r1")
     at = time.monotonic()

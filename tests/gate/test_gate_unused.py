@@ -38,7 +38,7 @@ def test_a_lease_that_nothing_is_done_with_expires_and_its_holder_hears_why(
     assert not held(bench)
     assert bench.report().state == "free"
     refused = bench.refusals("a")[-2]
-    assert (refused.what, refused.why) == ("lease", "it was not used for 120 s")
+    assert (refused.what, refused.why) == ("lease", "not used for 120 s")
 
 
 def test_it_expires_also_if_its_holder_hangs_and_says_nothing_at_all(bench):
@@ -79,9 +79,9 @@ def test_it_begins_anew_with_whatever_is_done_with_it(bench, act):
 def test_only_the_lease_of_now_can_be_renewed(bench):
     epoch = bench.report().epoch
     bench.say("b", op="renew", robot="r1", epoch=epoch)
-    assert bench.refusals("b")[-1].why == "A drives it"
+    assert bench.refusals("b")[-1].why == "A has control"
     bench.say("a", op="renew", robot="r1", epoch=epoch - 1)
-    assert "is not that of the lease" in bench.refusals("a")[-1].why
+    assert "expected 1, the epoch of the lease" in bench.refusals("a")[-1].why
 
 
 def test_who_asks_for_it_gets_it_as_ever(bench):

@@ -160,7 +160,7 @@ def test_a_bridge_that_is_killed_under_way_says_zero_first_when_it_is_back(opene
     killed = len(ros.twists())
     assert not stands(ros), "nothing can tell the robot to stop now"
     row = opened.locator("#robots > li")
-    expect(row).to_contain_text("No bridge")
+    expect(row).to_contain_text("No connection to the bridge")
     opened.wait_for_timeout(500)  # the key is still held
     ros.start_bridge()
     wait_until(lambda: len(ros.twists()) > killed, within=20.0, what="the next word")

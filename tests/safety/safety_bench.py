@@ -212,7 +212,7 @@ class Bench:
 
     def reset_stop(self):
         """End the STOP, through a socket of the page's own, as its button does."""
-        self.tab.wait("document.body.innerText.includes('stays stopped')")
+        self.tab.wait("document.body.innerText.includes('STOP active')")
         assert self.tab.evaluate(RESET) in {"free", "held", "stopping"}
 
     def heal(self):

@@ -229,7 +229,7 @@ def page_of_goals(folder, monkeypatch, chromium):
 def aim(robot, tab):
     """Send the robot to the middle of the world; again if the goal came too late."""
     for _ in range(10):
-        go = tab.get_by_role("button", name="Send to a place")
+        go = tab.get_by_role("button", name="Send goal")
         go.click()
         expect(go).to_have_attribute("aria-pressed", "true")
         tab.mouse.move(500, 350)
@@ -248,7 +248,7 @@ def aim(robot, tab):
 def test_a_page_ends_goals_that_block_their_socket_by_cancel_and_by_stop(page_of_goals):
     robot, tab = page_of_goals
     aim(robot, tab)
-    tab.get_by_role("button", name="Cancel the goal").first.click()
+    tab.get_by_role("button", name="Cancel goal").first.click()
     wait_for(lambda: robot.stands, "standing still after the cancel", BRAKING)
     assert robot.stays(1.0)
 

@@ -76,7 +76,7 @@ def test_another_program_is_named_before_driving_while_driving_and_in_the_alarm(
         for within in (5.0, 5.0, 15.0):
             bench.press()
             bench.tab.wait(
-                f"{WORDS}.includes('You drive') && {WORDS}.includes('{SAID}')"
+                f"{WORDS}.includes('You are driving') && {WORDS}.includes('{SAID}')"
             )
             bench.let_go()
             if is_shown(bench.tab, f"{ALARM}.includes('{SAID}')", within):

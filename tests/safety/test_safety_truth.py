@@ -111,8 +111,8 @@ def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
     bench.web_hop.shape(Shape(latency=EACH_WAY))
     bench.drive_off(within=45.0)
     said = bench.tab.evaluate(WORDS)
-    assert "slow link: " in said, said
-    assert "Up to 0.2" in said, said
+    assert "slow connection: " in said, said
+    assert "Speed limit 0.2" in said, said
     # The loop takes both ways at least; what it waits for a tick makes it slower.
     most = BLIND / (2 * EACH_WAY + DEADMAN + STOPS_WITHIN)
     now = time.monotonic()
@@ -124,7 +124,7 @@ def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
     bench.web_hop.shape(Shape())
     bench.let_go()
     drive_at_full_speed(bench)
-    assert "slow link: " not in bench.tab.evaluate(WORDS)
+    assert "slow connection: " not in bench.tab.evaluate(WORDS)
 
 
 def test_a_link_slower_than_the_age_limit_moves_nothing(bench):

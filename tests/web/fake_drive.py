@@ -93,7 +93,7 @@ class FakeDrive:
         return {
             "op": "robot", "robot": id, "name": f"Robot {id}", "state": "free",
             "holder": None, "mine": False, "epoch": None, "armed": False, "v": 0.3,
-            "w": 0.6, "why": ["unverified stop"], "link": "up", "sent": [0, 0, 0],
+            "w": 0.6, "why": ["stop not verified"], "link": "up", "sent": [0, 0, 0],
             "echoed": None, "measured": [0, 0, 0], "armable": True, "reason": None,
         }  # fmt: skip
 

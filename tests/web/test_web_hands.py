@@ -150,17 +150,17 @@ def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> Non
     bench.page.keyboard.down("w")
     bench.page.wait_for_timeout(300)
     assert bench.gate.said == []
-    assert "Ann drives" in bench.page.inner_text(".webmap-teleop")
+    assert "Ann is driving" in bench.page.inner_text(".webmap-teleop")
 
 
 def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
     ann = {"connection": "c9", "name": "Ann"}
     bench.gate.change("r1", holder=ann, epoch=7, state="held")
     bench.select("r1")
-    bench.page.get_by_role("button", name="Ask for it: Robot r1").click()
+    bench.page.get_by_role("button", name="Request control of Robot r1").click()
     bench.until(lambda: bench.gate.of("ask") == [{"op": "ask", "robot": "r1"}])
     words = bench.page.locator(".webmap-teleop-state")
-    asked = re.compile(r"yours in (\d) s, unless Ann keeps it")
+    asked = re.compile(r"handed over in (\d) s unless Ann refuses")
     bench.until(lambda: asked.search(words.inner_text()))
     left = int(asked.search(words.inner_text())[1])
     bench.until(lambda: int(asked.search(words.inner_text())[1]) < left)
@@ -177,21 +177,21 @@ def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
     assert bench.gate.of("take") == []
 
 
-@pytest.mark.parametrize("answer", ["Hand over", "Keep"])
+@pytest.mark.parametrize("answer", ["Hand over", "Keep control"])
 def test_the_holder_is_asked_and_answers(bench: Bench, answer: str) -> None:
     bench.drive()
     ann = {"connection": "c9", "name": "Ann", "left": 8.0}
     bench.gate.change("r1", asker=ann)
     request = bench.page.locator(".webmap-request")
     bench.until(lambda: request.count() == 1)
-    asked = re.compile(r"Ann asks for Robot r1 \((\d) s\)")
+    asked = re.compile(r"Ann requests control of Robot r1 \((\d) s\)")
     left = int(asked.search(request.inner_text())[1])
     bench.until(lambda: int(asked.search(request.inner_text())[1]) < left)
-    bench.page.get_by_role("button", name=f"{answer} Robot r1").click()
-    op = {"Hand over": "grant", "Keep": "deny"}[answer]
+    bench.page.get_by_role("button", name=re.compile(f"^{answer}.* Robot r1$")).click()
+    op = {"Hand over": "grant", "Keep control": "deny"}[answer]
     bench.until(lambda: bench.gate.of(op) == [{"op": op, "robot": "r1"}])
     bench.until(lambda: not request.count())
-    if answer == "Keep":
+    if answer == "Keep control":
         since = time.monotonic()
         bench.hold("w", lambda: bench.gate.moves(since))
         return
@@ -246,7 +246,7 @@ def test_space_in_a_text_field_is_a_space(bench: Bench) -> None:
 
 def test_the_stop_button_is_large_named_and_stops(bench: Bench) -> None:
     bench.select("r1")
-    button = bench.page.get_by_role("button", name="Stop Robot r1")
+    button = bench.page.get_by_role("button", name="STOP Robot r1")
     box = button.bounding_box()
     assert box is not None
     assert min(box["width"], box["height"]) >= 44
@@ -390,7 +390,7 @@ def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
     assert goal["yaw"] == pytest.approx(1.5707963)
     assert bench.view()["e"] == 400, "aiming does not move the view"
     assert bench.page.evaluate("bench.maps[0].selected") == "r1"
-    bench.page.get_by_role("button", name="Cancel the goal").click()
+    bench.page.get_by_role("button", name="Cancel goal").click()
     bench.until(lambda: bench.gate.of("cancel") == [{"op": "cancel", "robot": "r1"}])
 
 
@@ -408,7 +408,7 @@ def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
 def test_stop_all_says_what_became_of_it(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r2", measured=None)
-    bench.page.get_by_role("button", name="Stop all").click()
+    bench.page.get_by_role("button", name="STOP ALL").click()
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
     verdicts = bench.page.locator(".webmap-stop-verdict")
     bench.until(lambda: "NOT CONFIRMED: no odometry" in verdicts.nth(1).inner_text())
@@ -416,7 +416,11 @@ def test_stop_all_says_what_became_of_it(open_bench) -> None:
 
 
 CONFIRMED = {"by": "Ann", "confirmed": True, "why": "", "id": "s8"}
-UNCONFIRMED = CONFIRMED | {"confirmed": False, "why": "no link to ws://bob", "id": "s9"}
+UNCONFIRMED = CONFIRMED | {
+    "confirmed": False,
+    "why": "no connection to ws://bob",
+    "id": "s9",
+}
 
 
 def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -> None:
@@ -427,7 +431,7 @@ def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -
     bench.until(lambda: bench.shown() == "stopped")
     bench.gate.change("r1", stop=CONFIRMED)
     words = bench.page.locator(".webmap-teleop-state")
-    bench.until(lambda: "Stopped By Ann, confirmed by" in words.inner_text())
+    bench.until(lambda: "STOP active By Ann, confirmed by" in words.inner_text())
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
     bench.page.keyboard.down("w")
@@ -467,11 +471,11 @@ def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> Non
     bench.gate.change("r1", latched=True, state="stopped", stop=UNCONFIRMED)
     bench.gate.change("r2", latched=True, state="stopped", stop=CONFIRMED)
     standing = bench.page.locator(".webmap-stop-standing")
-    words = "2 robots stay stopped, 1 of them NOT CONFIRMED."
+    words = "STOP active: 2 robots, 1 NOT CONFIRMED."
     bench.until(lambda: standing.inner_text() == words)
     assert bench.shown() == "unconfirmed"
     said = bench.page.inner_text(".webmap-teleop-state")
-    assert said == "STOP NOT CONFIRMED By Ann: no link to ws://bob."
+    assert said == "STOP NOT CONFIRMED By Ann: no connection to ws://bob."
     reset = bench.page.get_by_role("button", name="Reset all")
     reset.click()
     bench.page.wait_for_timeout(450)
@@ -524,7 +528,7 @@ def test_a_reset_that_the_gate_refuses_is_said_beside_the_button(open_bench) -> 
     why = "Ben pressed STOP meanwhile; look at the robot, then press Reset again"
     bench.gate.refuse("r1", "reset", why)
     standing = bench.page.locator(".webmap-stop-standing")
-    bench.until(lambda: standing.inner_text().endswith(f"was not reset: {why}."))
+    bench.until(lambda: standing.inner_text().endswith(f"refused: {why}."))
     bench.gate.change("r1", latched=False, state="free", stop=None)
     bench.until(lambda: why not in standing.inner_text())
 
@@ -568,7 +572,7 @@ def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
     robots = dict(gate.robots)
     gate.robots.clear()
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
-    bench.page.get_by_role("button", name="Stop all").click()
+    bench.page.get_by_role("button", name="STOP ALL").click()
     verdicts = bench.page.locator(".webmap-stop-verdict")
     bench.until(lambda: "All robots: STOP NOT CONFIRMED" in verdicts.inner_text())
     gate.robots |= robots
@@ -580,16 +584,20 @@ def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
 def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.latching = True
-    bench.page.get_by_role("button", name="Stop all").click()
+    bench.page.get_by_role("button", name="STOP ALL").click()
     verdicts = bench.page.locator(".webmap-stop-verdict")
     bench.until(lambda: verdicts.count() == 2)
     bench.gate.change("r1", stop=CONFIRMED)
     bench.gate.change("r2", stop=UNCONFIRMED)
     bench.until(lambda: verdicts.nth(0).get_attribute("data-state") == "confirmed")
     bench.until(
-        lambda: verdicts.nth(1).inner_text().endswith("CONFIRMED: no link to ws://bob")
+        lambda: (
+            verdicts.nth(1)
+            .inner_text()
+            .endswith("CONFIRMED: no connection to ws://bob")
+        )
     )
-    bench.page.get_by_role("button", name="Stop all").click()
+    bench.page.get_by_role("button", name="STOP ALL").click()
     bench.until(lambda: len(bench.gate.of("stop")) == 2)
 
 
@@ -602,7 +610,7 @@ def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> No
     bench.page.keyboard.press("Space")
     bench.until(lambda: bench.shown() == "unconfirmed")
     words = bench.page.inner_text(".webmap-teleop-state")
-    assert words == "STOP NOT CONFIRMED The gate has not answered."
+    assert words == "STOP NOT CONFIRMED No answer from the gate."
     listed = bench.page.inner_text(".webmap-stop-verdict")
     assert "Robot r1: STOP NOT CONFIRMED" in listed
 

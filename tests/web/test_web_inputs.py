@@ -202,7 +202,7 @@ def test_a_finger_that_rests_through_a_doubt_moves_nothing(
 
 
 @pytest.mark.parametrize(
-    ("name", "robot"), [("Stop all", "*"), ("Stop Robot r1", "r1")]
+    ("name", "robot"), [("STOP ALL", "*"), ("STOP Robot r1", "r1")]
 )
 def test_one_thumb_stops_while_the_other_holds_the_stick(
     open_bench, name: str, robot: str
@@ -225,7 +225,7 @@ def test_one_thumb_stops_while_the_other_holds_the_stick(
 
 def test_a_tap_on_stop_is_one_stop(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop", has_touch=True)
-    bench.page.get_by_role("button", name="Stop all").tap()
+    bench.page.get_by_role("button", name="STOP ALL").tap()
     bench.page.wait_for_timeout(500)
     assert bench.gate.of("stop") == [{"op": "stop", "robot": "*"}]
 

@@ -75,7 +75,7 @@ def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
     tested = {"stop_source": "tested", "stop_date": "2026-11-21"}
     bench.gate.change("r1", stop_time=0.31, **tested)
     own = bench.page.locator(".webmap-teleop-own")
-    words = "Stops by itself within 0.31 s (tested 2026-11-21)."
+    words = "Command timeout of the base: 0.31 s (tested 2026-11-21)."
     bench.until(lambda: own.inner_text() == words)
     bench.gate.change("r1", test={"state": "creeping", "text": "creeping at 0.1 m/s"})
     test = bench.page.locator(".webmap-teleop-test")
@@ -90,7 +90,7 @@ def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
     button.click()
     bench.page.wait_for_timeout(450)
     assert bench.gate.of("stop-test") == []
-    assert button.inner_text() == "It will creep: press again"
+    assert button.inner_text() == "Robot will move slowly: press again"
     button.click()
     bench.until(
         lambda: bench.gate.of("stop-test") == [{"op": "stop-test", "robot": "r1"}]
@@ -102,7 +102,9 @@ def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
     bench.gate.change("r1", test={"state": "done", "text": ""}, stop_time=0.3)
     bench.until(lambda: "0.30 s" in bench.page.inner_text(".webmap-teleop-own"))
     bench.until(button.is_visible)
-    assert button.inner_text() != "It will creep: press again", "it may be asked anew"
+    assert button.inner_text() != "Robot will move slowly: press again", (
+        "it may be asked anew"
+    )
 
 
 def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> None:
@@ -114,13 +116,13 @@ def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> Non
     assert "ROBOT NOT OBEYING" in said
     assert "Use the hardware stop." in said
     assert "Robot r1: zero sent, still moving at 0.31 m/s" in said
-    alarm.get_by_role("button", name="Stop all").click()
+    alarm.get_by_role("button", name="STOP ALL").click()
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
     bench.page.keyboard.press("Shift+Escape")
     bench.until(lambda: len(bench.gate.of("stop")) == 2)
     bench.gate.change("r1", alarm="zero sent, still moving at 0.12 m/s")
     bench.until(lambda: "0.12" in alarm.inner_text())
-    bench.page.get_by_role("button", name="I have seen this").click()
+    bench.page.get_by_role("button", name="Acknowledge").click()
     alarm.wait_for(state="detached")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.11 m/s")
     bench.page.wait_for_timeout(200)
@@ -168,7 +170,7 @@ def test_the_alarm_lies_above_what_is_open_and_what_opens(open_bench) -> None:
     for kind in ("manual", "auto", "dialog"):
         bench.page.evaluate(OPEN, kind)
         bench.until(lambda: bench.page.evaluate(IN_THE_MIDDLE))
-    alarm.get_by_role("button", name="Stop all").click()
+    alarm.get_by_role("button", name="STOP ALL").click()
     bench.until(lambda: len(bench.gate.of("stop")) == 1)
     bench.page.keyboard.press("Escape")
     bench.until(lambda: len(bench.gate.of("stop")) == 2)

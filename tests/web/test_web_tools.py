@@ -79,7 +79,7 @@ def test_stop_of_the_driven_robot_does_not_move(
     bench.page.keyboard.up("w")
     bench.until(lambda: bench.shown() == "ready")
     boxes["ready"] = stop.bounding_box()
-    stopped = {"by": "Ann", "confirmed": False, "why": "no link to ws://bob"}
+    stopped = {"by": "Ann", "confirmed": False, "why": "no connection to ws://bob"}
     bench.gate.change("r1", latched=True, state="stopped", stop=stopped)
     bench.until(lambda: bench.shown() == "unconfirmed")
     boxes["stopped"] = stop.bounding_box()

@@ -122,7 +122,9 @@ class Tap:
             plain = self.names.plain(report)
         if plain["asker"] is not None:
             plain["asker"]["left"] = ANY
-        plain["why"] = [why for why in plain["why"] if not why.startswith("slow link")]
+        plain["why"] = [
+            why for why in plain["why"] if not why.startswith("slow connection")
+        ]
         if plain["test"] is not None:
             plain["test"]["text"] = _SECONDS.sub(f"{ANY} s", plain["test"]["text"])
         if plain["stop_source"] == "tested":

@@ -82,7 +82,7 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
         return "open", "open"
     if bridge.lost:
         why = f": {bridge.trouble}" if bridge.trouble else ""
-        return "lost", f"cannot be reached{why}; trying again"
+        return "lost", f"no connection{why}; reconnecting"
     return "connecting", "connecting"
 
 
@@ -91,9 +91,11 @@ def summary(links: Sequence[str]) -> str:
     total, open_ = len(links), sum(link in ("open", "late") for link in links)
     late = links.count("late")
     if total == 1:
-        return {"open": "Bridge open", "lost": "No bridge", "late": "Bridge late"}.get(
-            links[0], "Bridge connecting"
-        )
+        return {
+            "open": "Bridge open",
+            "lost": "No connection to the bridge",
+            "late": "Bridge late",
+        }.get(links[0], "Connecting to the bridge")
     if late:
         return f"{open_} of {total} bridges open, {late} late"
     if open_ == total:
@@ -123,7 +125,7 @@ class RefusedList:
         self._list = html.ul(class_="bridge-list refused-list")
         summary = html.summary(self._text, self._newest, icon("icon-chevron"))
         summary.set(
-            "title", "Messages of pages that were not taken. They moved nothing."
+            "title", "Messages of pages that WebMap refused. They moved no robot."
         )
         self._details = html.details(summary, self._list).set(hidden=True)
         self._details.set("data-webmap-menu", "")

@@ -17,7 +17,7 @@ COLUMNS = ("Sent", "Echoed", "Measured")
 OF_THE_PAGE = "limit of the page"
 """Why a robot is driven no faster that might be."""
 
-NOBODY_KNOWS = "Nobody knows whether it stops by itself."
+NOBODY_KNOWS = "Command timeout of the base: unknown."
 
 
 class SpeedTable:
@@ -67,7 +67,7 @@ class SpeedTable:
         self._why.clear()
         for reason in reasons:
             badge = html.span(text=reason, class_="badge")
-            if "unverified" in reason:
+            if "not verified" in reason:
                 badge.set("data-tone", "warn")
             self._why.append(badge)
 
@@ -90,7 +90,9 @@ class SpeedTable:
     def _limits(self) -> "Element":
         return html.dl(
             html.div(
-                html.dt(text="Speed cap"), html.dd(self._cap, self._why), class_="wide"
+                html.dt(text="Speed limit"),
+                html.dd(self._cap, self._why),
+                class_="wide",
             ),
             class_="facts",
         )
@@ -126,7 +128,7 @@ class OwnStop:
         self.elements: list[Element] = [
             html.dl(
                 html.div(
-                    html.dt(text="If WebMap dies"),
+                    html.dt(text="If commands end"),
                     html.dd(self._bound, self._how),
                     class_="own-stop",
                 ),
@@ -171,21 +173,21 @@ def bound(
     if stop_time is None:
         if source is None:
             return NOBODY_KNOWS, ""
-        return "It does not stop by itself.", f" {sentence(source)}"
+        return "The base does not stop.", f" {sentence(source)}"
     braking = v / brake
     return (
-        f"stands within {number(stop_time + braking)} s",
-        f" {number(stop_time)} s ({source}) + {number(braking)} s of braking "
-        f"from {number(v)} m/s",
+        f"stops within {number(stop_time + braking)} s",
+        f" {number(stop_time)} s command timeout ({source}) + {number(braking)} s "
+        f"of braking from {number(v)} m/s",
     )
 
 
 GOALS = {
     "sent": ("Goal sent", "sent", "active"),
     "accepted": ("Goal accepted", "sent", "active"),
-    "under way": ("Goal under way", "way", "active"),
-    "cancelling": ("Cancelling the goal", "cancelled", "warn"),
-    "unknown": ("State of the goal unknown", "unknown", "warn"),
+    "under way": ("Navigating to goal", "way", "active"),
+    "cancelling": ("Cancelling goal", "cancelled", "warn"),
+    "unknown": ("Goal state unknown", "unknown", "warn"),
     "reached": ("Goal reached", "reached", "good"),
     "failed": ("Goal failed", "failed", "bad"),
     "cancelled": ("Goal cancelled", "cancelled", ""),
@@ -262,12 +264,12 @@ def figures(goal: Goal) -> str:
     if goal.left is not None:
         parts.append(f"{goal.left:.1f} m to go")
     if goal.eta is not None:
-        parts.append(f"about {goal.eta:.0f} s")
+        parts.append(f"about {goal.eta:.0f} s left")
     if goal.time is not None:
-        parts.append(f"{goal.time:.0f} s under way")
+        parts.append(f"{goal.time:.0f} s elapsed")
     if goal.recoveries:
-        times = "once" if goal.recoveries == 1 else f"{goal.recoveries} times"
-        parts.append(f"got stuck {times}")
+        one = goal.recoveries == 1
+        parts.append("1 recovery" if one else f"{goal.recoveries} recoveries")
     return ", ".join(parts)
 
 
@@ -276,9 +278,9 @@ MOST = 6
 
 LEVELS = {
     "error": ("wrong", "Error"),
-    "stale": ("note", "Silent"),
+    "stale": ("note", "Stale"),
     "warn": ("warning", "Warning"),
-    "ok": ("good", "Well"),
+    "ok": ("good", "OK"),
 }
 """For each level of diagnostics its shape and colour, and its word."""
 
@@ -322,7 +324,7 @@ class RobotHealth:
         found = [m for m in modules if hasattr(m, "parts") and hasattr(m, "hold")]
         said = _lines([part for module in found for part in module.parts])
         if found and not said:
-            said = [("note", "Unheard: ", "no part of this robot says how it is")]
+            said = [("note", "No data: ", "no diagnostics of this robot received yet")]
         if said == self._shown:
             return
         self._shown = said
@@ -340,12 +342,12 @@ def _lines(parts: list[Any]) -> list[tuple[str, str, str]]:
         level, word = LEVELS[part.level]
         # A count of seconds would be another line every second.
         words = "" if part.level == "stale" else f": {part.message}"
-        whose = " (of some robot here)" if part.shared else ""
+        whose = " (robot unknown)" if part.shared else ""
         lines.append((level, f"{word}: ", f"{part.name}{whose}{words}"))
     if len(bad) > MOST:
         lines.append(("note", "", f"and {len(bad) - MOST} more parts"))
     # That the parts of nobody are well tells nothing of this robot.
     if not bad and any(not part.shared for part in parts):
         count = f"{len(parts)} part{'' if len(parts) == 1 else 's'}"
-        lines.append(("good", "All is well: ", count))
+        lines.append(("good", "All OK: ", count))
     return lines

@@ -78,7 +78,7 @@ function count() {
   const rows = document.querySelectorAll("#robots > .row").length;
   const old = document.querySelectorAll("#robots > .row .age.stale").length;
   const robots = rows === 1 ? "1 robot" : `${rows} robots`;
-  say(byId("robots-count"), old > 0 ? `${robots}, ${old} with old data` : robots);
+  say(byId("robots-count"), old > 0 ? `${robots}, ${old} with stale data` : robots);
 }
 
 /**

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 ACTIONS = (
     ("follow", "icon-follow", "Follow"),
-    ("send", "icon-send", "Send to…"),
+    ("send", "icon-send", "Send goal…"),
     ("cancel", "icon-cancel", "Cancel goal"),
     ("locate", "icon-locate", "Set pose…"),
-    ("release", "icon-release", "Hand back"),
-    ("remove", "icon-close", "Remove from the page"),
+    ("release", "icon-release", "Release control"),
+    ("remove", "icon-close", "Remove from page"),
 )
 """What ``data-act`` says, the symbol and the words.
 
@@ -28,17 +28,17 @@ console.js follows, cancels and hands back, since that must work over a bad link
 """
 
 UNABLE = {
-    "send": "WebMap knows no way to send goals to this robot",
-    "cancel": "WebMap knows no way to cancel goals of this robot",
-    "locate": "WebMap knows no topic for the initial pose of this robot",
+    "send": "No goal topic and no action is set for this robot",
+    "cancel": "No cancel topic and no action is set for this robot",
+    "locate": "No topic for the initial pose is set for this robot",
 }
 """Why a button of the card is disabled."""
 
 TEST_WORDS = (
-    ("take", "Take it to test its stop"),
-    ("ready", "Test its stop"),
-    ("asking", "It will creep: press again"),
-    ("running", "Testing its stop"),
+    ("take", "Take control to run the stop test"),
+    ("ready", "Run stop test"),
+    ("asking", "Robot will move slowly: press again"),
+    ("running", "Stop test running"),
 )
 """What the button of the stop test says; console.js says which, in ``data-test``."""
 
@@ -182,7 +182,7 @@ class RobotCard:
         close = html.button(
             icon("icon-close"), type="button", class_="button square quiet"
         )
-        close.set("aria-label", "Select no robot")
+        close.set("aria-label", "Deselect the robot")
         close.on("click", lambda event: self.map.set_selected(None))
         facts = html.dl(
             fact("x", self._x, " m"),
@@ -194,7 +194,7 @@ class RobotCard:
         )
         head = html.div(*self._shape.elements, self._name, close, class_="card-head")
         state = html.p(
-            html.span(text="Old data", class_="old"),
+            html.span(text="Stale data", class_="old"),
             self._state,
             self._mine,
             class_="state",
@@ -272,7 +272,10 @@ def stop_test() -> "Element":
     element = html.button(
         icon("icon-test"), *words, type="button", class_="button", disabled=True
     )
-    element.set("title", "Creeps, sends nothing any more, and sees when it stands")
+    element.set(
+        "title",
+        "Moves the robot slowly, ends the commands and measures when the robot stops",
+    )
     return element.set("data-act", "stop-test").set("data-test", "take")
 
 

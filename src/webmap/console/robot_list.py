@@ -108,7 +108,7 @@ class Row:
             *self._shape.elements,
             html.span(text=robot.name, class_="name"),
             html.span(
-                html.span(text="Old data", class_="old"),
+                html.span(text="Stale data", class_="old"),
                 self._state,
                 self._mine,
                 class_="state",

@@ -12,29 +12,29 @@ from webmap.poses.silence import PERIODS
 from webmap.ros.bridge import Bridge
 
 WORDS = {
-    "no_bridge": "No bridge",
+    "no_bridge": "No connection to the bridge",
     "connecting": "Connecting",
-    "gone": "Gone since {since}",
-    "watched": "Watched only",
-    "stopped": "Stopped",
+    "gone": "No pose since {since}",
+    "watched": "View only",
+    "stopped": "STOP active",
     "unconfirmed": "STOP NOT CONFIRMED",
-    "down": "No way to drive it",
+    "down": "No connection for commands",
     "changing": "Handing over",
     "stopping": "Stopping",
     "blocked": "Not moving: blocked?",
-    "driven": "{who} drives",
-    "driven_by_you": "You drive",
+    "driven": "{who} is driving",
+    "driven_by_you": "You are driving",
     "navigating": "Navigating",
-    "navigating_held": "Navigating, {who} holds it",
-    "navigating_held_by_you": "Navigating, you hold it",
+    "navigating_held": "Navigating ({who} has control)",
+    "navigating_held_by_you": "Navigating (you have control)",
     "settling": "Still moving",
     "moving": "Moving, not by WebMap",
     "barred": "Cannot be driven",
-    "barred_held": "Cannot be driven, {who} holds it",
-    "barred_held_by_you": "Cannot be driven, you hold it",
-    "other": "Another program drives it",
-    "held": "{who} holds it",
-    "held_by_you": "You hold it",
+    "barred_held": "Cannot be driven ({who} has control)",
+    "barred_held_by_you": "Cannot be driven (you have control)",
+    "other": "Another program is driving",
+    "held": "{who} has control",
+    "held_by_you": "You have control",
     "free": "Free",
 }
 """The words of each state. The page has the same table, made from this one."""
@@ -134,7 +134,7 @@ def _seen(facts: Facts, *, may_move: bool = False) -> str | None:
 
 def _state(name: str, facts: Facts) -> RobotState:
     holder = facts.report.holder if facts.report is not None else None
-    who = holder.name or holder.connection if holder is not None else "Somebody"
+    who = holder.name or holder.connection if holder is not None else "Another operator"
     text = WORDS[name].format(who=who, since=since_when(facts.silent_for))
     return RobotState(name, text, WORDS.get(f"{name}_by_you", text))
 

@@ -123,12 +123,12 @@ def caps_of(spec: RobotSpec, tested: StopRecord | None = None) -> list[Cap]:
     caps = []
     seconds = spec.stops_within if tested is None else tested.seconds
     if seconds is None and tested is not None:
-        why = f"did not stop by itself when tested on {tested.date}"
+        why = f"stop test failed on {tested.date}"
         caps.append(Cap(SLOW_V, SLOW_W, why))
     elif seconds is None:
-        caps.append(Cap(SLOW_V, SLOW_W, "unverified stop"))
+        caps.append(Cap(SLOW_V, SLOW_W, "stop not verified"))
     elif seconds > STOPS_WITHIN:
-        why = f"stops by itself only after {seconds:g} s"
+        why = f"command timeout of the base over {STOPS_WITHIN:g} s: {seconds:g} s"
         caps.append(Cap(SLOW_V, SLOW_W, why))
     v = math.inf if spec.v_max is None else spec.v_max
     w = math.inf if spec.w_max is None else spec.w_max
@@ -159,7 +159,7 @@ def in_force(speed: Speed) -> Speed:
     if math.inf not in (speed.v, speed.w):
         return speed
     v, w = min(speed.v, SLOW_V), min(speed.w, SLOW_W)
-    return Speed(v, w, (*speed.why, "no limit was stated"))
+    return Speed(v, w, (*speed.why, "no limit stated"))
 
 
 def speed_in_force(caps: Iterable[Cap]) -> Speed:

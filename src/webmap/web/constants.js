@@ -42,9 +42,9 @@ export const LEVELS = Object.freeze(["debug", "info", "warn", "error", "fatal"])
 export const GOALS = Object.freeze({
   "sent": ["Goal sent", "sent"],
   "accepted": ["Goal accepted", "sent"],
-  "under way": ["Goal under way", "way"],
-  "cancelling": ["Cancelling the goal", "cancelled"],
-  "unknown": ["State of the goal unknown", "unknown"],
+  "under way": ["Navigating to goal", "way"],
+  "cancelling": ["Cancelling goal", "cancelled"],
+  "unknown": ["Goal state unknown", "unknown"],
   "reached": ["Goal reached", "reached"],
   "failed": ["Goal failed", "failed"],
   "cancelled": ["Goal cancelled", "cancelled"],

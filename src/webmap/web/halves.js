@@ -52,7 +52,7 @@ export class Halves {
     this._load(attached, instance, module, options).catch((error) => {
       // What a module imports is not asked for again by every browser.
       const hint = error instanceof TypeError ? " Reload the page to try again." : "";
-      this._page.notice(`Module ${module} does not work: ${error}.${hint}`);
+      this._page.notice(`Module ${module} failed: ${error}.${hint}`);
     });
   }
 

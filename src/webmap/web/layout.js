@@ -208,7 +208,7 @@ export function readLayout(text) {
   if (version !== VERSION) {
     throw new LayoutRefused(
       `The layout is of another version: expected ${VERSION}, got ${shown(version)}. ` +
-        "Save it anew with this program.",
+        "Save the layout again with this version of WebMap.",
     );
   }
   const names = /** @type {(keyof Layout)[]} */ (Object.keys(PARTS));

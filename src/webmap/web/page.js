@@ -145,8 +145,8 @@ export class Page {
    */
   _closed(reason, forGood) {
     this._frames = [];
-    const what = reason ? `No connection to the server: ${reason}.` : "No connection to the server.";
-    this._disconnected(`${what} ${forGood ? "Reload the page." : "Trying again…"}`);
+    const what = reason ? `No connection to WebMap: ${reason}.` : "No connection to WebMap.";
+    this._disconnected(`${what} ${forGood ? "Reload the page." : "Reconnecting…"}`);
   }
 
   /** The server answers, but lets this page open no socket: say what to do. */
@@ -171,7 +171,7 @@ export class Page {
     if (document.hidden || this._frames.length > 0) this._heard = performance.now();
     const silent = performance.now() - this._heard;
     if (silent < SILENT || !this._link.isOpen) return;
-    this._disconnected("The server says nothing. What you see is old.");
+    this._disconnected("No data from WebMap. The page shows stale data.");
     if (silent > DEAD) this._link.renew();
   }
 
@@ -204,7 +204,7 @@ export class Page {
   _misunderstood(error) {
     this._frames = [];
     this._failures += 1;
-    this.trouble(`This page did not understand the server: ${error}`);
+    this.trouble(`This page cannot read a message from WebMap: ${error}`);
     const hopeless = error instanceof VersionError || this._failures >= FAILURES;
     if (hopeless) this._link.end();
     else this.send({ op: "resync" });

@@ -142,7 +142,7 @@ class Reader {
     try {
       return JSON.parse(this.string());
     } catch (error) {
-      throw new WireError(`what should be JSON is not: ${error}`);
+      throw new WireError(`expected JSON: ${error}`);
     }
   }
 
@@ -274,7 +274,7 @@ export function readFrame(buffer, begin) {
   try {
     const version = reader.u16();
     if (version !== VERSION) {
-      throw new VersionError(`version ${version} instead of ${VERSION}`);
+      throw new VersionError(`got version ${version}, expected ${VERSION}`);
     }
     const reset = (reader.u8() & FLAG.RESET) > 0;
     const header = { reset, frame: reader.u32(), now: reader.f64() };

@@ -263,7 +263,7 @@ def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
             report = SimpleNamespace(latched=True, other_writer=None, **said)
             robot.on_gate_report(report)
             assert await module["Dock"].press() is False
-            assert module["Dock"].words == "Not done: STOP stands: reset it first"
+            assert module["Dock"].words == "Not done: STOP is active: reset it first"
             assert node.calls == []
             assert await module["Light"].press() is True
 

@@ -17,9 +17,9 @@ test("a goal is said in words, with what the robot tells", () => {
   const told = { left: 3.24, eta: 75, recoveries: 2 };
   assert.equal(
     look(goal("under way", told)).text,
-    "Goal under way, 3.2 m to go, about 75 s, 2 × stuck",
+    "Navigating to goal, 3.2 m to go, about 75 s left, 2 recoveries",
   );
-  assert.equal(look(goal("under way", { left: 12.3, eta: 150 })).text, "Goal under way, 12 m to go, about 3 min");
+  assert.equal(look(goal("under way", { left: 12.3, eta: 150 })).text, "Navigating to goal, 12 m to go, about 3 min left");
   assert.equal(look(goal("failed", { why: "no path" })).text, "Goal failed, no path");
   assert.equal(look(goal("failed")).over, true);
   assert.equal(look(goal("unknown")).over, false);

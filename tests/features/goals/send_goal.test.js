@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/tools/goal_words.js";
 import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
 
-const LINKLESS = "no link to where its goals go";
+const LINKLESS = "no connection to the bridge of its goals";
 
 const pass = holdTimeouts();
 
@@ -38,8 +38,8 @@ test("after about three seconds without a link it is given up for that reason", 
 });
 
 test("a goal that is refused for another reason is not offered again", async () => {
-  const asked = gate("Ann drives it");
-  const sent = assert.rejects(sendGoal(asked.offer, () => true), /Ann drives it/);
+  const asked = gate("Ann has control");
+  const sent = assert.rejects(sendGoal(asked.offer, () => true), /Ann has control/);
   await pass(2);
   await sent;
   assert.equal(asked.times, 1);

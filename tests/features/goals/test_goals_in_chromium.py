@@ -149,11 +149,14 @@ def label(tab: Page):
 
 @pytest.mark.parametrize(
     ("name", "told"),
-    [("Old 0", r"Goal under way, [\d.]+ m to go"), ("New 0", r"m to go, about \d+ s")],
+    [
+        ("Old 0", r"Navigating to goal, [\d.]+ m to go"),
+        ("New 0", r"m to go, about \d+ s left"),
+    ],
 )
 def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, told):
     send(tab, name)
-    expect(label(tab)).to_contain_text("Goal under way")
+    expect(label(tab)).to_contain_text("Navigating to goal")
     expect(label(tab)).to_contain_text(re.compile(told))
     expect(tab.locator(".webmap-goal-arrow.way")).to_have_count(1)
     expect(label(tab)).to_contain_text("Goal reached", timeout=15_000)
@@ -162,8 +165,8 @@ def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, told):
 @pytest.mark.parametrize(("name", "to"), [("Old 0", "Plain 1"), ("New 0", "New 1")])
 def test_a_goal_is_called_off_where_it_is_drawn(tab, name, to):
     send(tab, name, to)
-    expect(label(tab)).to_contain_text("Goal under way")
-    label(tab).get_by_role("button", name="Cancel the goal").click()
+    expect(label(tab)).to_contain_text("Navigating to goal")
+    label(tab).get_by_role("button", name="Cancel goal").click()
     expect(label(tab)).to_contain_text("Goal cancelled")
 
 
@@ -173,14 +176,14 @@ def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
     press(tab, *OUTSIDE, drag=-30)
     expect(label(tab)).to_have_text(re.compile("Goal failed, no path to the goal"))
     expect(tab.locator(".webmap-goal-arrow.failed")).to_have_count(1)
-    label(tab).get_by_role("button", name="Show this goal no more").click()
+    label(tab).get_by_role("button", name="Hide this goal").click()
     expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
 
 
 def test_stop_cancels_a_goal_and_says_so(tab):
     send(tab, "Old 0", "Plain 1")
-    expect(label(tab)).to_contain_text("Goal under way")
-    tab.get_by_role("button", name="Stop all").click()
+    expect(label(tab)).to_contain_text("Navigating to goal")
+    tab.get_by_role("button", name="STOP ALL").click()
     expect(label(tab)).to_contain_text("Goal cancelled, STOP")
     reset(tab)
 
@@ -189,7 +192,7 @@ def reset(tab: Page) -> None:
     """End the STOP of all robots."""
     robots = tab.locator(".robot").count()
     standing = tab.locator(".webmap-stop-standing")
-    expect(standing).to_contain_text(f"{robots} robots stay stopped")
+    expect(standing).to_contain_text(f"STOP active: {robots} robots")
     button = tab.locator(".webmap-stop .webmap-reset")
     button.click(trial=True)  # a person could
     end_stops(button)
@@ -210,12 +213,12 @@ def test_a_plain_topic_says_that_it_says_nothing_and_is_drawn_once(tab, bridges)
     expect(label(tab)).to_have_text(re.compile("Goal sent, this robot does not say"))
     expect(published).to_have_attribute("data-pose", re.compile(r"goal \d+$"))
     expect(published).to_be_hidden()
-    label(tab).get_by_role("button", name="Cancel the goal").click()
+    label(tab).get_by_role("button", name="Cancel goal").click()
     expect(
         tab.locator(".webmap-goal-arrow.way, .webmap-goal-arrow.sent")
     ).to_have_count(0)
     # It has ended and is shown no more, and the topic has not told of another.
-    label(tab).get_by_role("button", name="Show this goal no more").click()
+    label(tab).get_by_role("button", name="Hide this goal").click()
     expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
     expect(published).to_be_hidden()
     send_elsewhere(bridges["ROS1"])
@@ -280,17 +283,19 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     sure = told["pose"]["covariance"]
     assert (sure[0], sure[7], sure[35]) == (0.25, 0.25, 0.068)
     send(tab, "Old 0", "Plain 1")
-    expect(label(tab)).to_contain_text("Goal under way")
+    expect(label(tab)).to_contain_text("Navigating to goal")
     tab.keyboard.press("i")
     press(tab, *beside(tab, "Old 0", 5), drag=30)
-    expect(word).to_have_text("Not sent: it follows a goal: cancel that first")
-    label(tab).get_by_role("button", name="Cancel the goal").click()
+    expect(word).to_have_text(
+        "Goal not sent: the robot is navigating: cancel the goal first"
+    )
+    label(tab).get_by_role("button", name="Cancel goal").click()
 
 
 def test_several_robots_go_to_places_beside_each_other(tab):
     pick(tab, "New 0")
     pick(tab, "New 1", shift=True)
-    expect(tab.locator(".webmap-goal-go")).to_have_text("Send 2 to a place")
+    expect(tab.locator(".webmap-goal-go")).to_have_text("Send goal to 2 robots")
 
     def act():
         tab.keyboard.press("g")
@@ -342,18 +347,18 @@ def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
         expect(word).to_have_text(re.compile("point 2 of 3|^Halted"), timeout=15_000)
         if not TOO_LATE.search(word.inner_text()):
             break
-        tab.locator(".webmap-route-pause").click()  # it says "Go on"
-    expect(word).to_have_text("New 1 goes to point 2 of 3.")
+        tab.locator(".webmap-route-pause").click()  # it says "Resume"
+    expect(word).to_have_text("New 1 is navigating to point 2 of 3.")
     tab.locator(".webmap-route-skip").click()
-    expect(word).to_have_text("New 1 goes to point 3 of 3.")
+    expect(word).to_have_text("New 1 is navigating to point 3 of 3.")
     tab.locator(".webmap-route-pause").click()
     expect(word).to_have_text("Paused before point 3 of 3.")
     tab.locator(".webmap-route-pause").click()
-    expect(word).to_have_text("New 1 goes to point 3 of 3.")
-    tab.get_by_role("button", name="Stop all").click()
-    expect(word).to_contain_text("Halted before point 3 of 3")
+    expect(word).to_have_text("New 1 is navigating to point 3 of 3.")
+    tab.get_by_role("button", name="STOP ALL").click()
+    expect(word).to_contain_text("Interrupted before point 3 of 3")
     reset(tab)
-    expect(word).to_contain_text("Halted before point 3 of 3")
+    expect(word).to_contain_text("Interrupted before point 3 of 3")
 
     tab.reload()
     tab.locator(".webmap-route > summary").click()
@@ -369,10 +374,10 @@ def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
     pick(tab, "New 1")
     tab.locator(".webmap-route-run").click()
     expect(word).to_have_text(
-        "Halted before point 1 of 1: failed: no path to the goal."
+        "Interrupted before point 1 of 1: failed: no path to the goal."
     )
     tab.locator(".webmap-route-skip").click()
-    expect(word).to_have_text("New 1 has ended its route.")
+    expect(word).to_have_text("New 1 ended.")
 
 
 def drawn_route(tab: Page) -> list[tuple[str, float]]:
@@ -395,7 +400,7 @@ def next_goal(tab: Page, robot: ClientConnection) -> float:
         except TimeoutError:
             if word.get_attribute("data-state") == "halted":
                 assert TOO_LATE.search(word.inner_text()), word.inner_text()
-                tab.locator(".webmap-route-pause").click()  # it says "Go on"
+                tab.locator(".webmap-route-pause").click()  # it says "Resume"
         else:
             return message["goal"]["target_pose"]["pose"]["position"]["x"]
     raise AssertionError(f"no further goal: {word.inner_text()}")
@@ -407,7 +412,7 @@ def test_a_route_is_put_in_order_and_goes_round(tab, bridges):
     word = tab.locator(".webmap-route > .webmap-route-word")
     loop = tab.locator(".webmap-route-loop")
     loop.click()
-    expect(word).to_have_text("A loop needs 2 points at least.")
+    expect(word).to_have_text("A loop needs at least 2 points.")
     tab.locator(".webmap-route-edit").click()
     x, y = beside(tab, "Old 0", 0)
     side = beside(tab, "Old 0", 1.0)[0] - x
@@ -431,6 +436,6 @@ def test_a_route_is_put_in_order_and_goes_round(tab, bridges):
         there = [tab.evaluate(WORLD, [across, y])[0] for across in (a, c, b, a)]
         heard = [next_goal(tab, robot) for _ in there]
     assert heard == pytest.approx(there, abs=0.02)
-    expect(word).to_have_text("Old 0 goes to point 1 of 3, round 2.")
+    expect(word).to_have_text("Old 0 is navigating to point 1 of 3, round 2.")
     tab.locator(".webmap-route-end").click()
-    expect(word).to_have_text("Old 0 has ended its route.")
+    expect(word).to_have_text("Old 0 ended.")

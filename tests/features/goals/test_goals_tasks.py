@@ -207,9 +207,9 @@ class TestOnTheCard:
 
     def test_what_the_robot_tells_is_said_with_units(self):
         told = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
-        text = "3.2 m to go, about 12 s, 5 s under way, got stuck 2 times"
+        text = "3.2 m to go, about 12 s left, 5 s elapsed, 2 recoveries"
         assert figures(told) == text
-        assert figures(goal(recoveries=1)) == "got stuck once"
+        assert figures(goal(recoveries=1)) == "1 recovery"
 
     def test_the_line_has_the_time_and_how_often_it_got_stuck(self):
         line = GoalLine()
@@ -219,8 +219,8 @@ class TestOnTheCard:
         _, words = line.element.children
         assert line.element.get("hidden") is None
         assert [each.text for each in words.children] == [
-            "Goal under way",
-            "3.2 m to go, about 12 s, 5 s under way, got stuck 2 times",
+            "Navigating to goal",
+            "3.2 m to go, about 12 s left, 5 s elapsed, 2 recoveries",
         ]
 
     def test_a_robot_without_a_goal_has_no_line(self, robot):

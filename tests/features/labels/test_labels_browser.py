@@ -165,7 +165,7 @@ def added(tab: Page, name: str, x: float, y: float) -> None:
     tab.locator("svg.webmap").focus()
     tab.keyboard.press("l")
     expect(tab.locator(".webmap-labels-word")).to_have_text(
-        "Press where the label is to be."
+        "Press on the map where the label goes."
     )
     tab.mouse.click(*place(tab, x, y))
     tab.keyboard.type(name)
@@ -268,15 +268,15 @@ def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, brid
         send = tab.locator(".webmap-labels-send")
         expect(send).to_be_disabled()
         tab.locator("#robots .row").click()
-        expect(send).to_have_text("Send the robot here")
+        expect(send).to_have_text("Send goal here")
         word = tab.locator(".webmap-labels-word")
         for _ in range(10):
             send.click()
-            expect(word).to_have_text(re.compile("^Sent to|^Not sent"))
+            expect(word).to_have_text(re.compile("^Goal sent to|^Goal not sent"))
             if not TOO_LATE.search(word.inner_text()):
                 break
             label(tab, "Äpfel <b>").press("Enter")  # which takes the words away
-        expect(word).to_have_text("Sent to Äpfel <b>.")
+        expect(word).to_have_text("Goal sent to Äpfel <b>.")
         expect(tab.locator(".robot.selected")).to_have_count(1)
         deadline = time.monotonic() + 10
         while not node.heard and time.monotonic() < deadline:

@@ -29,14 +29,14 @@ test("an area with a bay is one, whichever way round it is pressed", () => {
 });
 
 for (const [what, corners, problem] of [
-  ["one corner", [[0, 0]], "Got 1 corner: 3 are needed."],
+  ["one corner", [[0, 0]], "Got 1 corner, expected at least 3. Add corners."],
   [
     "two corners",
     [
       [0, 0],
       [1, 0],
     ],
-    "Got 2 corners: 3 are needed.",
+    "Got 2 corners, expected at least 3. Add corners.",
   ],
   [
     "sides that cross",
@@ -46,7 +46,7 @@ for (const [what, corners, problem] of [
       [0, 4],
       [4, 4],
     ],
-    "Sides 2 and 4 cross or touch: sides that meet only at their corners are needed.",
+    "Sides 2 and 4 cross or touch: sides may meet only at corners. Move a corner.",
   ],
   [
     "a corner on another side",
@@ -57,7 +57,7 @@ for (const [what, corners, problem] of [
       [2, 0],
       [0, 4],
     ],
-    "Sides 1 and 3 cross or touch: sides that meet only at their corners are needed.",
+    "Sides 1 and 3 cross or touch: sides may meet only at corners. Move a corner.",
   ],
   [
     "a side that goes back along the one before",
@@ -68,7 +68,7 @@ for (const [what, corners, problem] of [
       [4, 1],
       [0, 1],
     ],
-    "Sides 2 and 4 cross or touch: sides that meet only at their corners are needed.",
+    "Sides 2 and 4 cross or touch: sides may meet only at corners. Move a corner.",
   ],
   [
     "three corners on a line",
@@ -77,7 +77,7 @@ for (const [what, corners, problem] of [
       [2, 0],
       [5, 0],
     ],
-    `Got 0.00 m²: an area has ${LEAST_AREA} m² at least.`,
+    `Got 0.00 m², expected at least ${LEAST_AREA} m². Use a larger area.`,
   ],
   [
     "next to nothing",
@@ -87,7 +87,7 @@ for (const [what, corners, problem] of [
       [0.2, 0.2],
       [0, 0.2],
     ],
-    `Got 0.04 m²: an area has ${LEAST_AREA} m² at least.`,
+    `Got 0.04 m², expected at least ${LEAST_AREA} m². Use a larger area.`,
   ],
 ]) {
   test(`${what}: what was got and what is needed`, () => {
@@ -106,7 +106,7 @@ test("more corners than a preview keeps up with are refused with both numbers", 
   assert.equal(problemOf(around(MOST_CORNERS)), "");
   assert.equal(
     problemOf(around(MOST_CORNERS + 1)),
-    `Got ${MOST_CORNERS + 1} corners: an area has ${MOST_CORNERS} at most.`,
+    `Got ${MOST_CORNERS + 1} corners, expected at most ${MOST_CORNERS}. Use fewer corners.`,
   );
 });
 

@@ -5,7 +5,7 @@ import { RouteRobots } from "../../../src/webmap/features/routes/route_run.js";
 import { TRIES } from "../../../src/webmap/web/tools/goal_words.js";
 import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
 
-const LINKLESS = "no link to where its goals go";
+const LINKLESS = "no connection to the bridge of its goals";
 const POINTS = [1, 2, 3].map((x) => ({ x, y: 0, yaw: 0 }));
 
 const pass = holdTimeouts();
@@ -184,7 +184,7 @@ test("the robots that go, and no others, are kept for this page", async () => {
   assert.equal(drive.kept, 1);
 });
 
-test("a run goes on by the robots that come after, when the map was drawn anew", async () => {
+test("a run goes on by the robots that come after, when the map was drawn again", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   const before = new RouteRobots(drive, () => null, () => {});
@@ -200,7 +200,7 @@ test("a run goes on by the robots that come after, when the map was drawn anew",
   assert.equal(before.of("r1"), undefined);
 });
 
-test("what was being sent when the map was drawn anew waits for a person", async () => {
+test("what was being sent when the map was drawn again waits for a person", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   drive.refusal = LINKLESS;
@@ -211,7 +211,7 @@ test("what was being sent when the map was drawn anew waits for a person", async
   drive.refusal = null;
   await pass(20);
   assert.deepEqual(drive.said, [1]);
-  assert.equal(after.of("r1").run.why, "the map was drawn anew");
+  assert.equal(after.of("r1").run.why, "the map was drawn again");
 });
 
 test("a robot that is called so by a display that was started anew gets no run", async () => {
@@ -226,7 +226,7 @@ test("a robot that is called so by a display that was started anew gets no run",
   assert.equal(after.of("r1"), undefined);
 });
 
-test("a goal that leaves after the map was drawn anew is called off", async () => {
+test("a goal that leaves after the map was drawn again is called off", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   let take = () => {};

@@ -96,7 +96,7 @@ test("a failure halts it, and a person goes on or skips", () => {
 test("STOP, a lost lease, another's goal and a cancel halt it", () => {
   const cases = [
     [goal("g1"), { latched: true }, /STOP/],
-    [goal("g1"), { mine: false }, /does not have the robot/],
+    [goal("g1"), { mine: false }, /has no control of the robot/],
     [goal("g9"), {}, /another goal/],
     [goal("g1", "cancelled", { why: "STOP" }), {}, /cancelled: STOP/],
     [goal("g1", "cancelling"), {}, /cancelled/],
@@ -115,8 +115,8 @@ test("before the gate has accepted a goal a missing lease is no news", () => {
   run.go(null);
   assert.equal(say(run, null, { mine: false }), null);
   assert.equal(run.state, "going");
-  run.halt("Ann drives it");
-  assert.equal(run.why, "Ann drives it");
+  run.halt("Ann has control");
+  assert.equal(run.why, "Ann has control");
 });
 
 test("a goal that the gate never tells of halts it", () => {

@@ -229,7 +229,7 @@ for (const [spacing, got] of [
     const { problem, points } = plan(placed(HALL), { spacing });
     assert.equal(
       problem,
-      `Got ${got}: sweeps are ${SPACING.least} to ${SPACING.most} m apart.`,
+      `Got ${got}, expected a spacing of ${SPACING.least} to ${SPACING.most} m.`,
     );
     assert.deepEqual(points, []);
   });
@@ -240,19 +240,19 @@ test("more points than the route has room for are refused with both numbers", ()
   const { problem, points } = plan(placed(HALL), { room: 5 });
   assert.equal(
     problem,
-    "These sweeps need 6 points, and the route has room for 5: " +
-      "a larger distance or a smaller area is needed.",
+    "Got 6 points, expected at most 5. " +
+      "Use a larger spacing or a smaller area.",
   );
   assert.deepEqual(points, []);
 });
 
 test("a country is refused before its sweeps are laid", () => {
   const country = placed(HALL.map(([x, y]) => [x * 1e5, y * 1e5]));
-  assert.match(plan(country).problem, /^These sweeps need at least 300000 points/);
+  assert.match(plan(country).problem, /^Got at least 300000 points/);
 });
 
 test("what is no area is refused with its own sentence", () => {
   const bow = placed([HALL[0], HALL[1], HALL[3], HALL[2]]);
   assert.match(plan(bow).problem, /^Sides 2 and 4 cross or touch/);
-  assert.equal(plan(placed(HALL.slice(0, 2))).problem, "Got 2 corners: 3 are needed.");
+  assert.equal(plan(placed(HALL.slice(0, 2))).problem, "Got 2 corners, expected at least 3. Add corners.");
 });

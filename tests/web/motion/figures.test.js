@@ -61,7 +61,7 @@ test("one motion is told three times", () => {
   const told = motions(report({ measured: [-0.3, 0, -0.001] }));
   assert.deepEqual(told, [
     { name: "Sent", kind: "motion", text: "0.40 m/s", more: ", 0.00 rad/s" },
-    { name: "Echoed", kind: "motion", text: "not known", more: "" },
+    { name: "Echoed", kind: "motion", text: "unknown", more: "" },
     { name: "Measured", kind: "motion", text: "\u22120.30 m/s", more: ", 0.00 rad/s" },
   ]);
 });
@@ -71,15 +71,15 @@ test("times are the gate's own where it gives them", () => {
   assert.deepEqual(texts(report({ age: 41.6 }), 55, 230), ["42 ms", "230 ms", "0.40 m"]);
   assert.deepEqual(texts(report({ age: null }), 55, null)[0], "55 ms");
   const standing = report({ measured: [0, 0, 0] });
-  assert.deepEqual(texts(standing, null, null), ["not known", "not known", "stands"]);
+  assert.deepEqual(texts(standing, null, null), ["unknown", "unknown", "not moving"]);
 });
 
 test("a robot is said to stand only where odometry says so", () => {
   const stop = (fields) => timings(report(fields), null, null)[2].text;
   const rest = { sent: [0, 0, 0], echoed: null };
-  assert.equal(stop({ ...rest, measured: [0, 0, 0] }), "stands");
-  assert.equal(stop({ ...rest, measured: null }), "not known");
-  assert.equal(stop({ ...rest, state: "free", measured: [0.4, 0, 0] }), "not known");
+  assert.equal(stop({ ...rest, measured: [0, 0, 0] }), "not moving");
+  assert.equal(stop({ ...rest, measured: null }), "unknown");
+  assert.equal(stop({ ...rest, state: "free", measured: [0.4, 0, 0] }), "unknown");
 });
 
 test("the test of its own stop is told while it goes on, and when it failed", () => {
@@ -95,11 +95,11 @@ test("how a robot stops by itself is said with where that is known from", () => 
   const said = (stop_time, stop_source, stop_date, why = []) =>
     ownStop({ stop_time, stop_source, stop_date, why });
   assert.equal(said(undefined), "");
-  assert.equal(said(null, null, null), "Nobody knows whether it stops by itself.");
-  const failed = "Does not stop by itself (tested 2026-11-21).";
+  assert.equal(said(null, null, null), "Command timeout of the base: unknown.");
+  const failed = "Command timeout of the base: none (tested 2026-11-21).";
   assert.equal(said(null, "tested", "2026-11-21"), failed);
-  assert.equal(said(null, null, null, ["did not stop by itself when tested"]), "");
-  assert.equal(said(0.25, "stated", null), "Stops by itself within 0.25 s (stated).");
-  const tested = "Stops by itself within 0.31 s (tested 2026-11-21).";
+  assert.equal(said(null, null, null, ["stop test failed on 2026-11-21"]), "");
+  assert.equal(said(0.25, "stated", null), "Command timeout of the base: 0.25 s (stated).");
+  const tested = "Command timeout of the base: 0.31 s (tested 2026-11-21).";
   assert.equal(said(0.31, "tested", "2026-11-21"), tested);
 });

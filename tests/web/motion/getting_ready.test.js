@@ -54,7 +54,7 @@ const END = 5000;
 function pressAt(at) {
   const session = new Session(0, {});
   const { pilot } = session;
-  let title = "Getting ready"; // as the page itself says before there is anything else
+  let title = "Preparing input"; // as the page itself says before there is anything else
   let [ack, tick, moved, heard] = [-1, 0, false, false];
   const take = (/** @type {any[]} */ commands, /** @type {number} */ now) => {
     for (const { op, seq, x } of commands) {
@@ -90,7 +90,7 @@ test("the first press moves the robot, or the page says that it is getting ready
   const refused = [];
   for (let at = 0; at < 2500; at += 10) {
     const { title, moved } = pressAt(at);
-    if (!moved && title !== "Getting ready") refused.push([at, title]);
+    if (!moved && title !== "Preparing input") refused.push([at, title]);
   }
   assert.deepEqual(refused, []);
 });

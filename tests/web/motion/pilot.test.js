@@ -84,10 +84,10 @@ describe("the first press", () => {
 
   test("is given up when the gate refuses", () => {
     bench.press();
-    bench.pilot.refuse("r1", "take", "Ann drives it", bench.now);
+    bench.pilot.refuse("r1", "take", "Ann has control", bench.now);
     bench.grant("r1");
     assert.deepEqual(moves(bench.run(600)), []);
-    assert.equal(bench.pilot.status.refusal, "Ann drives it");
+    assert.equal(bench.pilot.status.refusal, "Ann has control");
   });
 });
 

@@ -109,18 +109,18 @@ test("without a selection nothing can be driven", () => {
 test("the name of who drives is shown", () => {
   const title = (more) =>
     describe(STATUS, "r1", { ...REPORT, holder: ANN, ...more }, true).title;
-  assert.equal(title({ doing: "held" }), "Ann holds it");
-  assert.equal(title(DRIVING), "Ann drives");
+  assert.equal(title({ doing: "held" }), "Ann has control");
+  assert.equal(title(DRIVING), "Ann is driving");
   const odd = { connection: "c2", name: "$& {since}" };
-  assert.equal(title({ ...DRIVING, holder: odd }), "$& {since} drives");
+  assert.equal(title({ ...DRIVING, holder: odd }), "$& {since} is driving");
   const nameless = { connection: "c2", name: "" };
-  assert.equal(title({ ...DRIVING, holder: nameless }), "c2 drives");
+  assert.equal(title({ ...DRIVING, holder: nameless }), "c2 is driving");
 });
 
 test("who holds a robot is shown where the state does not name anybody", () => {
   const report = { ...REPORT, holder: ANN, state: "stopping", doing: "stopping" };
   const words = describe(STATUS, "r1", report, true);
-  assert.deepEqual([words.title, words.detail], ["Stopping", "Ann holds it."]);
+  assert.deepEqual([words.title, words.detail], ["Stopping", "Ann has control."]);
 });
 
 test("a speed has its sign, and a robot that does not move is not driven in green", () => {
@@ -138,11 +138,11 @@ test("a speed has its sign, and a robot that does not move is not driven in gree
 
 test("who holds a robot without driving it reads so", () => {
   const { title, detail } = describe(STATUS, "r1", { ...REPORT, ...ME }, true);
-  assert.equal(title, "You hold it");
-  assert.equal(detail, "Ready: hold W A S D or the arrows. Space stops.");
+  assert.equal(title, "You have control");
+  assert.equal(detail, "Hold W A S D or the arrow keys to drive. Press Space for STOP.");
   const barred = { ...ME, armable: false, doing: "barred_held", reason: "no link" };
   const held = describe(STATUS, "r1", { ...REPORT, ...barred }, true);
-  assert.equal(held.title, "Cannot be driven, you hold it");
+  assert.equal(held.title, "Cannot be driven (you have control)");
   assert.equal(held.detail, "No link.");
 });
 
@@ -155,10 +155,10 @@ test("the title is the state of the gate, or what the display alone knows", () =
   assert.equal(title("free", "free"), "Free");
   assert.equal(title("free", "moving"), "Moving, not by WebMap");
   assert.equal(title("free", "navigating"), "Navigating");
-  assert.equal(title("free", "gone"), "Gone since 10:32");
-  assert.equal(title("barred", "gone"), "Gone since 10:32");
-  assert.equal(title("down", "no_bridge"), "No bridge");
-  assert.equal(title("down", "down"), "No way to drive it");
+  assert.equal(title("free", "gone"), "No pose since 10:32");
+  assert.equal(title("barred", "gone"), "No pose since 10:32");
+  assert.equal(title("down", "no_bridge"), "No connection to the bridge");
+  assert.equal(title("down", "down"), "No connection for commands");
   // What the display showed a moment ago is older than the report of the gate.
   assert.equal(title("free", "driven"), "Free");
   assert.equal(title("navigating", "gone"), "Navigating");
@@ -168,23 +168,23 @@ test("the title is the state of the gate, or what the display alone knows", () =
 
 test("a robot without a velocity topic has the words of the display", () => {
   const title = (more) => describe(STATUS, "r1", null, true, more).title;
-  assert.equal(title({}), "Watched only");
-  assert.equal(title({ seen: "watched" }), "Watched only");
-  assert.equal(title({ seen: "gone", since: "10:32" }), "Gone since 10:32");
+  assert.equal(title({}), "View only");
+  assert.equal(title({ seen: "watched" }), "View only");
+  assert.equal(title({ seen: "gone", since: "10:32" }), "No pose since 10:32");
 });
 
 test("a name at the beginning of a sentence keeps its small letter", () => {
-  assert.equal(sentence("no link to ws://a"), "No link to ws://a.");
+  assert.equal(sentence("no connection to ws://a"), "No connection to ws://a.");
   assert.equal(sentence("ws://a:9090 is lost."), "ws://a:9090 is lost.");
   assert.equal(sentence("robot_0 is free"), "robot_0 is free.");
   assert.equal(sentence("zero sent, still moving"), "Zero sent, still moving.");
 });
 
 test("the cap says why it is in force", () => {
-  const why = ["unverified stop"];
+  const why = ["stop not verified"];
   assert.equal(
     capOf({ ...REPORT, why }),
-    "Up to 0.30 m/s, 0.60 rad/s: unverified stop",
+    "Speed limit 0.30 m/s (stop not verified), turn limit 0.60 rad/s",
   );
 });
 
@@ -208,10 +208,10 @@ test("another program that publishes velocities is said in every state", () => {
   const mine = { ...STATUS, driven: "r1", settled: true };
   const stop = { by: "Ann", confirmed: true, why: "", id: "s1" };
   const states = [
-    [STATUS, { doing: "other" }, "Another program drives it"],
-    [mine, ME, "You hold it"],
-    [mine, { ...ME, ...DRIVING }, "You drive"],
-    [STATUS, { state: "stopped", doing: "stopped", latched: true, stop }, "Stopped"],
+    [STATUS, { doing: "other" }, "Another program is driving"],
+    [mine, ME, "You have control"],
+    [mine, { ...ME, ...DRIVING }, "You are driving"],
+    [STATUS, { state: "stopped", doing: "stopped", latched: true, stop }, "STOP active"],
   ];
   for (const [status, more, title] of states) {
     const words = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);

@@ -55,7 +55,7 @@ describe("a STOP", () => {
 
   test("that the gate does not answer in time is not confirmed", () => {
     assert.equal(verdict(null, 0, ANSWER_PATIENCE).state, "stopping");
-    assert.match(verdict(null, 0, ANSWER_PATIENCE + 1).text, /NOT CONFIRMED: the gate/);
+    assert.match(verdict(null, 0, ANSWER_PATIENCE + 1).text, /NOT CONFIRMED: no answer/);
   });
 
   test("of a robot that still moves after a second is not confirmed", () => {
@@ -87,7 +87,7 @@ describe("a STOP", () => {
   });
 
   test("of a robot that cannot be reached says so at once", () => {
-    assert.match(verdict(report({ link: "down" }), 10, 20).text, /no link/);
+    assert.match(verdict(report({ link: "down" }), 10, 20).text, /no connection to the robot/);
     assert.match(verdict(null, 0, 1, false).text, /no connection/);
   });
 
@@ -131,7 +131,7 @@ describe("a STOP for all that no robot is known to", () => {
     assert.equal(unheard.name, "All robots");
     assert.match(unheard.text, /^NOT CONFIRMED: no connection/);
     const [silent] = verdicts([], ANSWER_PATIENCE + 1);
-    assert.equal(silent.text, "STOP NOT CONFIRMED: the gate has not answered");
+    assert.equal(silent.text, "STOP NOT CONFIRMED: no answer from the gate");
   });
 
   test("is that of the robots that are heard of before it is answered", () => {
@@ -178,8 +178,8 @@ describe("a STOP that latches", () => {
   });
 
   test("is not confirmed for the reason that the gate gives", () => {
-    const said = latched({ stop: word(false, "no link to ws://bob") });
-    assert.equal(verdict(said, 100, 200).text, "NOT CONFIRMED: no link to ws://bob");
+    const said = latched({ stop: word(false, "no connection to ws://bob") });
+    assert.equal(verdict(said, 100, 200).text, "NOT CONFIRMED: no connection to ws://bob");
   });
 
   test("is not answered by a report without the latch", () => {
@@ -205,20 +205,20 @@ describe("a STOP that latches", () => {
   test("is told with who said it and what became of it", () => {
     const text = (stop) => stopWords(latched({ stop })).text;
     assert.equal(text(word(true)), "By Ann, confirmed by odometry.");
-    assert.equal(text(word(null)), "By Ann, looking whether it stands.");
+    assert.equal(text(word(null)), "By Ann, waiting for odometry to confirm.");
     assert.equal(text(word(false, "no odometry")), "By Ann: no odometry.");
     assert.equal(text({ ...word(true), by: "" }), "Confirmed by odometry.");
     assert.equal(text(null), "");
   });
 
   test("that the disk does not have is said to be forgotten at a restart", () => {
-    const forgotten = "a restart would forget this STOP: the disk is full";
+    const forgotten = "a restart would end this STOP: the disk is full";
     const text = (confirmed, why) =>
       stopWords(latched({ stop: { by: "Ann", confirmed, why: `${why}; ${forgotten}` } }))
         .text;
     const said = "stopped, confirmed by odometry";
     assert.equal(text(true, said), `By Ann, confirmed by odometry; ${forgotten}.`);
-    assert.equal(text(null, ""), `By Ann, looking whether it stands; ${forgotten}.`);
+    assert.equal(text(null, ""), `By Ann, waiting for odometry to confirm; ${forgotten}.`);
     const stop = { by: "Ann", confirmed: true, why: `${said}; ${forgotten}` };
     assert.equal(verdict(latched({ stop }), 100, 200).text, `${said}; ${forgotten}`);
   });
@@ -227,9 +227,9 @@ describe("a STOP that latches", () => {
     const one = latched({ stop: word(true) });
     const doubtful = latched({ stop: word(false, "no odometry") });
     assert.equal(standingStops([report()]), "");
-    assert.equal(standingStops([one, report()]), "Bob stays stopped.");
-    assert.equal(standingStops([doubtful]), "Bob stays stopped, NOT CONFIRMED.");
-    const words = "2 robots stay stopped, 1 of them NOT CONFIRMED.";
+    assert.equal(standingStops([one, report()]), "STOP active: Bob.");
+    assert.equal(standingStops([doubtful]), "STOP active: Bob, NOT CONFIRMED.");
+    const words = "STOP active: 2 robots, 1 NOT CONFIRMED.";
     assert.equal(standingStops([one, doubtful]), words);
   });
 });
@@ -280,7 +280,7 @@ describe("a stop hook that failed", () => {
   });
 
   test("is said where STOP ALL is", () => {
-    const words = "Bob stays stopped. Stop hooks failed: Bob.";
+    const words = "STOP active: Bob. Stop hooks failed: Bob.";
     assert.equal(standingStops([failed, report()]), words);
   });
 });

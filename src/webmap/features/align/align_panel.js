@@ -29,7 +29,7 @@ export class AlignPanel {
   constructor(wishes) {
     this._wishes = wishes;
     this._go = button("webmap-align-go", "Align maps", () => wishes.toggle());
-    this._what = html("select", "webmap-align-what", { "aria-label": "What is aligned" });
+    this._what = html("select", "webmap-align-what", { "aria-label": "What to align" });
     this._what.addEventListener("change", () => wishes.choose(this._what.value === "whole"));
     /** @type {Map<Field, HTMLInputElement>} */
     this._inputs = new Map();
@@ -44,7 +44,7 @@ export class AlignPanel {
         "p",
         "webmap-align-hint",
         {},
-        "Drag the map to move it, the round handle to turn it. Arrow keys, q and e do the same.",
+        "Drag the map to move its content, drag the round handle to turn it. Or use the arrow keys, q and e.",
       ),
       html(
         "div",
@@ -98,10 +98,10 @@ export class AlignPanel {
   /** @param {Subject} subject */
   open({ name, bridge, together }) {
     const number = together.length;
-    const all = `All behind ${bridge} (${number} robot${number === 1 ? "" : "s"})`;
+    const all = `All of ${bridge} (${number} robot${number === 1 ? "" : "s"})`;
     this._what.replaceChildren(
       html("option", "", { value: "whole" }, all),
-      html("option", "", { value: "own" }, `${name} alone`),
+      html("option", "", { value: "own" }, `Only ${name}`),
     );
     this._body.removeAttribute("hidden");
     this._go.setAttribute("aria-pressed", "true");
@@ -126,7 +126,7 @@ export class AlignPanel {
 
   /** @param {{line: string, lost: string}} saved */
   tellSaved({ line, lost }) {
-    say(this._word, lost || "Saved. In a fleet file it is this line:");
+    say(this._word, lost || "Saved. The line for a fleet file:");
     this._line.textContent = line;
     this._line.toggleAttribute("hidden", false);
     this._showForm();

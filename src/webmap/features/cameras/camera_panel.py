@@ -57,7 +57,7 @@ class View:
             ),
             type="button",
             class_="camera-small",
-            title="Show it large, or small again",
+            title="Show the camera large or small",
         )
         # camera_panel.js shows it, without a way to here and back.
         button.set("data-camera-id", str(camera_number(camera)))

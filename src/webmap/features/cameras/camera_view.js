@@ -10,7 +10,7 @@ const SIGNS = {
   side: { label: "Beside the map", path: "M4 5h16v14H4zM10 5v14M4.5 12h5" },
   below: { label: "Above or below the map", path: "M4 5h16v14H4zM4 13h16M12 13.5v5" },
   float: {
-    label: "Over the map; press again for the next corner",
+    label: "Over the map: press again for the next corner",
     path: "M4 5h16v14H4zM11 11h6v5h-6z",
   },
   close: { label: "Close the camera", path: "M6 6l12 12M18 6L6 18" },
@@ -32,7 +32,7 @@ export class CameraView {
     this._age = make("span", "camera-age");
     const places = make("div", "camera-places");
     places.setAttribute("role", "group");
-    places.setAttribute("aria-label", "Where the camera is shown");
+    places.setAttribute("aria-label", "Position of the camera picture");
     /** @type {Map<Dock, HTMLButtonElement>} */
     this._docks = new Map();
     for (const dock of DOCKS) {
@@ -68,7 +68,7 @@ export class CameraView {
   }
 
   get _alt() {
-    return `What ${this._name.textContent} sees`;
+    return `Picture of ${this._name.textContent}`;
   }
 
   /**
@@ -126,11 +126,11 @@ export class CameraView {
     // Whole seconds, so that a screen reader does not hear ten words a second.
     const seconds = Math.floor(age / 1000);
     let words = "";
-    if (!shown && !old) words = "Waiting for a picture";
+    if (!shown && !old) words = "Waiting for a picture.";
     else if (!shown) words = "No picture yet.";
     else if (old) words = seconds < 60 ? "Frozen." : "Frozen for over a minute.";
     if (old && mine) {
-      words += " The robot does not drive by it: choose another camera, or close this.";
+      words += " Commands are ignored: choose another camera or close this one.";
     }
     say(this._word, words);
   }

@@ -84,7 +84,7 @@ class Report:
         where = f"doctor-{next(_numbers)}"
         self.opener: Element = html.button("Check", type="button", class_="button")
         self.opener.set("popovertarget", where)
-        self.opener.set("aria-label", f"Check {name}: what is in the way of driving")
+        self.opener.set("aria-label", f"Check {name} for problems with driving")
         self.opener.on("click", lambda event: self._opened())
         close = html.button(_close_icon(), type="button", class_="button square quiet")
         close.set("popovertarget", where).set("aria-label", "Close the report")
@@ -106,7 +106,7 @@ class Report:
         status = html.p(self._checked, self._doing, class_="status")
         status.set("role", "status")
         self.element: Element = html.section(
-            html.div(html.h2(text=f"Is {name} ready?"), close, class_="doctor-head"),
+            html.div(html.h2(text=f"Check of {name}"), close, class_="doctor-head"),
             status,
             html.div(
                 self._again, self._copy, self._try.button, class_="doctor-actions"
@@ -118,7 +118,7 @@ class Report:
             id=where,
             popover="auto",
         )
-        self.element.set("aria-label", f"Readiness of {name}")
+        self.element.set("aria-label", f"Check of {name}")
         self.poll()
 
     def poll(self) -> None:
@@ -260,7 +260,7 @@ class Checkup:
             if number
         ]
         free = not numbers["wrong"] and not numbers["warning"]
-        return ("Nothing is in the way: " if free else "") + ", ".join(said)
+        return ("No problems: " if free else "") + ", ".join(said)
 
     @property
     def text(self) -> str:
@@ -287,7 +287,7 @@ class Checkup:
             self._begin(self._try(self._seen))
 
     def _begin(self, work: Coroutine[None, None, Observed]) -> None:
-        self._say("Beginning.")
+        self._say("Starting.")
         self._task = asyncio.get_running_loop().create_task(self._run(work))
 
     async def _look(self, robots: Sequence[MeantRobot]) -> Observed:
@@ -308,8 +308,8 @@ class Checkup:
             self.findings = judge(self._seen)
         except Exception as error:
             log.exception("the readiness check of %s failed", self.url)
-            words = f"The check itself failed: {error!r}."
-            advice = f"Run webmap doctor {self.url} in a terminal, and look at the log."
+            words = f"The check failed: {error!r}."
+            advice = f"Run webmap doctor {self.url} in a terminal and read the log."
             self._seen = None
             self.findings = [Finding("wrong", "bridge", words, advice)]
         self._say("")
@@ -334,12 +334,12 @@ MAY_TRY = ("operator", "admin")
 """Roles of viewers who may try a call."""
 
 TRY_WORDS = (
-    "Does a service that hangs hold up what comes after it on a socket? To find out, "
-    "WebMap offers a service of its own to the ROS system for a moment, under a name "
-    "that nobody else has. It calls that over a link of its own, leaves it unanswered "
-    "for a second, and asks rosapi for the time meanwhile.",
-    "No node of a robot is called, and velocity goes over other links. At the worst "
-    "the bridge keeps everybody waiting for that second: try it while nobody drives.",
+    "Does one slow service call delay later calls on the same connection? To test "
+    "this, WebMap advertises a service of its own with a unique name, calls it over a "
+    "separate connection, waits one second before the answer, and meanwhile asks "
+    "rosapi for the time.",
+    "No node of a robot is called, and velocity uses other connections. In the worst "
+    "case the bridge delays all clients for one second: test while nobody drives.",
 )
 
 
@@ -355,12 +355,14 @@ class TryCall:
     def __init__(self, checkup: "Checkup", role: str) -> None:
         self._checkup = checkup
         self._may = role in MAY_TRY
-        self.button: Element = html.button("Try a call", type="button", class_="button")
+        self.button: Element = html.button(
+            "Test slow call", type="button", class_="button"
+        )
         self.button.set(hidden=not self._may)
         self.button.on("click", lambda event: self._ask(True))
-        self._yes = html.button("Try it", type="button", class_="button")
+        self._yes = html.button("Run test", type="button", class_="button")
         self._yes.on("click", lambda event: self._agreed())
-        no = html.button("Not now", type="button", class_="button")
+        no = html.button("Cancel", type="button", class_="button")
         no.on("click", lambda event: self._ask(False))
         self.question: Element = html.div(
             *(html.p(text=text) for text in TRY_WORDS),
@@ -369,7 +371,7 @@ class TryCall:
             role="group",
             hidden=True,
         )
-        self.question.set("aria-label", "Try a call that hangs")
+        self.question.set("aria-label", "Test slow call")
         self.poll()
 
     def poll(self) -> None:

@@ -11,7 +11,7 @@ import { button, html, say, stopButton, TwiceButton } from "../../web/tools/elem
 /** From this loop age on it is said aloud, in ms. */
 const SLOW = 150;
 
-const ASK = "Ask for it";
+const ASK = "Request control";
 
 /** The words, the shape and the buttons in the corner of the map. */
 export class Panel {
@@ -30,8 +30,8 @@ export class Panel {
     /** @type {Map<string, HTMLElement>} */
     this._values = new Map();
     /** In this panel, unless the page has a place of its own for it. */
-    this.stop = stopButton("webmap-teleop-stop", "Stop", acts.stop);
-    this._lease = button("webmap-teleop-lease", "Take", acts.lease);
+    this.stop = stopButton("webmap-teleop-stop", "STOP", acts.stop);
+    this._lease = button("webmap-teleop-lease", "Take control", acts.lease);
     this._reset = new TwiceButton(
       "webmap-reset",
       "Reset",
@@ -40,13 +40,14 @@ export class Panel {
     );
     this._tester = new TwiceButton(
       "webmap-stop-test",
-      "Test its stop",
-      "It will creep: press again",
+      "Run stop test",
+      "Robot will move slowly: press again",
       acts.test,
     );
-    this._tester.element.title = "Creeps, sends nothing any more, and sees when it stands";
+    this._tester.element.title =
+      "Moves the robot slowly, ends the commands and measures when the robot stops";
     this._stick = button("webmap-teleop-stick", "Stick", acts.stick);
-    this._stick.title = "A stick on the screen to drive with";
+    this._stick.title = "Show a stick on the screen to drive with";
     const state = html(
       "p",
       "webmap-teleop-state",
@@ -78,7 +79,7 @@ export class Panel {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
     say(this._title, title);
     say(this._detail, detail);
-    const told = report?.why.some((why) => why.startsWith("slow link"));
+    const told = report?.why.some((why) => why.startsWith("slow connection"));
     const age = report?.age ?? delay;
     say(this._cap, report ? capOf(report) + (told ? "" : slowness(age)) : "");
   }
@@ -137,7 +138,7 @@ export class Panel {
     if (act !== null) {
       say(this._lease, act);
       // It begins with the words on the button, for people who speak to their computer.
-      set(this._lease, "aria-label", act === ASK ? `${ASK}: ${name}` : `${act} ${name}`);
+      set(this._lease, "aria-label", `${act} of ${name}`);
     }
     const stops = report === null ? [] : [stopKey(report)];
     this._reset.show(report !== null && isLatched(report), stops);
@@ -146,7 +147,7 @@ export class Panel {
     this._tester.element.classList.toggle("known", known);
     this._stick.hidden = stick === null;
     set(this._stick, "aria-pressed", String(stick === true));
-    set(this.stop, "aria-label", name ? `Stop ${name}` : "Stop the selected robot");
+    set(this.stop, "aria-label", name ? `STOP ${name}` : "STOP the selected robot");
     // Off only when there is nothing to stop, never because of doubt.
     set(this.stop, "data-robot", name);
     this.stop.disabled = report === null;
@@ -162,9 +163,9 @@ export class Panel {
  */
 function actOf(report, asking) {
   if (report === null || report.changing) return null;
-  if (report.mine) return "Hand back";
+  if (report.mine) return "Release control";
   if (!report.armable || isLatched(report)) return null;
-  if (report.holder === null) return "Take";
+  if (report.holder === null) return "Take control";
   return heldByProgram(report) || asking ? null : ASK;
 }
 
@@ -179,7 +180,7 @@ function mayTest(report) {
 
 /** @param {number | null} delay */
 function slowness(delay) {
-  return delay !== null && delay >= SLOW ? `. Slow: ${Math.round(delay)} ms` : "";
+  return delay !== null && delay >= SLOW ? `. Slow connection: ${Math.round(delay)} ms` : "";
 }
 
 /**
@@ -285,7 +286,7 @@ export class Requests {
       "p",
       "webmap-request-words",
       {},
-      html("strong", "", { role: "alert" }, `${who} asks for ${name}`),
+      html("strong", "", { role: "alert" }, `${who} requests control of ${name}`),
       " ",
       left,
     );
@@ -294,8 +295,8 @@ export class Requests {
       "webmap-panel webmap-request",
       {},
       words,
-      answer("Hand over", name, () => this._drive.grant(robot)),
-      answer("Keep", name, () => this._drive.deny(robot)),
+      answer("Hand over", `Hand over ${name}`, () => this._drive.grant(robot)),
+      answer("Keep control", `Keep control of ${name}`, () => this._drive.deny(robot)),
     );
     this.element.append(item);
     const made = { item, left };
@@ -306,12 +307,12 @@ export class Requests {
 
 /**
  * @param {string} label
- * @param {string} name The robot's.
+ * @param {string} name The accessible name; it begins with the label.
  * @param {() => void} act
  */
 function answer(label, name, act) {
   const element = button("webmap-request-answer", label, act);
-  element.setAttribute("aria-label", `${label} ${name}`);
+  element.setAttribute("aria-label", name);
   return element;
 }
 

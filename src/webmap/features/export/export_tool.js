@@ -150,7 +150,7 @@ async function asPng({ text, width, height }, scale) {
     canvas.width = Math.round(width * fits);
     canvas.height = Math.round(height * fits);
     const context = canvas.getContext("2d");
-    if (!context) throw new Error("this browser gives no canvas");
+    if (!context) throw new Error("this browser provides no canvas");
     context.drawImage(image, 0, 0, canvas.width, canvas.height);
     return await new Promise((resolve, reject) => {
       canvas.toBlob((blob) => {

@@ -95,7 +95,7 @@ export class GoalMarks {
     mark.label.className = `webmap-goal-label ${kind}${mine ? " mine" : ""}`;
     say(mark.words, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
     mark.end.hidden = !mine || (!seen.over && !cancels) || goal?.state === "cancelling";
-    const does = seen.over ? "Show this goal no more" : "Cancel the goal";
+    const does = seen.over ? "Hide this goal" : "Cancel goal";
     mark.end.setAttribute("aria-label", does);
     mark.end.title = does;
   }

@@ -61,9 +61,9 @@ class GoalTool {
       done: (pose) => this._done(pose),
     });
     this._wanted = false;
-    this._go = button("webmap-aim-go webmap-goal-go", "Send to a place", () => this._toggle());
+    this._go = button("webmap-aim-go webmap-goal-go", "Send goal", () => this._toggle());
     this._go.title = `Key ${key}`;
-    this._cancel = button("webmap-goal-cancel", "Cancel the goal", () => this._callOff());
+    this._cancel = button("webmap-goal-cancel", "Cancel goal", () => this._callOff());
     this._word = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
@@ -76,7 +76,7 @@ class GoalTool {
       "label",
       "webmap-goal-spacing",
       {},
-      "apart, in m ",
+      "Spacing in m ",
       this._spacing,
     );
     this._panel = html(
@@ -131,7 +131,7 @@ class GoalTool {
     if (this._wanted && !active && this._map.selected === null) {
       say(this._word, "Select a robot first.");
     } else {
-      say(this._word, active ? "Press on the map, drag for the heading." : "");
+      say(this._word, active ? "Press on the map and drag for the heading." : "");
     }
     this._wanted = false;
     this._show();
@@ -187,7 +187,7 @@ class GoalTool {
           () => this._drive.goal(robot, pose),
           () => this._goals.get(robot) === goal,
         );
-        if (!accepted) throw new Error("called off");
+        if (!accepted) throw new Error("cancelled");
         if (this._goals.get(robot) === goal) goal.state = "sent";
         if (this._drive.robots.get(robot)?.goal) this._goals.delete(robot);
         this._send({ goal: { robot, ...pose } });
@@ -199,7 +199,7 @@ class GoalTool {
       }
       this._show();
     }
-    if (problems.length > 0) say(this._word, `Not sent: ${problems.join("; ")}`);
+    if (problems.length > 0) say(this._word, `Goal not sent: ${problems.join("; ")}`);
   }
 
   _callOff() {
@@ -237,7 +237,7 @@ class GoalTool {
    * @param {string} why
    */
   _refused(robot, what, why) {
-    if (what === "cancel" && robot !== null) say(this._word, `Not cancelled: ${why}`);
+    if (what === "cancel" && robot !== null) say(this._word, `Goal not cancelled: ${why}`);
   }
 
   /** @param {string} robot */
@@ -280,7 +280,7 @@ class GoalTool {
     const robots = chosen(this._map);
     const way = robots.some((robot) => this._drive.robots.get(robot)?.way !== null);
     this._go.disabled = robots.length === 0 || !way;
-    const words = robots.length > 1 ? `Send ${robots.length} to a place` : "Send to a place";
+    const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     say(this._go, words);
     this._go.setAttribute("aria-pressed", String(this._aim.active));
     this._apart.hidden = robots.length < 2;

@@ -58,7 +58,7 @@ class InitialPoseTool {
       preview: (pose) => this._preview(pose),
       done: (pose) => this._done(pose),
     });
-    this._go = button("webmap-aim-go webmap-locate-go", "Set its pose", () => this._aim.toggle());
+    this._go = button("webmap-aim-go webmap-locate-go", "Set pose", () => this._aim.toggle());
     this._go.title = `Key ${key}`;
     this._word = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
     this._panel = html(
@@ -103,7 +103,7 @@ class InitialPoseTool {
     if (typeof message?.active !== "boolean") return;
     this._aim.activate(message.active);
     if (message.active && !this._aim.active) {
-      say(this._word, "This robot cannot be told where it is.");
+      say(this._word, "This robot has no topic for an initial pose.");
     }
   }
 
@@ -123,7 +123,7 @@ class InitialPoseTool {
   _explain() {
     if (!this._aim.active) return;
     const sure = this._doubt.words;
-    const words = "Press where the robot is, drag which way it looks";
+    const words = "Press where the robot is and drag for the heading";
     say(this._word, sure === "" ? `${words}.` : `${words} (${sure}).`);
   }
 
@@ -152,7 +152,7 @@ class InitialPoseTool {
       this._send({ told: { robot, ...pose } });
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
-      say(this._word, `Not sent: ${why}`);
+      say(this._word, `Pose not sent: ${why}`);
     }
     this._preview(null);
   }

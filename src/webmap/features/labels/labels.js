@@ -141,7 +141,7 @@ class Labels {
     this._active = active && this._editable;
     this._go.setAttribute("aria-pressed", String(this._active));
     this._map.svg.classList.toggle("webmap-labelling", this._active);
-    say(this._word, this._active ? "Press where the label is to be." : "");
+    say(this._word, this._active ? "Press on the map where the label goes." : "");
     this._fit();
   }
 
@@ -186,12 +186,12 @@ class Labels {
     const label = this._chosen;
     if (!label || this._move) return;
     const title = html("p", "title wide", {}, label.dataset.name ?? "");
-    const send = button("webmap-labels-send wide", "Send the robot here", () => {
+    const send = button("webmap-labels-send wide", "Send goal here", () => {
       void this._sendRobot(label);
     });
     const { selected } = this._map;
     send.disabled = selected === null;
-    if (selected === null) send.textContent = "Select a robot to send it here";
+    if (selected === null) send.textContent = "Select a robot to send a goal here";
     const close = button("webmap-labels-close", "Close", () => this._close(""));
     const remove = button("webmap-labels-remove", "Delete", () => {
       this._send({ remove: label.dataset.label ?? "" });
@@ -206,7 +206,7 @@ class Labels {
   _openMove(label) {
     const place = placeOf(label);
     if (!place) return;
-    say(this._word, "Drag it on the map, or say where it is.");
+    say(this._word, "Drag the label on the map or enter its position.");
     this._move = new LabelMove(this._map, label, place, (to) => {
       if (to) this._send({ move: label.dataset.label ?? "", to });
       else this._close("");
@@ -230,7 +230,7 @@ class Labels {
     const save = () => {
       const add = { name: name.value, icon: icon.value, x: place.x, y: place.y };
       if (name.value.trim()) this._send({ add });
-      else say(this._word, "A label needs a name.");
+      else say(this._word, "Enter a name for the label.");
     };
     name.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && !event.isComposing) save();
@@ -258,9 +258,9 @@ class Labels {
     try {
       await this._map.drive.goal(robot, { ...place, yaw });
       this._send({ goal: { robot, ...place, yaw } });
-      this._close(`Sent to ${label.dataset.name ?? "the label"}.`);
+      this._close(`Goal sent to ${label.dataset.name ?? "the label"}.`);
     } catch (error) {
-      say(this._word, `Not sent: ${error instanceof Error ? error.message : error}`);
+      say(this._word, `Goal not sent: ${error instanceof Error ? error.message : error}`);
       this._fit();
     }
   }

@@ -148,7 +148,7 @@ class LayoutTool {
       { role: "group", "aria-label": "Layout of this page" },
       button("webmap-layout-save", "Save", () => this._save()),
       button("webmap-layout-load", "Load", () => this._file.click()),
-      button("webmap-layout-reset", "As it was found", () => this._reset()),
+      button("webmap-layout-reset", "Reset layout", () => this._reset()),
       this._file,
       this._word,
     );
@@ -162,7 +162,7 @@ class LayoutTool {
     const parts = this._map.layout.read();
     const text = writeLayout(view ? { view, ...parts } : parts);
     offer(new Blob([text], { type: "application/json" }), FILE);
-    this._say(view ? `Saved as ${FILE}.` : `Saved as ${FILE}, without the view, which no file can say.`);
+    this._say(view ? `Saved as ${FILE}.` : `Saved as ${FILE}, without the view: a file cannot store this view.`);
   }
 
   async _load() {
@@ -176,9 +176,9 @@ class LayoutTool {
         this._map.follow(0);
         this._map.setView(viewOf(layout.view, this._map));
       }
-      this._say(`Loaded ${file.name}. No robot was told anything.`);
+      this._say(`Loaded ${file.name}. No command was sent to a robot.`);
     } catch (error) {
-      const why = error instanceof LayoutRefused ? error.message : `It cannot be read: ${error}.`;
+      const why = error instanceof LayoutRefused ? error.message : `Cannot read the file: ${error}.`;
       this._say(`${why} Nothing was changed.`, true);
     } finally {
       this._file.value = ""; // the same file can be chosen again
@@ -189,7 +189,7 @@ class LayoutTool {
     this._map.layout.reset();
     this._views.forget();
     this._send({ found: true });
-    this._say("The page is as it was found.");
+    this._say("The layout is reset.");
   }
 
   /**

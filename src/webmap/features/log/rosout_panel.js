@@ -149,13 +149,13 @@ class RosoutPanel {
       book.say();
     }
     say(this._badge, bad > 0 ? `${bad}` : "");
-    this._badge.title = bad > 0 ? `${bad} errors among the newest lines` : "";
+    this._badge.title = bad > 0 ? `${bad} errors in the newest lines` : "";
     const total = this._books.reduce((sum, book) => sum + book.total, 0);
     const lines = (/** @type {number} */ n) =>
       `${n.toLocaleString("en")} ${n === 1 ? "line" : "lines"}`;
     say(
       this._count,
-      total === 0 ? "Nothing was said yet." : `${lines(shown)} shown of ${lines(total)} heard.`,
+      total === 0 ? "No log lines yet." : `${lines(shown)} shown of ${lines(total)} received.`,
     );
   }
 
@@ -221,7 +221,7 @@ class Book {
 
   say() {
     const away = this._state !== "" && this._state !== "open";
-    say(this._note, away ? "This bridge is not open: nothing comes from it." : "");
+    say(this._note, away ? "No connection to this bridge: no new log lines." : "");
   }
 
   /**

@@ -113,7 +113,7 @@ class MeasureTool {
     this._pointer = this._line = null;
     this._button.setAttribute("aria-pressed", String(active));
     this._map.svg.classList.toggle("webmap-measuring", active);
-    say(this._word, active ? "Press on the map and drag." : "");
+    say(this._word, active ? "Press on the map and drag to measure." : "");
     this._draw();
   }
 

@@ -35,9 +35,12 @@ export function cleaned(corners) {
  */
 export function problemOf(corners) {
   const count = corners.length;
-  if (count < 3) return `Got ${count} ${count === 1 ? "corner" : "corners"}: 3 are needed.`;
+  if (count < 3) {
+    const got = count === 1 ? "1 corner" : `${count} corners`;
+    return `Got ${got}, expected at least 3. Add corners.`;
+  }
   if (count > MOST_CORNERS) {
-    return `Got ${count} corners: an area has ${MOST_CORNERS} at most.`;
+    return `Got ${count} corners, expected at most ${MOST_CORNERS}. Use fewer corners.`;
   }
   const sides = sidesOf(corners);
   for (let i = 0; i < count; i++) {
@@ -46,13 +49,13 @@ export function problemOf(corners) {
       if (neighbours || !meet(sides[i], sides[j])) continue;
       return (
         `Sides ${i + 1} and ${j + 1} cross or touch: ` +
-        "sides that meet only at their corners are needed."
+        "sides may meet only at corners. Move a corner."
       );
     }
   }
   const area = Math.abs(signedArea(corners));
   if (area >= LEAST_AREA) return "";
-  return `Got ${area.toFixed(2)} m²: an area has ${LEAST_AREA} m² at least.`;
+  return `Got ${area.toFixed(2)} m², expected at least ${LEAST_AREA} m². Use a larger area.`;
 }
 
 /**

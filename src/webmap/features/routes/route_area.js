@@ -103,7 +103,7 @@ export class RouteArea {
 
   /** @returns {string} What there is to say; empty where there is no area. */
   get words() {
-    if (this._aim.waits) return "More corners afterwards.";
+    if (this._aim.waits) return "Waiting: finish the other tool, then add more corners.";
     if (this.draws) return this._refused || this._drawingWords();
     if (!this._closed) return "";
     const { problem, points, sweeps } = this._plan;
@@ -183,7 +183,7 @@ export class RouteArea {
   _add({ x, y }) {
     const count = this._corners.length + 1;
     if (count <= MOST_CORNERS) this._set([...this._corners, { x, y }]);
-    else this._refuse(`Got ${count} corners: an area has ${MOST_CORNERS} at most.`);
+    else this._refuse(`Got ${count} corners, expected at most ${MOST_CORNERS}. Use fewer corners.`);
   }
 
   /** @param {Point} place @param {number} index @param {number} pixels */
@@ -270,13 +270,13 @@ class AreaPanel {
     this.across = false;
     /** Begins an area. */
     this.begin = button("webmap-area-begin", "Area", acts.begin);
-    this.begin.title = "Sweep back and forth over an area";
+    this.begin.title = "Cover an area with parallel sweeps";
     this._done = button("webmap-area-done", "Done", acts.close);
-    this._done.title = "Or press the first corner again";
+    this._done.title = "Close the area; or press the first corner again";
     this._undo = button("webmap-area-undo", "Undo", acts.undo);
-    this._undo.title = "Take the last corner away";
-    this._here = button("webmap-area-here", "Its place", acts.here);
-    this._here.title = "Add the place of the selected robot";
+    this._undo.title = "Remove the last corner";
+    this._here = button("webmap-area-here", "Position", acts.here);
+    this._here.title = "Add the position of the selected robot";
     this._spacing = html("input", "webmap-area-spacing", {
       type: "number",
       min: `${SPACING.least}`,
@@ -295,8 +295,8 @@ class AreaPanel {
     });
     this._turn.title = "Sweep across the longest side, not along it";
     this._take = button("webmap-area-take", "Add to route", acts.take);
-    this._leave = button("webmap-area-leave", "Leave", acts.leave);
-    const label = html("label", "webmap-area-apart", {}, "Apart, in m ", this._spacing);
+    this._leave = button("webmap-area-leave", "Cancel", acts.leave);
+    const label = html("label", "webmap-area-apart", {}, "Spacing in m ", this._spacing);
     this._how = html("div", "webmap-route-row", {}, label, this._turn);
     this.element = html(
       "div",

@@ -141,10 +141,10 @@ export class RouteRun {
     // Until the gate has accepted the goal the lease may be on its way.
     if (this.state !== "going" || this._acceptedAt === null) return null;
     if (latched) return this._halted("STOP was pressed");
-    if (!mine) return this._halted("this page does not have the robot any more");
+    if (!mine) return this._halted("this page has no control of the robot any more");
     if (!goal || goal.id === this._before) {
       const late = now - this._acceptedAt > PATIENCE;
-      return late ? this._halted("the goal did not leave") : null;
+      return late ? this._halted("the goal was not sent") : null;
     }
     this._goal ??= goal.id;
     if (goal.id !== this._goal) return this._halted("another goal was sent");
@@ -241,7 +241,7 @@ export class RouteRobots {
   destroy() {
     const runs = new Map();
     for (const [robot, { run, order }] of this._going) {
-      if (order !== null) run.halt("the map was drawn anew");
+      if (order !== null) run.halt("the map was drawn again");
       const name = this._drive.robots.get(robot)?.name;
       if (name !== undefined && run.live) runs.set(robot, { name, run });
     }

@@ -11,7 +11,7 @@ import { keepRoute, keptRoute, LEAST_LOOP, RouteRobots } from "./route_run.js";
 /** @typedef {(message: object) => void} Send */
 /** @typedef {import('../../web/halves.js').Half} Half */
 
-const TOO_SHORT = `A loop needs ${LEAST_LOOP} points at least.`;
+const TOO_SHORT = `A loop needs at least ${LEAST_LOOP} points.`;
 
 /**
  * Routes: points that are pressed on the map, or lie over an area there, and a robot that
@@ -79,7 +79,7 @@ class RouteTool {
     });
     this._edit = button("webmap-route-edit", "Add points", () => this._aim.toggle());
     this._edit.title = "Press on the map for each point";
-    this._here = button("webmap-route-here", "Its place", () => {
+    this._here = button("webmap-route-here", "Position", () => {
       const pose = this._robotPose();
       if (pose) this._add(pose);
     });
@@ -89,12 +89,12 @@ class RouteTool {
     this._loop = button("webmap-route-loop", "Loop", () =>
       this._set(this._points, !this._loops),
     );
-    this._loop.title = "Begin anew after the last point";
-    this._here.title = "Add the place of the selected robot";
-    this._run = button("webmap-route-run", "Run", () => this._begin());
+    this._loop.title = "Start again after the last point";
+    this._here.title = "Add the position of the selected robot";
+    this._run = button("webmap-route-run", "Start route", () => this._begin());
     this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
-    this._skip = button("webmap-route-skip", "Skip", () => this._do("skip"));
-    this._end = button("webmap-route-end", "End", () => this._do("end"));
+    this._skip = button("webmap-route-skip", "Skip point", () => this._do("skip"));
+    this._end = button("webmap-route-end", "End route", () => this._do("end"));
     this._word = html("p", "webmap-route-word", { role: "status" });
     this._saved = new SavedRoutes(saves, send, () => ({
       points: this._points,
@@ -237,10 +237,10 @@ class RouteTool {
     this._here.disabled = this._robotPose() === null;
     this._clear.disabled = this._points.length === 0;
     this._run.disabled = this._points.length === 0 || !report?.way || busy;
-    say(this._run, live ? "Run anew" : "Run");
+    say(this._run, live ? "Run again" : "Start route");
     for (const each of [this._pause, this._skip, this._end]) each.hidden = !live;
     for (const each of [this._pause, this._skip]) each.disabled = busy;
-    say(this._pause, run?.state === "going" ? "Pause" : "Go on");
+    say(this._pause, run?.state === "going" ? "Pause" : "Resume");
     say(this._word, this._words(run, report?.name ?? ""));
     const refused = this._area.refused ? "refused" : "";
     this._word.dataset.state = this._area.active ? refused : (run?.state ?? "");
@@ -256,8 +256,8 @@ class RouteTool {
 
   /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
   _words(run, name) {
-    if (this._aim.active) return "Press on the map for each point, drag for the heading.";
-    if (this._aim.waits) return "More points afterwards.";
+    if (this._aim.active) return "Press on the map for each point and drag for the heading.";
+    if (this._aim.waits) return "Waiting: finish the other tool, then add more points.";
     if (this._area.active) return this._area.words;
     const how = this._running(run, name);
     const short = this._loops && this._points.length < LEAST_LOOP;
@@ -267,14 +267,14 @@ class RouteTool {
   /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
   _running(run, name) {
     if (run === undefined) {
-      return this._map.selected === null ? "Select the robot that is to go." : "";
+      return this._map.selected === null ? "Select the robot for this route." : "";
     }
     const point = `point ${run.index + 1} of ${run.points.length}`;
     const round = run.loop && run.rounds > 0 ? `, round ${run.rounds + 1}` : "";
-    if (run.state === "going") return `${name} goes to ${point}${round}.`;
+    if (run.state === "going") return `${name} is navigating to ${point}${round}.`;
     if (run.state === "paused") return `Paused before ${point}.`;
-    if (run.state === "halted") return `Halted before ${point}: ${run.why}.`;
-    return `${name} has ended its route.`;
+    if (run.state === "halted") return `Interrupted before ${point}: ${run.why}.`;
+    return `Route of ${name} ended.`;
   }
 
   _showList() {

@@ -76,14 +76,14 @@ function none(problem) {
 function problemOfSpacing(spacing) {
   if (spacing >= SPACING.least && spacing <= SPACING.most) return "";
   const got = Number.isFinite(spacing) ? `${spacing} m` : "no number";
-  return `Got ${got}: sweeps are ${SPACING.least} to ${SPACING.most} m apart.`;
+  return `Got ${got}, expected a spacing of ${SPACING.least} to ${SPACING.most} m.`;
 }
 
 /** @param {number} count @param {number} room @param {string} least */
 function tooMany(count, room, least) {
   return (
-    `These sweeps need ${least}${count} points, and the route has room for ${room}: ` +
-    "a larger distance or a smaller area is needed."
+    `Got ${least}${count} points, expected at most ${room}. ` +
+    "Use a larger spacing or a smaller area."
   );
 }
 

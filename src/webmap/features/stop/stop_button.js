@@ -64,14 +64,14 @@ class Stop {
         for (const each of stops.slice(0, RESET_AT_ONCE)) this._drive.reset(...stopOf(each));
       },
     );
-    const all = stopButton("webmap-stop-all", "Stop all", () => {
+    const all = stopButton("webmap-stop-all", "STOP ALL", () => {
       this._drive.stop("*");
     });
-    all.title = "Key Shift and Escape";
+    all.title = "Shortcut: Shift+Esc";
     this._list = html(
       "div",
       "webmap-stop-list",
-      { role: "group", "aria-label": "What became of STOP" },
+      { role: "group", "aria-label": "Results of STOP" },
       this._verdicts,
       html("div", "webmap-stop-row", {}, this._standing, this._reset.element, this._close),
     );
@@ -79,7 +79,7 @@ class Stop {
     const panel = html(
       "section",
       "webmap-panel webmap-stop",
-      { "aria-label": "Emergency stop" },
+      { "aria-label": "STOP for all robots" },
       all,
       this._list,
     );
@@ -139,7 +139,7 @@ class Stop {
   _refusals() {
     const { robots } = this._drive;
     return [...this._refused].map(
-      ([robot, why]) => `${robots.get(robot)?.name ?? robot} was not reset: ${why}.`,
+      ([robot, why]) => `Reset of ${robots.get(robot)?.name ?? robot} refused: ${why}.`,
     );
   }
 
@@ -194,7 +194,7 @@ class Alarm {
     /** @type {ReadonlyMap<string, string>} */
     this._current = new Map();
     this._ending = new AbortController();
-    this._stop = stopButton("webmap-alarm-stop", "Stop all", stopAll);
+    this._stop = stopButton("webmap-alarm-stop", "STOP ALL", stopAll);
     // A hand that knows where STOP is on the page finds it there.
     this._twins = new StopTwins();
     this._element = html(
@@ -206,7 +206,7 @@ class Alarm {
       html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
       this._names,
       this._stop,
-      button("webmap-alarm-seen", "I have seen this", () => {
+      button("webmap-alarm-seen", "Acknowledge", () => {
         this._seen = new Set(this._current.keys());
         this.show(this._current);
       }),

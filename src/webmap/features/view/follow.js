@@ -26,7 +26,7 @@ export default function attach(map, _options, send) {
     }
     toggle.disabled = !map.following && map.selected === null;
   };
-  toggle.title = "Keep the selected robot where it is on the screen";
+  toggle.title = "Move the map with the selected robot";
   /** @type {import('../../web/drive.js').Drive} */
   const drive = map.drive;
   // The view does not tell when it begins to follow; it is looked at instead.

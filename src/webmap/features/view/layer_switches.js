@@ -132,7 +132,7 @@ class LayerSwitches {
     }
     for (const key of there) if (!this._rows.has(key)) this._add(key);
     for (const [key, row] of this._rows) row.hidden = !there.has(key);
-    say(this._none, there.size > 0 ? "" : "There is nothing to switch.");
+    say(this._none, there.size > 0 ? "" : "No layers yet.");
   }
 
   /** @param {string} key A layer, or one of its drawings. */
@@ -162,7 +162,7 @@ class LayerSwitches {
     const known = this._notes.get(name);
     if (more <= 0 && !known) return;
     const note = known ?? html("p", "webmap-layers-row one");
-    say(note, `${more} more: the switch “${name}” is for all of them`);
+    say(note, `${more} more: “${name}” switches all of them`);
     note.hidden = more <= 0;
     if (known) return;
     this._notes.set(name, note);

@@ -84,10 +84,10 @@ class Child:
         """What it ended of, in words, after :meth:`stop`."""
         code = self._process.returncode
         if code is not None and code < 0:
-            return f"it was ended by {signal.Signals(-code).name}"
+            return f"ended by {signal.Signals(-code).name}"
         self._listener.join(1.0)
         said = one_line(self._last_words.decode("utf-8", "replace").strip(), MAX_WORDS)
-        return said or f"exit code {code}, without a word"
+        return said or f"exit code {code}, no message"
 
     def start(self) -> None:
         """Begin to read."""

@@ -131,7 +131,7 @@ class GateClient:
         """
         trouble = None
         if not self.ready:
-            trouble = self._supervisor.trouble or "the gate does not run (yet)"
+            trouble = self._supervisor.trouble or "the gate is not running"
         return self._program.take(robot_id, trouble)
 
     def release(self, robot_id: str) -> None:
@@ -190,7 +190,7 @@ class GateClient:
         if self.ready:
             self.tell(messages.Reset(robot_id, stop))
         else:
-            log.error("the gate does not run: reset is not kept for later")
+            log.error("the gate is not running: the reset is lost")
 
     def name_writers(self, robot_id: str, nodes: tuple[str, ...]) -> None:
         """Tell which nodes besides the bridge publish to a robot's velocity topic."""
@@ -222,7 +222,7 @@ class GateClient:
 
     def _keep_stop(self, by: str | None, robot: str | None) -> None:
         if not self.ready:
-            log.error("STOP: the gate does not run; it is told as soon as it does")
+            log.error("STOP: the gate is not running; STOP is sent as soon as it runs")
         self._unheard.say(by, robot, time.monotonic())
 
     def _stop_again(self, by: str | None, robot: str | None) -> messages.ToGate:

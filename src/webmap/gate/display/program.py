@@ -86,7 +86,7 @@ class ProgramRoad:
 
         """
         if not twist.is_finite:
-            raise MotionError(f"a velocity is made of finite numbers, got {twist}")
+            raise MotionError(f"expected a velocity of finite numbers, got {twist}")
         with self._lock:
             epoch, tick = self._licence(robot_id)
             x, y, turn, z, rx, ry = map(float, twist.numbers)
@@ -131,7 +131,7 @@ class ProgramRoad:
     def _licence(self, robot_id: str) -> tuple[int, int]:
         epoch = self._epochs.get(robot_id)
         if epoch is None or self._tick is None:
-            raise NoLease(f"this program does not hold the lease of robot {robot_id!r}")
+            raise NoLease(f"this program does not have control of robot {robot_id!r}")
         return epoch, self._tick
 
     # What the gate says.
@@ -175,5 +175,5 @@ class ProgramRoad:
 
 def _finite(x: float, y: float, yaw: float) -> tuple[float, float, float]:
     if not all(map(math.isfinite, (x, y, yaw))):
-        raise MotionError(f"a pose is made of finite numbers, got {(x, y, yaw)}")
+        raise MotionError(f"expected a pose of finite numbers, got {(x, y, yaw)}")
     return float(x), float(y), float(yaw)

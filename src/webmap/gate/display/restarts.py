@@ -55,8 +55,8 @@ def in_words(epitaph: str, *, spoke: bool) -> str:
         spoke: Whether it had come to run.
 
     """
-    what = "ends again and again" if spoke else "does not start"
+    what = "ended repeatedly" if spoke else "does not start"
     return (
-        f"The gate {what}: {epitaph}. It is tried again; until it runs no robot can be "
-        "driven from here, and a STOP that is said is kept for it."
+        f"The gate {what}: {epitaph}. WebMap starts it again. Until then no robot "
+        "can be driven from here; a STOP is kept and sent then."
     )

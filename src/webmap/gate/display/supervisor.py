@@ -125,7 +125,7 @@ class Supervisor:
         self._silent_beats += 1
         if self._silent_beats > (HUNG if self.ready else SLOW_START):
             self._silent_beats = 0
-            child.kill("it says nothing")
+            child.kill("it does not respond")
 
     def _spawn(self) -> None:
         try:
@@ -158,7 +158,7 @@ class Supervisor:
     def _note_end(self, epitaph: str) -> None:
         self._restarts.ended(time.monotonic())
         spoke, self.ready = self.ready, False
-        log.error("the gate has ended (%s); it is started anew", epitaph)
+        log.error("the gate has ended (%s); WebMap starts it again", epitaph)
         failing = self._restarts.failing
         self.trouble = in_words(epitaph, spoke=spoke) if failing else None
         why = self.trouble or f"the gate has ended: {epitaph}"

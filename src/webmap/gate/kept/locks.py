@@ -105,8 +105,8 @@ class Locks:
         path = self._path(key)
         for other in self._held:
             if self._path(other) == path:
-                return f"it is driven as {other.topic} of {other.url} here"
-        return "another WebMap on this computer has it"
+                return f"this WebMap already drives it as {other.topic} of {other.url}"
+        return "another WebMap on this computer drives it"
 
     def _path(self, key: Key) -> Path:
         return path_of(self._folder, key, "lock")

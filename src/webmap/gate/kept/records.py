@@ -109,11 +109,11 @@ class Records:
             if seconds is not None:
                 seconds = float(seconds)
             if not isinstance(date, str) or (seconds is not None and _odd(seconds)):
-                raise ValueError("it makes no sense")
+                raise ValueError("invalid values")
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-            log.warning("%s cannot be read (%s): it is as if not tested", path, error)
+            log.warning("%s cannot be read (%s): no stop test known", path, error)
             return None
         return StopRecord(seconds, date[:MAX_NAME])
 
@@ -146,7 +146,7 @@ def _press_in(path: Path) -> Press | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        log.warning("%s cannot be read (%s): STOP stands", path, error)
+        log.warning("%s cannot be read (%s): STOP is active", path, error)
         by = id = None
     if not (isinstance(by, str) and by and by.isprintable()):
         by = UNKNOWN

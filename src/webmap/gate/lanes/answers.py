@@ -48,7 +48,7 @@ def answer_to(data: bytes, id: str) -> Answer | None:
         return Answer(_because("refused", frame.values))
     values = frame.values
     if isinstance(values, dict) and values.get("success") is False:
-        return Answer(_because("answered that it failed", values.get("message")))
+        return Answer(_because("the service reported a failure", values.get("message")))
     return Answer(None)
 
 

@@ -88,14 +88,15 @@ class Budget:
         """Return in words why the link is to be dropped; None if it is not."""
         self._pass_time(now)
         if self._behind_since is not None and now - self._behind_since > BEHIND:
-            return f"it sends too much: for {BEHIND:g} s more waits than can be taken"
+            return f"the bridge sends too much: data was waiting for {BEHIND:g} s"
         if self._close_since is None or now - self._close_since < PATIENCE:
             return None
         seconds = now - self._close_since
         return (
-            f"it sends too much: {self._frames} frames, {self._bytes} bytes and "
-            f"{self._work:.2f} s of work were taken in {seconds:.1f} s, and more waits "
-            f"(at most {FRAMES} frames, {BYTES} bytes and {WORK:g} s of work a second)"
+            f"the bridge sends too much: {self._frames} frames, {self._bytes} bytes "
+            f"and {self._work:.2f} s of work were taken in {seconds:.1f} s, and more "
+            f"waits (at most {FRAMES} frames, {BYTES} bytes and {WORK:g} s of work a "
+            f"second)"
         )
 
     def _pass_time(self, now: float) -> None:

@@ -77,7 +77,7 @@ class Calls:
                 outcomes.put_nowait(answer.why)
 
         def lost(why: str) -> None:
-            reason = readable(f"no answer, for the link is lost: {why}")
+            reason = readable(f"no answer: connection lost: {why}")
             outcomes.put_nowait(reason)
 
         ears = Ears(text=hear, pong=lambda _: None, lost=lost)
@@ -91,6 +91,6 @@ class Calls:
                     link.close()
         # The latter of a bridge that closes the link in the breath that opens it.
         except (BridgeClosed, WebSocketException) as error:
-            return readable(f"no link: {error}")
+            return readable(f"no connection: {error}")
         except TimeoutError:
             return f"no answer within {CALL_TIMEOUT:g} s"

@@ -115,7 +115,7 @@ class Lane:
         link = self._socket
         if link is not None and link.is_behind:
             # The answers that are missed may wait behind all that it sends.
-            link.drop(f"{why}, and it sends more than can be dealt with")
+            link.drop(f"{why}, and it sends more than WebMap can process")
         elif link is not None:
             link.abort(why)
 
@@ -164,7 +164,7 @@ class Lane:
                 link = await open_socket(self.url, ears, self._budget)
             except BridgeClosed as error:
                 if attempts.is_news(str(error)):
-                    log.warning("no link: %s", error)
+                    log.warning("no connection: %s", error)
                 await _sleep_about(attempts.failed())
                 continue
             begun, self._socket = loop.time(), link
@@ -175,14 +175,14 @@ class Lane:
                 await self._keep_pinging()
             # A bridge that closes the link while it reads nothing would keep it, and
             # what waits in it, beside the next one.
-            self.cut("the bridge is closing it")
+            self.cut("the bridge is closing the connection")
             if self._trouble is None:  # it goes on elsewhere
                 await _sleep_about(FIRST_WAIT)
                 continue
             wait = attempts.ended(loop.time() - begun, flooded=link.flooded)
             if attempts.is_news(self._trouble):
                 log.warning(
-                    "lost the link to %s: %s; the next attempt comes within %.1f s",
+                    "lost the connection to %s: %s; next attempt within %.1f s",
                     self.url,
                     self._trouble,
                     wait,

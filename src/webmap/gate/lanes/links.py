@@ -64,7 +64,7 @@ class Links:
                     self._watch(key)
             case actions.CutLink(url):
                 if url in self._control:
-                    self._control[url].lane.cut("it carries nothing")
+                    self._control[url].lane.cut("no longer used")
             case actions.Attach(key, spec):
                 self._attach(key, spec)
             case actions.Detach(key, robot):

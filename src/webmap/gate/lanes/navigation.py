@@ -32,7 +32,7 @@ _ACTIONLIB: dict[int, Outcome] = {
     9: "failed",
 }
 _ACTIONLIB_WAITING, _ACTIONLIB_ACTIVE = (0, 7), (1, 6)
-_ACTIONLIB_WORDS = {5: "the robot refused it", 9: "the robot lost it"}
+_ACTIONLIB_WORDS = {5: "the robot refused the goal", 9: "the robot lost the goal"}
 
 
 class _Duration(msgspec.Struct):
@@ -209,7 +209,7 @@ def _complaint(text: str, goal: SendGoal) -> GoalEnded | None:
     if "send_action_goal" not in text:
         return None
     if "unknown operation" in text.lower():
-        why = "the bridge is too old for goals of an action"
+        why = "the bridge does not support goals of actions"
         return GoalEnded(goal.robot, goal.id, "failed", why, no_actions=True)
     return _ended(goal, "failed", text)
 

@@ -163,11 +163,11 @@ class Socket(asyncio.Protocol):
 
     def eof_received(self) -> None:
         """Note the end of the bytes; asyncio closes the connection."""
-        self._end("the bridge closed the link")
+        self._end("the bridge closed the connection")
 
     def connection_lost(self, error: Exception | None) -> None:
         """Note the end; what came before it is dealt with first."""
-        self._end(str(error) if error else "the bridge closed the link")
+        self._end(str(error) if error else "the bridge closed the connection")
 
     def pause_writing(self) -> None:
         """Take in nothing more: it might have to be answered."""
@@ -204,7 +204,7 @@ class Socket(asyncio.Protocol):
                 self._protocol.receive_data(piece)
                 self._take_events()
             except Exception as error:
-                self.drop(f"what it sent cannot be dealt with: {error!r}")
+                self.drop(f"invalid data from the bridge: {error!r}")
             pieces, size = pieces + 1, size + length
             if time.thread_time() >= until:
                 break
@@ -258,7 +258,7 @@ class Socket(asyncio.Protocol):
                 assert isinstance(event, Frame)
                 self._hear(event)
         if self._protocol.handshake_exc is not None:
-            self.abort(f"no WebSocket there: {self._protocol.handshake_exc}")
+            self.abort(f"no WebSocket at this address: {self._protocol.handshake_exc}")
         elif self._protocol.close_expected() and self._transport is not None:
             self._waiting.clear()
             self._transport.close()
@@ -273,7 +273,7 @@ class Socket(asyncio.Protocol):
         elif frame.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
             self._parts.append(bytes(frame.data))
             if len(self._parts) > MAX_PARTS:
-                self.drop(f"it sends a message in more than {MAX_PARTS} frames")
+                self.drop(f"a message in more than {MAX_PARTS} frames")
             elif frame.fin:
                 text, self._parts = b"".join(self._parts), []
                 self._pass_on(text)
@@ -284,7 +284,7 @@ class Socket(asyncio.Protocol):
         except ProtocolError as error:
             if not self._complained:
                 self._complained = True
-                log.warning("%s: %s; what is like it is left out", self.url, error)
+                log.warning("%s: %s; ignored, as are similar messages", self.url, error)
 
     def _flush(self, until: float = math.inf) -> bool:
         """Hand over what the protocol has to say, unless that is too old."""

@@ -135,7 +135,7 @@ class TasksLane:
         elif self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False):
             ended(None)
         else:
-            why = "not sent, for want of a link"
+            why = "not sent: no connection"
             log.warning("stop hook %s: %s", hook["topic"], why)
             ended(why)
 
@@ -160,7 +160,7 @@ class TasksLane:
 
         def lost(why: str) -> None:
             del self._spent[link]
-            self._tell(GoalLost(goal.robot, goal.id, f"the link is lost: {why}"))
+            self._tell(GoalLost(goal.robot, goal.id, f"connection lost: {why}"))
 
         self._spending = True
         link = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=lost))
@@ -205,7 +205,7 @@ class TasksLane:
         if self._spending:
             return  # the socket goes on for the goal that it was spent on
         for _, goal in list(self._followed.values()):
-            why = f"no link to {self._url}"
+            why = f"no connection to {self._url}"
             self._tell(GoalLost(goal.robot, goal.id, why))
 
 

@@ -48,26 +48,26 @@ class Arming:
     def obstacle(self, now: float) -> str | None:
         """Return why nobody can have the machine, in words."""
         if self._latch.on:
-            return f"STOP by {self._latch.by} stands: reset it first"
+            return f"STOP by {self._latch.by} is active: reset it first"
         if not self.lock.held:
             return self.lock.why
         if doubt := self._pulse.doubt(now):
             return doubt
         if self._robots.drivable:
-            return None if self._control.up else f"no link to {self._url}"
+            return None if self._control.up else f"no connection to {self._url}"
         goals = self._robots.goals[self._robots.newest.id]
         if not goals.can_send:
-            return "it has neither a velocity topic nor a goal topic"
-        return None if goals.link.up else "no link to where its goals go"
+            return "the robot has no velocity topic and no goal topic"
+        return None if goals.link.up else "no connection to the bridge of its goals"
 
     def doubt(self, now: float) -> str | None:
         """Return why the machine must not be driven now, in words."""
         if reason := self.obstacle(now):
             return reason
         if not self._robots.drivable:
-            return "it has no velocity topic"
+            return "the robot has no velocity topic"
         if not self._control.fresh(now):
-            return f"{self._url} does not answer"
+            return f"no answer from {self._url}"
         if self._robots.has_odometry and (blind := self._sight.doubt(now)):
             return blind
         return self.video.doubt(now)

@@ -76,7 +76,7 @@ def assist(spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float) -> 
     allowed = math.sqrt(2 * spec.brake * room) if room > 0 else 0.0
     if allowed >= speed:
         return FREE
-    return Verdict(allowed / speed, f"scan assist: something {gap:.1f} m ahead")
+    return Verdict(allowed / speed, f"scan assist: obstacle {gap:.1f} m ahead")
 
 
 def points_of(spec: AssistSpec, sweep: Sweep, within: float = math.inf) -> list[Point]:
@@ -200,7 +200,7 @@ def _blindness(
         return f"the scan is {age:.1f} s old"
     if spec.frame and sweep.frame != spec.frame:
         named = f"frame {sweep.frame!r}" if sweep.frame else "no frame"
-        return f"the scan names {named}, expected {spec.frame!r}"
+        return f"the scan has {named}, expected {spec.frame!r}"
     if sweep.refused is not None:
         return sweep.refused
     step = sweep.angle_increment
@@ -209,11 +209,11 @@ def _blindness(
     towards = _rays_towards(spec, sweep, wanted)
     known, asked = folding.known(sweep, towards)
     if not asked:
-        return "the scan does not look where the robot goes"
+        return "the scan does not cover the direction of motion"
     if known < KNOWN * asked:
         return "most of the scan is unknown"
     if not _covers_the_way(spec, sweep, wanted):
-        return "the scan covers a part of the way only"
+        return "the scan covers only a part of the path"
     return None
 
 

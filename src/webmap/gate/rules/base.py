@@ -139,7 +139,7 @@ class Base:
         self, spec: RobotSpec, tasks: Health, hooks: Health, now: float
     ) -> None:
         """Take in a robot, or what changed of it; a change ends the lease."""
-        self.hands.end("the robot was declared anew", now)
+        self.hands.end("the robot was declared again", now)
         self.robots.declare(spec, tasks, hooks, now)
 
     def attached(self, now: float) -> None:
@@ -151,7 +151,9 @@ class Base:
         """Drop a robot; the last one stays until its machine has stopped."""
         self.robots.leaving.add(robot)
         if not self.robots.holds_without(robot):
-            self.hands.end("the robot, or one that is the same machine, is gone", now)
+            self.hands.end(
+                "the robot, or one on the same velocity topic, was removed", now
+            )
         self.robots.goals[robot].lost(now)
         self._left_at = now
         self._drop_leaving(now)
@@ -290,7 +292,7 @@ class Base:
 
     def link_down(self, now: float) -> None:
         """The control link is gone."""
-        self.driving.link_down(f"no link to {self.key.url}", now)
+        self.driving.link_down(f"no connection to {self.key.url}", now)
 
     def _update_watch(self, now: float) -> None:
         self.sight.update(

@@ -64,18 +64,18 @@ class Confirmation:
 
     def _reason(self, delivered: bool, silent: bool, now: float) -> str:
         if not delivered:
-            return self._since_then("its bridge does not answer")
+            return self._since_then("no answer from the bridge")
         if self._still.speed is None or silent:
             return self._since_then("no odometry")
         if self._still.speed < STILL_V and self._still.turn < STILL_W:
             gap = max(self._still.gap, now - self._still.heard_at)
             if gap > GAP:
-                return f"only one odometry message arrives in {gap:.1f} s"
-            return f"it has not been still for {STILL_FOR:g} s yet"
+                return f"only one odometry message in {gap:.1f} s"
+            return f"not yet still for {STILL_FOR:g} s"
         return self._moving()
 
     def _since_then(self, trouble: str) -> str:
-        return f"it stood, but since then {trouble}" if self._stood else trouble
+        return f"it stopped, but since then: {trouble}" if self._stood else trouble
 
     def _moving(self) -> str:
         speed = self._still.speed or 0.0

@@ -57,13 +57,13 @@ class Driving:
             return None if neutral else reason
         self._hands.deadman.accept(neutral, tick, now)
         if self._hands.deadman.expired(now):
-            self._lapse("the driver hears nothing", now)
-            return None if neutral else "no new tick has come to the driver"
+            self._lapse("the page receives no ticks", now)
+            return None if neutral else "the page received no new tick"
         if self._tests.running is not None:
             return self._go_on_with_test(self._tests.running, lease, neutral, now)
         if neutral or not self._hands.deadman.armed:
             self._motion.halt(now)
-            return None if neutral else "release every input first"
+            return None if neutral else "release all inputs first"
         self._drive(wanted, lease, now)
         return None
 
@@ -83,7 +83,7 @@ class Driving:
 
         Whatever it says, its way takes too long for anybody to drive by.
         """
-        self._lapse("the driver's commands come too late", now)
+        self._lapse("the commands of the page are too old", now)
 
     def begin_test(self, now: float) -> None:
         """Begin the stop test for the holder of the lease.
@@ -93,7 +93,7 @@ class Driving:
 
         """
         if self._tests.running is not None:
-            raise Refusal("a stop test is going on")
+            raise Refusal("a stop test is running")
         if reason := self._arming.doubt(now):
             raise Refusal(reason)
         self._tests.begin(self._hands.deadman.armed, now)
@@ -103,9 +103,9 @@ class Driving:
     ) -> str | None:
         if not neutral:
             self._lapse("a key was pressed", now)
-            return "a stop test was going on: release every input first"
+            return "a stop test was running: release all inputs first"
         if not self._hands.deadman.armed:
-            self._lapse("the driver fell silent", now)
+            self._lapse("the page stopped sending commands", now)
         if test.state == "creeping":
             self._drive(CREEP, lease, now)
         return None
@@ -137,7 +137,7 @@ class Driving:
         if reason := self._hands.unarmable(now):
             raise Refusal(reason)
         if not self.silent:
-            raise Refusal("it is driven: let it stand first")
+            raise Refusal("the robot is moving: stop it first")
         self._robots.goals[robot].locate(*pose, by, now)
         self._hands.renew(now)
 
@@ -152,7 +152,7 @@ class Driving:
             if reason := self._arming.doubt(now):
                 self._fault(reason, now)
             elif self._hands.deadman.expired(now):
-                self._lapse("the driver fell silent", now)
+                self._lapse("the page stopped sending commands", now)
         self._tests.step(now)
 
     def _lapse(self, why: str, now: float) -> None:

@@ -183,7 +183,7 @@ class Fleet:
         try:
             spec = checked(spec)
         except ConfigError as error:
-            log.error("a robot was declared that makes no sense: %s", error)
+            log.error("invalid declaration of a robot: %s", error)
             return
         key, earlier = key_of(spec), self._by_robot.get(spec.id)
         before = earlier.robots.specs[spec.id] if earlier is not None else None
@@ -294,9 +294,7 @@ class Fleet:
             return
         base.wrote(event, now)
         if event.by is not None and not event.done:
-            why = (
-                "a command was dropped: the link is backed up, or the gate was held up"
-            )
+            why = "a command was dropped: the connection or the gate was held up"
             self._refuse(event.by, base.robots.newest.id, "drive", why, now)
 
     def _wrote_goal(self, event: events.WroteGoal, now: float) -> None:
@@ -309,7 +307,7 @@ class Fleet:
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(Say(sent))
         else:
-            why = "the goal was dropped: the link is backed up, or the gate was held up"
+            why = "the goal was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "goal", why, now)
 
     def _wrote_pose(self, event: events.WrotePose, now: float) -> None:
@@ -317,7 +315,7 @@ class Fleet:
             told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(Say(told))
         else:
-            why = "the pose was dropped: the link is backed up, or the gate was held up"
+            why = "the pose was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "locate", why, now)
 
     def _goal_progress(self, event: events.GoalProgress, now: float) -> None:

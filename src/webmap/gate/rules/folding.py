@@ -57,7 +57,7 @@ def too_long(count: int) -> str | None:
 
 def _refusal(count: int, step: float) -> str | None:
     if abs(step) * count > _MOST_TURNS * math.tau:
-        return f"the {count} beams of the scan go round more than twice"
+        return f"the {count} beams of the scan cover more than two turns"
     return too_long(count)
 
 

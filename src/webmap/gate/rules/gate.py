@@ -167,4 +167,4 @@ class Gate:
             what, why = "stop", f"this STOP is not valid ({why}): {stopped}"
         self._people.refuse(connection.id, None, what, why, now)
         if connection.garbage.too_often(now):
-            self._people.close(connection, "too many messages that make no sense")
+            self._people.close(connection, "too many invalid messages")

@@ -30,7 +30,7 @@ BRAKES = 2.0
 OVER = ("reached", "failed", "cancelled")
 """The states of a goal that nothing follows any more."""
 
-ELSEWHERE = "its goals go elsewhere now; nobody tells whether it gave this one up"
+ELSEWHERE = "goals now go elsewhere: the state of this goal is unknown"
 
 
 class Goals:
@@ -113,9 +113,9 @@ class Goals:
         """
         way = self.way
         if way is None:
-            raise Refusal("no goal topic is known")
+            raise Refusal("no goal topic and no action is set")
         if not self.link.up:
-            raise Refusal("no link to where its goals go")
+            raise Refusal("no connection to the bridge of its goals")
         id, until = generate_id(), now + WAIT_LIMIT
         self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, way, until))
 
@@ -128,12 +128,12 @@ class Goals:
 
         """
         if self.spec.pose_topic is None:
-            raise Refusal("no topic for its initial pose is known")
+            raise Refusal("no topic for the initial pose is set")
         # Of a goal that nobody tells of and nobody can cancel there is no end to see.
         if self.following and (self.can_cancel or self.way != "topic"):
-            raise Refusal("it follows a goal: cancel that first")
+            raise Refusal("the robot is navigating: cancel the goal first")
         if not self.link.up:
-            raise Refusal("no link to where its initial pose goes")
+            raise Refusal("no connection to the bridge of its initial pose")
         until = now + WAIT_LIMIT
         self._emit(TellPose(self._key, self.spec.id, x, y, yaw, by, until))
 
@@ -150,7 +150,7 @@ class Goals:
             by=goal.by,
             way=way,
             state="sent",
-            why="this robot does not say how it goes" if way == "topic" else "",
+            why="this robot reports no progress" if way == "topic" else "",
         )
 
     def progress(self, news: GoalProgress) -> None:
@@ -180,7 +180,7 @@ class Goals:
             self._cancelled_at = float("-inf")  # if it was, that is answered now
             why = end.why
             if end.no_actions and self.spec.goal_topic is not None:
-                why = f"{why}; the next one goes to {self.spec.goal_topic}"
+                why = f"{why}; the next goal goes to {self.spec.goal_topic}"
             if end.outcome == "cancelled":
                 why = report.why if report.state == "cancelling" else why
             self._show(end.outcome, why or _OTHERWISE[end.outcome], now)
@@ -207,7 +207,7 @@ class Goals:
 
         """
         if not self.can_cancel:
-            raise Refusal("no cancel topic and no action is known")
+            raise Refusal("no cancel topic and no action is set")
         self._running, self._by, self._perhaps = None, None, False
         self._cancel_owed, self._cancelled_at = not self.link.up, now
         if self.link.up or self._cancels_apart:
@@ -245,7 +245,7 @@ class Goals:
         lately = self._made_way_at is not None and now - self._made_way_at < LATELY
         if self.can_cancel and (self._perhaps or not lately):
             self._made_way_at = now
-            self.cancel(now, "somebody drives the robot")
+            self.cancel(now, "the robot is being driven")
 
     def stop(self, now: float) -> None:
         """Cancel every goal if there is a way to."""
@@ -263,7 +263,7 @@ class Goals:
         if self._by is None or connection not in (None, self._by):
             return
         if self.spec.on_operator_loss == "cancel" and self._perhaps and self.can_cancel:
-            self.cancel(now, "who sent it is gone")
+            self.cancel(now, "the sender of the goal is gone")
 
     def vacate(self, spec: RobotSpec, now: float) -> None:
         """Call off what is under way, unless that can be done under ``spec`` as well.
@@ -308,7 +308,7 @@ class Goals:
 
 _OTHERWISE = {
     "reached": "",
-    "failed": "the robot does not say why",
+    "failed": "the robot gave no reason",
     "cancelled": "by the robot, or by another program",
 }
 

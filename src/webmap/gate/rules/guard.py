@@ -38,7 +38,9 @@ class Guard:
             self._changed[topic] = sweep.arrived
         changed = self._changed.get(topic)
         if changed is not None and sweep.arrived - changed < MIXED:
-            sweep = msgspec.structs.replace(sweep, refused="scans of two frames come")
+            sweep = msgspec.structs.replace(
+                sweep, refused="the scans have two different frames"
+            )
         self._sweeps[topic] = sweep
 
     def forget(self) -> None:

@@ -48,7 +48,9 @@ class HandOver:
         if self.asker is None:
             self.asker, self._asked_at = who, now
         elif self.asker is not who:
-            raise Refusal(f"{self.asker.name or self.asker.id} is asking already")
+            raise Refusal(
+                f"{self.asker.name or self.asker.id} has already requested control"
+            )
 
     def left(self, now: float) -> float:
         """Return the seconds until it is granted by itself."""

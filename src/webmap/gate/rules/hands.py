@@ -59,7 +59,7 @@ class Hands:
         """Return why nobody can take the machine now, in words."""
         heir = self.handover.heir
         if heir is not None and not self._arming.stopped:
-            return f"it goes to {heir.name or heir.id} as soon as it stands"
+            return f"control goes to {heir.name or heir.id} when the robot has stopped"
         return self._arming.obstacle(now)
 
     def is_held_by(self, connection: str) -> bool:
@@ -101,14 +101,14 @@ class Hands:
         """
         disappointed = self.handover.end()
         if disappointed is not None:
-            self._robots.refuse(disappointed.id, "ask", why or "it is gone")
+            self._robots.refuse(disappointed.id, "ask", why or "the robot is gone")
         self._end(why, now)
 
     def _end(self, why: str | None, now: float) -> None:
         lease = self.lease
         if lease is None:
             return
-        self._halt(why or "the driver let go of it", now)
+        self._halt(why or "control was released", now)
         self.lease = None
         self.deadman = DeadMan()
         self._new_driver(page_cap(), now)
@@ -135,7 +135,7 @@ class Hands:
         if reason := self.unarmable(now):
             raise Refusal(reason)
         if self.lease is None or self.lease.program:
-            raise Refusal("no person has it: take it")
+            raise Refusal("no operator has control: take control")
         self.handover.ask(who, now)
 
     def deny(self, why: str) -> None:
@@ -146,7 +146,7 @@ class Hands:
 
     def hand_over(self, heir: Connection, now: float) -> None:
         """Zero first; ``heir`` gets the machine when it stands (S5)."""
-        self._end(f"{heir.name or heir.id} gets it", now)
+        self._end(f"control goes to {heir.name or heir.id}", now)
         if self._robots.drivable:
             self._motion.zero(now)
         self._robots.make_way(now)  # what follows a goal does not come to stand
@@ -157,7 +157,7 @@ class Hands:
         """Let time have its say about who has the machine, and who gets it."""
         handover = self.handover
         if self._expired(now):
-            self.end(f"it was not used for {UNUSED:g} s", now)
+            self.end(f"not used for {UNUSED:g} s", now)
         if handover.asker is not None and handover.left(now) == 0:
             self.hand_over(handover.asker, now)
         heir = handover.heir

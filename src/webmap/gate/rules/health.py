@@ -75,5 +75,5 @@ class Pulse:
         if self.ended is not None:
             return self.ended
         if now - self._beat_at > BEAT_LIMIT:
-            return "the display process is silent"
+            return "the display process does not respond"
         return None

@@ -6,7 +6,7 @@ from webmap.gate.hookspecs import place_of
 from webmap.gate.messages import RobotSpec
 from webmap.gate.rules.health import Health
 
-NO_LINK = "not told yet, for want of a link"
+NO_LINK = "not sent yet: no connection"
 
 
 class Hooks:

@@ -119,7 +119,7 @@ class Latch:
 
         """
         if self.press is None:
-            raise Refusal("no STOP stands")
+            raise Refusal("no STOP is active")
         if self.press.id != stop:
             raise Refusal(
                 f"{self.press.by} pressed STOP meanwhile; look at the robot, then "

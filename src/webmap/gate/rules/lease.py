@@ -52,7 +52,7 @@ def check_take(
     check_role(role)
     if lease is None or (lease.program and not program):
         return
-    raise Refusal(f"{lease.name or lease.connection} drives it")
+    raise Refusal(f"{lease.name or lease.connection} has control")
 
 
 def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
@@ -63,11 +63,13 @@ def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
 
     """
     if lease is None:
-        raise Refusal("nobody has taken it: take it first")
+        raise Refusal("nobody has control: take control first")
     if lease.connection != connection:
-        raise Refusal(f"{lease.name or lease.connection} drives it")
+        raise Refusal(f"{lease.name or lease.connection} has control")
     if lease.epoch != epoch:
-        raise Refusal(f"epoch {epoch} is not that of the lease, which is {lease.epoch}")
+        raise Refusal(
+            f"got epoch {epoch}, expected {lease.epoch}, the epoch of the lease"
+        )
 
 
 def check_role(role: Literal["viewer", "operator", "admin"]) -> None:
@@ -78,4 +80,4 @@ def check_role(role: Literal["viewer", "operator", "admin"]) -> None:
 
     """
     if role == "viewer":
-        raise Refusal("viewers may look and STOP; driving needs an operator")
+        raise Refusal("viewers can only look and press STOP; driving needs an operator")

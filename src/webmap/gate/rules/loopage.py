@@ -90,5 +90,5 @@ def governed(speed: Speed, slow: float | None, stop_time: float | None) -> Speed
         return speed
     # Rounded, so that the speed in force does not tremble with every command.
     v = math.floor(100 * BLIND / reaction(slow, stop_time)) / 100
-    why = f"slow link: {math.ceil(slow * 100) * 10} ms"
+    why = f"slow connection: {math.ceil(slow * 100) * 10} ms"
     return Speed(min(v, speed.v), speed.w, (*speed.why, why))

@@ -117,7 +117,7 @@ class Obedience:
         if now - self._zero_at < GRACE or not self.watching(now):
             return None
         silent = now - self._seen_at > GRACE
-        until = ", and odometry has ceased since" if silent else ""
+        until = ", then odometry ended" if silent else ""
         speed, turn = self._moving.speed, self._moving.turn
         if speed > MOVES:
             return f"zero sent, still moving at {speed:.2f} m/s{until}"

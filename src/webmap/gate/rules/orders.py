@@ -80,7 +80,7 @@ class Orders:
             case StopTest(robot):
                 base = self._fleet.find(robot)
                 if not base.hands.is_held_by(connection.id):
-                    raise Refusal("take it first")
+                    raise Refusal("take control first")
                 base.driving.begin_test(now)
             case _:
                 self.cancel(connection, command.robot, now)
@@ -144,20 +144,20 @@ class Orders:
         check_role(connection.role)
         base = self._fleet.find(robot)
         if base.hands.is_held_by(connection.id):
-            raise Refusal("you have it already")
+            raise Refusal("you already have control")
         base.hands.ask(connection, now)
 
     def _answer(self, connection: Connection, answer: Grant | Deny, now: float) -> None:
         base = self._fleet.find(answer.robot)
         if not base.hands.is_held_by(connection.id):
-            raise Refusal("only who has it can answer")
+            raise Refusal("only the operator who has control can answer")
         asker = base.hands.handover.asker
         if asker is None:
-            raise Refusal("nobody asks for it")
+            raise Refusal("nobody requests control")
         if isinstance(answer, Grant):
             base.hands.hand_over(asker, now)
         else:
-            base.hands.deny(f"{connection.name or connection.id} keeps it")
+            base.hands.deny(f"{connection.name or connection.id} keeps control")
             base.hands.renew(now)
 
     def checked(
@@ -184,7 +184,7 @@ class Orders:
             connection, command.robot, command.epoch, command.tick, now
         )
         if command.seq <= connection.acked:
-            raise Refusal("its seq is not larger than the one before")
+            raise Refusal("seq is not larger than the previous seq")
         connection.acked = command.seq
         return base, age
 

@@ -137,7 +137,7 @@ def _stop(base: Base) -> StopReport | None:
     seen = base.standing.confirmation
     why = seen.why
     if base.latch.trouble is not None:
-        why = f"{why}; a restart would forget this STOP: {base.latch.trouble}"
+        why = f"{why}; a restart would end this STOP: {base.latch.trouble}"
     return StopReport(press.by, seen.confirmed, why, press.id)
 
 

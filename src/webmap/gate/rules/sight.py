@@ -64,7 +64,7 @@ class Sight:
         if now - came_at > BLIND_LIMIT:
             return f"no odometry for {BLIND_LIMIT:g} s"
         if now - said_after > BLIND_LIMIT:
-            return f"odometry comes more than {BLIND_LIMIT:g} s late"
+            return f"odometry is more than {BLIND_LIMIT:g} s late"
         return None
 
     def tells_since(self, then: float) -> bool:

@@ -136,5 +136,5 @@ class StandingStop:
         if not robots.drivable:
             link = robots.goals[robots.newest.id].link
         if not link.up:
-            return f"no link to {self._url}"
+            return f"no connection to {self._url}"
         return None if robots.has_odometry else "no odometry"

@@ -34,10 +34,10 @@ MOVES = 0.05
 WAIT_FOR = 3.0
 """Seconds after the last command for which a base is waited for."""
 
-NOT_ALONE = "another commanded it meanwhile: have that silent, then test again"
+NOT_ALONE = "another program sent commands: stop that program, then test again"
 """What is said when the gate was not the only one that commanded the base."""
 
-MOVES_ON = f"it did not stop by itself within {WAIT_FOR:g} s"
+MOVES_ON = f"the base did not stop within {WAIT_FOR:g} s"
 """What is said of a base that has no timeout of its own."""
 
 State = Literal["creeping", "waiting", "done", "failed"]
@@ -53,7 +53,7 @@ class StopTest:
 
     def __init__(self, now: float) -> None:
         self.state: State = "creeping"
-        self.text = "creeping until odometry shows it"
+        self.text = "moving slowly until odometry shows motion"
         self.concluded = False
         """Whether the base itself decided how it ended."""
         self.seconds: float | None = None
@@ -90,7 +90,10 @@ class StopTest:
         if twist is None:
             return
         if self.state == "creeping" and twist.speed > MOVES:
-            self.state, self.text = "waiting", "no more commands: does it stop?"
+            self.state, self.text = (
+                "waiting",
+                "no more commands: waiting until the base stops",
+            )
             self._left_alone_at = last_command_at
         elif self.state == "waiting":
             self._still.saw(twist, now)
@@ -98,12 +101,12 @@ class StopTest:
                 assert self._still.since is not None  # since when it stands
                 self.state, self.concluded = "done", True
                 self.seconds = round(self._still.since - self._left_alone_at, 3)
-                self.text = f"stopped by itself after {self.seconds:.2f} s"
+                self.text = f"the base stopped after {self.seconds:.2f} s"
 
     def step(self, now: float) -> None:
         """Let time pass."""
         if self.state == "creeping" and now - self._began_at >= CREEP_FOR:
-            self.abort(f"it did not move within {CREEP_FOR:g} s")
+            self.abort(f"the robot did not move within {CREEP_FOR:g} s")
         elif (
             self.state == "waiting"
             and now - self._left_alone_at >= WAIT_FOR

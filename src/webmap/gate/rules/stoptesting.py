@@ -46,12 +46,12 @@ class StopTesting:
 
         """
         if not armed or not self._motion.silent:
-            raise Refusal("release every input first")
+            raise Refusal("release all inputs first")
         measured = self._sight.measured
         if measured is None:
-            raise Refusal("without odometry nothing can be measured")
+            raise Refusal("no odometry: the stop test needs odometry")
         if moves(measured):
-            raise Refusal("it moves already")
+            raise Refusal("the robot is already moving")
         self.last = StopTest(now)
 
     def wrote(self, twist: Twist) -> None:

@@ -62,7 +62,7 @@ class Ticks:
         """
         age = self.age(tick, now)
         if age is None:
-            raise Refusal("its tick is unknown: too old, or of another session")
+            raise Refusal("unknown tick: too old, or from another session")
         if age > MAX_AGE:
-            raise Refusal(f"it took more than {MAX_AGE * 1000:.0f} ms to arrive")
+            raise Refusal(f"command too old (over {MAX_AGE * 1000:.0f} ms)")
         return age

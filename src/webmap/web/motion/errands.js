@@ -81,7 +81,7 @@ export class Errands {
   step(now) {
     for (const question of this._questions) {
       if (question.reached()) question.end(null);
-      else if (now - question.since > TAKE_PATIENCE) question.end("The gate is silent.");
+      else if (now - question.since > TAKE_PATIENCE) question.end("No answer from the gate.");
     }
   }
 

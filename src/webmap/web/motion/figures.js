@@ -1,7 +1,7 @@
 import { linearSpeed } from "./report.js";
 
 /** What stands where a figure would. */
-const UNKNOWN = "not known";
+const UNKNOWN = "unknown";
 
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
@@ -89,17 +89,17 @@ export function timings(report, loop, motion) {
   const stands = report.measured !== null && speedNow(report) < STANDING;
   return [
     {
-      name: "Loop",
+      name: "Round trip",
       kind: "time",
       text: duration(age),
-      title: "From your input to the robot's bridge and back; 95 % of commands take less. "
-        + `Between this page and WebMap: ${duration(loop)}.`,
+      title: "From your input to the robot's bridge and back: 95 % of commands take less. "
+        + `Round trip from this page to WebMap: ${duration(loop)}.`,
     },
-    { name: "To motion", kind: "time", text: duration(motion) },
+    { name: "Command to motion", kind: "time", text: duration(motion) },
     {
-      name: "To a stop",
+      name: "Stopping distance",
       kind: "time",
-      text: distance === null ? (stands ? "stands" : UNKNOWN) : `${distance.toFixed(2)} m`,
+      text: distance === null ? (stands ? "not moving" : UNKNOWN) : `${distance.toFixed(2)} m`,
     },
   ];
 }
@@ -114,13 +114,13 @@ export function ownStop({ stop_time, stop_source, stop_date, why }) {
   if (stop_time === undefined) return "";
   const tested = `tested ${stop_date ?? ""}`.trim();
   if (stop_time === null && stop_source === "tested") {
-    return `Does not stop by itself (${tested}).`;
+    return `Command timeout of the base: none (${tested}).`;
   }
   // Else what limits the speed says it already.
-  const failed = why.some((reason) => reason.startsWith("did not stop"));
-  if (stop_time === null) return failed ? "" : "Nobody knows whether it stops by itself.";
+  const failed = why.some((reason) => reason.startsWith("stop test failed"));
+  if (stop_time === null) return failed ? "" : "Command timeout of the base: unknown.";
   const how = stop_source === "tested" ? tested : "stated";
-  return `Stops by itself within ${stop_time.toFixed(2)} s (${how}).`;
+  return `Command timeout of the base: ${stop_time.toFixed(2)} s (${how}).`;
 }
 
 /**

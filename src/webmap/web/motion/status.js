@@ -31,7 +31,7 @@ import { stopWords } from "./stopping.js";
 
 /** @typedef {import('../drive.js').Drive['status']} Status */
 
-const KEYS = "W A S D or the arrows";
+const KEYS = "W A S D or the arrow keys";
 
 /**
  * Say what there is to drive with.
@@ -42,7 +42,7 @@ const KEYS = "W A S D or the arrows";
 export function inputsOf({ touch, stick, gamepad }) {
   const pad = gamepad ? ", or LB and the left stick of the gamepad" : "";
   if (touch && stick) return `the stick${pad}`;
-  return `${stick ? "W A S D, the arrows or the stick" : KEYS}${pad}`;
+  return `${stick ? "W A S D, the arrow keys or the stick" : KEYS}${pad}`;
 }
 
 /**
@@ -80,21 +80,21 @@ function ofRobot(status, robot, report, active, more) {
     return say("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
   }
   if (robot === null) {
-    return say("none", "No robot selected", "Click on one to drive it.");
+    return say("none", "No robot selected", "Select a robot to drive it.");
   }
   if (report === null) {
     const title = wordsOf(seen in WORDS ? seen : "watched", { since });
-    return say("fixed", title, "It has no velocity topic.");
+    return say("fixed", title, "This robot has no velocity topic.");
   }
   const name = doingOf(report, seen);
   const title = wordsOf(name, { report, since });
   if (isLatched(report)) return ofStopped(title, status, report);
   if (name === "changing") {
-    return say("taking", title, "It is brought to a standstill first.");
+    return say("taking", title, "The robot stops first.");
   }
   if (heldByAnother(report)) return ofOther(title, status, report, more.request);
   if (!active) {
-    return say("free", "Not driven here", "Click on this map to drive from it.");
+    return say("free", "Map not active", "Click this map to drive from it.");
   }
   const driven = status.driven === robot;
   const kept = driven ? ofHands(status, report, title) : ofReach(status, report, title);
@@ -115,7 +115,7 @@ function wordsOf(name, { report, since = "" }) {
   const words = WORDS;
   const text = (report?.mine && words[`${name}_by_you`]) || words[name];
   const holder = report?.holder;
-  const who = holder?.name || holder?.connection || "Somebody";
+  const who = holder?.name || holder?.connection || "Another operator";
   return text.replace(/\{(who|since)\}/, (_, key) => (key === "who" ? who : since));
 }
 
@@ -125,9 +125,9 @@ function wordsOf(name, { report, since = "" }) {
  * @param {RobotReport} report
  */
 export function capOf(report) {
-  const turn = `${digits(report.w)} rad/s`;
-  const why = report.why.length > 0 ? `: ${report.why.join(", ")}` : "";
-  return `Up to ${digits(report.v)} m/s, ${turn}${why}`;
+  const turn = limit(report.w, "rad/s");
+  const why = report.why.length > 0 ? ` (${report.why.join(", ")})` : "";
+  return `Speed limit ${limit(report.v, "m/s")}${why}, turn limit ${turn}`;
 }
 
 /**
@@ -136,7 +136,7 @@ export function capOf(report) {
  * @param {RobotReport} report
  */
 export function speedOf({ measured }) {
-  if (!measured) return "No speed known";
+  if (!measured) return "Speed unknown";
   return velocityWords(measured);
 }
 
@@ -150,19 +150,19 @@ function velocityWords(velocity) {
 
 /** @param {Status} status */
 function ofLink({ link }) {
-  if (link === "connecting") return say("connecting", "Getting ready", "Connecting.");
+  if (link === "connecting") return say("connecting", "Preparing input", "Connecting.");
   if (link === "lost") {
     return say(
       "lost",
       "Connection lost",
-      "Nothing can be driven from here. Trying again.",
+      "No robot can be driven from this page. Reconnecting…",
     );
   }
   if (link === "late") {
     return say(
       "late",
-      "Too slow",
-      "Commands take longer than 0.3 s, so none moves a robot.",
+      "Slow connection",
+      "Command too old (over 300 ms): ignored",
     );
   }
   return null;
@@ -195,11 +195,11 @@ function reasonOf({ text }) {
  * @param {Request} [request]
  */
 function ofOther(title, status, report, request) {
-  const who = report.holder?.name || report.holder?.connection || "Somebody";
-  const words = title.includes(who) ? [] : [`${who} holds it.`];
+  const who = report.holder?.name || report.holder?.connection || "Another operator";
+  const words = title.includes(who) ? [] : [`${who} has control.`];
   if (request && request.by === status.connection) {
-    words.push(`You asked for it: yours in ${request.left} s, unless ${who} keeps it.`);
-  } else if (request) words.push(`${request.who} asks for it.`);
+    words.push(`Control requested: handed over in ${request.left} s unless ${who} refuses.`);
+  } else if (request) words.push(`${request.who} requests control.`);
   else if (status.refusal) words.push(sentence(status.refusal));
   return say("held", title, words.join(" "));
 }
@@ -213,7 +213,7 @@ function ofOther(title, status, report, request) {
  * @returns {Description | null} null if they do.
  */
 function ofHands(status, report, title) {
-  if (isTested(report)) return say("driving", "Testing its stop", "Touch nothing.");
+  if (isTested(report)) return say("driving", "Stop test running", "Do not touch any input.");
   if (report.state === "driving") return null;
   if (report.reason) return say("fixed", title, sentence(report.reason));
   return status.pressed && status.dead ? handsOff() : null;
@@ -263,18 +263,18 @@ function ofDoing(name, title, report, inputs) {
       return say("moving", title, report.measured ? speedOf(report) : "");
     case "navigating":
     case "navigating_held":
-      return say("moving", title, `To drive, hold ${inputs}. This cancels its goal.`);
+      return say("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
   }
   if (name !== "held") return say("free", title, `Hold ${inputs} to drive.`);
-  return say("ready", title, `Ready: hold ${inputs}. Space stops.`);
+  return say("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
 }
 
 function gettingReady() {
-  return say("taking", "Getting ready", "");
+  return say("taking", "Preparing input", "");
 }
 
 function handsOff() {
-  return say("hands-off", "Let go, then press again", "What is held now does nothing.");
+  return say("hands-off", "Input blocked: release all keys, then press again", "");
 }
 
 /**
@@ -299,7 +299,10 @@ export function sentence(text) {
   return `${start}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
 }
 
-/** @param {number} value */
-function digits(value) {
-  return Number.isFinite(value) ? value.toFixed(2) : "any";
+/**
+ * @param {number} value
+ * @param {string} unit
+ */
+function limit(value, unit) {
+  return Number.isFinite(value) ? `${value.toFixed(2)} ${unit}` : "not set";
 }

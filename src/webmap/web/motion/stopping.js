@@ -205,13 +205,13 @@ function judge(robot, report, watch, connected, now) {
     text: `NOT CONFIRMED: ${why}`,
   });
   const waited = now - watch.since;
-  if (!connected) return unsure("no connection; STOP is sent again when there is one");
+  if (!connected) return unsure("no connection to WebMap; STOP is sent again after reconnecting");
   if (!watch.answered && waited > ANSWER_PATIENCE) {
-    const text = "STOP NOT CONFIRMED: the gate has not answered";
+    const text = "STOP NOT CONFIRMED: no answer from the gate";
     return { robot, name, state: "unconfirmed", text };
   }
   if (report?.stop?.confirmed === false) return unsure(report.stop.why);
-  if (report?.link === "down") return unsure("no link to the robot");
+  if (report?.link === "down") return unsure("no connection to the robot");
   if (watch.stoodAt !== null) {
     const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
     const words = ["stopped, confirmed by odometry", ...more];
@@ -238,7 +238,7 @@ export function stopWords({ stop }) {
   const what = {
     true: ["confirmed by odometry", ...more].join("; "),
     false: stop.why,
-    null: ["looking whether it stands", ...more].join("; "),
+    null: ["waiting for odometry to confirm", ...more].join("; "),
   }[`${stop.confirmed}`];
   const text = [by, what].filter(Boolean).join(stop.confirmed === false ? ": " : ", ");
   return { confirmed: stop.confirmed, text: `${text[0].toUpperCase()}${text.slice(1)}.` };
@@ -265,11 +265,11 @@ export function standingStops(reports) {
   const doubtful = stopped.filter(({ stop }) => stop?.confirmed === false).length;
   const one = stopped.length === 1;
   const who = one ? stopped[0].name : `${stopped.length} robots`;
-  const doubt = one ? "NOT CONFIRMED" : `${doubtful} of them NOT CONFIRMED`;
+  const doubt = one ? "NOT CONFIRMED" : `${doubtful} NOT CONFIRMED`;
   const unhooked = stopped.filter(({ hooks }) => hooks?.length).map(({ name }) => name);
   const hooks = unhooked.length ? ` Stop hooks failed: ${unhooked.join(", ")}.` : "";
   const doubts = doubtful ? `, ${doubt}` : "";
-  return `${who} ${one ? "stays" : "stay"} stopped${doubts}.${hooks}`;
+  return `STOP active: ${who}${doubts}.${hooks}`;
 }
 
 /** @param {RobotReport} report */

@@ -21,11 +21,16 @@ export function look(goal) {
   const parts = [];
   if (goal.state === "under way" || goal.state === "cancelling") {
     if (goal.left !== null) parts.push(`${metres(goal.left)} to go`);
-    if (goal.eta !== null) parts.push(`about ${seconds(goal.eta)}`);
-    if (goal.recoveries) parts.push(`${goal.recoveries} × stuck`);
+    if (goal.eta !== null) parts.push(`about ${seconds(goal.eta)} left`);
+    if (goal.recoveries) parts.push(recoveries(goal.recoveries));
   }
   if (goal.why !== "") parts.push(goal.why);
   return { text: [word, ...parts].join(", "), shape, over };
+}
+
+/** @param {number} number */
+function recoveries(number) {
+  return number === 1 ? "1 recovery" : `${number} recoveries`;
 }
 
 /** @param {number} number */
@@ -126,7 +131,7 @@ export async function sendGoal(offer, wanted) {
       await offer();
       return true;
     } catch (error) {
-      const linkless = error instanceof Error && error.message.startsWith("no link to");
+      const linkless = error instanceof Error && error.message.startsWith("no connection to");
       if (!linkless || tries === TRIES) throw error;
     }
     await new Promise((resolve) => setTimeout(resolve, RETRY));
