@@ -3,10 +3,10 @@
 import re
 
 import pytest
-from cli_shown import shown
 from playwright.sync_api import expect
 
 from bag_making import FRAMES, GRID, ODOMETRY, TWIST, Made
+from cli_shown import shown
 
 pytestmark = pytest.mark.browser
 

@@ -105,20 +105,23 @@ def test_a_word_of_rosbridge_would_be_seen(text: str) -> None:
     assert not ROSBRIDGE_WORDS.search("bridge.call_service(name)")
 
 
-IMPORTED = re.compile(r"""^(?:import|export|\}) .*?["'](\.[^"']+)["'];$""", re.M)
+IMPORTED = re.compile(
+    r"""^(?:import|export|\}) .*?["'](\.[^"']+)["'];$|^@import url\("(.+)"\);$""", re.M
+)
 
 
-def test_every_file_that_a_script_of_the_page_imports_is_served():
+def test_every_file_that_a_script_or_a_style_sheet_imports_is_served():
     package = ROOT / "src" / "webmap"
-    scripts = {
+    served = {
         file.resolve()
         for folder in FOLDERS
-        for file in (package / folder).rglob("*.js")
+        for file in (package / folder).rglob("*")
+        if file.suffix in {".css", ".js"}
     }
     imported = {
-        (file.parent / name).resolve()
-        for file in scripts
-        for name in IMPORTED.findall(file.read_text("utf-8"))
+        (file.parent / (script or style)).resolve()
+        for file in served
+        for script, style in IMPORTED.findall(file.read_text("utf-8"))
     }
-    assert len(imported) > 50
-    assert imported <= scripts
+    assert {file.suffix for file in imported} == {".css", ".js"}
+    assert imported <= served
