@@ -35,7 +35,7 @@ def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
             re.compile(r"Recording office: \d+\.\d of 19\.9 s, 2 times as fast")
         )
         expect(page.locator("#bridges")).to_contain_text("Bridge open")
-        for name in ("Send to", "Cancel goal", "Set pose"):
+        for name in ("Send goal…", "Cancel goal", "Set pose"):
             button = card.get_by_role("button", name=name)
             expect(button).to_be_disabled()
             expect(button).to_have_attribute("title", re.compile("^WebMap knows no "))

@@ -48,7 +48,7 @@ def send_away(page: Page) -> None:
     without_path: set[tuple[float, ...]] = set()
     # A page that is too busy sends nothing, and some places have no path to them.
     for _ in range(12):
-        page.get_by_role("button", name="Send to").click()
+        page.get_by_role("button", name="Send goal…").click()
         expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
         # Now, as the words have moved the panel, and robots may move too.
         places = page.evaluate(PLACES)

@@ -58,7 +58,7 @@ def test_twelve_states_have_no_violation(open_console):
     hold(page.keyboard, "a", lambda: you.text_content() == "You are driving")
     look("it is driven")
     page.keyboard.up("a")
-    page.get_by_role("button", name="Send to").click()
+    page.get_by_role("button", name="Send goal…").click()
     expect(page.locator(".webmap-goal-word")).not_to_be_empty()
     look("a goal is chosen")
     page.keyboard.press("g")

@@ -251,7 +251,7 @@ def test_follow_keeps_a_robot_that_drives_in_the_middle_until_pressed_again(
 def test_send_to_begins_with_a_word_of_what_to_do(open_console):
     page = open_console()
     row(page, "Robot 5").click()
-    page.get_by_role("button", name="Send to").click()
+    page.get_by_role("button", name="Send goal…").click()
     expect(page.locator(".webmap-goal-word")).to_have_text(
         re.compile("Press on the map")
     )

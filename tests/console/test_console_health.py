@@ -39,7 +39,7 @@ def test_what_is_not_well_is_listed_by_word_and_shape_the_worst_first(map):
     assert health.element.get("hidden") is not None
     diagnosing = Diagnosing(
         ("motors", "error", "<b>hot</b>"),
-        ("laser", "stale", "silent for 12 s"),
+        ("laser", "stale", "no data for 12 s"),
         ("battery", "warn", "low"),
         ("wheels", "ok", "fine"),
     )
@@ -84,7 +84,7 @@ def test_of_a_robot_of_which_no_part_was_heard_nothing_is_said_to_be_well(map, p
 def test_a_part_that_may_be_another_robots_is_listed_as_such_if_it_is_not_well(map):
     nobodys = [
         ("base: Motors", "error", "hot", "nobody's"),
-        ("base: Laser", "stale", "silent for 12 s", "nobody's"),
+        ("base: Laser", "stale", "no data for 12 s", "nobody's"),
     ]
     chosen(map, Diagnosing(*nobodys, ("robot_0/base: Battery", "ok", "full")))
     health = RobotHealth(map, html.section())

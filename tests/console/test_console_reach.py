@@ -125,7 +125,7 @@ def test_the_card_tests_whether_a_robot_of_which_that_is_stated_stops(open_conso
     page = open_console()
     page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
     test = page.locator("[data-act=stop-test]")
-    expect(test).to_have_text(re.compile("Take it to test its stop"))
+    expect(test).to_have_text(re.compile("Stop test: take control"))
     expect(test).to_be_disabled()
     bound = page.locator("#card .own-stop")
     expect(bound).to_contain_text(re.compile(r"stops within \d\.\d\d s"))

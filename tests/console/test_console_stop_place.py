@@ -115,7 +115,7 @@ def camera(page: Page) -> None:
 
 def in_one_state_each(page: Page, look: Callable[[str], None]) -> None:
     """Open one thing of the console after the other beside the card."""
-    page.locator("#card .button", has_text="Send to").click()
+    page.locator("#card .button", has_text="Send goal…").click()
     expect(page.locator(".webmap-goal-word")).not_to_be_empty()
     look("choosing a goal")
     page.keyboard.press("g")

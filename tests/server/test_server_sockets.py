@@ -184,11 +184,15 @@ def test_the_model_can_end_a_scene_and_say_why(rooms, open_socket):
         (
             "scene?id=p",
             "x" * (16 * 1024 + 1),
-            "a message of 16385 bytes, at most 16384",
+            "got a message of 16385 bytes, expected at most 16384",
         ),
-        ("drive?id=p", "x" * 1025, "a message of 1025 bytes, at most 1024 are taken"),
-        ("scene?id=p", b"binary", "a binary message; only text is taken"),
-        ("drive?id=p", b"binary", "a binary message; only text is taken"),
+        (
+            "drive?id=p",
+            "x" * 1025,
+            "got a message of 1025 bytes, expected at most 1024",
+        ),
+        ("scene?id=p", b"binary", "got a binary message, expected text"),
+        ("drive?id=p", b"binary", "got a binary message, expected text"),
     ],
 )
 def test_what_is_too_large_or_binary_ends_the_socket(
@@ -364,7 +368,7 @@ def test_there_are_so_many_pages_and_no_more(rooms, open_socket, name):
 
     code, reason = asyncio.run(scenario())
     assert code == 1013
-    assert "no more pages" in reason
+    assert "too many open pages" in reason
 
 
 def test_a_page_that_stops_reading_is_closed_and_holds_nothing(rooms, open_socket):
@@ -437,9 +441,9 @@ def test_a_model_that_fails_costs_one_page_only(
         return scene, drive, message
 
     scene, drive, message = asyncio.run(scenario())
-    assert scene == (1011, "the page could not be opened; the log says why")
-    assert drive == (1011, "the gate cannot be reached; the log says why")
-    assert message == (1011, "the server failed on this page; its log says why")
+    assert scene == (1011, "the page could not be opened; see the log of WebMap")
+    assert drive == (1011, "no connection to the gate; see the log of WebMap")
+    assert message == (1011, "WebMap failed on this page; see the log of WebMap")
     assert "the model is not there" in caplog.text
     assert "has no attribute 'append'" in caplog.text
 

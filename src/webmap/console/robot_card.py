@@ -35,7 +35,7 @@ UNABLE = {
 """Why a button of the card is disabled."""
 
 TEST_WORDS = (
-    ("take", "Take control to run the stop test"),
+    ("take", "Stop test: take control"),
     ("ready", "Run stop test"),
     ("asking", "Robot will move slowly: press again"),
     ("running", "Stop test running"),

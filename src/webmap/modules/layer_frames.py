@@ -118,7 +118,7 @@ class LayerFrames:
 
 def not_known(frame: str, why: object) -> str:
     """Return a sentence on a frame that is somewhere and nobody tells where."""
-    return f"it is not known where {frame!r} is on the map: {why}"
+    return f"the pose of {frame!r} on the map is unknown: {why}"
 
 
 class Anchored(LayerFrames):

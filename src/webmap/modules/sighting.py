@@ -142,8 +142,8 @@ class Sightings:
             on_robot=True,
             settled=stamp <= newest,
             trouble="then",
-            words=f"it is not known where the robot was at the stamp of what is drawn, "
-            f"so it is drawn where the robot is now: {reason}; are the clocks of the "
+            words=f"the pose of the robot at the stamp of the data is unknown, so "
+            f"the data is drawn at the current pose: {reason}; are the clocks of the "
             f"sensor and of the odometry the same?",
         )
 
@@ -158,7 +158,7 @@ def _lost(
         otherwise,
         settled=False,
         trouble=f"{type(error).__name__} {source}",
-        words=f"it is not known where {source!r} is: {error}",
+        words=f"the pose of {source!r} is unknown: {error}",
     )
 
 

@@ -245,8 +245,9 @@ class Jumps:
         if known and not -BACK <= took <= passed + AHEAD:
             self._jumped = now
             self.problem = (
-                f"the clock of its poses leapt by {took:+.1f} s: it was set, a "
-                f"recording began anew, or two nodes with other clocks tell where it is"
+                f"the clock of its poses jumped by {took:+.1f} s: the clock was set, a "
+                f"recording started again, or two nodes with different clocks publish "
+                f"the pose"
             )
             return
         one, other = before.position, reading.position
@@ -259,13 +260,13 @@ class Jumps:
         self._count += 1
         if self._count == 1:
             self.problem = (
-                f"it jumped by {went:.1f} m within {took:.2f} s: it was localised "
-                f"anew, or set somewhere else"
+                f"the pose jumped by {went:.1f} m within {took:.2f} s: the robot was "
+                f"localised again or moved"
             )
         elif self._count == OFTEN:
             self.problem = (
-                f"it jumps again and again, by {went:.1f} m: two nodes seem to tell "
-                f"where it is, each something else"
+                f"the pose jumps repeatedly, by {went:.1f} m: two nodes seem to "
+                f"publish different poses"
             )
 
     def forget(self) -> None:

@@ -123,7 +123,9 @@ class Placing:
         try:
             found = self.buffer.find(self.map_frame, frame, reading.stamp)
         except TransformError as error:
-            self._wrong(error, f"it is drawn where {frame!r} has it: {error}")
+            self._wrong(
+                error, f"the robot is drawn in {frame!r}, not on the map: {error}"
+            )
             if frame not in self._known:
                 return reading._replace(frame_id=frame)
         else:
@@ -148,7 +150,7 @@ class Placing:
                 return None
             placed = self.buffer.lookup(self.map_frame, base)
         except TransformError as error:
-            self._wrong(error, f"its place is not known: {error}")
+            self._wrong(error, f"the pose of the robot is unknown: {error}")
             return None
         self._newest = newest
         return PoseReading(
@@ -167,9 +169,9 @@ class Placing:
         if now > heard + LATE:
             self.kind = "late"
             self.problem = (
-                f"nothing new of {self.map_frame!r} -> {frame!r} was told for more "
-                f"than {LATE:g} s, so it may be somewhere else: does what publishes "
-                f"it still run?"
+                f"no new transform {self.map_frame!r} -> {frame!r} for more than "
+                f"{LATE:g} s, the shown pose may be wrong: check the node that "
+                f"publishes it"
             )
 
     def _look_at_clocks(self, frame: str, newest: float | None, stamp: float) -> None:
@@ -182,8 +184,8 @@ class Placing:
             self.problem = (
                 f"its odometry is stamped {abs(apart):.1f} s "
                 f"{'later' if apart > 0 else 'earlier'} than the newest of "
-                f"{self.map_frame!r} -> {frame!r}, so it is drawn by the newest: are "
-                f"the clocks of both the same?"
+                f"{self.map_frame!r} -> {frame!r}, so the robot is drawn by the newest "
+                f"transform: are the clocks of both the same?"
             )
 
     def _wrong(self, error: TransformError, words: str) -> None:

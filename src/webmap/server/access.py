@@ -28,7 +28,7 @@ _SECRET = {TOKEN, CODE}
 
 NOT_SIGNED_IN = (
     "This browser is not signed in, or WebMap was started again with a new token. Open "
-    "the address that WebMap printed when it started."
+    "the address that WebMap printed at its start."
 )
 
 Authenticate = Callable[
@@ -225,15 +225,14 @@ class AccessControl:
         if not self._settings.hosts.allow(request.host):
             return Refusal(
                 421,
-                "This server does not answer to that host name. Open the address that "
-                "WebMap printed when it started, or start it with this name among its "
-                "hosts.",
+                "WebMap does not accept this host name. Open the address that WebMap "
+                "printed at its start, or add this name to the hosts of WebMap.",
             )
         if request.changes and not self._is_own_origin(request):
             return Refusal(
                 403,
-                "Only WebMap's own pages may do this, and this request does not come "
-                "from one of them.",
+                "Expected a request from a page of WebMap, got a request from another "
+                "origin.",
             )
         return None
 
@@ -269,7 +268,8 @@ class AccessControl:
             return self._refuse_token(request, now)
         if request.codes():
             return Refusal(
-                401, "This address works once, and soon after WebMap has made it."
+                401,
+                "This address has expired: it works once and only for a short time.",
             )
         return Refusal(401, "Sign in first.")
 
@@ -278,15 +278,15 @@ class AccessControl:
         if wait:
             return Refusal(
                 429,
-                "Too many wrong tokens came from your address. The right one, in the "
-                f"address that WebMap printed, works now; a wrong one after {wait} s.",
+                "Too many wrong tokens from your address. The token in the address "
+                f"that WebMap printed works now; try other tokens after {wait} s.",
                 retry_after=wait,
             )
         self._attempts.failed(request.address, now)
         return Refusal(
             401,
-            "That is not the token of this server. Unless it was given one, WebMap "
-            "makes a new token each time it starts.",
+            "Wrong token. Without a fixed token, WebMap makes a new token at each "
+            "start.",
         )
 
     def _sign_in(self, request: RequestHead, viewer: Viewer | None) -> SignedIn:

@@ -86,7 +86,7 @@ class DriveSockets:
         except Exception:
             log.exception("%s cannot reach the gate", viewer.name)
             await page_socket.refuse(
-                FAILED, "the gate cannot be reached; the log says why"
+                FAILED, "no connection to the gate; see the log of WebMap"
             )
             return
         try:

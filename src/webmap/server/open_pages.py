@@ -93,7 +93,7 @@ class PageHost:
     def connected(self, socket: PageSocket) -> None:
         """Speak to this socket from now on, once it has said hello."""
         if self._socket is not None:
-            self._socket.end(FAILED, "this page was opened again elsewhere")
+            self._socket.end(FAILED, "this page was opened again in another tab")
         self._socket = socket
         self._stop_watching()
         self._stay()

@@ -25,7 +25,7 @@ _HTML = """<!doctype html>
 <meta name="referrer" content="no-referrer">
 <meta http-equiv="refresh" content="0;url={url}">
 <title>WebMap</title>
-<p>This leads to <a href="{url}">WebMap</a>, once.</p>
+<p>This link opens <a href="{url}">WebMap</a>, once.</p>
 </html>
 """
 

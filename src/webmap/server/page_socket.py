@@ -88,7 +88,7 @@ class Allowance:
         bounds = self._bounds
         size = len(text) if text.isascii() else len(text.encode(errors="replace"))
         if size > bounds.max_bytes:
-            return f"a message of {size} bytes, at most {bounds.max_bytes} are taken"
+            return f"got a message of {size} bytes, expected at most {bounds.max_bytes}"
         filled = self._left + (now - self._then) * bounds.rate
         self._left, self._then = min(bounds.burst, filled) - 1.0, now
         if self._left < 0.0:
@@ -155,7 +155,7 @@ class PageSocket:
     async def refuse_full(self) -> None:
         """End the socket because too many pages are open."""
         await self.refuse(
-            COME_BACK, "this server takes no more pages now: close one, or come back"
+            COME_BACK, "too many open pages: close one, or try again later"
         )
 
     async def run(
@@ -188,7 +188,7 @@ class PageSocket:
                 if isinstance(result, Exception):
                     log.error("%s failed", self._name, exc_info=result)
                     self._end(
-                        FAILED, "the server failed on this page; its log says why"
+                        FAILED, "WebMap failed on this page; see the log of WebMap"
                     )
         if on_rest is not None and not self._gone:
             await self._read_rest(on_rest)
@@ -198,7 +198,7 @@ class PageSocket:
         if self._queue.put(item):
             self._wake.set()
         else:
-            self._end(COME_BACK, "this page does not read what it is sent")
+            self._end(COME_BACK, "this page does not read its messages")
 
     def _end(self, code: int, reason: str) -> None:
         if self._ended is None:
@@ -218,7 +218,7 @@ class PageSocket:
                 return
             text: str | None = message.get("text")
             if text is None:
-                broken: str | None = "a binary message; only text is taken"
+                broken: str | None = "got a binary message, expected text"
             else:
                 broken = self._allowance.spend(text, time.monotonic())
             if broken is not None:
@@ -254,7 +254,7 @@ class PageSocket:
                 async with asyncio.timeout(STALLED_S):
                     await self._send(item)
             except TimeoutError:
-                self._end(COME_BACK, f"this page read nothing for {STALLED_S:.0f} s")
+                self._end(COME_BACK, f"this page read no message for {STALLED_S:.0f} s")
                 return
             except _GONE:
                 self._gone = True

@@ -68,7 +68,7 @@ class SceneSockets:
         except Exception:
             log.exception("the page %s could not be opened", path)
             await page_socket.refuse(
-                FAILED, "the page could not be opened; the log says why"
+                FAILED, "the page could not be opened; see the log of WebMap"
             )
             return
         try:

@@ -83,12 +83,12 @@ _SIGN_IN = """<!doctype html>
 <main>
 <h1>Sign in to WebMap</h1>
 <p>{text}</p>
-<p>Open the address that WebMap printed when it started, or enter the token in it:</p>
+<p>Open the address that WebMap printed at its start, or enter its token:</p>
 <form>
 <label>Token <input name="token" type="password" autocomplete="off" required></label>
 <button>Sign in</button>
 </form>
-<p>If you have just signed in through a link on another site, <a href="?">go on</a>.</p>
+<p>If you have just signed in through another site, <a href="?">continue</a>.</p>
 </main>
 </html>
 """

@@ -165,9 +165,9 @@ def test_a_viewer_aligns_nothing(tmp_path, robot, channel, store):
     map.add_robot(robot)
     tool = map.add_module("AlignTool")
     tool.on_message({"begin": robot.id})
-    assert answer(channel, "refused") == "Only an operator may align maps."
+    assert answer(channel, "refused") == "Only operators can align maps."
     save(tool, robot)
-    assert answer(channel, "refused") == "Only an operator may align maps."
+    assert answer(channel, "refused") == "Only operators can align maps."
     assert robot.whereabouts.own_alignment is None
     page.close()
 
@@ -176,7 +176,7 @@ def test_a_robot_that_nobody_places_cannot_be_aligned(tool, channel):
     lost = Robot("Lost")
     tool.map.add_robot(lost)
     tool.on_message({"begin": lost.id})
-    assert "Nothing tells where Lost is" in answer(channel, "refused")
+    assert "Cannot align Lost: its pose is unknown" in answer(channel, "refused")
     tool.on_message({"begin": "r0"})
     assert answer(channel, "refused") == "Select a robot first."
     lost.destroy()
@@ -187,7 +187,9 @@ def test_what_cannot_be_kept_holds_and_that_is_said(tool, robot, channel, store)
     store._folder.write_text("a file where the folder should be")
     save(tool, robot)
     said = answer(channel, "saved")
-    assert said["lost"].startswith("It holds until WebMap ends, and cannot be kept")
+    assert said["lost"].startswith(
+        "The alignment is lost when WebMap ends: cannot save it"
+    )
     assert robot.whereabouts.own_alignment is not None
 
 

@@ -243,7 +243,7 @@ def test_while_it_runs_it_cannot_be_pressed_again(sim, robot):
             first = asyncio.create_task(dock.press(by="Ann"))
             try:
                 await until(lambda: node.calls)
-                assert dock.barred == "it runs already, for Ann"
+                assert dock.barred == "already running for Ann"
                 assert await dock.press(by="Bea") is False
             finally:
                 go_on.set()
@@ -340,7 +340,7 @@ def test_a_parameter_that_stays_as_it_was_is_a_failure(sim, robot):
     store = {"/fixed/x": "1"}
     button = {"label": "P", "parameter": "/fixed/x", "value": 2}
     failed, _ = pressed(robot, button, sim["ros1"], services=params(store))
-    assert failed.words == "Failed: /fixed/x was to be 2, and the robot says 1"
+    assert failed.words == "Failed: /fixed/x was to be 2, but the robot reports 1"
 
 
 @pytest.mark.parametrize(
@@ -444,7 +444,7 @@ def test_a_viewer_who_may_not_sees_the_button_disabled_and_cannot_press_it(
     (holder,) = page.element("here").children
     go = next(e for e in holder.walk() if getattr(e, "tag", "") == "button")
     assert go.get("disabled") is not None
-    assert go.get("title") == "Not now: only an operator may"
+    assert go.get("title") == "Not available: only operators can press this button"
     (handler,) = go.handlers("click")
     asyncio.run(handler(Event(kind="click")))
     assert module["Dock"].state == "idle"

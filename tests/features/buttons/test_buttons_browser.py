@@ -146,5 +146,5 @@ def test_while_stop_stands_buttons_are_off_and_say_why(tab):
     dock = button(tab, "Dock")
     expect(dock.locator(".go")).to_be_disabled()
     expect(dock.locator(".go")).to_have_attribute(
-        "title", "Not now: STOP is active: reset it first"
+        "title", "Not available: STOP is active: reset it first"
     )

@@ -70,8 +70,8 @@ def test_what_was_kept_is_there_again_and_can_be_taken_away(map, page, state, sa
         module.on_message({"remove": "nobody"})
         module.on_message({"remove": old})
         assert said == [
-            {"refused": "Desk is in the configuration and stays"},
-            {"refused": "this label is gone already"},
+            {"refused": "Desk is in the configuration and cannot be deleted"},
+            {"refused": "this label was already deleted"},
             {"done": True},
         ]
         await saved(module.layer)
@@ -119,7 +119,7 @@ def test_a_label_is_moved_for_everybody_and_stays_there(map, page, state, said):
             ({"move": dock.get("data-label"), "to": {"x": 1}}, "y: expected a number"),
             ({"move": dock.get("data-label")}, "x and y, in metres"),
             ({"move": desk.get("data-label"), "to": {"x": 1, "y": 1}}, "configuration"),
-            ({"move": "nobody", "to": {"x": 1, "y": 1}}, "gone already"),
+            ({"move": "nobody", "to": {"x": 1, "y": 1}}, "already deleted"),
         ):
             one.on_message(wrong)
             assert words in said.pop()["refused"]
@@ -201,7 +201,7 @@ def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
     )
     module = Map(page.element("map"), 700, 500).add_module("Labels")
     module.on_message({"add": DESK})
-    assert said == [{"refused": "only an operator adds, moves and deletes labels"}]
+    assert said == [{"refused": "only operators can add, move and delete labels"}]
     assert module.layer.added.labels == {}
     page.close()
 
@@ -215,7 +215,7 @@ def test_a_file_that_cannot_be_read_is_said_and_never_written_over(
     assert shown(module.layer) == ["Desk"]
     assert "added labels are not shown" in channel.errors[0]
     module.on_message({"add": {"name": "Dock", "x": 3, "y": 4}})
-    assert "could not be read and is left alone" in said[0]["refused"]
+    assert "cannot be read and is left unchanged" in said[0]["refused"]
     assert state.read_text() == "{broken"
     page.close()
 

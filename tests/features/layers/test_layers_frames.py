@@ -105,7 +105,7 @@ def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, robot):
     link.say("/plan", message)
     assert in_world(module.line) == near([(1, 2), (3, 4)])
     (problem,) = robot.problems.values()
-    assert "it is not known where 'odom' is" in problem
+    assert "the pose of 'odom' is unknown" in problem
     tell(link, transform("map", "odom", *ODOM))
     link.say("/plan", message)
     assert robot.problems == {}
@@ -137,7 +137,7 @@ def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel)
     assert "/tf" not in link.listeners, "nobody needs frames yet"
     link.say("/local", local())
     (error,) = channel.errors
-    assert "it is not known where 'odom' is on the map" in error
+    assert "the pose of 'odom' on the map is unknown" in error
     image = module.layer.picture.element
     for at in [ODOM, (0.0, 0.0, -1.0)]:
         tell(link, transform("map", "odom", *at, secs=4 + int(at != ODOM)))

@@ -78,7 +78,7 @@ def test_a_part_that_falls_silent_is_stale(link, module, monkeypatch):
     monkeypatch.setattr(room.time, "monotonic", lambda: now + 12)
     link.say("/diagnostics", array(status("two", 0)))
     assert levels(module) == {"one": "stale", "two": "ok"}
-    assert module.parts[0].message == "silent for 12 s"
+    assert module.parts[0].message == "no data for 12 s"
 
 
 def test_robots_that_share_a_topic_have_each_its_own_parts(link, robot):
@@ -144,7 +144,7 @@ def test_that_parts_of_nobody_are_well_says_nothing_of_any_robot(link, two):
     a, b = two
     assert (a.level, b.level) == (None, "ok")
     assert set(a.svg.classes) == {"diagnostics", "unheard"}
-    assert a.svg.text == "no part of this robot was heard"
+    assert a.svg.text == "no diagnostics of this robot received"
 
 
 def test_a_robot_whose_filter_lets_nothing_through_is_not_well(link, robot):

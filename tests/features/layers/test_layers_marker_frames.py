@@ -90,7 +90,7 @@ def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, layer, c
     say(link, cube(1, "odom"), cube(2, "map"))
     assert middle(layer, 1) == pytest.approx((1.0, 0.0)), "as it comes"
     (problem,) = layer.problems.values()
-    assert "it is not known where 'odom' is on the map: there is no frame" in problem
+    assert "the pose of 'odom' on the map is unknown: there is no frame" in problem
     assert channel.errors == [problem]
     drive(link, 0.0, 100.0)
     assert middle(layer, 1) == pytest.approx((10.0, 1.0))

@@ -96,7 +96,7 @@ def test_odometry_an_hour_off_is_drawn_and_the_hour_is_said_once(map, channel, w
         await stand(scene, 1.2, NOW + 0.2)
         await stand(scene, 1.3, NOW + 0.3)
         (line,) = scene.errors
-        assert line.startswith("Bob: the clock of its poses leapt by ")
+        assert line.startswith("Bob: the clock of its poses jumped by ")
         assert f"{WAYS[way]:+.1f} s" in line
 
     with_scene(map, channel, scenario)

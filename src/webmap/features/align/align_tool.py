@@ -115,7 +115,7 @@ class AlignTool:
             path = await asyncio.to_thread(store.save, name, before, pose, by)
         except OSError as error:
             log.error("%s: the alignment cannot be kept: %s", name, error)
-            lost = f"It holds until WebMap ends, and cannot be kept: {error}."
+            lost = f"The alignment is lost when WebMap ends: cannot save it: {error}."
         else:
             log.info("%s is aligned by %s: %s", name, by, path)
             lost = ""
@@ -124,15 +124,15 @@ class AlignTool:
     def _barred(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
         """Return why a robot cannot be aligned from here now, None if it can."""
         if self.map.page.viewer.role not in MAY_ALIGN:
-            return "Only an operator may align maps."
+            return "Only operators can align maps."
         if robot is None:
             return "Select a robot first."
         if robot.whereabouts.bridge is None:
-            return f"Nothing tells where {robot.name} is, so it cannot be aligned."
+            return f"Cannot align {robot.name}: its pose is unknown."
         concerned = self._together(robot) if whole else [robot]
         for each in concerned:
             if each.report is not None and each.report.state in MOVING:
-                return f"{each.name} is being driven: align when nobody drives it."
+                return f"{each.name} is being driven. Align it when it is free."
         return None
 
     def _together(self, robot: "Robot") -> "list[Robot]":

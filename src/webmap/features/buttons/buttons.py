@@ -54,7 +54,7 @@ class ButtonView:
         self._press.on("click", self._pressed)
         self._age = html.span(class_="since")
         self._progress = html.progress()
-        self._progress.set("aria-label", f"{spec.label}: under way")
+        self._progress.set("aria-label", f"{spec.label}: running")
         self._running = html.span(self._progress, self._age, class_="running")
         self._result = html.p(class_="result")
         self._result.set("role", "status")
@@ -76,7 +76,7 @@ class ButtonView:
         why = self._barred()
         self.element.set("data-state", button.state)
         self._press.set(disabled=why is not None)
-        self._press.set(title=None if why is None else f"Not now: {why}")
+        self._press.set(title=None if why is None else f"Not available: {why}")
         self._running.set(hidden=not running)
         if running:
             self._age.set_age(
@@ -88,7 +88,7 @@ class ButtonView:
 
     def _barred(self) -> str | None:
         if self._viewer.role not in MAY_PRESS:
-            return "only an operator may"
+            return "only operators can press this button"
         return self.button.barred
 
     async def _pressed(self, event: Event) -> None:
@@ -137,12 +137,12 @@ class ButtonView:
             self._sheet.clear().append(html.p(text=str(error), class_="wrong"))
         else:
             self._form = form
-            self._sheet.clear().append(form.element, self._buttons("Do it", self._fill))
+            self._sheet.clear().append(form.element, self._buttons("Run", self._fill))
         self._sheet.set(hidden=False)
 
     def _unknown(self, error: UnknownType) -> list[Element]:
         return [
-            html.p(text=f"The fields of {error.type} are not known here."),
+            html.p(text=f"The fields of {error.type} are unknown."),
             self._buttons("Ask the robot", self._ask_robot),
         ]
 
@@ -183,8 +183,8 @@ class ButtonView:
 def _said(button: RobotButton, why: str | None) -> str:
     """Return what stands under a button that cannot be pressed because of ``why``."""
     if button.state == "running":
-        return f"Under way, for {button.by}"
-    return button.words or (f"Not now: {why}" if why else "")
+        return f"Running for {button.by}"
+    return button.words or (f"Not available: {why}" if why else "")
 
 
 class FormView:
@@ -210,7 +210,7 @@ class FormView:
         self.element: Element = html.div(class_="message-form")
         self._fill(self.element, self.fields, "")
         if not self.entries:
-            self.element.append(html.p(text="There is nothing to fill in."))
+            self.element.append(html.p(text="No fields to fill in."))
 
     def message(self, *, ros2: bool) -> dict[str, Any]:
         """Return the message that stands in the form.

@@ -60,10 +60,10 @@ class RobotButton:
     def barred(self) -> str | None:
         """Why it cannot be pressed now, in words; None if it can."""
         if self.state == "running":
-            return f"it runs already, for {self.by}"
+            return f"already running for {self.by}"
         report = self.robot.report
         if report is not None and report.latched and not self.spec.during_stop:
-            return "STOP stands: reset it first"
+            return "STOP is active: reset it first"
         return None
 
     def on_change(self, fn: Callable[[], None]) -> Removable:
@@ -107,7 +107,7 @@ class RobotButton:
             self._become("failed", words, by)
             return False
         except BaseException:
-            self._become("failed", "Failed: it was broken off", by)
+            self._become("failed", "Failed: cancelled", by)
             raise
         self._become("done", words, by)
         return True
@@ -270,7 +270,7 @@ async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
     now = await bridge.set_parameter(name, value, timeout=spec.timeout)
     if now != value:
         raise NotDone(
-            f"{name} was to be {shown(value)}, and the robot says {shown(now)}"
+            f"{name} was to be {shown(value)}, but the robot reports {shown(now)}"
         )
     return f"{name} is {shown(value)}"
 
@@ -287,7 +287,7 @@ async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
     results = answer.get("results") if isinstance(answer, Mapping) else None
     first = results[0] if isinstance(results, list) and results else None
     if not isinstance(first, Mapping) or "successful" not in first:
-        raise ServiceError(f"{spec.node}/set_parameters answered nothing to the point")
+        raise ServiceError(f"{spec.node}/set_parameters gave no usable answer")
     if first["successful"] is not True:
         reason = str(first.get("reason") or "no reason was given")
         raise NotDone(shortened(f"{spec.node} refused: {reason}"))
@@ -305,7 +305,7 @@ def answered(answer: Any) -> str:
         return "Done"
     said = str(answer.get("message") or answer.get("status_message") or "")
     if answer.get("success") is False:
-        raise NotDone(shortened(said or "the robot says that it did not succeed"))
+        raise NotDone(shortened(said or "the robot reports no success"))
     if said:
         return shortened(f"Done: {said}")
     rest = {name: value for name, value in answer.items() if name != "success"}

@@ -42,5 +42,5 @@ class ExportTool:
         elif isinstance(missing, int):
             self.map.report_error(
                 f"the view was saved without {missing} of its images: the display "
-                "does not have them any more"
+                "no longer has them"
             )

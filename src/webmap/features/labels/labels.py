@@ -94,7 +94,9 @@ class LabelLayer(Layer):
     def _check_added(self, id: str) -> None:
         label = self.configured.get(id)
         if label is not None:
-            raise ConfigError(f"{label.name} is in the configuration and stays")
+            raise ConfigError(
+                f"{label.name} is in the configuration and cannot be deleted"
+            )
 
     def erase(self, id: str) -> None:
         """Draw a label no more."""
@@ -205,7 +207,7 @@ class AddedLabels:
         self._check_writable()
         label = self.labels.get(id)
         if label is None:
-            raise ConfigError("this label is gone already")
+            raise ConfigError("this label was already deleted")
         return label
 
     def _draw(self, label: Label) -> None:
@@ -217,8 +219,8 @@ class AddedLabels:
     def _check_writable(self) -> None:
         if not self.readable:
             raise ConfigError(
-                f"{self.store.file} could not be read and is left alone: mend or "
-                "remove it, and start again"
+                f"{self.store.file} cannot be read and is left unchanged: repair or "
+                "remove it, then start WebMap again"
             )
 
     def _load(self) -> None:
@@ -327,7 +329,7 @@ class Labels:
                 if sent is not None:
                     self.map.notify_modules("on_goal_sent", *sent)
             elif not self.may_edit:
-                raise ConfigError("only an operator adds, moves and deletes labels")
+                raise ConfigError("only operators can add, move and delete labels")
             elif "add" in message:
                 self.layer.add(new_label(message["add"]))
                 self.half.send({"done": True})

@@ -107,7 +107,7 @@ LONGEST_NAME, LONGEST = 256, 1000
 UNHEARD = "unheard"
 """The class of a badge while nothing was heard that tells how the robot is."""
 
-UNSAID = "no part of this robot was heard"
+UNSAID = "no diagnostics of this robot received"
 GREY = "#8a8f98"
 
 # An error weighs more than a part that has gone silent, though its number is less.
@@ -376,7 +376,7 @@ class Diagnostics:
     def _aged(self, part: Health, now: float) -> Health:
         if now - part.heard <= self.hold or part.level == LEVELS[STALE]:
             return part
-        said = f"silent for {now - part.heard:.0f} s"
+        said = f"no data for {now - part.heard:.0f} s"
         return replace(part, level=LEVELS[STALE], message=said)
 
     def _show(self) -> None:

@@ -75,7 +75,7 @@ def read_route(value: Any) -> Route:
     try:
         route = msgspec.convert(value, Route)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"this is no route: {error}") from error
+        raise ConfigError(f"not a route: {error}") from error
     if not 1 <= len(route.points) <= MOST_POINTS:
         raise ConfigError(
             f"a route has 1 to {MOST_POINTS} points, got {len(route.points)}"

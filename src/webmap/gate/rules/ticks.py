@@ -64,5 +64,5 @@ class Ticks:
         if age is None:
             raise Refusal("unknown tick: too old, or from another session")
         if age > MAX_AGE:
-            raise Refusal(f"command too old (over {MAX_AGE * 1000:.0f} ms)")
+            raise Refusal(f"command too old (over {MAX_AGE * 1000:.0f} ms): ignored")
         return age
