@@ -14,11 +14,11 @@ from webmap.gate.rules.burst import LENGTH, NEW_LINK_LENGTH
 from webmap.testing import Bounds, Quiet, check_invariants
 
 EVERY = 5
-"""Of how many trials one takes its time: the first, the sixth and so on.
+"""Of how many trials of a full run one takes its time.
 
 How soon the robot is stopped does not depend on how long a fault lasts after that; what
 happens when it is mended might. So all trials measure the one, and a fifth of a full
-run, as the first trial of a quick one, waits for the other at length.
+run, as every trial of a quick one, waits for the other at length.
 """
 
 HURRIED_WATCH = 0.3
@@ -83,7 +83,7 @@ class ProvingBench(Bench):
         begin, figures, progress = time.monotonic(), [], Progress(name, TRIALS)
         self.quiet, self.unreachable, self.causes = [], [], []
         for trial in range(TRIALS):
-            self.hurried = trial % EVERY != 0
+            self.hurried = FULL and trial % EVERY != 0
             self._get_under_way(before)
             waiting = self.waiting()
             self.fault_at = time.monotonic()
