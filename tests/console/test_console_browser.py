@@ -50,7 +50,7 @@ def test_who_holds_a_robot_reads_you_and_others_read_a_name(open_console):
             break
     expect(you).to_have_text("You have control")
     other = theirs.locator('#robots [aria-pressed]:has-text("Robot 2") .holder')
-    expect(other).to_contain_text("holds it")
+    expect(other).to_contain_text("has control")
     expect(other).to_be_visible()
     mine.get_by_role("button", name="Release control", exact=True).click()
     expect(mine.locator("#card .state .holder")).to_have_text("Free")
@@ -387,7 +387,7 @@ def test_points_of_a_route_are_added_by_touch_after_a_pose_was_set_in_between(
     page.locator("#sheet").tap()
     page.get_by_role("button", name="Set pose").tap()
     expect(page.locator(".webmap-route > .webmap-route-word")).to_have_text(
-        "More points afterwards."
+        "Waiting: finish the other tool, then add more points."
     )
     tap_floor(2)
     expect(page.locator(".webmap-locate-word")).to_contain_text(

@@ -70,7 +70,7 @@ def test_a_call_is_tried_from_the_report_and_what_that_told_stands_in_it(open_co
     expect(report.locator(".status")).to_contain_text("Checked", timeout=20_000)
     report.get_by_role("button", name="Test slow call").click()
     question = report.get_by_role("group", name="Test slow call")
-    expect(question).to_contain_text("offers a service of its own")
+    expect(question).to_contain_text("advertises a service of its own")
     expect(question).to_contain_text("test while nobody drives")
     question.get_by_role("button", name="Run test").click()
     told = report.locator(".finding").filter(has_text="blocks no socket (tried)")

@@ -68,14 +68,14 @@ def test_a_robot_that_is_gone_fades_and_can_be_removed_until_it_is_back(
         with page_of(file) as address:
             row = page.locator("#robots .row", has_text="Ghost")
             drawn = page.locator('.robot[data-name="Ghost"]')
-            remove = page.get_by_role("button", name="Remove from the page")
+            remove = page.get_by_role("button", name="Remove from page")
             with odometry(url):
                 page.goto(address)
                 expect(page.locator(".robot:not(.unplaced)")).to_have_count(2)
                 row.locator("button").first.click()
                 expect(page.locator("#card .state")).to_contain_text("View only")
                 expect(remove).to_be_hidden()
-            since = re.compile(r"Gone since \d\d:\d\d")
+            since = re.compile(r"No pose since \d\d:\d\d")
             inner = {"use_inner_text": True}
             expect(page.locator("#card .state")).to_contain_text(since, **inner)
             expect(row).to_contain_text(since, **inner)

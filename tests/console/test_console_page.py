@@ -204,7 +204,7 @@ def test_a_robot_that_is_gone_is_removed_until_it_is_heard_of_again(
         map.set_selected(robots[0])
         card = page.element("card")
         assert card.get("data-state") == "gone"
-        assert "Gone since " in card.text
+        assert "No pose since " in card.text
         elements = (e for e in card.walk() if isinstance(e, Element))
         button = next(e for e in elements if e.get("data-act") == "remove")
         (press,) = button.handlers("click")

@@ -230,7 +230,7 @@ def test_there_is_one_figure_of_latency_and_it_is_explained(open_console):
     expect(page.locator("#link")).to_have_text("Connected", use_inner_text=True)
     loop = page.locator(".webmap-teleop-figures .time").first
     expect(loop).to_have_attribute(
-        "title", re.compile("Between this page and WebMap: ")
+        "title", re.compile("Round trip from this page to WebMap: ")
     )
 
 

@@ -3,6 +3,7 @@
 import re
 
 TOO_LATE = re.compile(
-    "older than|too old|does not respond|take control first|held up|have the robot"
+    "older than|too old|does not respond|take control first|held up|"
+    "control of the robot"
 )
 """Why a goal was not taken that is taken when it is sent again."""

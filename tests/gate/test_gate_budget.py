@@ -95,7 +95,9 @@ class TestBudget:
             budget.spend(1, 100, 0.0001, 1000 + each / 10)
             budget.note(1000 + each / 10, behind=True)
         assert budget.flood(1001.9) is None
-        assert "it sends too much: for 2 s" in budget.flood(1002.1)
+        assert "the bridge sends too much: data was waiting for 2 s" in budget.flood(
+            1002.1
+        )
 
     def test_one_that_catches_up_now_and_then_is_not(self):
         budget = Budget()

@@ -355,7 +355,10 @@ async def test_a_robot_is_one_however_this_computer_is_spelled(tmp_path):
             lambda r: r.robot == "r1" and r.latched and r.stop.by == "Ann", "its STOP"
         )
         assert not second.armable
-        assert second.reason == f"it is driven as /cmd_vel of {bridge.url} here"
+        assert (
+            second.reason
+            == f"this WebMap already drives it as /cmd_vel of {bridge.url}"
+        )
 
 
 @in_loop

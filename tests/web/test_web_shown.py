@@ -98,7 +98,7 @@ def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
     bench.gate.change("r1", test={"state": "creeping", "text": "creeping"})
     bench.until(lambda: not button.is_visible())
     words = bench.page.locator(".webmap-teleop-state")
-    bench.until(lambda: "Testing its stop" in words.inner_text())
+    bench.until(lambda: "Stop test running" in words.inner_text())
     bench.gate.change("r1", test={"state": "done", "text": ""}, stop_time=0.3)
     bench.until(lambda: "0.30 s" in bench.page.inner_text(".webmap-teleop-own"))
     bench.until(button.is_visible)

@@ -19,6 +19,6 @@ test("where there are keys, or no stick, nothing is said otherwise", () => {
 });
 
 test("only how to drive is said otherwise", () => {
-  const lost = { state: "lost", title: "Connection lost", detail: "Trying again." };
+  const lost = { state: "lost", title: "Connection lost", detail: "Reconnecting…" };
   assert.equal(withoutKeys(lost, FINGERS, "the stick"), lost);
 });

@@ -210,7 +210,7 @@ def send_elsewhere(bridge: str) -> None:
 def test_a_plain_topic_says_that_it_says_nothing_and_is_drawn_once(tab, bridges):
     published = tab.locator(".posestamped.goal")
     send(tab, "Plain 1", "Old 0")
-    expect(label(tab)).to_have_text(re.compile("Goal sent, this robot does not say"))
+    expect(label(tab)).to_have_text(re.compile("Goal sent, this robot reports no"))
     expect(published).to_have_attribute("data-pose", re.compile(r"goal \d+$"))
     expect(published).to_be_hidden()
     label(tab).get_by_role("button", name="Cancel goal").click()

@@ -56,6 +56,6 @@ def test_many_robots_are_in_natural_order_and_those_without_a_switch_explained(
         page.locator(".webmap-layers summary").click()
         rows = page.locator(".webmap-layers-row")
         robots = [f"/robot_{number}/scan" for number in range(1, 17)]
-        note = "4 more: the switch \N{LEFT DOUBLE QUOTATION MARK}Scans"
-        note += "\N{RIGHT DOUBLE QUOTATION MARK} is for all of them"
+        note = "4 more: \N{LEFT DOUBLE QUOTATION MARK}Scans"
+        note += "\N{RIGHT DOUBLE QUOTATION MARK} switches all of them"
         expect(rows).to_have_text(["Scans", *robots, note])
