@@ -4,10 +4,10 @@ import subprocess
 import sys
 
 import pytest
-from cli_shown import shown
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
+from cli_shown import shown
 from webmap_process import simulator
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
