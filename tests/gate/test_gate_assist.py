@@ -129,8 +129,8 @@ def test_too_near_to_measure_is_an_obstacle():
         (sweep_of(lambda b: math.nan if abs(b) < 0.6 else math.inf), "unknown"),
         (Sweep(math.nan, 0.1, 0.1, 8.0, [1.0] * 10, 0.0), "no angles"),
         (Sweep(0.0, 0.0, 0.1, 8.0, [math.inf] * 10, 0.0), "no angles"),
-        (Sweep(0.0, 0.1, 0.1, 8.0, [], 0.0), "does not look"),
-        (Sweep(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not look"),
+        (Sweep(0.0, 0.1, 0.1, 8.0, [], 0.0), "does not cover the direction"),
+        (Sweep(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not cover the direction"),
     ],
 )
 def test_a_blind_robot_stops_or_creeps_as_configured(sweep, said):

@@ -124,7 +124,7 @@ class TestFold:
     def test_the_fold_looks_no_farther_aside_than_the_scan(self):
         narrow = math.radians(20)
         sweep = dense([math.inf] * 1000, low=-narrow, span=2 * narrow)
-        assert "a part of the way" in assist(SPEC, folded(sweep), AHEAD, 0.1).why
+        assert "only a part of the path" in assist(SPEC, folded(sweep), AHEAD, 0.1).why
         wide = dense([math.inf] * 1000, low=-1.5, span=3.0)
         assert assist(SPEC, folded(wide), AHEAD, 0.1) == FREE
 
