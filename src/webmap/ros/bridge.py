@@ -1,7 +1,7 @@
 """The connection to one ROS system, shared by the whole process.
 
 A :class:`Bridge` has topics, messages and services, and refuses messages that only the
-gate may publish. The wire protocol is in the link behind it.
+gate may publish. The wire protocol is in ``rosbridge``.
 """
 
 import asyncio

@@ -47,7 +47,7 @@ class ReceivedMessage:
         return value
 
     def is_decoded(self, type: type[msgspec.Struct] | None) -> bool:
-        """Return whether :meth:`decode` has already been called with ``type``."""
+        """Return whether the message is already decoded as ``type``."""
         return type in self._decoded
 
     def prime(self, type: type[msgspec.Struct] | None, value: Any) -> None:

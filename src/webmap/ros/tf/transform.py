@@ -79,8 +79,8 @@ class Transform:
     def heading_and_tilt(self) -> tuple[Pose, "Transform"]:
         """Return position and heading seen from above, and the rest.
 
-        The rest tilts and lifts, and is applied first: ``Transform.from_pose(pose) @
-        tilt`` is the whole transform. For an upright frame the rest only lifts.
+        The rest tilts and lifts, and is applied first. The whole transform is
+        ``Transform.from_pose(pose) @ tilt``. For an upright frame the rest only lifts.
         """
         pose = self.planar
         lift = Vector3(0.0, 0.0, self.translation.z)

@@ -49,11 +49,11 @@ class Quirks:
     """``/rosapi/message_details`` never answers, and rosapi ends."""
 
     spinning_queue: bool = False
-    """The server hangs for ever when a client ends such a subscription in any way.
+    """The server hangs for ever when certain subscriptions end, in any way.
 
-    It is a subscription with a ``throttle_rate`` of 0 and a ``queue_length`` above 0
-    that has got a message. rosbridge 2.1.0 hangs only if a message is queued at that
-    moment. A test cannot time that, so here a message always is.
+    These have a ``throttle_rate`` of 0, a ``queue_length`` above 0, and have got a
+    message. rosbridge 2.1.0 hangs only if a message is queued at that moment. A test
+    cannot time that, so here a message always is.
     """
 
     hanging_stop: bool = False
