@@ -11,7 +11,7 @@ from webmap.base.errors import ConfigError
 
 
 def need_rosbags() -> None:
-    """Go on if bags can be read and written here.
+    """Raise an error if bags cannot be read and written here.
 
     Raises:
         ConfigError: If rosbags is not installed.

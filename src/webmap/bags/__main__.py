@@ -22,11 +22,11 @@ from webmap.sim.process import signals_set
 log = logging.getLogger("webmap.bags")
 
 HOST = "127.0.0.1"
-"""Others need not listen: what is recorded is nobody else's."""
+"""Only this machine may connect: a recording is private."""
 
 READY = "rosbridge is ready at "
 WRONG = "error: "
-"""How the one line on standard output begins if there is nothing to be played."""
+"""The beginning of the only line on standard output if there is nothing to play."""
 
 
 def main() -> int:
@@ -80,7 +80,7 @@ async def _run(
                 await asyncio.wait(
                     [playing, stopped], return_when=asyncio.FIRST_COMPLETED
                 )
-                if playing.done():  # which it never is unless something is wrong
+                if playing.done():  # only after an error
                     playing.result()
             finally:
                 playing.cancel()

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Qos
 
 METADATA_VERSION: Literal[8] = 8
-"""What a bag of ROS 2 calls its form: Humble and all later releases read this one."""
+"""The version of the metadata of a ROS 2 bag: Humble and later releases read it."""
 
 FOREVER = (9223372036, 854775807)
-"""What ROS 2 says for a time without an end, in seconds and nanoseconds."""
+"""An infinite duration in ROS 2, in seconds and nanoseconds."""
 
 
 class BagFile(Protocol):
@@ -24,27 +24,26 @@ class BagFile(Protocol):
     path: Path
 
     def add(self, topic: str, version: TypeVersion) -> Any:
-        """Begin a topic, and return what its messages are written to."""
+        """Add a topic, and return the channel for its messages."""
 
     def write(self, channel: Any, time: int, data: bytes) -> None:
-        """Write a message that came at a time, in nanoseconds since 1970."""
+        """Write a message, with its time of arrival in nanoseconds since 1970."""
 
     def close(self) -> None:
-        """End the file, so that others can open it."""
+        """Complete and close the file, so that other programs can open it."""
 
 
 def new_bag(path: Path, dialect: DialectName) -> BagFile:
-    """Begin a bag; nothing that exists is overwritten.
+    """Create a bag; nothing that exists is overwritten.
 
     Args:
-        path: A file for ROS 1, to which ``.bag`` is added if need be, and a folder for
-            ROS 2.
-        dialect: Which ROS.
+        path: A file for ROS 1 (``.bag`` is added if missing), a folder for ROS 2.
+        dialect: ROS 1 or ROS 2.
 
     Raises:
-        ConfigError: If something of that name exists, it does not suit the dialect, or
-            rosbags makes no bag of it.
-        OSError: If it cannot be written there.
+        ConfigError: If the path exists, does not fit the dialect, or rosbags cannot
+            make a bag of it.
+        OSError: If the bag cannot be written there.
 
     """
     if dialect == "ros1" and path.suffix != ".bag":
@@ -75,7 +74,7 @@ class Ros1Bag:
         self._writer.open()
 
     def add(self, topic: str, version: TypeVersion) -> Any:
-        """Begin a topic, and return what its messages are written to."""
+        """Add a topic, and return the channel for its messages."""
         return self._writer.add_connection(
             topic,
             version.type_name,
@@ -85,20 +84,19 @@ class Ros1Bag:
         )
 
     def write(self, channel: Any, time: int, data: bytes) -> None:
-        """Write a message that came at a time, in nanoseconds since 1970."""
+        """Write a message, with its time of arrival in nanoseconds since 1970."""
         self._writer.write(channel, time, data)
 
     def close(self) -> None:
-        """End the file, so that others can open it."""
+        """Complete and close the file, so that other programs can open it."""
         self._writer.close()
 
 
 class Ros2Bag:
     """A folder with an MCAP file and its description.
 
-    MCAP holds the definitions of the types, and most of it can be recovered when it was
-    not closed; rosbags writes sqlite3 as one transaction, of which nothing would be
-    left.
+    MCAP holds the definitions of the types, and most of an unclosed file can be
+    recovered. rosbags writes sqlite3 as one transaction, of which nothing would remain.
     """
 
     def __init__(self, path: Path) -> None:
@@ -111,7 +109,7 @@ class Ros2Bag:
         self._writer.open()
 
     def add(self, topic: str, version: TypeVersion) -> Any:
-        """Begin a topic, and return what its messages are written to."""
+        """Add a topic, and return the channel for its messages."""
         latched = is_latched(topic, canonical(version.type_name))
         return self._writer.add_connection(
             topic,
@@ -121,16 +119,16 @@ class Ros2Bag:
         )
 
     def write(self, channel: Any, time: int, data: bytes) -> None:
-        """Write a message that came at a time, in nanoseconds since 1970."""
+        """Write a message, with its time of arrival in nanoseconds since 1970."""
         self._writer.write(channel, time, data)
 
     def close(self) -> None:
-        """End the file, so that others can open it."""
+        """Complete and close the file, so that other programs can open it."""
         self._writer.close()
 
 
 def _kept() -> "Qos":
-    """Return what a publisher offers whose newest message is for latecomers too."""
+    """Return the quality of service of a publisher that latches its newest message."""
     from rosbags.interfaces import (
         Qos,
         QosDurability,

@@ -1,4 +1,4 @@
-"""Listening to everything behind a bridge, as long as it is recorded."""
+"""Subscriptions to all topics behind a bridge, for a recording."""
 
 import asyncio
 import contextlib
@@ -14,30 +14,30 @@ from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.received import ReceivedMessage
 
 LOOK = 2.0
-"""Seconds between two looks which topics there are."""
+"""Seconds between two checks for new topics."""
 
 SHOW = 1.0
-"""Seconds between two words of how much was recorded."""
+"""Seconds between two displays of the progress."""
 
 OPEN_WITHIN = 5.0
-"""Seconds after which it is said that the link is not open yet."""
+"""Seconds after which a message states that the connection is not open yet."""
 
 PICTURES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
-"""Types that are asked for in binary: a bridge takes long to encode them as text."""
+"""Types requested in binary: a bridge takes long to encode them as text."""
 
 QUEUE = 100
-"""Messages of a topic that the bridge may hold back; each one counts."""
+"""Messages of a topic that the bridge may queue; none should be lost."""
 
 
 class Listening:
-    """Subscribes to topics behind a bridge, also to those that come later.
+    """Subscribes to topics behind a bridge, also to those that appear later.
 
     Args:
         bridge: The bridge, not started yet.
-        recorder: Gets what comes.
-        only: The topics that are wanted; all if there are none.
-        told: Types by topic, where the bridge cannot be asked for them.
-        say: Told in a sentence what people should know.
+        recorder: Gets the messages.
+        only: The wanted topics; all if empty.
+        told: Types by topic, if the bridge cannot be asked for them.
+        say: Called with each sentence for people.
 
     """
 
@@ -72,17 +72,17 @@ class Listening:
         ready: Callable[[], object],
         show: Callable[[float], object],
     ) -> float:
-        """Record until ``stop`` is set, or for a time; return for how many seconds.
+        """Record until ``stop`` is set or the time is over; return the seconds.
 
         Args:
-            topics: Types by topic, as the bridge has them now.
-            stop: Ends it.
-            duration: How long it lasts at most, in seconds.
-            ready: Called once all is subscribed.
+            topics: Types by topic, as the bridge lists them now.
+            stop: The event that ends the recording.
+            duration: Longest duration, in seconds.
+            ready: Called when all topics are subscribed.
             show: Called once a second with the seconds since then.
 
         Raises:
-            OSError: If the bag cannot be written any more.
+            OSError: If the bag can no longer be written.
 
         """
         self._stop, self._loop = stop, asyncio.get_running_loop()
@@ -121,7 +121,7 @@ class Listening:
         return lasted
 
     def take(self, topics: Mapping[str, str]) -> None:
-        """Subscribe to those topics that are wanted and new; name what is left out."""
+        """Subscribe to topics that are wanted and new; name those left out."""
         unknown = []
         for topic, type_name in sorted(topics.items()):
             wanted = topic in self._only if self._only else topic != STATUS
@@ -137,7 +137,7 @@ class Listening:
 
     @property
     def missing(self) -> list[str]:
-        """The topics that are wanted and that nobody has yet."""
+        """The wanted topics that do not exist yet."""
         return sorted(self._only - self._seen)
 
     def _subscribe(self, topic: str, type_name: str) -> bool:

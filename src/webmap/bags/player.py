@@ -1,4 +1,4 @@
-"""Playing a recording at its pace, from its begin or from anywhere in it."""
+"""Playing of a recording at a given rate, from its beginning or any other time."""
 
 import asyncio
 import contextlib
@@ -14,37 +14,36 @@ from webmap.base.errors import ConfigError
 log = logging.getLogger("webmap.bags")
 
 SAY_EVERY = 0.5
-"""Seconds between two words of where in the recording it is."""
+"""Seconds between two status messages with the position in the recording."""
 
 SLOWEST, FASTEST = 0.001, 1000.0
-"""The rates at which a recording can be played."""
+"""The least and the greatest rate."""
 
 ROUND = 1.0
-"""Least seconds from one round to the next; a recording may be one message long."""
+"""Least seconds from one round to the next; a recording may be one message."""
 
 SOON = 1_000_000
-"""Nanoseconds for which it is not worth while to wait."""
+"""Nanoseconds that are too short to wait for."""
 
 
 def steady_clock() -> Callable[[], int]:
-    """Return a clock in nanoseconds since 1970 that nobody sets meanwhile."""
+    """Return a clock in nanoseconds since 1970 that ignores changes of the time."""
     since = time.time_ns() - time.monotonic_ns()
     return lambda: since + time.monotonic_ns()
 
 
 class Player:
-    """Plays a recording for whoever listens.
+    """Plays a recording for all subscribers.
 
     Args:
         recording: The recording.
-        rate: How many seconds of it are played in one, from 0.001 to 1000.
-        start: Where in it the playing begins, in seconds.
-        loop: Whether it begins anew when it has ended.
-        now: The time in nanoseconds since 1970.
+        rate: Seconds of the recording that are played per second, from 0.001 to 1000.
+        start: The position where the playing begins, in seconds.
+        loop: Whether to play again from the beginning after the end.
+        now: Returns the time in nanoseconds since 1970.
 
     Raises:
-        ConfigError: If the recording is shorter than ``start``, or the rate makes no
-            sense.
+        ConfigError: If the recording is shorter than ``start``, or the rate is invalid.
 
     """
 
@@ -82,7 +81,7 @@ class Player:
 
     @property
     def words(self) -> str:
-        """Which recording is played, where in it, and how fast; for people."""
+        """The name, position and rate of the recording, for people."""
         recording = self._recording
         at = (self._pace.at(self._now()) - recording.begin) / SECOND
         at = min(max(at, 0.0), recording.seconds)
@@ -98,7 +97,7 @@ class Player:
         self._woken.set()
 
     async def run(self) -> None:
-        """Play until cancelled; nothing is played before somebody listens."""
+        """Play until cancelled; playing begins with the first subscription."""
         await self.replay.graph.heard.wait()
         async with asyncio.TaskGroup() as group:
             group.create_task(self._say_on())
@@ -137,13 +136,13 @@ class Player:
             self.replay.publish(recorded, self._pace)
 
     async def _read_kept(self) -> list[Recorded]:
-        """Read what is kept of before the begin: in a thread, for it may take long."""
+        """Read the earlier messages to keep, in a thread, since it may take long."""
         reading = asyncio.create_task(asyncio.to_thread(self._kept_of_before))
         try:
             return await asyncio.shield(reading)
         except asyncio.CancelledError:
             self._over = True
-            await asyncio.wait([reading])  # since the file is closed then
+            await asyncio.wait([reading])  # the file is closed afterwards
             raise
 
     def _kept_of_before(self) -> list[Recorded]:
@@ -151,7 +150,7 @@ class Player:
         return list(kept)
 
     async def _until(self, due: int) -> bool:
-        """Wait until something is due; return whether it is still to be played."""
+        """Wait until a message is due; return whether it is still to be played."""
         wait = due - self._now()
         if wait < -SECOND:
             self._pace.put_off(-wait)
@@ -159,7 +158,7 @@ class Player:
                 self._late = True
                 log.warning("this computer cannot keep the pace, and plays later")
         if wait < SOON:
-            await asyncio.sleep(0)  # those who listen have their turn
+            await asyncio.sleep(0)  # let the subscribers run
             return not self._again
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(wait / SECOND):

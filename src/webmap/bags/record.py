@@ -1,4 +1,4 @@
-"""One recording from its first question to its last word."""
+"""The recording of a bridge, from the question for its topics to the summary."""
 
 import asyncio
 import sys
@@ -21,21 +21,21 @@ from webmap.ros.rosbridge.server.dialect import DialectName
 from webmap.sim.process import signals_set
 
 EVERY = 10.0
-"""Seconds between two words of how it goes where they cannot replace each other."""
+"""Seconds between two progress lines if one cannot replace the other."""
 
 
 def told_types(
     names: Sequence[str], types: Sequence[str], topics: Mapping[str, str] | None
 ) -> dict[str, str] | None:
-    """Return the types that a person said, by topic; None if nobody said any.
+    """Return the types that a person stated, by topic; None if there are none.
 
     Args:
         names: The topics of ``--topic``.
         types: The types of ``--type``.
-        topics: What ``--topics`` lists.
+        topics: The topics and types of ``--topics``.
 
     Raises:
-        UsageError: If there are not as many types as topics, or something is no type.
+        UsageError: If there are not as many types as topics, or a type is invalid.
 
     """
     if not types:
@@ -64,15 +64,15 @@ async def record_to(
     Args:
         url: The bridge's address.
         out: The bag; None for a name with the time in it.
-        only: The topics that are wanted; all if there are none.
-        told: Types by topic, where the bridge cannot be asked for them.
-        wait: How long to wait for a bridge that cannot be reached, in seconds.
-        duration: How long to record at most, in seconds.
+        only: The wanted topics; all if empty.
+        told: Types by topic, if the bridge cannot be asked for them.
+        wait: Longest time to wait for an unreachable bridge, in seconds.
+        duration: Longest duration of the recording, in seconds.
 
     Raises:
         BridgeError: If the bridge cannot be reached.
         ConfigError: If there is nothing to record, or nowhere to record to.
-        OSError: If the bag cannot be made.
+        OSError: If the bag cannot be created.
 
     """
     topics = await _topics(url, told, wait)
@@ -119,9 +119,9 @@ async def record_to(
 
 
 class ProgressLine:
-    """How a recording goes, on standard error: one line that is written anew.
+    """The progress of a recording, on one line of standard error that is rewritten.
 
-    Where standard error is no terminal, it is a line now and then.
+    If standard error is not a terminal, it prints a line from time to time.
     """
 
     def __init__(self) -> None:
@@ -130,11 +130,11 @@ class ProgressLine:
         self._next = EVERY
 
     def show(self, seconds: float, recorder: Recorder) -> None:
-        """Say how it goes.
+        """Show the progress.
 
         Args:
-            seconds: For how long it has gone on.
-            recorder: What was recorded.
+            seconds: Duration of the recording until now.
+            recorder: Its counts are shown.
 
         """
         text = (
@@ -149,7 +149,7 @@ class ProgressLine:
             echo(text, err=True)
 
     def say(self, text: str) -> None:
-        """Say something else, on a line of its own."""
+        """Print another text, on a line of its own."""
         if self._shown:
             echo("", err=True)
         echo(text, err=True)
@@ -157,7 +157,7 @@ class ProgressLine:
 
 
 def megabytes(recorder: Recorder) -> str:
-    """Return how much was recorded, for people."""
+    """Return the recorded size, for people."""
     return f"{recorder.size / 1e6:.1f} MB"
 
 

@@ -1,4 +1,4 @@
-"""What becomes of messages that are recorded: bytes in a bag, or a word why not."""
+"""Writes received messages to a bag, and reports those that cannot be written."""
 
 import asyncio
 import logging
@@ -17,32 +17,32 @@ from webmap.ros.received import ReceivedMessage
 log = logging.getLogger("webmap.bags")
 
 HELD = 256 << 20
-"""Bytes of messages that may wait; what comes when there are more is left out."""
+"""Bytes of messages that may wait; further messages are dropped."""
 
 ASIDE = 1 << 10
-"""Bytes that a message needs in memory beside its frame, about."""
+"""Approximate bytes of memory that a message needs in addition to its frame."""
 
 
 @dataclass(slots=True)
 class _Track:
-    """A topic that is recorded."""
+    """A recorded topic."""
 
     type: str
     version: TypeVersion
-    """As the newest release has the type, or the one that its messages fit."""
+    """The type of the newest release, or of the one that fits its messages."""
 
     channel: Any = None
     misfit: bool = False
-    """Whether a message came that does not fit its type."""
+    """Whether a message did not fit its type."""
 
 
 class Recorder:
-    """Writes messages as they come. It asks no clock, and no bridge.
+    """Writes messages as they come. It uses no clock and no bridge.
 
     Args:
-        bag: Where they are written.
-        types: Knows how.
-        say: Told in a sentence what is left out.
+        bag: The bag to write to.
+        types: The types of messages.
+        say: Called with a sentence about each kind of dropped message.
 
     """
 
@@ -50,11 +50,11 @@ class Recorder:
         self, bag: BagFile, types: Types, say: Callable[[str], object]
     ) -> None:
         self.messages = 0
-        """How many were written."""
+        """Number of written messages."""
         self.size = 0
-        """How many bytes they are."""
+        """Bytes of the written messages."""
         self.dropped = 0
-        """How many were not written: misfits, unreadable ones, and too many at once."""
+        """Number of dropped messages: misfits, unreadable ones, or too many at once."""
         self._bag = bag
         self._types = types
         self._say = say
@@ -64,15 +64,15 @@ class Recorder:
 
     @property
     def topics(self) -> int:
-        """How many topics have messages in the bag."""
+        """Number of topics with messages in the bag."""
         return sum(track.channel is not None for track in self._tracks.values())
 
     def add(self, topic: str, type_name: str) -> bool:
-        """Take in a topic; return False if its type cannot be written.
+        """Add a topic; return False if its type cannot be written.
 
         Args:
-            topic: Its name.
-            type_name: In the spelling of either ROS.
+            topic: The name of the topic.
+            type_name: Its type, in either dialect.
 
         """
         version = next(self._types.versions(type_name), None)
@@ -81,12 +81,12 @@ class Recorder:
         return version is not None
 
     def take(self, topic: str, message: object, time: int) -> None:
-        """Write a message of a topic that was added.
+        """Write a message of an added topic.
 
         Args:
-            topic: Its name.
-            message: As :meth:`webmap.Bridge.subscribe` gives it, without ``decode``.
-            time: When it came, in nanoseconds since 1970.
+            topic: The name of the topic.
+            message: The value from :meth:`webmap.Bridge.subscribe` without ``decode``.
+            time: Its time of arrival, in nanoseconds since 1970.
 
         Raises:
             OSError: If the file cannot be written.
@@ -107,12 +107,12 @@ class Recorder:
         self.size += len(data)
 
     def drop(self, topic: str, why: str, error: str = "") -> None:
-        """Count a message that is not written, from any thread.
+        """Count a dropped message; callable from any thread.
 
         Args:
-            topic: Its name.
-            why: What is said of it, once for each topic.
-            error: What was wrong with the first one, if that is known.
+            topic: The name of the topic.
+            why: The reason; shown once for each topic.
+            error: The error of the first one, if known.
 
         """
         with self._lock:
@@ -123,7 +123,7 @@ class Recorder:
             self._say(f"{topic}: {why}{f': {error}' if error else ''}")
 
     def _bytes_of(self, track: _Track, message: object) -> bytes:
-        """Return a message's bytes; the first one tells which release's they are."""
+        """Return a message's bytes; the first message determines the release."""
         try:
             return track.version.bytes_of(message)
         except Misfit:
@@ -140,11 +140,11 @@ class Recorder:
 
 
 class Incoming:
-    """Decodes and writes messages in a thread, so that the link is read meanwhile.
+    """Decodes and writes messages in a thread, so that reading can continue.
 
     Args:
-        recorder: Writes them; nobody else lets it :meth:`Recorder.take` any.
-        failed: Called in that thread if the file cannot be written any more.
+        recorder: Writes the messages; only this object may call :meth:`Recorder.take`.
+        failed: Called in that thread if the file can no longer be written.
 
     """
 
@@ -156,22 +156,22 @@ class Incoming:
         )
         self._lock = threading.Lock()
         self._size = 0
-        """How many bytes are waiting, as :func:`_size_of` counts them."""
+        """Bytes that wait, as counted by :func:`_size_of`."""
         self._thread = threading.Thread(
             target=self._write_on, name="recording", daemon=True
         )
 
     def start(self) -> None:
-        """Begin to write."""
+        """Start the thread."""
         self._thread.start()
 
     def put(self, topic: str, message: ReceivedMessage, time: int) -> None:
-        """Take a message that came; it is counted as dropped if too many wait.
+        """Queue a received message; if too many wait, it is counted as dropped.
 
         Args:
-            topic: Its name.
-            message: As it came, not decoded yet.
-            time: When it came, in nanoseconds since 1970.
+            topic: The name of the topic.
+            message: The message, not decoded yet.
+            time: Its time of arrival, in nanoseconds since 1970.
 
         """
         size = _size_of(message)
@@ -187,7 +187,7 @@ class Incoming:
             self._waiting.put((topic, message, time))
 
     async def finish(self) -> None:
-        """Return once all that came is written."""
+        """Wait until all queued messages are written."""
         self._waiting.put(None)
         await asyncio.to_thread(self._thread.join)
 
@@ -195,7 +195,7 @@ class Incoming:
         while (one := self._waiting.get()) is not None:
             try:
                 self._write(*one)
-            except OSError as error:  # the disk is full, for one
+            except OSError as error:  # such as a full disk
                 self._failed(error)
                 return
             with self._lock:
@@ -209,7 +209,7 @@ class Incoming:
             self._recorder.drop(topic, why, str(error))
         except OSError:
             raise
-        except Exception as error:  # whatever came, the next message is due
+        except Exception as error:  # the next message must be written in any case
             log.exception("a message on %s was lost", topic)
             why = "messages are left out that could not be written"
             self._recorder.drop(topic, why, str(error))

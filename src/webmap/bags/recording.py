@@ -1,4 +1,4 @@
-"""A recording as it lies on the disk: its topics, and its messages in their order."""
+"""A recording on disk: its topics, and its messages in order."""
 
 import keyword
 from collections.abc import Callable, Iterator, Sequence
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
 
 NAMES = ("map", "tf_static", "robot_description")
-"""What such topics are called, whatever a bag tells of them."""
+"""Names of topics that latch, even if the bag does not mark them so."""
 
 TYPES = ("nav_msgs/OccupancyGrid",)
-"""What is worth keeping of any topic: it is large, and seldom comes."""
+"""Types whose newest message is kept on any topic: large and rare."""
 
 STATIC = "tf_static"
 
@@ -30,7 +30,7 @@ def is_latched(topic: str, type_name: str) -> bool:
     """Return whether the newest message of a topic is kept by its name or type.
 
     Args:
-        topic: Its name.
+        topic: The name of the topic.
         type_name: Canonical, such as ``nav_msgs/OccupancyGrid``.
 
     """
@@ -38,22 +38,22 @@ def is_latched(topic: str, type_name: str) -> bool:
 
 
 def is_static(topic: str) -> bool:
-    """Return whether a topic tells of frames that never move against each other."""
+    """Return whether a topic carries static transforms."""
     return topic.rpartition("/")[2] == STATIC
 
 
 class StaticFrames:
-    """All that was told of static frames, as one message.
+    """All static transforms so far, as one message.
 
-    Each node tells of its own, and a bag does not say which node said what; so the
-    newest message alone would leave the others' out.
+    Each node publishes its own static transforms, and a bag does not record the node of
+    a message. So the newest message alone would lack the transforms of other nodes.
     """
 
     def __init__(self) -> None:
         self._frames: dict[str, Any] = {}
 
     def with_all(self, message: dict[str, Any]) -> dict[str, Any]:
-        """Return a ``tf2_msgs/TFMessage`` with what was told before it."""
+        """Return a ``tf2_msgs/TFMessage`` that includes all earlier transforms."""
         for transform in message["transforms"]:
             self._frames[transform["child_frame_id"]] = transform
         return {"transforms": list(self._frames.values())}
@@ -63,13 +63,13 @@ Make = Callable[[Any], Any]
 
 
 class Messages:
-    """Makes messages, as the rosbridge server publishes them, of rosbags' objects.
+    """Converts rosbags' objects to messages of the rosbridge server.
 
-    Arrays stay arrays, and bytes become bytes; times are spelled as the dialect of the
-    schema has them.
+    Arrays stay arrays, and bytes become bytes; times have the field names of the
+    schema's dialect.
 
     Args:
-        schema: Knows the fields of the types.
+        schema: The types with their fields.
 
     """
 
@@ -81,16 +81,16 @@ class Messages:
         """Return the message of an object.
 
         Args:
-            type_name: Of the message, as the schema knows it.
-            value: What rosbags made of its bytes.
+            type_name: The type of the message, by its name in the schema.
+            value: The object that rosbags decoded.
 
         Raises:
-            UnknownType: If the schema does not know the type.
+            UnknownType: If the type is not in the schema.
 
         """
         make = self._known.get(type_name)
         if make is None:
-            # Worked out once a type, for messages of it come many times a second.
+            # Built once for each type, since messages come many times a second.
             fields = self._schema.fields(type_name)
             make = self._known[type_name] = self._record(fields)
         made: dict[str, Any] = make(value)
@@ -127,7 +127,7 @@ class Messages:
 
 
 def _attribute(field: str) -> str:
-    """Return what rosbags calls a field: a word of Python gets a line behind it."""
+    """Return rosbags' name of a field: a keyword of Python gets an underscore."""
     return f"{field}_" if keyword.iskeyword(field) else field
 
 
@@ -147,15 +147,15 @@ ROS1, ROS2 = ".bag", (".mcap", ".db3")
 METADATA = "metadata.yaml"
 
 LARGEST_METADATA = 4 << 20
-"""Bytes of the description of a bag, which is read as a whole."""
+"""Most bytes of the description of a bag, which is read as a whole."""
 
 
 class Recorded(NamedTuple):
-    """A message as it was recorded, not decoded yet."""
+    """A recorded message, not decoded yet."""
 
     topic: str
     time: int
-    """When it came, in nanoseconds since 1970."""
+    """Its time of arrival, in nanoseconds since 1970."""
 
     connection: "Connection"
     data: bytes
@@ -170,18 +170,18 @@ class RecordedTopic:
     """Canonical: ``nav_msgs/Odometry``."""
 
     latched: bool
-    """Whether its newest message is for those too who come later."""
+    """Whether later subscribers also get its newest message."""
 
 
 class Recording:
-    """A bag of ROS 1, or several that are played as one, or one of ROS 2.
+    """A bag of ROS 1, several that are played as one, or a bag of ROS 2.
 
-    Messages are read as they are asked for, so that memory does not grow with the file;
-    of a bag of ROS 1 the index is kept.
+    Messages are read on demand, so memory does not grow with the file; of a bag of ROS
+    1 the index is kept in memory.
 
     Args:
         paths: Files (``.bag``, ``.mcap``, ``.db3``), or the folder of a bag of ROS 2.
-        warn: Told in a sentence what is left out.
+        warn: Called with a sentence about each part that is left out.
 
     Raises:
         ConfigError: If there is no such file, or it cannot be read.
@@ -192,7 +192,7 @@ class Recording:
         self, paths: Sequence[Path], *, warn: Callable[[str], object] = lambda _: None
     ) -> None:
         self.name = recording_name(paths)
-        """What people call it."""
+        """The name, as shown to people."""
         self.dialect: DialectName = _dialect(paths)
         self._warn = warn
         self._failed: set[str] = set()
@@ -200,9 +200,9 @@ class Recording:
         self._reader = _opened(paths, self.name, self.dialect)
         try:
             self.begin = self._reader.start_time
-            """When its first message came, in nanoseconds since 1970."""
+            """Time of the first message, in nanoseconds since 1970."""
             self.end = self._reader.end_time
-            """Right after its last message, likewise."""
+            """Time right after the last message, in nanoseconds since 1970."""
             self.schema = Schema(Dialect(self.dialect))
             self.topics: dict[str, RecordedTopic] = {}
             self._names: dict[str, str] = {}
@@ -217,20 +217,20 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """How long it is."""
+        """Duration in seconds."""
         return (self.end - self.begin) / SECOND
 
     def close(self) -> None:
-        """Read no more."""
+        """Close the file."""
         if not self._closed:
             self._closed = True
             self._reader.close()
 
     def messages(self, start: int) -> Iterator[Recorded]:
-        """Give the messages from a moment on, in their order.
+        """Yield the messages from a time on, in order.
 
         Args:
-            start: The moment, in nanoseconds since 1970.
+            start: The time, in nanoseconds since 1970.
 
         Raises:
             ConfigError: If the file is damaged there.
@@ -241,14 +241,14 @@ class Recording:
     def kept_until(
         self, start: int, go_on: Callable[[], bool] = lambda: True
     ) -> Iterator[Recorded]:
-        """Give the messages of before a moment that still count at it.
+        """Yield the earlier messages that are still valid at a time.
 
         Args:
-            start: The moment, in nanoseconds since 1970.
-            go_on: Asked again and again whether they are still wanted.
+            start: The time, in nanoseconds since 1970.
+            go_on: Called repeatedly; returns whether the messages are still wanted.
 
         Raises:
-            ConfigError: If the file is damaged before it.
+            ConfigError: If the file is damaged before that time.
 
         """
         latched = [
@@ -269,9 +269,9 @@ class Recording:
         yield from newest.values()
 
     def message(self, recorded: Recorded) -> dict[str, Any] | None:
-        """Return a message as the rosbridge server publishes it.
+        """Return a message for the rosbridge server to publish.
 
-        None if its bytes are not of its type, which is said once for each topic.
+        None if its bytes do not fit its type, which is reported once for each topic.
         """
         try:
             value = self._reader.deserialize(recorded.data, recorded.connection.msgtype)
@@ -298,7 +298,7 @@ class Recording:
             raise unreadable(self.name, error) from None
 
     def _usable(self) -> "list[Connection]":
-        """Return what can be played, and note its topics and types."""
+        """Return the connections that can be played; register topics and types."""
         if self._reader.message_count == 0:
             raise ConfigError(f"{self.name}: there is no message in it")
         _add_defaults(self._reader, self.dialect)
@@ -334,18 +334,18 @@ class Recording:
 
 
 def recording_name(paths: Sequence[Path]) -> str:
-    """Return what people call a recording: its file, and how many there are more."""
+    """Return the name of a recording: its file, and the number of further files."""
     first = resolved(paths[0]).name or str(paths[0])
     return first if len(paths) == 1 else f"{first} and {len(paths) - 1} more"
 
 
 def unreadable(name: str, error: Exception) -> ConfigError:
-    """Return what is said of a file that cannot be read."""
+    """Return the error for a file that cannot be read."""
     return ConfigError(f"{name} cannot be read as a recording: {_words(error)}")
 
 
 def _words(error: Exception) -> str:
-    """Return why something could not be read, for people."""
+    """Return why a file could not be read, for people."""
     said = str(error).strip().partition("\n")[0].rstrip(".")
     if not said or isinstance(error, AssertionError | LookupError | TypeError):
         return "it is damaged or cut off"
@@ -375,12 +375,12 @@ def _dialect(paths: Sequence[Path]) -> DialectName:
 
 
 def _refuse_endless(path: Path) -> None:
-    """Refuse what a reader would wait for, or read without end."""
+    """Refuse files on which a reader would block for ever."""
     refuse_special(path)
     if not path.is_dir():
         return
     for entry in path.iterdir():
-        if entry.exists():  # a link that leads nowhere is left to the reader
+        if entry.exists():  # a dangling link is left to the reader
             refuse_special(entry)
     about = path / METADATA
     size = about.stat().st_size if about.is_file() else 0
@@ -406,7 +406,7 @@ def _opened(paths: Sequence[Path], name: str, dialect: DialectName) -> "AnyReade
 
 
 def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
-    """Let a reader know the usual types that the file itself does not define."""
+    """Add the common types that the file itself does not define to a reader."""
     from rosbags.typesys import Stores, get_typestore
 
     known = reader.typestore.fielddefs

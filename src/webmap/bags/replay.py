@@ -1,4 +1,4 @@
-"""A recording as a ROS system that can be listened to, and told nothing."""
+"""A recording as a ROS system that can only be read."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,30 +18,31 @@ from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 
 NODE = "/recording"
-"""The node that publishes what was recorded."""
+"""The node that publishes the recorded messages."""
 
 STATUS = "/webmap/recording"
-"""Where it is said which recording is played, and where in it; a ``std_msgs/String``.
+"""Topic with the name and position of the recording; a ``std_msgs/String``.
 
-It is the replay's own: it is neither recorded nor taken from a recording."""
+Only the replay publishes it: it is neither recorded nor played from a recording.
+"""
 
 REFUSED = "this is a recording: nothing is taken in"
 
 
 class ReplayGraph(Graph):
-    """A ROS graph that takes nothing in once it is sealed.
+    """A ROS graph that accepts no publishers or services once it is sealed.
 
-    Whoever connects may subscribe and ask questions; there is nobody who would obey.
+    Clients may subscribe and ask questions; no node would follow their commands.
     """
 
     def __init__(self, schema: Schema, *, clock: Callable[[], float]) -> None:
         super().__init__(schema, clock=clock)
         self.heard = asyncio.Event()
-        """Set when somebody listens."""
+        """Set at the first subscription."""
         self._sealed = False
 
     def seal(self) -> None:
-        """Let nobody publish or serve any more who did not before."""
+        """Refuse all new publishers and services from now on."""
         self._sealed = True
 
     def advertise(
@@ -53,10 +54,10 @@ class ReplayGraph(Graph):
         node: str = BRIDGE_NODE,
         latch: bool = False,
     ) -> None:
-        """Let ``owner`` publish on a topic, unless the graph is sealed.
+        """Register ``owner`` as publisher of a topic, unless the graph is sealed.
 
         Raises:
-            GraphError: If it is, or as of any graph.
+            GraphError: If the graph is sealed, or as in :meth:`Graph.advertise`.
 
         """
         self._refuse()
@@ -71,10 +72,10 @@ class ReplayGraph(Graph):
         *,
         node: str = BRIDGE_NODE,
     ) -> None:
-        """Let ``owner`` answer a service, unless the graph is sealed.
+        """Register ``owner`` as the server of a service, unless the graph is sealed.
 
         Raises:
-            GraphError: If it is.
+            GraphError: If the graph is sealed.
 
         """
         self._refuse()
@@ -89,10 +90,10 @@ class ReplayGraph(Graph):
         *,
         node: str = BRIDGE_NODE,
     ) -> None:
-        """Let ``owner`` hear a topic, what is latched included.
+        """Subscribe ``owner`` to a topic, and deliver its latched messages.
 
         Raises:
-            GraphError: As of any graph.
+            GraphError: As in :meth:`Graph.subscribe`.
 
         """
         super().subscribe(owner, name, deliver, type_name, node=node)
@@ -104,11 +105,11 @@ class ReplayGraph(Graph):
 
 
 class Replay:
-    """Publishes recorded messages as if they were said now.
+    """Publishes recorded messages as if they came now.
 
     Args:
-        recording: Where they come from.
-        clock: The time in seconds since 1970.
+        recording: The recording.
+        clock: Returns the time in seconds since 1970.
 
     """
 
@@ -119,7 +120,7 @@ class Replay:
         self._static: dict[str, StaticFrames] = {}
 
     def start(self) -> None:
-        """Tell of all topics of the recording, and let nobody add to them."""
+        """Advertise all topics of the recording, and seal the graph."""
         for topic in self.recording.topics.values():
             if topic.name == STATUS:
                 continue
@@ -133,7 +134,7 @@ class Replay:
         self.graph.seal()
 
     def publish(self, recorded: Recorded, pace: Pace) -> None:
-        """Publish a message with its stamps moved, if anybody would get it."""
+        """Publish a message with shifted stamps, if there is a subscriber."""
         name = recorded.topic
         if name == STATUS or not self.graph.is_wanted(name):
             return
@@ -147,5 +148,5 @@ class Replay:
         self.graph.publish(self, name, message)
 
     def say(self, text: str) -> None:
-        """Say how it stands with the replay, for people."""
+        """Publish the status of the replay, for people."""
         self.graph.publish(self, STATUS, {"data": text})

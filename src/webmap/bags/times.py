@@ -1,4 +1,4 @@
-"""The times of a replay: which moment is due when, and what stamps in messages say."""
+"""The times of a replay: when a message is due, and the stamps in played messages."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from webmap.ros.definitions import TIMES, Field
 from webmap.ros.rosbridge.server.schema import Schema
 
 SECOND = 1_000_000_000
-"""Nanoseconds."""
+"""One second, in nanoseconds."""
 
 LAST = 2**31 * SECOND
-"""The end of what a stamp of ROS 2 can say, in nanoseconds since 1970."""
+"""The end of the range of a ROS 2 stamp, in nanoseconds since 1970."""
 
 
 STAMP = "stamp"
-"""What a field is called that says of when a message, or a part of it, is."""
+"""The name of a field with the time of a message, or of a part of it."""
 
 Move = Callable[[int], int]
 """From nanoseconds since 1970 to nanoseconds since 1970."""
@@ -23,17 +23,17 @@ Move = Callable[[int], int]
 
 @dataclass(slots=True)
 class Pace:
-    """Maps the time of a recording to the time at which it is played; no clock.
+    """Maps the time of a recording to the time at which it is played; uses no clock.
 
-    All times are nanoseconds since 1970. At a rate of 1 everything keeps its distance
-    from everything else, so a message is as old when it is played as it was when it was
-    recorded; at another rate distances are divided by the rate, ages too. Two equal
-    stamps stay equal, which frames need.
+    All times are nanoseconds since 1970. At a rate of 1 all time differences stay the
+    same, so a message is as old when it is played as when it was recorded. At another
+    rate differences and ages are divided by the rate. Two equal stamps stay equal,
+    which frames need.
 
     Args:
-        begin: The moment of the recording that is played first.
+        begin: The time in the recording that is played first.
         now: When it is played.
-        rate: How many seconds of the recording are played in one; above 0.
+        rate: Seconds of the recording that are played per second; above 0.
 
     """
 
@@ -42,36 +42,36 @@ class Pace:
     rate: float = 1.0
 
     def due(self, recorded: int) -> int:
-        """Return when a moment of the recording is played."""
+        """Return when a time of the recording is played."""
         return self.now + self._scaled(recorded - self.begin, 1 / self.rate)
 
     def at(self, now: int) -> int:
-        """Return the moment of the recording that is played now."""
+        """Return the time of the recording that is played now."""
         return self.begin + self._scaled(now - self.now, self.rate)
 
     def moved(self, stamp: int) -> int:
-        """Return what a recorded stamp says when it is played.
+        """Return the played value of a recorded stamp.
 
-        Zero says that there is no time, and stays; so does a stamp that would leave
-        what stamps can say, since it came from a clock that was set to another time.
+        Zero means no time, and stays. A stamp that would leave the range of stamps
+        stays, too, since it came from a clock that was set to another time.
         """
         moved = self.due(stamp)
         return moved if stamp != 0 and 0 < moved < LAST else stamp
 
     def put_off(self, by: int) -> None:
-        """Play everything later than it was due, by so many nanoseconds."""
+        """Delay everything by so many nanoseconds."""
         self.now += by
 
     def _scaled(self, distance: int, factor: float) -> int:
-        # A float would round a distance of years to microseconds.
+        # A float would round a difference of years to microseconds.
         return distance if factor == 1.0 else round(distance * factor)
 
 
 class Stamps:
-    """Finds the stamps in messages: every time field called so, however deep.
+    """Finds the stamps in messages: every time field of that name, at any depth.
 
     Args:
-        schema: Knows the fields of the types, and how its dialect spells times.
+        schema: The types with their fields, and the dialect of times.
 
     """
 
@@ -81,12 +81,12 @@ class Stamps:
         self._known: dict[str, list[tuple[Field, str]]] = {}
 
     def move(self, type_name: str, message: dict[str, Any], move: Move) -> None:
-        """Move every stamp in a message, in place.
+        """Shift every stamp in a message, in place.
 
         Args:
-            type_name: Of the message, as the schema knows it.
-            message: It belongs to the caller, with all that is in it.
-            move: Gives what a stamp is to say.
+            type_name: The type of the message, by its name in the schema.
+            message: The message; the caller owns it and all its parts.
+            move: Returns the new value of a stamp.
 
         """
         for field, inner in self._leading(type_name):
@@ -102,7 +102,7 @@ class Stamps:
         time[self._whole], time[self._rest] = divmod(moved, SECOND)
 
     def _leading(self, type_name: str) -> list[tuple[Field, str]]:
-        """Return the fields of a type that are stamps, or lead to some by a type."""
+        """Return the fields of a type that are stamps or contain stamps."""
         found = self._known.get(type_name)
         if found is None:
             found = self._known[type_name] = []

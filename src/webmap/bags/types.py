@@ -1,4 +1,4 @@
-"""What rosbags knows of the types of a ROS, and messages as bytes by that."""
+"""The message types of rosbags, and the serialization of messages with them."""
 
 import base64
 import binascii
@@ -31,26 +31,26 @@ if TYPE_CHECKING:
 
 ROS1 = ("ROS1_NOETIC",)
 ROS2 = ("ROS2_KILTED", "ROS2_JAZZY", "ROS2_IRON", "ROS2_HUMBLE", "ROS2_FOXY")
-"""Releases whose types are known, in the order in which they are tried."""
+"""Releases with known types, in the order in which they are tried."""
 
 _ARRAY, _SEQUENCE = 3, 4
 """rosbags' kinds of fields that are arrays."""
 
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _FILLER = "structure_needs_at_least_one_member"
-"""What a type without fields has in ROS 2, where nobody looks."""
+"""The only field in ROS 2 of a type without fields."""
 
 
 def texts_of(store: "Typestore", type_name: str) -> dict[str, str]:
     """Return the definitions of a type and of all types in it, as texts by name.
 
     Args:
-        store: What rosbags knows of types.
-        type_name: As rosbags has it: ``nav_msgs/msg/Odometry``.
+        store: The types of rosbags.
+        type_name: The name in rosbags: ``nav_msgs/msg/Odometry``.
 
     Raises:
-        UnknownType: If the store does not know the type or one in it, or a field is
-            of a kind that messages over rosbridge do not have.
+        UnknownType: If the store lacks the type or one in it, or a field is of a kind
+            that messages over rosbridge do not have.
 
     """
     found: dict[str, str] = {}
@@ -83,15 +83,15 @@ def texts_of(store: "Typestore", type_name: str) -> dict[str, str]:
 
 
 class TypeVersion:
-    """A message type as one release of ROS has it, and the bytes of its messages.
+    """A message type in one release of ROS, with the serialization of its messages.
 
     Args:
-        store: What rosbags knows of the types of that release.
-        type_name: As rosbags has it: ``nav_msgs/msg/Odometry``.
-        dialect: Whose bytes they are.
+        store: The types of that release in rosbags.
+        type_name: The name in rosbags: ``nav_msgs/msg/Odometry``.
+        dialect: The dialect of the bytes.
 
     Raises:
-        ConfigError: If that release has no such type, or it makes no sense.
+        ConfigError: If the release has no such type, or the type is invalid.
 
     """
 
@@ -106,10 +106,10 @@ class TypeVersion:
         self._conformer = _FromRobot(ros2=self._ros2)
 
     def bytes_of(self, message: object) -> bytes:
-        """Return a message as ROS itself puts it on its wire.
+        """Return the serialized bytes of a message, as ROS sends them.
 
         Raises:
-            Misfit: If the message does not fit the type as this release has it.
+            Misfit: If the message does not fit the type in this release.
 
         """
         whole = self._conformer.message(self._fields, message)
@@ -120,10 +120,10 @@ class TypeVersion:
 
 
 class Types:
-    """The types of one ROS, as its releases have them.
+    """The types of one ROS, in all its releases.
 
     Args:
-        dialect: Which ROS.
+        dialect: ROS 1 or ROS 2.
 
     """
 
@@ -133,12 +133,12 @@ class Types:
         self._stores: dict[str, Typestore] = {}
 
     def versions(self, type_name: str) -> Iterator[TypeVersion]:
-        """Give a message type as each release has it, the newest first.
+        """Yield a message type in each release, the newest first.
 
-        Nothing is given for a type that neither rosbags nor WebMap knows.
+        Yields nothing for a type that is unknown to both rosbags and WebMap.
 
         Args:
-            type_name: In the spelling of either ROS.
+            type_name: The type, in either dialect.
 
         """
         try:
@@ -170,10 +170,10 @@ class Types:
 
 
 class _FromRobot(Conformer):
-    """Takes whole messages, in every form in which a rosbridge sends them.
+    """Accepts complete messages, in every encoding of a rosbridge.
 
-    In JSON a ``null`` stands for a float that is not finite; it becomes NaN. Bytes come
-    as they are, as a list, or as text in base64.
+    In JSON ``null`` means a float that is not finite; it becomes NaN. Bytes come as
+    bytes, as a list, or as text in base64.
     """
 
     def absent(self, field: Field, made: dict[str, Any]) -> None:
@@ -191,7 +191,7 @@ class _FromRobot(Conformer):
         dtype = np.dtype(DTYPES.get(field.type, "?"))
         try:
             with np.errstate(invalid="ignore"):
-                numbers = np.ascontiguousarray(value, dtype)  # of None it makes NaN
+                numbers = np.ascontiguousarray(value, dtype)  # None becomes NaN
         except (TypeError, ValueError, OverflowError) as error:
             raise Misfit(str(error)) from None
         if dtype.kind in "iu" and not octets:
@@ -210,7 +210,7 @@ class _FromRobot(Conformer):
         return float(value)
 
     def whole(self, field: Field, value: Any) -> int:
-        if isinstance(value, str | bytes):  # in ROS 2 a number of one byte comes so
+        if isinstance(value, str | bytes):  # in ROS 2 a one-byte number may come so
             one = isinstance(value, str) and len(value) == 1
             octets = b"" if one else _octets(value)
             value = ord(value) if one else int.from_bytes(octets, "little")

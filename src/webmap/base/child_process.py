@@ -13,7 +13,7 @@ class ChildProcess(NamedTuple):
 
     process: "subprocess.Popen[str]"
     stdin: IO[str]
-    """Its standard input; the process ends when this ends."""
+    """Its standard input; the process ends when this is closed."""
     line: str
     """The first line that it wrote; empty if it ended before."""
 

@@ -1,4 +1,4 @@
-"""Child processes that run Python: how they are started, and what ends them."""
+"""Start and end of child processes that run Python."""
 
 import contextlib
 import os
@@ -8,19 +8,19 @@ import time
 from collections.abc import Callable
 
 GRACE = 3.0
-"""Seconds that a process has to end in order when its parent has ended."""
+"""Seconds in which a process can end in order after the end of its parent."""
 
 
 def python_command(module: str, *arguments: object) -> list[str]:
     """Return the command line that runs a module in another Python.
 
     ``-P`` keeps the working folder out of the module search path. Without it, a file
-    such as ``msgspec.py`` in that folder would run in place of the real module. The
-    variable ``PYTHONPATH`` counts as before.
+    such as ``msgspec.py`` in that folder would run instead of the real module. The
+    variable ``PYTHONPATH`` stays in effect.
 
     Args:
-        module: Its name, such as ``webmap.gate``.
-        arguments: What follows on the command line.
+        module: The module, such as ``webmap.gate``.
+        arguments: The arguments after the module.
 
     """
     return [sys.executable, "-P", "-m", module, *map(str, arguments)]
@@ -34,7 +34,7 @@ def end_with_parent(
     """End this process when its standard input ends.
 
     The parent holds the other end of that pipe, so the pipe ends with the parent, also
-    when the parent is killed. A process that is still there after ``grace`` seconds,
+    when the parent is killed. A process that still runs after ``grace`` seconds,
     because it hangs, exits at once.
 
     Args:
@@ -45,11 +45,11 @@ def end_with_parent(
     """
 
     def watch() -> None:
-        # Not through sys.stdin: its lock would be held while the interpreter ends.
+        # Do not use sys.stdin: its lock would be held while the interpreter ends.
         with contextlib.suppress(OSError, RuntimeError):
             while os.read(0, 4096):
                 on_data()
-        with contextlib.suppress(RuntimeError):  # the event loop is closed already
+        with contextlib.suppress(RuntimeError):  # the event loop is already closed
             end()
         time.sleep(grace)
         os._exit(1)

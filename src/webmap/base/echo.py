@@ -1,4 +1,4 @@
-"""What commands print: names and texts of robots must not steer the terminal."""
+"""Output of commands: names and texts of robots must not control the terminal."""
 
 import contextlib
 
@@ -8,16 +8,16 @@ from webmap.base.logs import budgets
 from webmap.base.outside_text import lines_of, one_line
 
 LONGEST = 10_000
-"""Characters of a line that is printed; a list of topics may be long."""
+"""Most characters of a printed line; a list of topics may be long."""
 
 
 def echo(text: object, *, err: bool = False, lines: bool = False) -> None:
-    """Print a text and a line break; what is not printable is escaped.
+    """Print text and a line break; characters that are not printable are escaped.
 
     Args:
         text: The text.
-        err: Whether it goes to standard error.
-        lines: Whether line breaks in it are WebMap's own, and are kept.
+        err: Whether to print to standard error.
+        lines: Whether line breaks in the text are WebMap's own, and are kept.
 
     """
     click.echo((lines_of if lines else one_line)(text, LONGEST), err=err)

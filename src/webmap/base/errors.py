@@ -3,17 +3,17 @@
 ::
 
     WebMapError
-    ├── BridgeError            a link to a ROS system
-    │   ├── BridgeClosed       the link is not open now
-    │   ├── ProtocolError      bytes that cannot be understood
-    │   └── ServiceError       a ROS service failed, or did not answer
-    ├── MotionError            a command that the gate did not take
-    │   ├── NoLease            somebody else drives, or nobody took the robot
-    │   └── MotionRefused      velocity or goals outside the gate's road
+    ├── BridgeError            an error of the connection to a ROS system
+    │   ├── BridgeClosed       the connection is not open now
+    │   ├── ProtocolError      bytes that cannot be read
+    │   └── ServiceError       a ROS service failed, or did not respond
+    ├── MotionError            a command that the gate refused
+    │   ├── NoLease            the sender has no control of the robot
+    │   └── MotionRefused      velocity or goals that bypass the gate
     ├── ModuleNotFound         no module of that name
     ├── SceneError             an element or attribute outside the allow-list
     ├── WireError              bytes that are not a message between page and display
-    └── ConfigError            a file or an argument that does not make sense
+    └── ConfigError            an invalid file or argument
 """
 
 
@@ -22,34 +22,34 @@ class WebMapError(Exception):
 
 
 class BridgeError(WebMapError):
-    """Something went wrong on a link to a ROS system."""
+    """An error of the connection to a ROS system."""
 
 
 class BridgeClosed(BridgeError):
-    """The link to the ROS system is not open now, and nothing is queued."""
+    """The connection to the ROS system is not open now, and nothing is queued."""
 
     why = ""
-    """How the attempt to open it failed, without the address, if that is known."""
+    """Why the attempt to open it failed, without the address, if known."""
 
 
 class ProtocolError(BridgeError):
-    """Bytes came in that cannot be understood."""
+    """Bytes came in that cannot be read."""
 
 
 class ServiceError(BridgeError):
-    """A ROS service answered with a failure, or did not answer in time."""
+    """A ROS service responded with a failure, or did not respond in time."""
 
 
 class MotionError(WebMapError):
-    """A command for a robot was not taken."""
+    """A command for a robot was refused."""
 
 
 class NoLease(MotionError):
-    """The lease of the robot is not held by the one who gave the command."""
+    """The sender of the command has no control of the robot."""
 
 
 class MotionRefused(MotionError):
-    """Velocity, goals and cancel are written by the gate and by nobody else."""
+    """A velocity, goal or cancel that bypasses the gate, which alone publishes them."""
 
 
 class ModuleNotFound(WebMapError, LookupError):
@@ -57,7 +57,7 @@ class ModuleNotFound(WebMapError, LookupError):
 
 
 class SceneError(WebMapError, ValueError):
-    """A tag, an attribute or a place in the tree that the scene does not allow."""
+    """A tag, an attribute or a position in the tree that the scene does not allow."""
 
 
 class WireError(WebMapError, ValueError):
@@ -65,4 +65,4 @@ class WireError(WebMapError, ValueError):
 
 
 class ConfigError(WebMapError, ValueError):
-    """A file or an argument that does not make sense, and what would."""
+    """An invalid file or argument; the error message gives valid values."""

@@ -1,22 +1,22 @@
 """Positions, orientations, velocities and the matrices of the view: plain values.
 
-Lengths are metres and angles radians unless a name says otherwise (REP 103).
+Lengths are metres and angles radians unless a name shows another unit (REP 103).
 """
 
 import math
 from dataclasses import dataclass
 
 FARTHEST = 1e7
-"""Metres: a number beyond the size of a planet is a mistake, and no browser draws it.
+"""Metres: a number beyond the size of a planet is an error that no browser can draw.
 
-Numbers that are finite and absurd, such as 1e300, overflow the single precision that
-browsers draw with, and the whole view then fits nothing.
+Finite numbers such as 1e300 overflow the single precision that browsers draw with, and
+the whole view then fits nothing.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Vector3:
-    """Three numbers along x, y and z, as ``geometry_msgs/Vector3`` and ``Point``."""
+    """Three numbers along x, y and z, as in ``geometry_msgs/Vector3`` and ``Point``."""
 
     x: float = 0.0
     y: float = 0.0
@@ -35,7 +35,7 @@ def normalize_angle(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Quaternion:
-    """An orientation, with the components' names of ``geometry_msgs/Quaternion``."""
+    """An orientation, with the component names of ``geometry_msgs/Quaternion``."""
 
     x: float = 0.0
     y: float = 0.0
@@ -49,12 +49,12 @@ class Quaternion:
 
     @property
     def norm(self) -> float:
-        """The length; 1 for a rotation, 0 or NaN for a message that is none."""
+        """The length; 1 for a rotation, 0 or NaN if a message holds no rotation."""
         return math.hypot(self.x, self.y, self.z, self.w)
 
     @property
     def yaw(self) -> float:
-        """The heading about z, in radians in ``[-pi, pi]``, whatever the norm.
+        """The heading about z, in radians in ``[-pi, pi]``, for any norm.
 
         It is 0 for a quaternion of zeros and NaN for one with NaN.
         """
@@ -66,7 +66,7 @@ class Quaternion:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """A velocity of a base in its own frame.
+    """The velocity of a robot's base in its own frame.
 
     The first three numbers move it in the plane. The others are 0 for every base that
     moves on the ground.
@@ -97,12 +97,12 @@ class Twist:
 
     @property
     def speed(self) -> float:
-        """Metres per second, whatever the direction."""
+        """Metres per second, in any direction."""
         return math.hypot(self.vx, self.vy, self.vz)
 
     @property
     def turn(self) -> float:
-        """Radians per second, whatever the axis."""
+        """Radians per second, about any axis."""
         return math.hypot(self.wx, self.wy, self.wz)
 
     @property
@@ -116,7 +116,7 @@ class Twist:
         return all(map(math.isfinite, self.numbers))
 
     def to_message(self) -> dict[str, dict[str, float]]:
-        """Return it as ``geometry_msgs/Twist`` has it."""
+        """Return the fields of a ``geometry_msgs/Twist``."""
         return {
             "linear": {"x": self.vx, "y": self.vy, "z": self.vz},
             "angular": {"x": self.wx, "y": self.wy, "z": self.wz},
@@ -125,7 +125,7 @@ class Twist:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A place and a heading in the plane of a frame that the context names."""
+    """A position and a heading in the plane of a frame that the context defines."""
 
     x: float = 0.0
     """Metres along the frame's x."""
@@ -147,7 +147,7 @@ class Pose:
 
     @property
     def inverse(self) -> "Pose":
-        """The pose that undoes this one: ``pose @ pose.inverse`` is the origin."""
+        """The inverse pose: ``pose @ pose.inverse`` is the origin."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return Pose(
             -cos * self.x - sin * self.y,
@@ -158,9 +158,9 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Affine:
-    """A map of the plane, with the components' names of ``SVGMatrix``.
+    """An affine transform of the plane, with the component names of ``SVGMatrix``.
 
-    A point ``(x, y)`` goes to ``(a*x + c*y + e, b*x + d*y + f)``.
+    A point ``(x, y)`` becomes ``(a*x + c*y + e, b*x + d*y + f)``.
     """
 
     a: float = 1.0
@@ -172,18 +172,18 @@ class Affine:
 
     @classmethod
     def of_pose(cls, pose: "Pose") -> "Affine":
-        """Return the map from the frame that has this pose to the frame around it."""
+        """Return the transform from the frame that has this pose to the outer frame."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         return cls(cos, sin, -sin, cos, pose.x, pose.y)
 
     @classmethod
     def translation(cls, x: float, y: float) -> "Affine":
-        """Return the map that moves every point by ``(x, y)``."""
+        """Return the transform that moves every point by ``(x, y)``."""
         return cls(e=x, f=y)
 
     @classmethod
     def scaling(cls, factor: float, x: float = 0.0, y: float = 0.0) -> "Affine":
-        """Return the map that scales by ``factor`` and leaves ``(x, y)`` in place.
+        """Return the transform that scales by ``factor`` and keeps ``(x, y)``.
 
         Raises:
             ValueError: If ``factor`` is not a finite number above 0.
@@ -195,20 +195,20 @@ class Affine:
 
     @classmethod
     def rotation(cls, angle: float, x: float = 0.0, y: float = 0.0) -> "Affine":
-        """Return the turn by ``angle`` that leaves ``(x, y)`` in place.
+        """Return the rotation by ``angle`` that keeps ``(x, y)``.
 
         Args:
-            angle: Radians from the first axis towards the second. Seen on a screen,
-                where y points down, that is clockwise.
-            x: The point that stays, along the first axis.
-            y: The point that stays, along the second axis.
+            angle: Radians from the first axis towards the second. On a screen, where y
+                points down, this is clockwise.
+            x: The fixed point, along the first axis.
+            y: The fixed point, along the second axis.
 
         """
         cos, sin = math.cos(angle), math.sin(angle)
         return cls(cos, sin, -sin, cos, x - cos * x + sin * y, y - sin * x - cos * y)
 
     def __matmul__(self, other: "Affine") -> "Affine":
-        """Return the map that applies ``other`` first and this one to its result."""
+        """Return the transform that applies ``other`` first, then this one."""
         return Affine(
             self.a * other.a + self.c * other.b,
             self.b * other.a + self.d * other.b,
@@ -219,20 +219,20 @@ class Affine:
         )
 
     def apply(self, x: float, y: float) -> tuple[float, float]:
-        """Return where the point ``(x, y)`` goes."""
+        """Return the transformed point of ``(x, y)``."""
         return (self.a * x + self.c * y + self.e, self.b * x + self.d * y + self.f)
 
     @property
     def determinant(self) -> float:
-        """The factor by which areas grow; negative if the map mirrors."""
+        """The factor by which areas grow; negative if the transform mirrors."""
         return self.a * self.d - self.b * self.c
 
     @property
     def inverse(self) -> "Affine":
-        """The map that undoes this one.
+        """The inverse transform.
 
         Raises:
-            ValueError: If the map flattens the plane.
+            ValueError: If the transform flattens the plane.
 
         """
         det = self.determinant

@@ -6,11 +6,11 @@ _numbers = itertools.count(1)
 
 
 def generate_id() -> str:
-    """Return an identifier for a link that no other part of the process uses.
+    """Return an identifier for a connection that is unique in this process.
 
     Returns:
-        ``"WebMap-"`` and a number, as the WebMap report of 2012 has it, so that
-        it cannot meet the identifiers of another library on the same link.
+        ``"WebMap-"`` and a number, as in the WebMap report of 2012, so that it differs
+        from the identifiers of other libraries on the same connection.
 
     """
     return f"WebMap-{next(_numbers)}"

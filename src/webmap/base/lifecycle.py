@@ -1,8 +1,8 @@
-"""Who starts what: constructors record, :func:`webmap.start` does the I/O.
+"""The life cycle of services: constructors register, :func:`webmap.start` does the I/O.
 
-A :class:`Service` (a bridge, for one) adds itself to :data:`lifecycle` when it is
-made. Nothing happens until the model's event loop runs; from then on a service that
-is added starts at once.
+A :class:`Service`, such as a bridge, adds itself to :data:`lifecycle` when it is
+created. Nothing happens until the model's event loop runs; from then on an added
+service starts at once.
 """
 
 import asyncio
@@ -16,13 +16,13 @@ log = logging.getLogger("webmap")
 
 
 class Service(Protocol):
-    """Something with I/O of its own on the model's event loop."""
+    """An object with I/O of its own on the model's event loop."""
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin; called in the loop's thread."""
+        """Begin the work; called in the loop's thread."""
 
     async def stop(self) -> None:
-        """End, and leave nothing behind."""
+        """Stop all work of the service."""
 
 
 class Lifecycle:
@@ -40,17 +40,17 @@ class Lifecycle:
         return self.loop is not None
 
     def add(self, service: Service) -> None:
-        """Let ``service`` start with the process, or now if that has started."""
+        """Start ``service`` with the process, or now if that has started."""
         self._services.add(service)
         if self.loop is not None:
             self.call(service.start, self.loop)
 
     def discard(self, service: Service) -> None:
-        """Forget ``service``; it does not start any more."""
+        """Forget ``service``, without stopping it."""
         self._services.discard(service)
 
     def end_service(self, service: Service) -> None:
-        """Forget ``service`` and stop it, soon, if the process has started."""
+        """Forget ``service`` and stop it soon, if the process has started."""
         self.discard(service)
         if self.loop is not None:
             self.call(self._begin_to_stop, service)
@@ -95,4 +95,4 @@ async def _stop(service: Service) -> None:
 
 
 lifecycle = Lifecycle()
-"""The one life cycle of this process."""
+"""The only life cycle of this process."""

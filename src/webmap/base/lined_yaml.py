@@ -1,4 +1,4 @@
-"""YAML files that people write by hand, and on which line of them something stands."""
+"""YAML files that people write by hand, with the line number of each value."""
 
 from pathlib import Path
 from typing import Any
@@ -10,30 +10,31 @@ from webmap.base.outside_text import one_line
 from webmap.base.plain_files import read_file
 
 LARGEST = 1 << 18
-"""Bytes that a file may have; a megabyte takes half a minute to read."""
+"""Most bytes of a file; a megabyte takes half a minute to read."""
 
 DEEPEST = 50
-"""Values in one another."""
+"""Greatest depth of nested values."""
 
 MOST_VALUES = 40_000
-"""Keys and values of a file."""
+"""Most keys and values of a file."""
 
 MOST_DIGITS = 100
-"""Characters of a number; one of very many, such as 1:1:1, takes minutes to read."""
+"""Most characters of a number; one with many parts, as 1:1:1, takes minutes to read."""
 
 
 class LinedYaml:
-    """What a YAML file says, and where; JSON is YAML, too.
+    """The values of a YAML file, with line numbers; JSON is YAML, too.
 
-    Aliases are refused: a few of them in one another stand for more than any memory
-    holds. So is a key that is there twice, of which one would be lost.
+    Aliases are refused: a few nested ones expand beyond any memory. Duplicate keys are
+    refused, since one of them would be lost.
 
     Args:
         file: The file.
-        texts: Whether to make nothing but texts, so that "yes" is not taken for a 1.
+        texts: Whether all values stay strings, so that "yes" does not become a boolean.
 
     Raises:
-        ConfigError: If it cannot be read or is no such YAML; file and line are named.
+        ConfigError: If the file cannot be read or is not such YAML; the error message
+            names file and line.
 
     """
 
@@ -47,7 +48,7 @@ class LinedYaml:
             if node is not None:
                 self._note((), node)
             self.data: Any = None if node is None else loader.construct_document(node)
-            """What it says, as plain values; None if it says nothing."""
+            """The values, as plain data; None if the file is empty."""
         except ConfigError:
             raise
         except OSError as error:
@@ -64,18 +65,18 @@ class LinedYaml:
             raise ConfigError(f"{file}: this is no YAML: {words}") from None
 
     def wrong(self, way: tuple[str | int, ...], words: str) -> ConfigError:
-        """Return the error that something is wrong, with file and line.
+        """Return an error with file and line.
 
         Args:
-            way: Keys and indices on the way to it; what is not there is taken to be
-                where the part stands that lacks it.
-            words: What was got and what was expected.
+            way: Keys and indices of the wrong value; for a missing value, the line is
+                that of the part that lacks it.
+            words: The wrong value and the expected one.
 
         """
         while way and way not in self._lines:
             way = way[:-1]
         line = self._lines.get(way, 1)
-        # What a file holds must not steer the terminal that shows it.
+        # Text of a file must not control the terminal that shows it.
         return ConfigError(f"{self.file}:{line}: {one_line(words)}")
 
     def _note(self, way: tuple[str | int, ...], node: yaml.Node) -> None:
@@ -97,7 +98,7 @@ class LinedYaml:
 
 
 class _Bounded(yaml.composer.Composer):
-    """Refuses what takes long to read, as soon as it is met."""
+    """Refuses values that take long to read, before they are built."""
 
     _depth = 0
     _values = 0

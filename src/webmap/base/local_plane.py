@@ -1,8 +1,8 @@
 """A plane that touches the globe: from latitude and longitude to metres and back.
 
-It is the local tangent plane of WGS 84, east and north of a datum, as
-``robot_localization`` and GeographicLib's LocalCartesian have it. Directions from the
-datum are exact. A length on the ground is drawn shorter by its cube over six times the
+This is the local tangent plane of WGS 84, east and north of a datum, as in
+``robot_localization`` and GeographicLib's LocalCartesian. Directions from the datum are
+exact. A length on the ground is drawn shorter by its cube divided by six times the
 square of the earth's radius: 4 mm at 10 km, 0.5 m at 50 km.
 """
 
@@ -15,20 +15,20 @@ EQUATOR = 6378137.0
 ECCENTRICITY_2 = 6.69437999014e-3
 
 REACH = 100_000.0
-"""Metres from the datum within which the plane is used: it is 4 m wrong there."""
+"""Metres from the datum within which the plane is used; the error there is 4 m."""
 
 
 class LocalPlane:
     """The plane that touches the globe at a datum.
 
     Args:
-        latitude: Of the datum, in degrees, north positive; on no pole.
-        longitude: In degrees, east positive.
-        east: How far x is turned from east, in degrees, counter-clockwise from above:
-            90 if x points north.
+        latitude: Latitude of the datum, in degrees, north positive; not a pole.
+        longitude: Longitude of the datum, in degrees, east positive.
+        east: The angle from east to x, in degrees, counter-clockwise from above: 90 if
+            x points north.
 
     Raises:
-        ConfigError: If the datum is on no globe, or ``east`` is not finite.
+        ConfigError: If the datum is not on the globe, or ``east`` is not finite.
 
     """
 
@@ -47,7 +47,7 @@ class LocalPlane:
         self._turn = math.cos(turn), math.sin(turn)
 
     def from_globe(self, latitude: float, longitude: float) -> tuple[float, float]:
-        """Return x and y of a place, in metres.
+        """Return x and y of a position, in metres.
 
         Args:
             latitude: In degrees.
@@ -66,17 +66,17 @@ class LocalPlane:
         return cos * east - sin * north, sin * east + cos * north
 
     def to_globe(self, x: float, y: float) -> tuple[float, float]:
-        """Return latitude and longitude of a place on the plane, in degrees.
+        """Return latitude and longitude of a position on the plane, in degrees.
 
         Args:
             x: Metres, within :data:`REACH` of the datum.
-            y: Likewise.
+            y: Metres, within :data:`REACH` of the datum.
 
         """
         lat, lon = self.latitude, self.longitude
         flat = 1 - ECCENTRICITY_2 * self._sin**2
         metres_lat = math.radians(EQUATOR * (1 - ECCENTRICITY_2) / flat**1.5)
-        for _ in range(12):  # each round is tens of times nearer at the least
+        for _ in range(12):  # each round divides the error by at least 10
             at_x, at_y = self.from_globe(lat, lon)
             dx, dy = x - at_x, y - at_y
             cos, sin = self._turn
@@ -93,5 +93,5 @@ class LocalPlane:
 
 
 def _radius(sine: float) -> float:
-    """Return how far the axis is from a place, straight down, in metres."""
+    """Return the distance from a position straight down to the axis, in metres."""
     return EQUATOR / math.sqrt(1 - ECCENTRICITY_2 * sine * sine)

@@ -1,8 +1,8 @@
-"""What WebMap logs: on one line, of a limited length, and not without end.
+"""WebMap's log: one line for each record, of limited length and limited rate.
 
 Text of robots, bridges, browsers and files gets into the log. A filter on each of
-WebMap's loggers makes it harmless before any handler sees the record, so this holds
-for the logging that a program sets up for itself, too.
+WebMap's loggers escapes that text before any handler sees the record, so this also
+holds for the logging that a program sets up for itself.
 """
 
 import logging
@@ -39,7 +39,7 @@ LOGGERS = (
 """Every logger of WebMap."""
 
 OTHERS = ("uvicorn.error", "websockets.client", "websockets.server")
-"""Loggers of libraries that log what WebMap's peers send."""
+"""Loggers of libraries that log text of WebMap's peers."""
 
 BURST = 30
 """Lines in a row that one source may log."""
@@ -48,7 +48,7 @@ PAUSE = 5.0
 """Seconds until a source that has used up its lines may log one more."""
 
 MOST_SOURCES = 1000
-"""Sources that are told apart; a peer can invent names."""
+"""Most sources that are counted separately; a peer can invent names."""
 
 MOST_LINES = 80
 """Lines of a traceback that are logged."""
@@ -64,10 +64,10 @@ class _Budget:
 
 
 class Budgets:
-    """How many lines each source may log. No I/O.
+    """Counts how many lines each source may log. No I/O.
 
     Args:
-        clock: Seconds that only go forward.
+        clock: A clock in seconds that never goes back.
 
     """
 
@@ -77,11 +77,11 @@ class Budgets:
         self._sources: dict[tuple[object, ...], _Budget] = {}
 
     def note(self, place: tuple[object, ...], about: str) -> str | None:
-        """Return what is added to the next line of a source; None leaves it out.
+        """Return the suffix of the next line of a source; None to drop the line.
 
         Args:
-            place: Where in the code the line is logged.
-            about: What the line is about, such as the name of a bridge.
+            place: The place in the code that logs the line.
+            about: The subject of the line, such as the name of a bridge.
 
         """
         with self._lock:
@@ -105,7 +105,7 @@ class Budgets:
             return words
 
     def clear(self) -> None:
-        """Forget what was logged so far."""
+        """Forget all counts."""
         with self._lock:
             self._sources.clear()
 
@@ -120,36 +120,36 @@ class Budgets:
 
 
 class OutsideText(logging.Filter):
-    """Makes a record harmless and drops what a source logs without end."""
+    """Escapes the text of records, and drops records of a source that logs too much."""
 
     def __init__(self, budgets: Budgets) -> None:
         super().__init__()
         self._budgets = budgets
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Return whether the record is logged; its text is made harmless."""
+        """Escape the text of the record; return whether the record is logged."""
         if getattr(record, "webmap_checked", False):
-            return True  # by its logger; this is a handler
+            return True  # filtered by its logger; this is a handler
         place = (record.name, record.pathname, record.lineno)
         added = self._budgets.note(place, _source(record))
         if added is None:
             return False
         record.msg, record.args = one_line(_message(record)) + added, None
         if record.exc_info and record.exc_info[0] is not None:
-            # Formatters take this in place of what they would make of the exception.
+            # Formatters use this text instead of formatting the exception themselves.
             record.exc_text = _traceback(record)
         record.webmap_checked = True
         return True
 
 
 budgets = Budgets()
-"""Of this process."""
+"""The budgets of this process."""
 
 _filter = OutsideText(budgets)
 
 
 def guard_loggers() -> None:
-    """Have everything that WebMap logs made harmless, whoever handles it."""
+    """Filter all records of WebMap's loggers, for any handler."""
     for name in (*LOGGERS, *OTHERS):
         logging.getLogger(name).addFilter(_filter)
 
@@ -159,27 +159,28 @@ def set_up_logging(
     handler: logging.Handler | None = None,
     format: str = FORMAT,
 ) -> None:
-    """Log to standard error, as a process of WebMap does that has no other logging.
+    """Log to standard error, as a process of WebMap without other logging does.
 
     Args:
         level: The least level that is logged.
-        handler: What writes the records, formatted already; standard error if None.
-        format: As :mod:`logging` takes it, if there is no handler.
+        handler: The handler, with a formatter; standard error if None.
+        format: A format of :mod:`logging`; used if there is no handler.
 
     """
     if handler is None:
         handler = logging.StreamHandler()
         handler.setFormatter(logging.Formatter(format))
-    handler.addFilter(_filter)  # what other libraries log
+    handler.addFilter(_filter)  # records of other libraries
     logging.basicConfig(level=level, handlers=[handler])
     for noisy in ("websockets", "uvicorn", "asyncio", "PIL"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 
 def _source(record: logging.LogRecord) -> str:
-    """Return what a record is about: ``extra={"source": ...}``, or its first argument.
+    """Return the subject of a record: ``extra={"source": ...}``, or the first argument.
 
-    An only argument is the whole text, and no two texts need be the same.
+    A single argument is often the whole text, which differs in every record, and is not
+    used.
     """
     source = getattr(record, "source", None)
     if source is None and isinstance(record.args, tuple) and len(record.args) > 1:
@@ -190,7 +191,7 @@ def _source(record: logging.LogRecord) -> str:
 def _message(record: logging.LogRecord) -> str:
     try:
         return record.getMessage()
-    except Exception:  # a text that cannot be made must not end who logs
+    except Exception:  # a wrong format must not end the caller
         return str(record.msg)
 
 
@@ -204,5 +205,5 @@ def _traceback(record: logging.LogRecord) -> str:
         half = MOST_LINES // 2
         left_out = f"... {len(lines) - 2 * half} lines are left out ..."
         lines = [*lines[:half], left_out, *lines[-half:]]
-    # Indented, so that no line of it looks like the beginning of another record.
+    # Indented, so that no line looks like the beginning of another record.
     return "\n".join(f"  {one_line(line)}" for line in lines)

@@ -1,4 +1,4 @@
-"""Maps from disk, in the form of ROS's map_server: a YAML file and an image."""
+"""Maps from disk, in the format of ROS's map_server: a YAML file and an image."""
 
 import math
 from dataclasses import dataclass
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     from PIL import Image
 
 MAX_YAML = 1 << 14
-"""Bytes of the YAML; a map's own has 200, and reading much of it takes long."""
+"""Most bytes of the YAML file; map_server writes 200, and long files read slowly."""
 
 MAX_PIXELS = 1 << 26
 
 MAX_DECODED = 128 << 20
-"""Bytes of the decoded image; it is decoded as a whole."""
+"""Most bytes of the decoded image; it is decoded as a whole."""
 
 PIECE = 1024
-"""Side of the squares that are made cells at a time, some twenty bytes a pixel."""
+"""Side of the squares that are converted at a time, with about 20 bytes per pixel."""
 
 _PIXEL = {"1": 1, "L": 1, "P": 1, "I;16": 2, "I;16B": 2, "I;16L": 2}
 """Bytes of a decoded pixel, by the mode of the image; 4 in other modes."""
 
 FINEST = 1e-4
-"""The least side of a cell, in metres: less is a number in another unit."""
+"""The least side of a cell, in metres; a smaller number has another unit."""
 
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
-"""What map_server reads, by its magic bytes; PPM includes PGM."""
+"""The formats that map_server reads, by magic bytes; PPM includes PGM."""
 
 MAGIC = (b"P", b"\x89PNG", b"BM", b"\xff\xd8")
-"""How files of these formats begin."""
+"""The first bytes of files of these formats."""
 
 MODES = ("trinary", "scale", "raw")
 TRUTH = {"0": False, "1": True, "false": False, "true": True}
@@ -44,7 +44,7 @@ TRUTH = {"0": False, "1": True, "false": False, "true": True}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapImage:
-    """A map as ``nav_msgs/OccupancyGrid`` has it."""
+    """A map with the fields of ``nav_msgs/OccupancyGrid``."""
 
     cells: "NDArray[np.int8]"
     """Of shape (height, width), the lowest row first: 0 to 100, or -1 unknown."""
@@ -56,7 +56,7 @@ class MapImage:
     """The pose of the lower left corner of the first cell."""
 
     image: Path
-    """The image that it was read from."""
+    """The image file of the map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +74,11 @@ def read_map(file: Path) -> MapImage:
     """Read a map.
 
     Args:
-        file: The YAML file; its image lies in the same folder or below.
+        file: The YAML file; its image is in the same folder or below.
 
     Raises:
-        ConfigError: If a file cannot be read or makes no sense; it is named, with
-            what was got and what was expected.
+        ConfigError: If a file cannot be read or is invalid; the error message names the
+            file, the wrong value and the expected one.
 
     """
     settings = _settings(file)
@@ -175,7 +175,7 @@ def _image_path(said: LinedYaml, name: object) -> Path:
             f"the image {name!r} is not in the folder of the YAML file; put it there "
             "and write its bare name",
         )
-    # A pipe or a device would be waited for, or read without an end.
+    # Opening a pipe would block, and a device may have no end.
     if not image.is_file():
         raise said.wrong(way, f"there is no image file {name!r}")
     return image
@@ -217,7 +217,7 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.int8]":
 
 
 def _cells_of(image: "Image.Image", settings: _Settings) -> "NDArray[np.int8]":
-    """Return the cells of an image, looking at a piece at a time."""
+    """Return the cells of an image, converted piece by piece."""
     import numpy as np
 
     width, height = image.size
@@ -231,11 +231,12 @@ def _cells_of(image: "Image.Image", settings: _Settings) -> "NDArray[np.int8]":
 
 
 def _light(image: "Image.Image", mode: str) -> "NDArray[np.float32]":
-    """Return how light each pixel is, 0 to 1, the upper row first.
+    """Return the lightness of each pixel, 0 to 1, the upper row first.
 
-    As map_server has it, colours count by their mean. What an alpha channel means
-    hangs on the mode: in ``trinary`` it is one more colour, in ``scale`` whatever is
-    not opaque is unknown, here NaN, and in ``raw`` it is nothing.
+    As in map_server, the lightness is the mean of the colours. The meaning of an alpha
+    channel depends on the mode: in ``trinary`` it counts as one more colour, in
+    ``scale`` a pixel that is not opaque is unknown, here NaN, and in ``raw`` it is
+    ignored.
     """
     import numpy as np
 
@@ -253,7 +254,7 @@ def _light(image: "Image.Image", mode: str) -> "NDArray[np.float32]":
 
 
 def _kind(begins: bytes) -> str:
-    """Return what a file is that is no image, by its first bytes."""
+    """Return the kind of a file that is not an image, by its first bytes."""
     if not begins:
         return "an empty file"
     further = " and makes no sense further on" if begins.startswith(MAGIC) else ""

@@ -1,21 +1,21 @@
-"""How the process gets memory for what is large, such as the cells of a map."""
+"""Memory allocation for large data, such as the cells of a map."""
 
 import ctypes
 import platform
 
 LARGE = 4 * 2**20
-"""Bytes from which a piece of memory goes back to the system when it is freed."""
+"""Bytes from which a block of memory is returned to the system when it is freed."""
 
 _M_MMAP_THRESHOLD = -3
 
 
 def return_large_pieces() -> None:
-    """Have every large piece of memory go back to the system as soon as it is freed.
+    """Return every large block of memory to the system as soon as it is freed.
 
-    glibc raises the size from which it does so to that of the largest piece that was
-    freed, up to 32 MiB. What is smaller comes from a heap that shrinks at its end only:
-    one small thing behind a map that went keeps the room of the map. Setting the size
-    ends the raising (see ``mallopt(3)``). Other C libraries are left as they are.
+    By default glibc raises the limit for this to the size of the largest block that was
+    freed, up to 32 MiB. Smaller blocks come from a heap that shrinks only at its end:
+    one small block behind a freed map keeps the memory of the map. Setting the limit
+    ends the raising (see ``mallopt(3)``). Other C libraries are not changed.
     """
     if platform.libc_ver()[0] == "glibc":
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE)

@@ -1,9 +1,9 @@
-"""How deeply a value from outside may be nested."""
+"""The nesting depth of values from outside."""
 
 from typing import Any
 
 MAX_DEPTH = 32
-"""Levels of lists and maps in each other; ROS messages are far flatter."""
+"""Levels of nested lists and maps; ROS messages have far fewer."""
 
 
 def is_too_deep(value: Any, allowed: int = MAX_DEPTH) -> bool:

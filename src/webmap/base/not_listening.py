@@ -1,10 +1,10 @@
-"""Why a port cannot be listened on, in words of what to do instead."""
+"""Error messages for a port that cannot be listened on, with advice."""
 
 import errno
 
 
 def why_not_listening(host: str, port: int, error: OSError) -> str:
-    """Return one sentence for what the system said when a port was asked for."""
+    """Return one sentence for the error of the system, with advice."""
     if error.errno == errno.EADDRINUSE:
         return (
             f"port {port} on {host} is in use: end what uses it, choose another port, "

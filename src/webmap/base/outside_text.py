@@ -1,17 +1,17 @@
-"""Text from outside, for a terminal or a log: on one line, and of a limited length.
+"""Text from outside, for a terminal or a log: on one line, and of limited length.
 
-Robots, bridges, browsers and files choose what is in it. A line break would forge a
-line of the log, and an escape sequence would steer the terminal.
+Robots, bridges, browsers and files choose this text. A line break in it would forge a
+line of the log, and an escape sequence would control the terminal.
 """
 
 LONGEST = 1000
-"""Characters of a text that are shown, unless a caller names another number."""
+"""Characters of a text that are shown, unless a caller sets another number."""
 
 _CUT = "..."
 
 
 def escaped(text: str) -> str:
-    r"""Return a text with everything escaped that is not printable.
+    r"""Return a text with all characters escaped that are not printable.
 
     Control characters become ``\n`` or ``\x1b``, characters that reverse the direction
     of text ``\u202e``, lone surrogates ``\ud800``. Applied to its own result, the
@@ -23,10 +23,10 @@ def escaped(text: str) -> str:
 
 
 def one_line(text: object, longest: int = LONGEST) -> str:
-    """Return a text as a terminal may show it: :func:`escaped`, and cut.
+    """Return a text that is safe for a terminal: :func:`escaped`, and cut.
 
     Args:
-        text: The text, or what ``str`` makes of an object.
+        text: The text, or an object, converted by ``str``.
         longest: The most characters of the result.
 
     """
@@ -38,7 +38,7 @@ def one_line(text: object, longest: int = LONGEST) -> str:
 
 
 def lines_of(text: object, longest: int = LONGEST) -> str:
-    """Return a text of several lines, each of them as :func:`one_line` makes it.
+    """Return a text of several lines, each treated by :func:`one_line`.
 
     Only for texts whose line breaks WebMap itself has written.
     """

@@ -1,4 +1,4 @@
-"""Files that people name are read, and those of this program written, whole."""
+"""Reading of files that people name, and writing of whole files."""
 
 import os
 import secrets
@@ -8,26 +8,26 @@ from pathlib import Path
 from webmap.base.errors import ConfigError
 
 LARGEST_STATE = 16 << 20
-"""Bytes that a file may have which WebMap keeps for itself."""
+"""Most bytes of a file that WebMap keeps for itself."""
 
 
 def read_file(file: Path, largest: int) -> bytes:
-    """Return what is in a file.
+    """Return the content of a file.
 
-    What is no regular file is refused before a byte of it is read: a pipe would be
-    waited for without an end, and a device may have none.
+    A file that is not regular is refused before it is read: reading a pipe could block
+    for ever, and a device may have no end.
 
     Args:
         file: The file, or a link to one.
-        largest: The most bytes that it may have.
+        largest: The most bytes of the file.
 
     Raises:
-        ConfigError: If it is no regular file, or larger.
-        OSError: If it cannot be read.
+        ConfigError: If the file is not regular, or larger.
+        OSError: If the file cannot be read.
 
     """
-    # Opened without waiting for anybody at the other end, and then looked at, so that
-    # nothing can be put in its place between the two.
+    # Opened without blocking and checked afterwards, so that the file cannot be
+    # replaced between the two.
     try:
         number = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     except ValueError:
@@ -48,12 +48,12 @@ def resolved(path: Path) -> Path:
     """Return an absolute path without symbolic links.
 
     Raises:
-        ConfigError: If the links lead in a circle, or the text is no path.
+        ConfigError: If the links form a circle, or the text is not a path.
 
     """
     try:
         return path.resolve()
-    except RuntimeError:  # up to Python 3.12; later versions leave it to the open
+    except RuntimeError:  # up to Python 3.12; later versions fail on open
         raise ConfigError(
             f"{path}: the symbolic links lead in a circle; expected a file"
         ) from None
@@ -62,7 +62,7 @@ def resolved(path: Path) -> Path:
 
 
 def refuse_special(path: Path) -> None:
-    """Refuse a pipe, a device or a socket, which a reader may wait for without end.
+    """Refuse a pipe, a device or a socket, on which a reader may block for ever.
 
     Raises:
         ConfigError: If the path leads to one of them.
@@ -75,20 +75,21 @@ def refuse_special(path: Path) -> None:
 
 
 def write_file(file: Path, data: bytes) -> None:
-    """Put bytes in the place of a file, or leave it as it was.
+    """Replace the content of a file, or leave the file as it was.
 
-    Several may write one file at once: it holds all that one of them wrote.
+    Several writers may write one file at once: it then holds all that one of them
+    wrote.
 
     Args:
-        file: The file; its folder is made if there is none.
-        data: All that is to be in it.
+        file: The file; its folder is created if missing.
+        data: The new content.
 
     Raises:
-        OSError: If the disk does not take them.
+        OSError: If the disk does not accept the data.
 
     """
     file.parent.mkdir(parents=True, exist_ok=True)
-    # A name that nobody else has, or one would put there what another still writes.
+    # A unique name: else one writer could publish the unfinished file of another.
     temporary = file.with_name(f".{file.name}.{secrets.token_hex(8)}.new")
     try:
         with temporary.open("xb") as stream:

@@ -1,8 +1,8 @@
-"""Scopes: what is made on behalf of somebody ends with them.
+"""Scopes: objects that a page, map or robot creates end together with their owner.
 
-A page, a map and a robot each own a :class:`Scope`. Whatever is made while a scope
-is current (a subscription, a listener, an element's handler) joins it and is removed
-when the scope closes, in reverse order, also when one removal raises.
+A page, a map and a robot each own a :class:`Scope`. An object that is created while a
+scope is current (a subscription, a listener, an element's handler) joins it and is
+removed when the scope closes, in reverse order, also when one removal raises.
 """
 
 import asyncio
@@ -20,14 +20,14 @@ _current: ContextVar["Scope | None"] = ContextVar("webmap_scope", default=None)
 
 
 class Removable(Protocol):
-    """Anything that was added and can be removed again, any number of times."""
+    """An object that was added and can be removed, any number of times."""
 
     def remove(self) -> None:
-        """Undo what was added; the second call does nothing."""
+        """Undo the addition; the second call has no effect."""
 
 
 class Removal:
-    """One thing that was added, and how to undo it once."""
+    """One added object, with a function that removes it once."""
 
     __slots__ = ("__weakref__", "_undo")
 
@@ -35,20 +35,20 @@ class Removal:
         self._undo: Callable[[], object] | None = undo
 
     def remove(self) -> None:
-        """Undo what was added; the second call does nothing."""
+        """Undo the addition; the second call has no effect."""
         undo, self._undo = self._undo, None
         if undo is not None:
             undo()
 
 
 class Scope:
-    """The things that one owner made, in the order in which they were made.
+    """The objects of one owner, in the order in which they were created.
 
     Args:
         name: The owner's name, for the log.
-        report: Shows people that something made here failed: a sentence, and what
-            that is about if it goes on failing, else None.
-        mended: Is told what goes on failing no more: what it was about.
+        report: Shows a failure to people: called with a sentence, and with the failing
+            object if the failure lasts, else None.
+        mended: Called with the object when its failure has ended.
 
     """
 
@@ -68,19 +68,19 @@ class Scope:
         return len(self._things)
 
     def add(self, thing: Removable) -> None:
-        """Let ``thing`` end with this scope; at once if the scope is closed."""
+        """Remove ``thing`` when this scope closes; at once if it is closed."""
         if self.closed:
             thing.remove()
         else:
             self._things[id(thing)] = thing
 
     def discard(self, thing: Removable) -> None:
-        """Forget ``thing``, because it was removed by other means."""
+        """Forget ``thing``, which was removed by other means."""
         self._things.pop(id(thing), None)
 
     @contextmanager
     def active(self) -> Iterator["Scope"]:
-        """Make this the scope that new things join, within a ``with`` block."""
+        """Make this the scope that new objects join, within a ``with`` block."""
         token = _current.set(self)
         try:
             yield self
@@ -88,7 +88,7 @@ class Scope:
             _current.reset(token)
 
     def close(self) -> None:
-        """Remove everything, newest first, also when one removal raises."""
+        """Remove all objects, newest first, also when one removal raises."""
         self.closed = True
         while self._things:
             _, thing = self._things.popitem()
@@ -99,13 +99,13 @@ class Scope:
 
 
 def current_scope() -> Scope | None:
-    """Return the scope that new things join now, if there is one."""
+    """Return the scope that new objects join now, if there is one."""
     return _current.get()
 
 
 @contextmanager
 def no_scope() -> Iterator[None]:
-    """Make things in this ``with`` block that belong to no scope."""
+    """Let new objects join no scope, within a ``with`` block."""
     token = _current.set(None)
     try:
         yield
@@ -122,10 +122,10 @@ def keep(thing: T) -> T:
 
 
 def break_off(task: "asyncio.Future[Any]") -> None:
-    """Cancel what goes on beside the caller for somebody who has ended.
+    """Cancel a task whose owner has ended.
 
-    The task that ends somebody itself, as a handler does that takes itself away, is
-    left alone: it has the rest of its own work to do.
+    The current task is not cancelled: a handler that removes itself still finishes its
+    work.
     """
     try:
         current = asyncio.current_task()

@@ -1,4 +1,4 @@
-"""Work that goes on beside the caller, on the model's event loop."""
+"""Background tasks on the model's event loop."""
 
 import asyncio
 import inspect
@@ -23,13 +23,13 @@ def spawn(work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
 
 
 def begin(work: Awaitable[Any], report: Callable[[Exception], object]) -> None:
-    """Run what a user's function returned beside the caller, in the current scope.
+    """Run the awaitable of a user's function as a task, in the current scope.
 
-    It is cancelled when that scope closes, unless it closes the scope itself.
+    The task is cancelled when that scope closes, unless it closes the scope itself.
 
     Args:
-        work: What a coroutine function returned, as a rule.
-        report: Is told of an exception that it lets out.
+        work: Usually the result of a coroutine function.
+        report: Called with an exception that the task raises.
 
     Raises:
         RuntimeError: If no event loop runs in this thread.
@@ -51,7 +51,7 @@ def begin(work: Awaitable[Any], report: Callable[[Exception], object]) -> None:
             report(error)
 
     task, scope = spawn(finish()), current_scope()
-    task.add_done_callback(lambda _: _close(work))  # it may never have been begun
+    task.add_done_callback(lambda _: _close(work))  # it may never have begun
     if scope is not None:
         ending = Removal(partial(break_off, task))
         task.add_done_callback(lambda _: scope.discard(ending))
@@ -59,7 +59,7 @@ def begin(work: Awaitable[Any], report: Callable[[Exception], object]) -> None:
 
 
 def _close(work: Awaitable[Any]) -> None:
-    """Let go of a coroutine; Python would say that nobody waited for it."""
+    """Close a coroutine; otherwise Python warns that it was never awaited."""
     if inspect.iscoroutine(work):
         work.close()
 

@@ -1,8 +1,8 @@
-"""Arrays of numbers in messages, kept as bytes until somebody asks for numpy.
+"""Arrays of numbers in messages, kept as bytes until numpy is needed.
 
-JSON brings lists with ``null`` for what is not a number, a binary encoding brings typed
-arrays. Both become one compact value that costs 4 bytes or 1 byte a number and needs no
-numpy to be made, moved between processes or thrown away.
+JSON gives lists with ``null`` for NaN and infinities; a binary encoding gives typed
+arrays. Both become one compact value of 4 bytes or 1 byte a number. Creating, moving
+between processes and dropping such a value needs no numpy.
 """
 
 from array import array
@@ -17,25 +17,25 @@ T = TypeVar("T", bound="Numbers")
 _NAN = float("nan")
 
 NOT_COPIED = 1 << 20
-"""Bytes from which numbers stay in the bytes that they came in."""
+"""Size in bytes above which an array uses the received bytes without a copy."""
 
 
 class Numbers:
-    """Numbers of one width; :class:`Floats` and :class:`Int8s` say which."""
+    """Numbers of one width; base class of :class:`Floats` and :class:`Int8s`."""
 
     typecode: ClassVar[str]
     __slots__ = ("values",)
 
     def __init__(self, values: "array[Any]") -> None:
         self.values = values
-        """The numbers, in the machine's byte order; not to be changed."""
+        """The numbers, in the byte order of the machine. Read-only."""
 
     @classmethod
     def from_wire(cls: type[T], value: object) -> T:
-        """Return what a decoder found in the place of the array.
+        """Return the decoded value of an array field.
 
         Raises:
-            ValueError: If it is no array, or a number in it does not fit.
+            ValueError: If the value is not an array, or a number does not fit.
 
         """
         try:
@@ -84,7 +84,7 @@ class Numbers:
 
 
 class Floats(Numbers):
-    """Numbers of ``float32[]``; what was ``null`` is NaN."""
+    """Numbers of ``float32[]``; ``null`` becomes NaN."""
 
     typecode = "f"
     __slots__ = ()
@@ -93,7 +93,7 @@ class Floats(Numbers):
     def _from_list(cls, value: list[Any]) -> "array[Any]":
         try:
             return array("f", value)
-        except TypeError:  # a null: bridges write it for NaN and both infinities
+        except TypeError:  # bridges write null for NaN and infinities
             return array("f", [_NAN if item is None else item for item in value])
 
     def array(self) -> "NDArray[np.float32]":
@@ -117,7 +117,7 @@ class Int8s(Numbers):
 
 
 def dec_hook(wanted: type, value: object) -> object:
-    """Decode the fields that msgspec does not know; see its ``dec_hook``."""
+    """Decode the fields of types unknown to msgspec; its ``dec_hook``."""
     if isinstance(wanted, type) and issubclass(wanted, Numbers):
         return wanted.from_wire(value)
     raise NotImplementedError(f"a message cannot hold a {wanted!r}")

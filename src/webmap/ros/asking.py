@@ -1,4 +1,4 @@
-"""Asking a bridge for its topics, before anything else is there."""
+"""Get the topics of a bridge before the display is built."""
 
 import asyncio
 import time
@@ -17,16 +17,16 @@ async def ask_topics(
     wait: float,
     waiting: Callable[[str], object] = lambda _why: None,
 ) -> dict[str, str]:
-    """Return the type of every topic behind a bridge.
+    """Return the topics of a bridge and the type of each.
 
     Args:
-        url: The bridge's address.
-        wait: How long to wait for a bridge that cannot be reached, in seconds.
-        waiting: Called once with the reason if there is something to wait for.
+        url: The address of the bridge.
+        wait: Longest time to wait for an unreachable bridge, in seconds.
+        waiting: Called once with the reason when waiting begins.
 
     Raises:
         BridgeClosed: If the bridge cannot be reached in that time.
-        ServiceError: If it does not list its topics.
+        ServiceError: If the bridge does not list its topics.
 
     """
     deadline = time.monotonic() + wait

@@ -1,4 +1,4 @@
-"""When to try again."""
+"""Delays between attempts to connect."""
 
 import random
 from collections.abc import Callable
@@ -9,10 +9,10 @@ STEADY = 5.0
 
 
 class Backoff:
-    """Delays between attempts to connect: growing, and never the same for two.
+    """Growing, random delays between attempts to connect.
 
     Args:
-        jitter: Gives a number in [0, 1); replaced in tests.
+        jitter: Returns a number in [0, 1); replaced in tests.
 
     """
 
@@ -21,14 +21,15 @@ class Backoff:
         self._failures = 0
 
     def next(self, lasted: float = 0.0) -> float:
-        """Return how long to wait before the next attempt, in seconds.
+        """Return the delay before the next attempt, in seconds.
 
-        Between 0.25 s and 0.5 s at first, twice that at each failure, at most 10 s.
+        The first delay is between 0.25 s and 0.5 s. Each failure doubles it; the
+        greatest is 10 s.
 
         Args:
-            lasted: How long the link that ended now was open, in seconds. One that
-                held for 5 s starts the growth anew; a bridge that accepts and
-                hangs up does not.
+            lasted: How long the connection that has just ended was open, in seconds.
+                After 5 s or more the delay starts again at its smallest value; after
+                less (a bridge that accepts and disconnects) the delay keeps growing.
 
         """
         if lasted >= STEADY:

@@ -1,7 +1,7 @@
-"""The link to one ROS system, shared by everything in the process that needs it.
+"""The connection to one ROS system, shared by the whole process.
 
-What is said here holds for any kind of link: topics, messages, services and who may
-publish what. How it goes over the wire is known to the link behind it alone.
+A :class:`Bridge` has topics, messages and services, and refuses messages that only the
+gate may publish. The wire protocol is in ``rosbridge``.
 """
 
 import asyncio
@@ -34,18 +34,19 @@ log = logging.getLogger("webmap.ros")
 
 
 class Bridge:
-    """A link to one ROS system through a rosbridge v2 server.
+    """A connection to one ROS system through a rosbridge v2 server.
 
-    Making one only records; the link is opened when WebMap starts and is opened again
-    whenever it is lost, with all subscriptions and advertisements. Its methods are
-    called in the model's thread.
+    Creating a bridge opens no connection. The connection opens when WebMap starts, and
+    reopens after each loss with all subscriptions and advertisements. Call the methods
+    in the model's thread.
 
-    One that a page function or a module makes ends with that page or module, also for
-    others who use it: they are told so. What outlives a page needs one made outside.
+    A bridge created by a page function or a module ends with that page or module, also
+    for its other users, who get an error. Create a bridge that must outlive a page
+    outside of the page function.
 
     Args:
         url: Address of the rosbridge, such as ``ws://localhost:9090``.
-        name: What people call it; the address if not given.
+        name: Name shown to people; the address if not given.
 
     Raises:
         ConfigError: If ``url`` is not a WebSocket address.
@@ -54,10 +55,10 @@ class Bridge:
 
     def __init__(self, url: str, *, name: str | None = None) -> None:
         self.url = normalise_url(url)
-        """The one spelling of the address."""
+        """The normalised address."""
         self.name = name or self.url
         self.replays = False
-        """Whether a recording is played behind it, whose robots may pause and end."""
+        """Whether the bridge plays a recording; its robots may pause and end."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._topics: dict[str, Topic] = {}
         self._written = written_behind(self.url)
@@ -91,17 +92,17 @@ class Bridge:
 
     @property
     def stats(self) -> BridgeStats:
-        """What came over the link, since the bridge was made."""
+        """Counts of the connection since the bridge was created."""
         return self._link.stats
 
     @property
     def trouble(self) -> str | None:
-        """Why the link is not open: how the last attempt failed or the link ended."""
+        """Why the connection is not open: the last failed attempt or the last loss."""
         return self._link.trouble
 
     @property
     def lost(self) -> bool:
-        """Whether the link is away, rather than open or not reached yet."""
+        """Whether the connection is closed or failing, not only new or connecting."""
         if self.state == "open":
             return False
         return self.state == "closed" or self.trouble is not None
@@ -113,19 +114,19 @@ class Bridge:
 
     @property
     def lag(self) -> float:
-        """How many seconds what comes from the bridge now was under way, about.
+        """Approximate delay of the data that now comes from the bridge, in seconds.
 
-        It is the time that the bridge takes to answer a ping, which waits behind all
-        that it has sent before; a link that becomes slow is seen within a second.
-        What a robot's own nodes keep back is not in it.
+        This is the time that the bridge takes to answer a ping; the answer waits behind
+        all data that the bridge has sent before. A connection that becomes slow shows
+        within a second. Delays in the robot's own nodes are not included.
         """
         return self._link.lane.lag
 
     def on_open(self, fn: Callable[[], Any]) -> Removal:
-        """Call ``fn`` whenever the link opens; soon, if it is open already.
+        """Call ``fn`` whenever the connection opens; soon, if it is open already.
 
         Raises:
-            BridgeClosed: If the page or the module that made this bridge has ended.
+            BridgeClosed: If the page or module that created this bridge has ended.
 
         """
         self._link.refuse_if_over()
@@ -135,11 +136,11 @@ class Bridge:
         return removal
 
     def on_close(self, fn: Callable[[str], Any]) -> Removal:
-        """Call ``fn`` with the reason whenever an open link ends."""
+        """Call ``fn`` with the reason whenever an open connection ends."""
         return self._on_close.add(fn)[1]
 
     def on_error(self, fn: Callable[[Exception], Any]) -> Removal:
-        """Call ``fn`` with each error that a person might want to know of."""
+        """Call ``fn`` with each error that a person may need to know."""
         return self._on_error.add(fn)[1]
 
     def subscribe(
@@ -153,36 +154,36 @@ class Bridge:
         encoding: Encoding | None = None,
         queue_length: int = 1,
     ) -> Subscription:
-        """Hear the messages of a topic; also of one that does not exist yet.
+        """Subscribe to a topic, also to one that does not exist yet.
 
-        All listeners to a topic share what comes over the wire, each with a throttle
-        of its own, and a message is decoded once for each ``decode``.
+        All listeners of a topic share one subscription on the wire. Each has its own
+        throttle, and a message is decoded once for each ``decode``.
 
         Args:
             topic: Name of the topic.
-            callback: Called with each message; what a coroutine function goes on
-                with is cancelled when the subscription ends.
-            type: Message type, in either dialect. Without it the bridge can only
-                serve a topic that exists when it is asked.
+            callback: Called with each message. If it is a coroutine function, its
+                running tasks are cancelled when the subscription ends.
+            type: Message type, in either dialect. Without it the bridge can serve only
+                a topic that exists at the time of the subscription.
             throttle: Least time between two messages, in milliseconds; 0 gives every
-                message. The bridge is never asked for less than 1 ms between two, and
-                then keeps the messages of a burst.
-            decode: A type with the fields that are wanted; None for a plain dict.
-            encoding: ``binary`` for a binary encoding, which keeps infinities and
-                costs a bridge less for large messages; ``text``; or ``raw`` for a
-                mapping with the bytes that ROS itself sends. None lets what may be
-                large (scans, grids, clouds, paths, arrays of poses, markers) come in
-                a binary encoding and the rest as text.
-            queue_length: Messages that the bridge may hold back; it is asked for
-                at least 1.
+                message. WebMap asks the bridge for at least 1 ms; the bridge then
+                queues the messages of a burst.
+            decode: A type with the wanted fields; None for a plain dict.
+            encoding: ``binary`` for a binary encoding, which keeps infinities and costs
+                a bridge less for large messages; ``text``; or ``raw`` for a mapping
+                with the serialized bytes of ROS. None uses a binary encoding for types
+                that may be large (scans, grids, clouds, paths, arrays of poses,
+                markers) and text for all others.
+            queue_length: Most messages that the bridge may queue; WebMap asks for at
+                least 1.
 
         Returns:
-            What ends it. It ends with the current scope, too.
+            The subscription. It ends with the current scope, or by its ``remove()``.
 
         Raises:
-            ConfigError: If an argument makes no sense, or another listener said
-                that the topic has another type.
-            BridgeClosed: If the page or the module that made this bridge has ended.
+            ConfigError: If an argument is invalid, or another listener stated another
+                type for the topic.
+            BridgeClosed: If the page or module that created this bridge has ended.
 
         """
         self._link.refuse_if_over()
@@ -195,7 +196,7 @@ class Bridge:
         entry.check(options)
         called = Callback(callback, f"{self.name}: {name}", self._report)
         listener = Subscription(entry, called, options, decode)
-        if listener.removed:  # its scope has ended already
+        if listener.removed:  # its scope has already ended
             return listener
         self._topics[name] = entry
         late, is_first = entry.replay, not entry.listeners
@@ -209,19 +210,19 @@ class Bridge:
     def publish(
         self, topic: str, message: Mapping[str, Any], type: str | None = None
     ) -> None:
-        """Publish a message now, or not at all; it is never kept for later.
+        """Publish a message now, or raise an error; messages are never queued.
 
         Args:
-            topic: Name of the topic; it is advertised the first time.
+            topic: Name of the topic; the first call advertises it.
             message: The fields of the message.
-            type: Message type; needed the first time.
+            type: Message type; required the first time.
 
         Raises:
             MotionRefused: If the topic moves a robot: see :meth:`protect`.
-            BridgeClosed: If the link is not open.
-            BridgeError: If the type is not known or not the one of before.
+            BridgeClosed: If the connection is not open.
+            BridgeError: If the type is unknown or differs from the earlier one.
             ValueError: If a number in the message is NaN or infinite.
-            TypeError: If a value in the message is nothing that JSON knows.
+            TypeError: If a value in the message has no form in JSON.
 
         """
         name = normalise_topic(topic)
@@ -236,18 +237,19 @@ class Bridge:
         self._link.publish(name, wanted, message)
 
     def unadvertise(self, topic: str) -> None:
-        """Publish no more on ``topic``; nothing happens if nobody did."""
+        """Stop publishing on ``topic``; no effect if it was not advertised."""
         self._link.unadvertise(normalise_topic(topic))
 
     def protect(self, topic: str, carries: str = "a goal") -> None:
-        """Refuse to publish on ``topic`` from now on: the gate writes it.
+        """Refuse to publish on ``topic`` from now on: only the gate publishes there.
 
-        A topic that was declared as velocity, goal, cancel, initial pose or stop hook
-        of a robot is one. It holds for every bridge of this address.
+        WebMap calls this for each topic that is declared as velocity, goal, cancel,
+        initial pose or stop hook of a robot. The rule holds for every bridge of this
+        address.
 
         Args:
             topic: Name of the topic.
-            carries: What it carries, for whoever is refused.
+            carries: What the topic carries, for the error message.
 
         """
         name = normalise_topic(topic)
@@ -262,21 +264,22 @@ class Bridge:
         type: str | None = None,
         timeout: float = 5.0,
     ) -> Any:
-        """Call a ROS service; calls share no socket with data.
+        """Call a ROS service, over another socket than the data.
 
         Args:
             service: Name of the service.
             args: The fields of the request.
             type: Service type; some bridges need it.
-            timeout: Longest time for the answer, in seconds.
+            timeout: Longest time for the response, in seconds.
 
         Returns:
-            The fields of the answer.
+            The fields of the response.
 
         Raises:
-            ServiceError: If the service fails or does not answer in time.
-            BridgeClosed: If the link cannot be opened, or ends before the answer.
-            MotionRefused: If the service would send a robot somewhere.
+            ServiceError: If the service fails or does not respond in time.
+            BridgeClosed: If the connection cannot be opened, or ends before the
+                response.
+            MotionRefused: If the service would move a robot.
 
         """
         name = normalise_topic(service)
@@ -284,11 +287,11 @@ class Bridge:
         return await self._link.call_service(name, args, type=type, timeout=timeout)
 
     async def topics(self) -> dict[str, str]:
-        """Return the type of every topic.
+        """Return the topics and the type of each.
 
         Raises:
             ServiceError: If the bridge does not list its topics.
-            BridgeClosed: If the link cannot be opened.
+            BridgeClosed: If the connection cannot be opened.
 
         """
         return await self._graph.topics()
@@ -296,14 +299,14 @@ class Bridge:
     async def topic_type(self, topic: str) -> str | None:
         """Return the type of a topic in the bridge's dialect.
 
-        None if nobody knows the topic, or the bridge does not answer.
+        None if the topic is unknown, or the bridge does not answer.
         """
         return await self._graph.topic_type(normalise_topic(topic))
 
     async def service_type(self, service: str) -> str | None:
         """Return the type of a service in the bridge's dialect.
 
-        None if nobody knows the service, or the bridge does not answer.
+        None if the service is unknown, or the bridge does not answer.
         """
         return await self._graph.service_type(normalise_topic(service))
 
@@ -312,26 +315,26 @@ class Bridge:
         return await self._graph.nodes("publishers", normalise_topic(topic))
 
     async def other_publishers(self, topic: str) -> list[str] | None:
-        """Return the publishers without those that publish for clients of a bridge.
+        """Return the publishers without those that serve clients of a bridge.
 
         WebMap itself is such a client. None as for :meth:`publishers`.
         """
         return await self._graph.other_publishers(normalise_topic(topic))
 
     async def subscribers(self, topic: str) -> list[str] | None:
-        """Return the nodes that subscribe to a topic; None as for publishers."""
+        """Return the nodes that subscribe to a topic; None if there is no answer."""
         return await self._graph.nodes("subscribers", normalise_topic(topic))
 
     async def definitions(self, type: str, kind: str = "msg") -> Definitions:
-        """Return the definitions of a type and of all its parts, and the shipped ones.
+        """Return the definitions of a type and of all its parts, and the included ones.
 
         Args:
             type: The type.
             kind: ``"msg"``, or ``"srv"`` for the request of a service.
 
         Raises:
-            ServiceError: If the bridge does not say them, or cannot be asked safely.
-            BridgeClosed: If the link cannot be opened.
+            ServiceError: If the bridge does not return them, or cannot be asked safely.
+            BridgeClosed: If the connection cannot be opened.
 
         """
         return await self._link.definitions(type, kind)
@@ -339,37 +342,37 @@ class Bridge:
     async def time(self) -> float | None:
         """Return the time of the ROS system in seconds since 1970.
 
-        That of a simulator may begin at zero. None if the bridge does not answer.
+        The time of a simulator may begin at zero. None if the bridge does not answer.
         """
         return await self._graph.time()
 
     async def set_parameter(
         self, name: str, value: Any, *, timeout: float = 5.0
     ) -> Any:
-        """Set a parameter of ROS 1; return the value that it has then.
+        """Set a parameter of ROS 1 and return its new value.
 
-        Parameters of ROS 2 belong to nodes, which have services for them.
+        In ROS 2 parameters belong to nodes and are set by services of the nodes.
 
         Raises:
             ServiceError: If the bridge does not answer in time.
-            BridgeClosed: If the link cannot be opened.
+            BridgeClosed: If the connection cannot be opened.
 
         """
         return await self._graph.set_parameter(name, value, timeout)
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Open the link, and keep it open; called when WebMap starts."""
+        """Open the connection and keep it open; called when WebMap starts."""
         if self._link.over is None:
             self._loop = loop
             self._fan_out.begin(loop)
             self._link.lane.start(loop)
 
     async def stop(self) -> None:
-        """Close every link; listeners stay, for another :meth:`start`."""
+        """Close all connections; the listeners stay for another :meth:`start`."""
         await self._link.stop()
         await self._fan_out.stop()
         await self._faults.stop()
-        if self._link.over is not None and self._topics:  # others listen to it still
+        if self._link.over is not None and self._topics:  # it still has listeners
             log.warning(
                 "%s: nothing more of %s", self._link.over, ", ".join(self._topics)
             )
@@ -377,7 +380,7 @@ class Bridge:
                 topic.over(BridgeClosed(self._link.over))
 
     def _end(self) -> None:
-        """End for good: what made this bridge has ended."""
+        """End for ever: the page or module that created this bridge has ended."""
         self._link.over = (
             f"the link to {self.url} has ended with the page or the module that made "
             "it: a bridge that others use, too, is made outside of both"
@@ -418,7 +421,7 @@ class Bridge:
 
 
 class TemporaryBridge(Bridge):
-    """A bridge for the time of an ``async with``, such as to look at a robot.
+    """A bridge for the duration of an ``async with``, such as to examine a robot.
 
     WebMap's life cycle does not start it.
     """
@@ -430,10 +433,10 @@ class TemporaryBridge(Bridge):
         await self.stop()
 
     async def open(self) -> None:
-        """Open the link for messages; questions open one of their own.
+        """Open the connection for messages; service calls open another one.
 
         Raises:
-            BridgeClosed: If it cannot be opened.
+            BridgeClosed: If the connection cannot be opened.
 
         """
         loop = asyncio.get_running_loop()

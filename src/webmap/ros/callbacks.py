@@ -1,4 +1,4 @@
-"""The functions that others want to have called, each in the scope it was added in."""
+"""Callbacks, each called in the scope in which it was added."""
 
 import asyncio
 import inspect
@@ -12,13 +12,13 @@ log = logging.getLogger("webmap.ros")
 
 
 class Callback:
-    """One function of somebody else's, which may raise.
+    """One callback, which may raise.
 
     Args:
-        fn: The function; where it is a coroutine function it runs as a task, until
-            :meth:`end` at the latest.
-        what: What it is called for, for the log.
-        report: Is told of what it raises.
+        fn: The function. A coroutine function runs as a task, until :meth:`end` at the
+            latest.
+        what: The occasion of the call, for the log.
+        report: Called with each error that the function raises.
 
     """
 
@@ -30,13 +30,13 @@ class Callback:
         self.fn = fn
         self.what = what
         self.removed = False
-        """Whether it is not to be called any more."""
+        """Whether it has ended and is no longer called."""
         self._report = report
         self._scope = current_scope()
         self._tasks: set[asyncio.Future[Any]] = set()
 
     def __call__(self, *args: Any) -> None:
-        """Call the function; what it raises is logged and reported, never raised."""
+        """Call the function; its errors are logged and reported, never raised."""
         if self.removed:
             return
         try:
@@ -50,7 +50,7 @@ class Callback:
             self._failed(error)
 
     def end(self) -> None:
-        """Let it not be called any more, and break off what still runs of it."""
+        """Stop calling the function, and cancel its running tasks."""
         self.removed = True
         for task in tuple(self._tasks):
             break_off(task)
@@ -70,7 +70,7 @@ class Callback:
 
 
 class Callbacks:
-    """The functions to be called for one occasion, in the order they were added."""
+    """The callbacks of one occasion, in the order in which they were added."""
 
     def __init__(self, what: str, report: Callable[[Exception], None]) -> None:
         self._what = what
@@ -82,7 +82,7 @@ class Callbacks:
         return len(self._each)
 
     def add(self, fn: Callable[..., Any]) -> tuple[Callback, Removal]:
-        """Add a function, which ends with the current scope or when removed."""
+        """Add a function until the current scope ends or the function is removed."""
         key, self._count = self._count, self._count + 1
         callback = self._each[key] = Callback(fn, self._what, self._report)
         scope = current_scope()
@@ -99,6 +99,6 @@ class Callbacks:
         return callback, removal
 
     def call(self, *args: Any) -> None:
-        """Call every function; none of them can keep the others from being called."""
+        """Call every function; an error in one does not stop the others."""
         for callback in list(self._each.values()):
             callback(*args)

@@ -1,4 +1,4 @@
-"""Plain data checked against the definition of a message, field by field."""
+"""Check of plain data against the definition of a message, field by field."""
 
 import math
 from collections.abc import Mapping, Sequence, Sized
@@ -9,7 +9,7 @@ from webmap.base.errors import ConfigError
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field
 
 MAX_TEXT = 10_000
-"""Characters of one text that a person gives."""
+"""Most characters of one string that a person enters."""
 
 
 class Misfit(ConfigError):
@@ -18,9 +18,9 @@ class Misfit(ConfigError):
     Attributes:
         path: Where the field is in the message: ``pose.position.x``, ``ranges[3]``;
             empty for the message as a whole.
-        words: What is wrong with its value.
-        value: What was got.
-        expected: What the field takes, in words; empty if there is no such field.
+        words: The error message.
+        value: The value.
+        expected: What the field expects, in words; empty if there is no such field.
 
     """
 
@@ -44,13 +44,14 @@ class Misfit(ConfigError):
 
 
 class Conformer:
-    """Returns plain data as a message of its type, or says which field does not fit.
+    """Converts plain data to a message of its type, or raises :class:`Misfit`.
 
     This class is as strict as a form: absent fields stay absent, numbers are finite,
-    and a time may be a number of seconds. Subclasses take messages from elsewhere.
+    and a time may be a number of seconds. Subclasses convert messages from other
+    sources.
 
     Args:
-        ros2: Whether times are written as ROS 2 has them.
+        ros2: Whether times have the field names of ROS 2.
 
     """
 
@@ -61,8 +62,8 @@ class Conformer:
         """Return a message with the fields in the order of the definition.
 
         Args:
-            fields: Those of the type.
-            value: The fields' values by their names.
+            fields: The fields of the type.
+            value: The values by the names of the fields.
 
         Raises:
             Misfit: If a value does not fit; its path names the field.
@@ -83,7 +84,7 @@ class Conformer:
                     self.array(field, each) if field.is_array else self.one(field, each)
                 )
             except Misfit as error:
-                if field.name not in value:  # perhaps it has another name there
+                if field.name not in value:  # a wrong name is the better reason
                     _check_names(fields, value)
                 raise error.inside(field.name) from None
         if found < len(value):
@@ -91,10 +92,10 @@ class Conformer:
         return made
 
     def absent(self, field: Field, made: dict[str, Any]) -> None:
-        """Handle a field that is absent: here, it stays absent."""
+        """Handle an absent field: here, leave it absent."""
 
     def array(self, field: Field, value: Any) -> Any:
-        """Return the value of an array."""
+        """Return the value of an array field."""
         if not isinstance(value, list | tuple):
             raise wrong(value, expectation(field))
         check_size(field, value)
@@ -119,15 +120,15 @@ class Conformer:
         return self.text(field, value) if field.type == "string" else self.truth(value)
 
     def number(self, field: Field, value: Any) -> float:
-        """Return a number that may have a fraction."""
+        """Return a floating-point number."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise wrong(value, "a number")
-        if not abs(value) <= FLOATS[field.type]:  # neither NaN nor infinite
+        if not abs(value) <= FLOATS[field.type]:  # NaN or infinite
             raise wrong(value, "a number")
         return float(value)
 
     def whole(self, field: Field, value: Any) -> int:
-        """Return a whole number."""
+        """Return an integer."""
         low, high = INTEGERS[field.type]
         if isinstance(value, bool) or not isinstance(value, int):
             raise wrong(value, expectation(replace(field, is_array=False)))
@@ -136,20 +137,20 @@ class Conformer:
         return value
 
     def truth(self, value: Any) -> bool:
-        """Return true or false."""
+        """Return a boolean."""
         if not isinstance(value, bool):
             raise wrong(value, "true or false")
         return value
 
     def text(self, field: Field, value: Any) -> str:
-        """Return a text."""
+        """Return a string."""
         longest = MAX_TEXT if field.longest is None else field.longest
         if not isinstance(value, str) or len(value) > longest:
             raise wrong(value, expectation(replace(field, is_array=False)))
         return value
 
     def time(self, field: Field, value: Any) -> dict[str, int]:
-        """Return a moment, or a length of time, of a number of seconds."""
+        """Return a time or a duration, from a number of seconds or from its fields."""
         number = seconds(value)
         fits = isinstance(number, int | float) and not isinstance(number, bool)
         if not fits or not math.isfinite(number) or abs(number) >= 2**31:
@@ -163,7 +164,7 @@ class Conformer:
         )
 
     def spelled(self, whole: int, rest: int) -> dict[str, int]:
-        """Return seconds and nanoseconds by the names that the dialect has for them."""
+        """Return seconds and nanoseconds under the field names of the dialect."""
         if self.ros2:
             return {"sec": whole, "nanosec": rest}
         return {"secs": whole, "nsecs": rest}
@@ -178,10 +179,10 @@ def _check_names(fields: Sequence[Field], value: Mapping[str, Any]) -> None:
 
 
 def check_size(field: Field, value: Sized) -> None:
-    """Check that an array has as many elements as its field takes.
+    """Check the number of elements of an array.
 
     Raises:
-        Misfit: If it has more or fewer.
+        Misfit: If the array has more or fewer elements than its field allows.
 
     """
     count = len(value)
@@ -193,13 +194,13 @@ def check_size(field: Field, value: Sized) -> None:
 
 
 def wrong(value: Any, expected: str) -> Misfit:
-    """Return the error of a value that is not what its field takes."""
+    """Return the error for a value of the wrong kind."""
     words = f"got {show(value)}, expected {expected}"
     return Misfit(words, value=value, expected=expected)
 
 
 def expectation(field: Field) -> str:
-    """Return in words what a field takes."""
+    """Return a description of the values that a field accepts."""
     if field.is_array:
         most = "" if field.most is None else f"at most {field.most} "
         many = most if field.size is None else f"{field.size} "
@@ -217,7 +218,7 @@ def expectation(field: Field) -> str:
 
 
 def seconds(value: Any) -> Any:
-    """Return a time of either dialect in seconds; anything else as it is."""
+    """Return a time of either dialect in seconds, and any other value unchanged."""
     if not isinstance(value, Mapping):
         return value
     whole = value.get("secs", value.get("sec", 0))
@@ -229,7 +230,7 @@ def seconds(value: Any) -> Any:
 
 
 def show(value: Any) -> str:
-    """Return a value as an error shows it: short, without control characters."""
+    """Return a value as shown in errors: short, without control characters."""
     text = value if isinstance(value, str) else repr(value)
     text = "".join(c if c.isprintable() else "?" for c in text[:41])
     text = f"{text[:40]}..." if len(text) > 40 else text

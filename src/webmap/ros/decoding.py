@@ -1,9 +1,10 @@
-"""From bytes to a value of the type that was asked for: strictly, then leniently.
+"""Decoding of bytes to a value of a given type: strictly, then leniently.
 
-Nearly every frame takes the first road, one strict pass by msgspec. What real bridges
-write beside the standard takes the second: the bare tokens ``NaN`` and ``Infinity``,
-``null`` in the place of a number, and half a pair of surrogates in a text, which Python
-writes for a byte that is no UTF-8. Such a half becomes U+FFFD.
+Nearly every frame passes the strict decoding, in one step of msgspec. The lenient
+decoding accepts what real bridges write outside of the standard: the bare tokens
+``NaN`` and ``Infinity``, ``null`` instead of a number, and a single surrogate in a
+string, which Python writes for a byte that is not UTF-8. Such a surrogate becomes
+U+FFFD.
 """
 
 import json
@@ -27,7 +28,7 @@ _FAILURES = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 class Unreadable(ProtocolError):
-    """What came is no JSON at all, whatever type was expected."""
+    """The frame is not JSON, whatever type was expected."""
 
 
 @lru_cache(maxsize=256)
@@ -39,7 +40,8 @@ def decode_json(text: bytes | bytearray, type: Any) -> Any:
     """Return the JSON in ``text`` as a value of ``type``.
 
     Raises:
-        ProtocolError: If it is not JSON, not even leniently, or of another shape.
+        ProtocolError: If the text is not JSON, not even leniently, or has another
+            shape.
 
     """
     try:
@@ -47,7 +49,7 @@ def decode_json(text: bytes | bytearray, type: Any) -> Any:
     except msgspec.ValidationError as error:
         reason: Exception = error
     except _FAILURES as error:
-        # Only these can make good text of what is bad JSON.
+        # The lenient decoding accepts only these tokens and such escapes.
         numbers = b"NaN" in text or b"Infinity" in text
         if not numbers and not _HALF_PAIR_ESCAPE.search(text):
             raise Unreadable(f"not JSON: {error}") from None
@@ -62,7 +64,7 @@ def decode_json(text: bytes | bytearray, type: Any) -> Any:
 
 
 def _whole_text(value: Any, allowed: int) -> Any:
-    """Return ``value`` with U+FFFD for each half of a pair of surrogates in a text."""
+    """Return ``value`` with each single surrogate in a string replaced by U+FFFD."""
     if allowed == 0:
         raise ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
     if isinstance(value, str):
@@ -78,10 +80,10 @@ def _whole_text(value: Any, allowed: int) -> Any:
 
 
 def convert(value: Any, type: Any) -> Any:
-    """Return a decoded value as one of ``type``.
+    """Return a decoded value as a value of ``type``.
 
-    A ``null`` where a number is wanted becomes NaN and a typed array where a list
-    is wanted becomes a list.
+    ``null`` becomes NaN where a number is expected, and a typed array becomes a list
+    where a list is expected.
 
     Raises:
         ProtocolError: If the value has another shape.
@@ -99,10 +101,10 @@ def convert(value: Any, type: Any) -> Any:
 
 
 def check_depth(value: Any) -> None:
-    """Let a plain value pass if it is not nested too deeply.
+    """Check that a plain value is not nested too deeply.
 
     Raises:
-        ProtocolError: If it is.
+        ProtocolError: If the value is nested too deeply.
 
     """
     if is_too_deep(value):

@@ -1,14 +1,15 @@
-"""The catalogue of message and service definitions, and the reader of their texts.
+"""The catalogue of message and service definitions, and the parser of their texts.
 
 The texts are in the language of ``.msg``, ``.srv`` and ``.action`` files of ROS 1 and
-ROS 2. One text holds many types, as in bags and in the answers of bridges: a line such
-as ``MSG: std_msgs/Bool``, ``SRV: std_srvs/SetBool`` or ``ACTION: my_msgs/Dock``
-begins each type. WebMap ships those in ``msg/``, one file for each package; the files
-``ros1.msg`` and ``ros2.msg`` hold the types whose fields differ between the two.
+ROS 2. One text may hold many types, as in bags and in the answers of bridges: a line
+such as ``MSG: std_msgs/Bool``, ``SRV: std_srvs/SetBool`` or ``ACTION: my_msgs/Dock``
+begins each type. The definitions included in WebMap are in ``msg/``, one file for each
+package; the files ``ros1.msg`` and ``ros2.msg`` hold the types whose fields differ
+between the two.
 
-Names are written as in ROS 1: ``std_msgs/Bool``. The request of a service is
+Names have the form of ROS 1: ``std_msgs/Bool``. The request of a service is
 ``std_srvs/SetBoolRequest``, its response ``std_srvs/SetBoolResponse``. The messages of
-an action have the names that the dialect gives them.
+an action have the names of the dialect.
 """
 
 import re
@@ -33,22 +34,22 @@ INTEGERS = {
     "int64": (-(2**63), 2**63 - 1),
     "uint64": (0, 2**64 - 1),
 }
-"""The range of each type of whole numbers."""
+"""The range of each integer type."""
 
 FLOATS = {"float32": 3.4028234663852886e38, "float64": 1.7976931348623157e308}
-"""The largest number of each type."""
+"""The largest number of each floating-point type."""
 
 OCTETS = ("uint8", "byte", "char")
-"""The types of one byte, whose arrays are bytes."""
+"""The types of one byte; an array of them is bytes."""
 
 TIMES = ("time", "duration")
-"""The types of a moment and of a length of time, under these names in both dialects."""
+"""The types of a time and of a duration, with these names in both dialects."""
 
 SCALARS = (*INTEGERS, *FLOATS, *TIMES, "bool", "string")
-"""The types that hold no fields."""
+"""The types without fields."""
 
 MAX_DEPTH = 16
-"""How deep messages are nested."""
+"""Greatest depth of nested messages."""
 
 _OTHER_NAMES = {
     "builtin_interfaces/Time": "time",
@@ -68,10 +69,10 @@ _ACTION_HEAD = "std_msgs/Header header\nactionlib_msgs/"
 
 
 class UnknownType(ConfigError):
-    """A type whose definition is not known.
+    """A type without a known definition.
 
     Attributes:
-        type: Its name.
+        type: The name of the type.
 
     """
 
@@ -86,31 +87,31 @@ class Field:
 
     name: str
     type: str
-    """A scalar's type, ``time``, ``duration``, or the name of a message type."""
+    """A scalar type, ``time``, ``duration``, or the name of a message type."""
 
     fields: tuple["Field", ...] | None = None
-    """Those of a message; None for a scalar."""
+    """The fields of a message type; None for a scalar."""
 
     is_array: bool = False
     size: int | None = None
-    """Elements of an array of fixed size."""
+    """Number of elements of an array of fixed size."""
 
     most: int | None = None
-    """The most elements of a bounded array."""
+    """Most elements of a bounded array."""
 
     longest: int | None = None
-    """Characters that a text may have; None if nothing bounds it."""
+    """Most characters of a string; None if unbounded."""
 
     default: Any = None
-    """What ROS takes if it is left out; None for zero, false or an empty text."""
+    """The default value in ROS; None for zero, false or an empty string."""
 
     constants: Mapping[str, Any] | None = None
-    """Names for its values."""
+    """The constants that name values of the field."""
 
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A name for a value that stands in a definition."""
+    """A named value in a definition."""
 
     name: str
     type: str
@@ -119,7 +120,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """One message type: what it is made of."""
+    """The definition of one message type: fields and constants."""
 
     name: str
     fields: tuple[Field, ...]
@@ -130,8 +131,8 @@ class Definitions:
     """The definitions of types, found by name.
 
     Args:
-        ros2: Whether they are those of ROS 2.
-        texts: Texts by the names of types, which count more than the shipped ones.
+        texts: Texts by the names of types; they replace the included ones.
+        ros2: Whether the definitions are those of ROS 2.
 
     """
 
@@ -147,18 +148,18 @@ class Definitions:
         return iter(self._texts)
 
     def text(self, name: str) -> str:
-        """Return the text of one type alone, by its name as ROS 1 writes it."""
+        """Return the text of one type alone; ``name`` is in the form of ROS 1."""
         return self._texts[name]
 
     def definition(self, type: str) -> Definition:
         """Return the definition of a message, or of the request of a service.
 
         Args:
-            type: In either dialect.
+            type: The type, in either dialect.
 
         Raises:
-            UnknownType: If a definition is missing, of the type or of a part of it.
-            ConfigError: If a definition makes no sense.
+            UnknownType: If the definition of the type or of a part of it is missing.
+            ConfigError: If a definition is invalid.
 
         """
         name = str(split_type(type))
@@ -196,7 +197,7 @@ class Definitions:
         kind = _OTHER_NAMES.get(match["type"], match["type"])
         inner = None
         if kind not in SCALARS:
-            if "/" not in kind:  # of the same package
+            if "/" not in kind:  # in the same package
                 kind = f"{outer[-1].partition('/')[0]}/{kind}"
             kind = str(split_type(kind))
             inner = self._definition(kind, outer).fields
@@ -215,12 +216,12 @@ class Definitions:
 
 
 def split_texts(text: str, name: str | None = None, *, ros2: bool) -> dict[str, str]:
-    """Return the text of each type that stands in one text, by the types' names.
+    """Return the text of each type in one text, by the names of the types.
 
     Args:
         text: Types one after the other.
-        name: Of the message that the text begins with, if no line tells it.
-        ros2: Whether the parts of actions are named as in ROS 2.
+        name: The name of the first type, if no line names it.
+        ros2: Whether the parts of actions have the names of ROS 2.
 
     """
     found: dict[str, str] = {}
@@ -274,17 +275,18 @@ def _shipped(ros2: bool) -> dict[str, str]:
 
 @cache
 def shipped(ros2: bool) -> Definitions:
-    """Return the definitions that WebMap brings along, for one dialect."""
+    """Return the definitions of one dialect that are included in WebMap."""
     return Definitions(ros2=ros2)
 
 
 def _named(
     field: Field, among: Sequence[Field], constants: Sequence[Constant]
 ) -> Field:
-    """Give a field the constants that are names for its values, if there are any.
+    """Return a field with the constants that name its values, if there are any.
 
-    Those whose names begin with its own are; or all of its type, if no other field
-    has that type and none of them is called like a field.
+    These are the constants that begin with the name of the field. If there are none,
+    these are all constants of its type, provided that no other field has that type and
+    no constant begins with the name of a field.
     """
     if field.is_array or field.fields is not None:
         return field
@@ -301,7 +303,7 @@ def _named(
 
 
 def _without_comment(line: str) -> str:
-    # A text constant may hold the sign of a comment; no other line does.
+    # A string constant may contain "#"; in any other line it begins a comment.
     if re.match(r"\s*w?string\s+\w+\s*=", line):
         return line.strip()
     return line.partition("#")[0].strip()

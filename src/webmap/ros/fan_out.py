@@ -1,4 +1,4 @@
-"""What a topic says, handed to all who listen: to each as often as it wants."""
+"""Delivery of the messages of a topic to its listeners, each with its own throttle."""
 
 import asyncio
 import time
@@ -10,9 +10,10 @@ from webmap.ros.subscriptions import Subscription
 
 
 class FanOut:
-    """Hands messages over: at once, after a throttle's time, or once decoded elsewhere.
+    """Delivers messages: at once, after the throttle's time, or after the offload.
 
-    A throttle holds back the newest message alone, and gives it when its time is over.
+    A throttle holds back only the newest message, and releases it when its time is
+    over.
     """
 
     def __init__(self) -> None:
@@ -20,17 +21,17 @@ class FanOut:
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def begin(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Keep the time of throttles by this loop; without one they hold for good."""
+        """Use this loop for the timers of throttles; without it they never release."""
         self._loop = loop
 
     async def stop(self) -> None:
-        """Decode nothing any more."""
+        """Stop decoding."""
         await self._offload.stop()
 
     def offer(
         self, message: ReceivedMessage, listeners: Iterable[Subscription]
     ) -> None:
-        """Take a message that came, for listeners of whom not each may want it yet."""
+        """Deliver a new message to the listeners whose throttle allows it."""
         now = time.monotonic()
         due = []
         for listener in listeners:
@@ -42,7 +43,7 @@ class FanOut:
             self._give(message, due)
 
     def give_soon(self, message: ReceivedMessage, listener: Subscription) -> None:
-        """Give a message that came before there was this listener."""
+        """Deliver an earlier message to a new listener."""
         if self._loop is not None:
             self._loop.call_soon(self._give, message, [listener])
 
@@ -51,7 +52,7 @@ class FanOut:
             listener.hold(self._loop, lambda: self._release(listener))
 
     def _release(self, listener: Subscription) -> None:
-        """Hand over the newest message that a listener's throttle held back."""
+        """Deliver the newest message that a listener's throttle held back."""
         listener.forget_timer()
         message = listener.throttle.take(time.monotonic())
         if message is not None:

@@ -1,28 +1,28 @@
-"""One thing that a check of a ROS system found out, for people."""
+"""One result of a check of a ROS system."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Level: TypeAlias = Literal["wrong", "warning", "note", "good"]
-"""``wrong``: it will not work, or not safely. ``note``: cannot be told from here."""
+"""``wrong``: does not work, or not safely. ``note``: cannot be checked from here."""
 
 LEVELS: tuple[Level, ...] = ("wrong", "warning", "note", "good")
 """All levels, the worst first."""
 
 BRIDGE = "bridge"
-"""What a finding is about that holds for a bridge and not for one robot."""
+"""``Finding.about`` of a finding that concerns the bridge, not one robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was found out."""
+    """One result of a check."""
 
     level: Level
     about: str
     """A robot's name, or :data:`BRIDGE`."""
 
     words: str
-    """What is so, in a sentence."""
+    """The result, in a sentence."""
 
     advice: str = ""
-    """What to do about it, in a sentence; empty if nothing is to be done."""
+    """What to do about it, in a sentence; empty if there is nothing to do."""

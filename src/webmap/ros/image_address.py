@@ -1,4 +1,4 @@
-"""Where a camera is on the web, as a person wrote it."""
+"""The web address of a camera."""
 
 import base64
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ EXAMPLE = "http://robot.local:8080/stream?topic=/camera/image_raw&type=mjpeg"
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """A checked address: where to connect to, and what to ask for."""
+    """A checked address: where to connect, and what to request."""
 
     host: str
     port: int
     tls: bool
     target: str
-    """The path and the query, as they stand in a request."""
+    """The path and the query, as in a request."""
     shown: str
-    """The address as people may see it: without what may be secret in it."""
+    """The address as shown to people: without the parts that may be secret."""
     authorization: str = ""
-    """The value of the header of that name, if a user was given."""
+    """The value of the ``Authorization`` header, if a user was given."""
 
     @property
     def request(self) -> bytes:
-        """The request for it.
+        """The HTTP request for the address.
 
-        It is one of HTTP/1.0, to which no server answers in chunks.
+        The request is HTTP/1.0, so no server answers in chunks.
         """
         name = f"[{self.host}]" if ":" in self.host else self.host
         lines = [
@@ -43,14 +43,14 @@ class Address:
 
 
 def parse_address(text: str) -> Address:
-    """Return the address of a camera.
+    """Return the parsed address of a camera.
 
     Args:
-        text: ``http://`` or ``https://``, a host, and what follows; a user and a
-            password may stand before the host.
+        text: ``http://`` or ``https://``, a host, and a path; a user and a password may
+            precede the host.
 
     Raises:
-        ConfigError: If it is anything else.
+        ConfigError: If the text is not such an address.
 
     """
     if not isinstance(text, str) or not text.isascii() or not text.isprintable():
@@ -82,7 +82,7 @@ _MEANT = f"the address of a camera begins with http:// or https://, as {EXAMPLE}
 
 
 def _without_user(text: str) -> str:
-    """Return an address without what stands before the host."""
+    """Return an address without user and password."""
     scheme, slashes, rest = text.partition("://")
     host, slash, path = rest.partition("/")
     return scheme + slashes + host.rpartition("@")[2] + slash + path

@@ -1,4 +1,4 @@
-"""Pulling the pictures of a camera on the web, again and again."""
+"""Repeated download of the pictures of a camera on the web."""
 
 import asyncio
 import socket
@@ -12,25 +12,26 @@ from webmap.ros.image_address import Address
 from webmap.ros.messages_image import MAX_BYTES
 
 PATIENCE = 10.0
-"""Seconds for the next whole picture, however many bytes drip in."""
+"""Longest time for the next complete picture, in seconds, even if bytes come."""
 
 _CHUNK = 1 << 16
 
 
 class Pull:
-    """One connection to a camera, made anew whenever it ends; a service of the process.
+    """One connection to a camera, reopened whenever it ends; a service of the process.
 
-    A stream is read as quickly as it comes, since a camera that must wait would show
-    the past, and its newest picture is handed on. A single picture is asked for again.
-    Where an address leads elsewhere, that is not followed.
+    A stream is read as fast as it comes, since a camera that must wait would send old
+    pictures, and its newest picture is shown. A single picture is requested again and
+    again. Redirects are not followed.
 
     Args:
         address: Where the camera is.
         throttle: The least time between two pictures, in seconds.
-        show: Takes each picture.
-        complain: Takes what fails, in words; it is tried again until it is stopped.
-        patience: Seconds for the next whole picture.
-        backoff: Tells when to try again.
+        show: Called with each picture.
+        complain: Called with each failure, in words; after it the connection is tried
+            again until the pull is stopped.
+        patience: Longest time for the next complete picture, in seconds.
+        backoff: The delays between attempts.
 
     """
 
@@ -56,18 +57,18 @@ class Pull:
         self._trust: ssl.SSLContext | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Connect, and pull."""
+        """Begin to connect and to download."""
         self._task = loop.create_task(self._pull_on())
 
     async def stop(self) -> None:
-        """Hang up, and wait until that is done."""
+        """Disconnect, and wait until that is done."""
         task = self._task
         self.hang_up()
         if task is not None:
             await asyncio.wait([task])
 
     def hang_up(self) -> None:
-        """Pull no more; the second call does nothing."""
+        """Disconnect; the second call has no effect."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -89,10 +90,10 @@ class Pull:
                 await asyncio.sleep(self._backoff.next(now() - began))
 
     async def _pull(self) -> bool:
-        """Pull until the answer ends; return whether it was a stream."""
+        """Read pictures until the answer ends; return whether it was a stream."""
         address, self._newest = self._address, None
         if address.tls and self._trust is None:
-            # Reading who may vouch for a name takes 0.1 s: other cameras cannot wait.
+            # Loading the certificates takes 0.1 s and must not delay other cameras.
             self._trust = await asyncio.to_thread(ssl.create_default_context)
         async with asyncio.timeout(self._patience):
             reader, writer = await asyncio.open_connection(
@@ -102,7 +103,7 @@ class Pull:
             writer.write(address.request)
             return await self._read(reader)
         finally:
-            # Whatever is still on its way is of no use any more.
+            # Data that has not been sent or read yet is of no use now.
             writer.transport.abort()
 
     async def _read(self, reader: asyncio.StreamReader) -> bool:
@@ -143,7 +144,7 @@ class Pull:
             return f"no picture came for {self._patience:g} s"
         if isinstance(error, ConnectionRefusedError):
             return "nothing listens there"
-        # The latter is how a name fails that no host can have, such as "cam..local".
+        # UnicodeError: the host name is invalid, such as "cam..local".
         if isinstance(error, socket.gaierror | UnicodeError):
             return "there is no such host"
         if isinstance(error, ssl.SSLCertVerificationError):
@@ -154,7 +155,7 @@ class Pull:
 
 
 MAX_HEAD = 16_384
-"""The longest head of an answer, in bytes."""
+"""Most bytes of the head of an answer."""
 
 _ENDS = (b"\r\n\r\n", b"\n\n")
 
@@ -167,21 +168,21 @@ _WORDS = {
 
 
 class Answer:
-    """Takes an HTTP answer apart, whether it is a stream or a single picture."""
+    """Parser of an HTTP answer, of a stream or of a single picture."""
 
     def __init__(self) -> None:
         self.streams: bool | None = None
-        """Whether pictures follow each other in it; None until its head has come."""
+        """Whether pictures follow each other; None until the head is complete."""
         self._head = bytearray()
         self._parts: Multipart | None = None
         self._body = bytearray()
         self._length: int | None = None
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Take in what came and return the pictures that are whole by it.
+        """Add received bytes and return the pictures that are now complete.
 
         Raises:
-            ProtocolError: If it is not what a camera answers.
+            ProtocolError: If the answer is not that of a camera.
 
         """
         if self.streams is None:
@@ -207,10 +208,10 @@ class Answer:
         return []
 
     def end(self) -> list[bytes]:
-        """Take in that the connection has ended; what it leaves may be a picture.
+        """Handle the end of the connection; the rest may be a picture.
 
         Raises:
-            ProtocolError: If it ended too early.
+            ProtocolError: If the connection ended too early.
 
         """
         if self.streams is None:
@@ -278,21 +279,21 @@ def _plain(text: str) -> str:
 
 
 MAX_HEADERS = 8192
-"""The longest that stands before one picture, in bytes."""
+"""Most bytes of the headers before one picture."""
 
 
 class Multipart:
-    """Takes the bytes of a ``multipart/x-mixed-replace`` answer apart.
+    """Parser of a ``multipart/x-mixed-replace`` answer.
 
-    Cameras differ in how they write it. The length of a part may be stated or not,
-    lines may end with or without a carriage return, and the boundary may be named
-    with the two dashes that only stand before it in the body.
+    Cameras write this format differently. The length of a part may be stated or not,
+    lines may end with or without a carriage return, and the stated boundary may include
+    the two dashes that precede it in the body.
 
     Args:
-        boundary: What the answer's ``Content-Type`` names.
+        boundary: The boundary from the ``Content-Type`` of the answer.
 
     Raises:
-        ProtocolError: If no boundary is named.
+        ProtocolError: If the boundary is empty.
 
     """
 
@@ -307,10 +308,10 @@ class Multipart:
         self._length: int | None = None
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Take in what came and return the pictures that are whole by it.
+        """Add received bytes and return the pictures that are now complete.
 
         Raises:
-            ProtocolError: If it is too long for a picture, or not of this form.
+            ProtocolError: If a picture is too long, or the format is wrong.
 
         """
         self._rest += data
@@ -325,7 +326,7 @@ class Multipart:
                 pictures.append(picture)
 
     def _begin(self) -> bool:
-        """Go to the beginning of a picture; whether that is there yet."""
+        """Skip to the beginning of a picture; return whether it has come."""
         at = self._rest.find(self._mark)
         if at < 0:
             if len(self._rest) > MAX_HEADERS:
@@ -349,7 +350,7 @@ class Multipart:
         if self._length is not None:
             end = self._length if len(rest) >= self._length else -1
         else:
-            # What was looked at is not looked at again, but for a torn mark.
+            # Search only new bytes, and the last old ones, which may begin a mark.
             end = rest.find(self._mark, self._searched)
             self._searched = max(0, len(rest) - len(self._mark))
         if end < 0:
@@ -371,7 +372,7 @@ def _length(headers: bytes) -> int | None:
     """Return the stated length of a part, None if there is none.
 
     Raises:
-        ProtocolError: If it is no length, or that of no picture.
+        ProtocolError: If the length is not a number, or too large for a picture.
 
     """
     for line in headers.splitlines():
@@ -379,7 +380,7 @@ def _length(headers: bytes) -> int | None:
         if name.strip().lower() != b"content-length":
             continue
         value = value.strip()
-        # Some cameras state 0 where they do not know.
+        # Some cameras state 0 for an unknown length.
         if not value.isdigit() or len(value) > 12:
             raise ProtocolError(f"a picture of {value[:20]!r} bytes")
         if int(value) > MAX_BYTES:

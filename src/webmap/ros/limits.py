@@ -1,8 +1,8 @@
-"""How large a message may be: the one table of limits by type, and how it is checked.
+"""Size limits of messages by type, in one table, and their checks.
 
-A message of one robot must not delay what other robots and their drivers see. So the
-bytes of a message are checked when it comes, and the number of values in it is counted
-before any of them is built.
+A message of one robot must not delay the data of other robots. So the bytes of a
+message are checked when it comes, and its values are counted before any of them is
+built.
 """
 
 from collections.abc import Iterable
@@ -14,10 +14,10 @@ from webmap.ros.names import split_type
 MIB = 1 << 20
 
 MAX_FRAME = 64 * MIB
-"""Most bytes of a WebSocket message; a longer one ends the link."""
+"""Most bytes of a WebSocket message; a longer one ends the connection."""
 
 LARGE = 256 << 10
-"""Bytes above which a frame is decoded by the worker process."""
+"""Bytes above which the worker process decodes a frame."""
 
 MAX_VALUES = 100_000
 """Most objects and lists in one message."""
@@ -28,16 +28,16 @@ class TooLarge(ProtocolError):
 
 
 class Limit(NamedTuple):
-    """How large messages of a type may be, and why."""
+    """Size limit of the messages of a type, with its reason."""
 
     size: int
-    """Bytes of the whole frame, as it comes."""
+    """Bytes of the whole frame, as received."""
 
     why: str
-    """Why the limit is where it is."""
+    """The reason for the limit."""
 
     advice: str
-    """What a person can do about a message that is larger."""
+    """What a person can do about a larger message."""
 
 
 GENERAL = Limit(
@@ -81,18 +81,19 @@ ITEMS = {
     "corners": (10_000, "so many corners of a polygon are drawn"),
     "status": (2_000, "1,000 parts of a robot are shown"),
 }
-"""Most items of one list of a message, and why, by the name of the field."""
+"""Most items of one list of a message, with the reason, by the name of the field."""
 
 _VIEWS = {"ShownAnyImageMsg": "sensor_msgs/Image"}
-"""Views that belong to a type which nobody stated."""
+"""The types of views that may be used when no type is stated."""
 
 
 def limit_of(type: str | None, views: Iterable[object] = ()) -> Limit:
     """Return the limit of a topic.
 
     Args:
-        type: The message type, in either dialect; None if nobody stated it.
-        views: What the message is decoded as, which tells the type if nobody did.
+        type: The message type, in either dialect; None if not stated.
+        views: The types that the message is decoded as; they show the type if it is not
+            stated.
 
     """
     if type is None:
@@ -102,15 +103,15 @@ def limit_of(type: str | None, views: Iterable[object] = ()) -> Limit:
 
 
 def check_size(size: int, limit: Limit, type: str | None) -> None:
-    """Refuse a message that is larger than its type may be.
+    """Check the size of a message against the limit of its type.
 
     Args:
         size: Bytes of the frame.
         limit: The limit of its topic.
-        type: The message type; None if nobody stated it.
+        type: The message type; None if not stated.
 
     Raises:
-        TooLarge: If it is larger; the words say what to do.
+        TooLarge: If the message is larger; the error message gives advice.
 
     """
     if size > limit.size:
@@ -121,11 +122,11 @@ def check_size(size: int, limit: Limit, type: str | None) -> None:
 
 
 def check_items(field: str, count: int) -> None:
-    """Refuse a list that is longer than anybody can use.
+    """Check the length of a list against :data:`ITEMS`.
 
     Args:
         field: The field's name.
-        count: How many items are in the list.
+        count: Number of items in the list.
 
     Raises:
         TooLarge: If there are more than :data:`ITEMS` allows.

@@ -1,7 +1,7 @@
-"""Forms for messages: the fields that people fill in, and the message they make.
+"""Forms for messages: the fields that people fill in, and the resulting message.
 
-A value is named by its path in the message, such as ``pose.position.x``. People fill
-in text, ``True`` or ``False``; a configuration gives plain data.
+A value is named by its path in the message, such as ``pose.position.x``. People fill in
+text, ``True`` or ``False``; a configuration gives plain data.
 """
 
 import json
@@ -14,19 +14,19 @@ from webmap.ros.conforming import MAX_TEXT, Conformer, Misfit, expectation, seco
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Definitions, Field, shipped
 
 MAX_FIELDS = 400
-"""Fields of one form, all depths together."""
+"""Most fields of one form, over all depths."""
 
 
 def fields_of(type: str, known: Definitions | None = None) -> tuple[Field, ...]:
     """Return the fields of a message, or of the request of a service.
 
     Args:
-        type: In either dialect.
-        known: The definitions; those that are shipped, if not given.
+        type: The type, in either dialect.
+        known: The definitions; those included in WebMap if not given.
 
     Raises:
-        UnknownType: If a definition is missing, of the type or of a part of it.
-        ConfigError: If a definition makes no sense, or is too long for a form.
+        UnknownType: If the definition of the type or of a part of it is missing.
+        ConfigError: If a definition is invalid, or too long for a form.
 
     """
     found = (known or shipped(ros2=type.count("/") == 2)).definition(type)
@@ -36,11 +36,11 @@ def fields_of(type: str, known: Definitions | None = None) -> tuple[Field, ...]:
 def _form_fields(
     owner: str, fields: Sequence[Field], budget: list[int]
 ) -> tuple[Field, ...]:
-    """Return the fields without those that nobody fills in, as deep as they go."""
+    """Return the fields that people fill in, at all depths."""
     kept = []
     for field in fields:
         if owner == "std_msgs/Header" and field.name == "seq":
-            continue  # the publisher counts, in ROS 1
+            continue  # in ROS 1 the publisher sets it
         budget[0] -= 1
         if budget[0] < 0:
             raise ConfigError(f"{owner}: more than {MAX_FIELDS} fields are no form")
@@ -52,11 +52,11 @@ def _form_fields(
 
 
 def initial(fields: Sequence[Field], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a whole message: what is given, and the defaults for the rest.
+    """Return a complete message: the given values, and defaults for the rest.
 
     Args:
-        fields: Those of the type.
-        given: Plain data that :func:`checked` has let pass.
+        fields: The fields of the type.
+        given: Plain data checked by :func:`checked`.
 
     """
     return {field.name: _initial(field, given.get(field.name)) for field in fields}
@@ -65,10 +65,10 @@ def initial(fields: Sequence[Field], given: Mapping[str, Any]) -> dict[str, Any]
 def checked(
     fields: Sequence[Field], given: Any, *, ros2: bool = False
 ) -> dict[str, Any]:
-    """Return plain data that fits a type; what is left out stays so.
+    """Return plain data that fits a type; absent fields stay absent.
 
     Raises:
-        Misfit: If it does not fit; the field is named.
+        Misfit: If a value does not fit; its path names the field.
 
     """
     return Conformer(ros2=ros2).message(fields, given)
@@ -77,15 +77,15 @@ def checked(
 def filled_in(
     fields: Sequence[Field], entries: Mapping[str, Any], *, ros2: bool = False
 ) -> dict[str, Any]:
-    """Return the message that entries make.
+    """Return the message that the entries make.
 
     Args:
-        fields: Those of the type.
-        entries: What was filled in, by the path of each field; see :func:`leaves`.
-        ros2: Whether times are written as ROS 2 has them.
+        fields: The fields of the type.
+        entries: The entered values, by the path of each field; see :func:`leaves`.
+        ros2: Whether times have the field names of ROS 2.
 
     Raises:
-        Misfit: If an entry is not what its field takes; the field is named.
+        Misfit: If an entry does not fit its field; its path names the field.
 
     """
 
@@ -103,7 +103,7 @@ def filled_in(
 
 
 def leaves(fields: Sequence[Field], outer: str = "") -> list[tuple[str, Field]]:
-    """Return what is filled in, with its path, in order."""
+    """Return the fields to fill in, each with its path, in order."""
     found: list[tuple[str, Field]] = []
     for field in fields:
         path = _joined(outer, field.name)
@@ -115,7 +115,7 @@ def leaves(fields: Sequence[Field], outer: str = "") -> list[tuple[str, Field]]:
 
 
 def entry_of(field: Field, value: Any) -> str | bool:
-    """Return a value as it stands in a form."""
+    """Return a value as shown in a form."""
     if field.is_array:
         if field.fields is not None:
             return json.dumps(value or [], ensure_ascii=False)
@@ -126,7 +126,7 @@ def entry_of(field: Field, value: Any) -> str | bool:
 
 
 def hint(field: Field) -> str:
-    """Return in words what is filled in, where that is more than its type tells."""
+    """Return a hint how to fill in a field; empty if its type is enough."""
     if field.is_array:
         form = "as JSON, in brackets" if field.fields else "with commas between them"
         return f"{expectation(field)}, {form}"
@@ -151,7 +151,7 @@ def _zero(field: Field) -> Any:
 
 
 def _from_entry(field: Field, entry: Any, path: str) -> Any:
-    """Return what an entry says; text of a number stays text if it is none."""
+    """Return the value of an entry; text that is not a number stays text."""
     if isinstance(entry, str) and len(entry) > MAX_TEXT:
         raise Misfit(f"at most {MAX_TEXT} characters are taken", path)
     if field.is_array and isinstance(entry, str):

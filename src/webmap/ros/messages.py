@@ -1,11 +1,12 @@
 """Typed views of ROS messages: the fields that WebMap needs, in either dialect.
 
-A view names a few fields of a message; a decoder skips the rest. Fields that tell one
-type from another have no defaults, so a message of another type is an error and never
-a robot at the origin. A number that was ``null`` is NaN.
+A view names a few fields of a message; a decoder skips the rest. Fields that
+distinguish one type from another have no defaults, so a message of another type is an
+error and never a robot at the origin. A number that was ``null`` is NaN.
 
-Messages are trees, so the garbage collector need not look at those of which a message
-has many (``gc=False``): it would stop every thread for longer than the decoding takes.
+Messages are trees, so types of which a message has many objects are excluded from
+garbage collection (``gc=False``): it would stop every thread for longer than the
+decoding takes.
 """
 
 import math
@@ -25,11 +26,11 @@ if TYPE_CHECKING:
 
 
 SECOND = 1_000_000_000
-"""Nanoseconds."""
+"""One second, in nanoseconds."""
 
 
 class Time(msgspec.Struct, frozen=True, gc=False):
-    """A moment of the robot's clock, with the names of ROS 1 and of ROS 2."""
+    """A time of the robot's clock, with the field names of ROS 1 and of ROS 2."""
 
     secs: int = 0
     nsecs: int = 0
@@ -38,16 +39,16 @@ class Time(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def seconds(self) -> float:
-        """Seconds since the epoch of that clock; 0 if nobody set it.
+        """Seconds since the epoch of the robot's clock; 0 if not set.
 
         Raises:
-            ProtocolError: If the nanoseconds are below zero, or a second or more of
-                them; or if the seconds are more than a number can hold.
+            ProtocolError: If the nanoseconds are below zero, or one second or more; or
+                if the seconds are too large for a number.
 
         """
         part = self.nsecs or self.nanosec
         if not 0 <= part < SECOND:
-            # Python refuses to write a number of thousands of digits.
+            # Python refuses to format an integer of thousands of digits.
             got = str(part) if abs(part) < 1 << 64 else "far too many"
             raise ProtocolError(
                 f"a time has {got} nanoseconds; expected 0 to {SECOND - 1}"
@@ -62,7 +63,7 @@ class Time(msgspec.Struct, frozen=True, gc=False):
 
 
 class Header(msgspec.Struct, frozen=True, gc=False):
-    """When a message was measured, and in which frame its numbers are."""
+    """The time of a measurement, and the frame of its numbers."""
 
     stamp: Time = Time()
     frame_id: str = ""
@@ -82,7 +83,7 @@ class PointMsg(msgspec.Struct, frozen=True, gc=False):
 
 
 class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
-    """``geometry_msgs/Quaternion``; its norm may be anything."""
+    """``geometry_msgs/Quaternion``, of any norm."""
 
     x: float
     y: float
@@ -96,16 +97,16 @@ class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
 
 
 class Unstamped(msgspec.Struct, frozen=True, gc=False):
-    """A type without a header, which is asked the same as one that has it."""
+    """A type without a header, with the same properties as :class:`Stamped`."""
 
     @property
     def frame_id(self) -> str:
-        """Empty: this type does not say in which frame it is."""
+        """Empty: this type has no frame."""
         return ""
 
     @property
     def stamp(self) -> float:
-        """0: this type does not say when it was measured."""
+        """0: this type has no time of measurement."""
         return 0.0
 
 
@@ -117,16 +118,16 @@ class PoseMsg(Unstamped, frozen=True):
 
     @property
     def planar(self) -> Pose:
-        """Place and heading in the plane."""
+        """Position and heading in the plane."""
         return Pose(self.position.x, self.position.y, self.orientation.quaternion.yaw)
 
     @property
     def usable(self) -> Pose:
-        """Place and heading in the plane, of a pose that has them.
+        """Position and heading in the plane, checked.
 
         Raises:
-            ProtocolError: If a number is NaN or infinite, the quaternion is zero, or it
-                is farther away than anything can be.
+            ProtocolError: If a number is NaN or infinite, the quaternion is zero, or
+                the position is farther away than any robot can be.
 
         """
         p, q = self.position, self.orientation
@@ -151,28 +152,28 @@ class PoseMsg(Unstamped, frozen=True):
 
     @property
     def turns_nowhere(self) -> bool:
-        """Whether the quaternion is zero, as a message has it that nobody filled."""
+        """Whether the quaternion is zero, as in an uninitialized message."""
         return self.orientation.quaternion.norm <= 1e-6
 
     @property
     def place(self) -> "PoseMsg":
-        """The pose itself; every view of a pose has one of this name."""
+        """The pose itself; every view of a pose has this property."""
         return self
 
 
 class Stamped(msgspec.Struct, frozen=True, kw_only=True, gc=False):
-    """Every type that begins with a header."""
+    """A type that begins with a header."""
 
     header: Header = Header()
 
     @property
     def frame_id(self) -> str:
-        """The frame that the numbers are in."""
+        """The frame of the numbers."""
         return self.header.frame_id
 
     @property
     def stamp(self) -> float:
-        """When it was measured, in seconds of the robot's clock; 0 if not said."""
+        """Time of the measurement, in seconds of the robot's clock; 0 if not set."""
         return self.header.stamp.seconds
 
 
@@ -183,7 +184,7 @@ class PoseStampedMsg(Stamped, frozen=True, kw_only=True):
 
     @property
     def place(self) -> PoseMsg:
-        """Place and orientation in :attr:`frame_id`."""
+        """Position and orientation in :attr:`frame_id`."""
         return self.pose
 
 
@@ -200,7 +201,7 @@ class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
 
     @property
     def place(self) -> PoseMsg:
-        """Place and orientation in :attr:`frame_id`."""
+        """Position and orientation in :attr:`frame_id`."""
         return self.pose.pose
 
 
@@ -230,7 +231,7 @@ class TwistMsg(msgspec.Struct, frozen=True):
 
     @property
     def twist(self) -> Twist:
-        """The same velocity, as a base has it."""
+        """The same velocity as a planar :class:`Twist`."""
         linear, angular = self.linear, self.angular
         return Twist(linear.x, linear.y, angular.z, linear.z, angular.x, angular.y)
 
@@ -242,14 +243,14 @@ class TwistWithCovarianceMsg(msgspec.Struct, frozen=True):
 
 
 class OdometryMsg(PoseWithCovarianceStampedMsg, frozen=True, kw_only=True):
-    """``nav_msgs/Odometry``: the same pose, and a velocity."""
+    """``nav_msgs/Odometry``: a pose and a velocity."""
 
     twist: TwistWithCovarianceMsg
     child_frame_id: str = ""
 
     @property
     def velocity(self) -> Twist:
-        """How the base moves, in its own frame."""
+        """The velocity of the robot's base, in its own frame."""
         return self.twist.twist.twist
 
 
@@ -260,23 +261,23 @@ class LaserScanMsg(Stamped, frozen=True, kw_only=True):
     """Bearing of the first ray, in radians, counter-clockwise from x."""
 
     angle_increment: float
-    """Angle between neighbouring rays, in radians; negative if it sweeps clockwise."""
+    """Angle between neighbouring rays, in radians; negative for a clockwise sweep."""
 
     range_min: float
-    """Shortest range the sensor can measure, in metres."""
+    """Shortest range that the sensor can measure, in metres."""
 
     range_max: float
-    """Longest range the sensor can measure, in metres."""
+    """Longest range that the sensor can measure, in metres."""
 
     range_values: Floats = msgspec.field(name="ranges")
-    """The ranges as they came; :attr:`ranges` is what to count with."""
+    """The received ranges; use :attr:`ranges` for calculations."""
 
     @property
     def ranges(self) -> "NDArray[np.float32]":
         """Measured ranges, in metres, of shape (N,), read-only.
 
-        NaN and infinities are kept in a binary encoding; as text bridges write
-        ``null`` for all three, which is NaN here.
+        A binary encoding keeps NaN and infinities. As text, bridges write ``null`` for
+        all three, which is NaN here.
         """
         return self.range_values.array()
 
@@ -298,7 +299,7 @@ class MapMetaDataMsg(msgspec.Struct, frozen=True):
     """``nav_msgs/MapMetaData``."""
 
     resolution: float
-    """Metres a cell."""
+    """Metres per cell."""
 
     width: int
     """Cells along x."""
@@ -311,14 +312,14 @@ class MapMetaDataMsg(msgspec.Struct, frozen=True):
 
 
 MAX_CELLS = 1 << 26
-"""The most cells that a grid may have."""
+"""Most cells of a grid."""
 
 
 def cells_of(data: Int8s, width: int, height: int) -> "NDArray[np.int8]":
     """Return the cells of a grid, of shape (height, width), read-only.
 
     Raises:
-        ProtocolError: If there are none, too many, or not as many as the size says.
+        ProtocolError: If there are no cells, too many, or not width times height.
 
     """
     size = f"a grid of {width} x {height} cells"
@@ -342,7 +343,7 @@ class OccupancyGridMsg(Stamped, frozen=True, kw_only=True):
         """The cells, of shape (height, width), read-only; -1 is unknown.
 
         Raises:
-            ProtocolError: If there are more or fewer than the size says.
+            ProtocolError: If the number of cells is not width times height.
 
         """
         return cells_of(self.data, self.info.width, self.info.height)
@@ -378,6 +379,6 @@ class TFMessage(msgspec.Struct, frozen=True):
     """``tf2_msgs/TFMessage``."""
 
     separable: ClassVar = True
-    """Whether the parts of a long one may be handed over one after the other."""
+    """Whether the parts of a long message may be delivered one after the other."""
 
     transforms: list[TransformStampedMsg]

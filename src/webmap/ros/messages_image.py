@@ -16,23 +16,23 @@ YUV = {
     "yuv422_yuy2": (0, 1, 3),
     "yuyv": (0, 1, 3),
 }
-"""For each encoding, where the first light, U and V are in the bytes of two pixels.
+"""For each encoding, the positions of the first Y, U and V in the bytes of two pixels.
 
-``yuv422`` has them in the order of UYVY, as ``sensor_msgs/image_encodings.hpp`` says.
+``yuv422`` has the order of UYVY, as defined in ``sensor_msgs/image_encodings.hpp``.
 """
 
 
 class Mosaic(NamedTuple):
-    """How the filters lie before a sensor, in squares of two by two."""
+    """The order of the colour filters of a sensor, in squares of 2 x 2 values."""
 
     red: tuple[int, int]
     """Row and column of red."""
 
     blue: tuple[int, int]
-    """Row and column of blue; green are the other two."""
+    """Row and column of blue; the other two are green."""
 
     octets: int
-    """Bytes of a value."""
+    """Bytes per value."""
 
 
 _CORNERS = {
@@ -53,15 +53,15 @@ BAYER = {
 def from_yuv(
     rows: "NDArray[np.uint8]", order: tuple[int, int, int]
 ) -> "NDArray[np.uint8]":
-    """Return a picture whose colours are shared by two pixels each.
+    """Return a picture in which two pixels share one colour as RGB.
 
     Args:
-        rows: Its bytes, of shape (height, 2 * width).
+        rows: The bytes, of shape (height, 2 * width).
         order: One of :data:`YUV`.
 
     Returns:
-        Red, green and blue, of shape (height, width, 3), by BT.601 with light from 16
-        to 235, as cameras and OpenCV have it.
+        Red, green and blue, of shape (height, width, 3), by BT.601 with Y from 16 to
+        235, as in cameras and OpenCV.
 
     Raises:
         ProtocolError: If the width is odd.
@@ -88,7 +88,7 @@ def from_yuv(
 
 
 def from_bayer(mosaic: "NDArray[np.uint8]", filters: Mosaic) -> "NDArray[np.uint8]":
-    """Return the picture of a mosaic: each square of two by two becomes a pixel.
+    """Return the picture of a mosaic: each square of 2 x 2 values becomes a pixel.
 
     Args:
         mosaic: Of shape (height, width).
@@ -98,7 +98,7 @@ def from_bayer(mosaic: "NDArray[np.uint8]", filters: Mosaic) -> "NDArray[np.uint
         Red, green and blue, of shape (height // 2, width // 2, 3).
 
     Raises:
-        ProtocolError: If it is not as large as one square.
+        ProtocolError: If the mosaic is smaller than one square.
 
     """
     import numpy as np
@@ -119,21 +119,21 @@ def from_bayer(mosaic: "NDArray[np.uint8]", filters: Mosaic) -> "NDArray[np.uint
 
 
 MOST_SEGMENTS = 1000
-"""Segments of a JPEG that are passed over before its size."""
+"""Most segments of a JPEG before the segment with its size."""
 
 _NO_FRAME = (0xC4, 0xC8, 0xCC)
-"""Markers from 0xC0 to 0xCF that are no begin of a frame."""
+"""Markers from 0xC0 to 0xCF that do not begin a frame."""
 
 
 def size_of(data: bytes) -> tuple[int, int]:
-    """Return width and height of a JPEG, PNG or WebP, in pixels, by its head alone.
+    """Return width and height of a JPEG, PNG or WebP, in pixels, from its head alone.
 
-    A picture of a few kilobytes may have billions of pixels: whoever decodes it, a
-    browser too, runs out of memory. What a browser would have to search for is not
-    searched for here, so a picture whose size is not plain is refused.
+    A picture of a few kilobytes may have billions of pixels. A program that decodes it,
+    also a browser, runs out of memory. This function does not search for a size as a
+    browser does, so a picture whose size is not in the expected place is refused.
 
     Raises:
-        ProtocolError: If it does not say, or says it in a place where it may not be.
+        ProtocolError: If the size is missing or not in the expected place.
 
     """
     if data.startswith(b"\xff\xd8"):
@@ -152,7 +152,7 @@ def size_of(data: bytes) -> tuple[int, int]:
 def _of_jpeg(data: bytes) -> tuple[int, int]:
     at = 2
     for _ in range(MOST_SEGMENTS):
-        while data[at : at + 2] == b"\xff\xff":  # bytes that fill
+        while data[at : at + 2] == b"\xff\xff":  # fill bytes
             at += 1
         if len(data) < at + 9 or data[at] != 0xFF:
             break
@@ -188,10 +188,10 @@ def _little(data: bytes) -> int:
 
 
 MAX_BYTES = 4 << 20
-"""The largest compressed picture that is shown."""
+"""Most bytes of a compressed picture that is shown."""
 
 MAX_PIXELS = 16_000_000
-"""The most pixels of a picture that is decoded, here or in a browser."""
+"""Most pixels of a picture that is decoded, here or in a browser."""
 
 _CHANNELS = {
     "rgb8": (0, 1, 2),
@@ -200,25 +200,25 @@ _CHANNELS = {
     "bgra8": (2, 1, 0),
     "8UC3": (2, 1, 0),
 }
-"""For each encoding, which of a pixel's bytes are red, green and blue."""
+"""For each encoding, the positions of red, green and blue in the bytes of a pixel."""
 
 _WIDE = {"rgba8": 4, "bgra8": 4}
 _GREY = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2", "32FC1": "f4"}
 
 
 class CompressedImageMsg(msgspec.Struct):
-    """The fields of ``sensor_msgs/CompressedImage`` that are shown."""
+    """The fields of ``sensor_msgs/CompressedImage`` that are used."""
 
     data: bytes
     format: str = ""
 
     @property
     def media_type(self) -> str:
-        """What the picture is, by its first bytes, whatever ``format`` says.
+        """The media type of the picture, by its first bytes; ``format`` is ignored.
 
         Raises:
-            ProtocolError: If it is nothing that a browser shows, or has more pixels
-                than a browser should have to decode.
+            ProtocolError: If a browser cannot show the picture, or it has too many
+                pixels.
 
         """
         data = self.data
@@ -252,11 +252,11 @@ class ImageMsg(msgspec.Struct):
     def pixels(self) -> "NDArray[np.uint8]":
         """Return the picture, of shape (height, width, 3) or, if grey, (height, width).
 
-        What has more than 8 bits is stretched from its least to its greatest value. A
+        Values of more than 8 bits are scaled from their least and greatest value. A
         mosaic of a sensor (``bayer_...``) becomes a picture of half its size.
 
         Raises:
-            ProtocolError: If the encoding is not known or the size does not fit.
+            ProtocolError: If the encoding is unknown or the size does not fit.
 
         """
         width, height = self.width, self.height
@@ -297,7 +297,7 @@ class ImageMsg(msgspec.Struct):
 
 
 class AnyImageMsg(msgspec.Struct):
-    """A picture of a topic whose type nobody knows: either of both."""
+    """A picture of a topic of unknown type: compressed or not."""
 
     data: bytes
     format: str = ""
@@ -309,12 +309,12 @@ class AnyImageMsg(msgspec.Struct):
 
     @property
     def packed(self) -> CompressedImageMsg:
-        """It as ``sensor_msgs/CompressedImage``."""
+        """The same as ``sensor_msgs/CompressedImage``."""
         return CompressedImageMsg(self.data, self.format)
 
     @property
     def raw(self) -> ImageMsg | None:
-        """It as ``sensor_msgs/Image``; None if it has no encoding, which that has."""
+        """The same as ``sensor_msgs/Image``; None without an encoding."""
         if not self.encoding:
             return None
         return ImageMsg(

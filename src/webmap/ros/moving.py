@@ -1,9 +1,9 @@
-"""What sets robots in motion, and what a bridge therefore never publishes or calls.
+"""Topics and services that move robots, and that a bridge never publishes or calls.
 
-Velocity, goals and cancel are written by the gate alone. :class:`WrittenByGate` refuses
-what was declared for a robot. Where nobody has declared anything, names and types that
-ROS packages give show what moves a robot. A service that moves a robot by itself, such
-as one that docks, cannot be recognised by its name.
+Only the gate publishes velocity, goals and cancel. :class:`WrittenByGate` refuses the
+topics that were declared for a robot. For other topics, names and types of ROS packages
+show whether they move a robot. A service that moves a robot by itself, such as docking,
+cannot be recognised by its name.
 """
 
 import re
@@ -13,7 +13,7 @@ from webmap.base.errors import ConfigError, MotionRefused
 from webmap.ros.names import TypeName, is_type, split_type
 
 STOP = "what STOP says"
-"""What a topic carries that is a robot's stop hook."""
+"""Kind of a topic that is a robot's stop hook."""
 
 INSTEAD = {
     "a velocity": "Robot.twist()",
@@ -22,7 +22,7 @@ INSTEAD = {
     "an initial pose": "Robot.locate()",
     STOP: "Robot.stop() and Robot.reset_stop()",
 }
-"""What writes it, by what a topic carries."""
+"""What to call instead, by what a topic carries."""
 
 _TWISTS = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 _SEND_GOAL = "/_action/send_goal"
@@ -85,22 +85,22 @@ _VELOCITY = re.compile(
 _CONTROLLER = re.compile(
     r"/[^/]*controller[^/]*/(?:commands?|reference(?:_unstamped)?|joint_trajectory)\Z"
 )
-"""What the controllers of ros_control and ros2_control listen to."""
+"""Command topics of the controllers of ros_control and ros2_control."""
 
 _NUMBERS = re.compile(
     r"std_msgs/(?:Float|U?Int)\d+(?:MultiArray)?|geometry_msgs/Vector3(?:Stamped)?"
 )
-"""Types that say nothing of what their numbers are."""
+"""Types whose numbers may mean anything."""
 
 _NUMBERS_MOVE = re.compile(r"/(?:commands?|cmds?|vel|velocity|velocities)\Z")
-"""Names at which such numbers are commands; at another, a message may be a text."""
+"""Names at which such numbers are commands; at other names they are allowed."""
 
 _ACTION_TOPICS = ("ActionGoal",)
 _ACTION_TYPES = ("_SendGoal", "_Goal")
 
 
 def moved_by_name(name: str) -> str | None:
-    """Return what a topic or a service of this name carries, if it moves robots.
+    """Return what a topic or service of this name carries, if it moves robots.
 
     Args:
         name: The resolved name.
@@ -118,13 +118,13 @@ def moved_by_name(name: str) -> str | None:
 
 
 def moved_by_type(type: str) -> str | None:
-    """Return what a message or a service of this type carries, if it moves robots.
+    """Return what a message or service of this type carries, if it moves robots.
 
     Args:
-        type: In either dialect; a text that is no type moves nothing.
+        type: The type, in either dialect; text that is not a type gives None.
 
     Returns:
-        What :func:`moved_by_name` returns, or that it is a simulator's.
+        A value of :func:`moved_by_name`, or the kind of a simulator's types.
 
     """
     try:
@@ -141,12 +141,13 @@ def moved_by_type(type: str) -> str | None:
 def moved_by_both(name: str, type: str) -> str | None:
     """Return what numbers of this type carry at this name, if they move robots.
 
-    Neither tells it alone: wheels take a ``std_msgs/Float64MultiArray`` at
-    ``/wheels/commands``, and so does a plot at ``/samples``.
+    Name and type are needed together: wheels subscribe to a
+    ``std_msgs/Float64MultiArray`` at ``/wheels/commands``, and a plot to the same type
+    at ``/samples``.
 
     Args:
         name: The resolved name.
-        type: In either dialect; a text that is no type moves nothing.
+        type: The type, in either dialect; text that is not a type gives None.
 
     """
     try:
@@ -157,28 +158,28 @@ def moved_by_both(name: str, type: str) -> str | None:
 
 
 class WrittenByGate(dict[str, str]):
-    """What the gate alone writes behind one address: what each topic carries."""
+    """Topics of one address on which only the gate publishes, and what they carry."""
 
     def declare(self, topic: str, carries: str) -> None:
         """Refuse ``topic`` from now on.
 
         Args:
-            topic: Its resolved name.
-            carries: What it carries, in the words of :data:`INSTEAD`.
+            topic: The resolved name of the topic.
+            carries: What it carries: a key of :data:`INSTEAD`.
 
         """
-        if self.get(topic, STOP) == STOP:  # a goal stays one
+        if self.get(topic, STOP) == STOP:  # other kinds have precedence
             self[topic] = carries
 
     def refuse_message(self, topic: str, *types: str | None) -> None:
-        """Let a message pass unless it would move a robot.
+        """Check that a message does not move a robot.
 
         Args:
             topic: The resolved name of its topic.
-            types: The types that it is said to have; None where nobody knows.
+            types: The types that are stated for the topic; None if unknown.
 
         Raises:
-            MotionRefused: If it would.
+            MotionRefused: If the message would move a robot.
 
         """
         carried = self.get(topic)
@@ -196,16 +197,16 @@ class WrittenByGate(dict[str, str]):
                 )
 
     def refuse_service(self, service: str) -> None:
-        """Let a call pass unless it would send a robot somewhere.
+        """Check that a service does not move a robot.
 
         Args:
             service: The resolved name.
 
         Raises:
-            MotionRefused: If it would.
+            MotionRefused: If the service would move a robot.
 
         """
-        # A topic that is a stop hook may well have a service of its name beside it.
+        # A topic that is a stop hook may share its name with a service.
         moves = self.get(service, STOP) != STOP
         if service.endswith(_SEND_GOAL) or moves:
             raise MotionRefused(
@@ -217,5 +218,5 @@ _written: WeakValueDictionary[str, WrittenByGate] = WeakValueDictionary()
 
 
 def written_behind(url: str) -> WrittenByGate:
-    """Return what the gate writes behind an address; the same for all its bridges."""
+    """Return what only the gate publishes at an address; shared by all its bridges."""
     return _written.setdefault(url, WrittenByGate())

@@ -1,4 +1,4 @@
-"""Names of topics, types and bridges, and when two of them mean the same."""
+"""Names of topics, types and bridges, and their comparison."""
 
 import re
 from typing import NamedTuple
@@ -25,15 +25,15 @@ class TypeName(NamedTuple):
     name: str
 
     def __str__(self) -> str:
-        """The name as ROS 1 writes it."""
+        """The name in the form of ROS 1."""
         return f"{self.package}/{self.name}"
 
 
 def normalise_topic(topic: str) -> str:
-    """Return the resolved name of ``topic``: absolute, single slashes, none last.
+    """Return the resolved name of ``topic``: absolute, single slashes, none at the end.
 
-    A relative name is taken from the root, as rosbridge itself does unless it runs
-    in a namespace.
+    A relative name is resolved from the root, as in rosbridge, unless rosbridge runs in
+    a namespace.
 
     Raises:
         ConfigError: If the text cannot be the name of a topic or a service.
@@ -51,7 +51,7 @@ def normalise_topic(topic: str) -> str:
 
 
 def is_topic(topic: str) -> bool:
-    """Return whether :func:`normalise_topic` would take ``topic``."""
+    """Return whether :func:`normalise_topic` accepts ``topic``."""
     try:
         normalise_topic(topic)
     except ConfigError:
@@ -62,8 +62,8 @@ def is_topic(topic: str) -> bool:
 def split_type(type: str) -> TypeName:
     """Return package and name of a type in either dialect.
 
-    ``nav_msgs/Odometry`` (ROS 1) and ``nav_msgs/msg/Odometry`` (ROS 2) give the
-    same value.
+    ``nav_msgs/Odometry`` (ROS 1) and ``nav_msgs/msg/Odometry`` (ROS 2) give the same
+    value.
 
     Raises:
         ConfigError: If the text is not the name of a type.
@@ -79,9 +79,9 @@ def split_type(type: str) -> TypeName:
 
 
 def same_type(one: str, other: str) -> bool:
-    """Return whether two names mean one type, whatever their dialects.
+    """Return whether two names mean one type, in any dialects.
 
-    A text that is not the name of a type is the same as nothing.
+    Text that is not the name of a type equals nothing.
     """
     try:
         return split_type(one) == split_type(other)
@@ -90,12 +90,12 @@ def same_type(one: str, other: str) -> bool:
 
 
 def is_type(type: str, *names: str) -> bool:
-    """Return whether ``type`` is one of ``names``, whatever the dialects."""
+    """Return whether ``type`` is one of ``names``, in any dialects."""
     return any(same_type(type, name) for name in names)
 
 
 def ros2_type(type: str) -> str:
-    """Return the name of a message type as ROS 2 writes it, with ``/msg/``.
+    """Return the name of a message type in the form of ROS 2, with ``/msg/``.
 
     Raises:
         ConfigError: If the text is not the name of a type.
@@ -106,10 +106,10 @@ def ros2_type(type: str) -> str:
 
 
 def normalise_url(url: str) -> str:
-    """Return the one spelling of a bridge's address.
+    """Return the normalised address of a bridge.
 
-    Scheme and host are in lower case, the scheme's own port and the slash at the
-    end are left out, so that two spellings of one bridge compare equal.
+    Scheme and host become lower case; the default port of the scheme and a slash at the
+    end are removed. So two spellings of one address compare equal.
 
     Raises:
         ConfigError: If the text is not a WebSocket address.
@@ -141,9 +141,9 @@ def normalise_url(url: str) -> str:
 
 
 def spellings_of(url: str) -> list[str]:
-    """Return a normalised address in each spelling of this computer, the first first.
+    """Return a normalised address and its other spellings; the given one is first.
 
-    One that leads to another computer has no other spelling than its own.
+    Only an address of this computer has other spellings.
     """
     parts = urlsplit(url)
     host, port = parts.netloc, ""

@@ -1,4 +1,4 @@
-"""Large frames are decoded elsewhere, so that small ones need not wait for them."""
+"""Decoding of large frames in another process, so that they do not delay small ones."""
 
 import asyncio
 import contextlib
@@ -32,14 +32,14 @@ PATIENCE = 20.0
 """Longest time for one frame, in seconds."""
 
 CHUNK = 1 << 20
-"""Bytes that are copied at a time: nothing else runs meanwhile."""
+"""Bytes that are copied at a time; the event loop waits for each copy."""
 
 MOST_STATIC = 16
-"""Messages of ``/tf_static`` that wait while one is decoded; each is sent but once."""
+"""Most ``/tf_static`` messages that wait for the decoding; each is sent only once."""
 
 
 class Reply(NamedTuple):
-    """An answer, what belongs to it, and how long the worker was busy with it."""
+    """An answer, its parts, and how long the worker was busy with it."""
 
     answer: Answer
     parts: list[bytearray]
@@ -51,15 +51,15 @@ _WORKER_FAILURES = (
     EOFError,
     TimeoutError,
     msgspec.MsgspecError,
-    RuntimeError,  # of uvloop, for a pipe that has just closed
+    RuntimeError,  # from uvloop, if the pipe has just closed
 )
 
 
 class _Worker:
-    """The one worker process of this process; started by the first large frame.
+    """The only worker process of this process; the first large frame starts it.
 
-    It does one thing at a time, in the order in which it is asked. Each bridge asks for
-    one thing at a time, so every bridge gets its turn.
+    It handles one request at a time, in the order of the requests. Each bridge sends
+    one request at a time, so every bridge gets its turn.
     """
 
     def __init__(self) -> None:
@@ -67,12 +67,12 @@ class _Worker:
         self._process: asyncio.subprocess.Process | None = None
         self._turn = asyncio.Lock()
         self.taking_over = asyncio.Lock()
-        """Held by whoever takes over a part of an answer; others wait in order."""
+        """Held while a part of an answer is processed; others wait in order."""
 
     async def ask(
         self, request: Request, data: bytes | bytearray | memoryview
     ) -> Reply:
-        """Have a request answered; what goes wrong with that is an answer, too."""
+        """Return the worker's answer to a request; a failure is an answer, too."""
         async with self._turn:
             began = time.monotonic()
             try:
@@ -82,7 +82,7 @@ class _Worker:
                 await self.stop()
                 answer, parts = Answer(error=f"its decoder ended: {error!r}"), []
             except asyncio.CancelledError:
-                await self.stop()  # an answer that nobody reads would meet the next
+                await self.stop()  # the next request would get this answer
                 raise
             return Reply(answer, parts, time.monotonic() - began)
 
@@ -131,7 +131,7 @@ async def _start() -> asyncio.subprocess.Process:
 
 
 async def _read(stream: asyncio.StreamReader, size: int) -> bytearray:
-    """Return so many bytes; no copy on the way is long enough to be noticed."""
+    """Read so many bytes in pieces, since one long copy would block the event loop."""
     found, at = bytearray(size), 0
     while at < size:
         piece = await stream.read(min(CHUNK, size - at))
@@ -143,11 +143,11 @@ async def _read(stream: asyncio.StreamReader, size: int) -> bytearray:
 
 
 def values(answer: Answer, parts: list[bytearray], type: Any) -> Iterator[Any]:
-    """Take the value of an answer apart, a step for each part that came.
+    """Build the value of an answer, one step for each received part.
 
     Yields:
-        For a type that is ``separable``, each part as a message of its own. For others,
-        None for each step and in the end the message.
+        For a type that is ``separable``, each part as a message of its own. For other
+        types, None for each step and the message at the end.
 
     Raises:
         ProtocolError: If the answer is an error, or not of the type.
@@ -216,10 +216,10 @@ async def aside(
     data: bytes | bytearray | memoryview,
     *arguments: object,
 ) -> bytearray:
-    """Return what a function of WebMap's own makes of bytes, in the worker process.
+    """Call a function of WebMap with bytes in the worker process; return the result.
 
     Raises:
-        ProtocolError: If it raises one, or does not end.
+        ProtocolError: If the function raises one, or does not end.
 
     """
     user, name = object(), view_name(function)
@@ -244,21 +244,22 @@ class _Job(NamedTuple):
 
 
 class Offload:
-    """The large frames of one bridge: in order within a topic, the newest wins.
+    """Decodes the large frames of one bridge: in order within a topic, the newest wins.
 
-    Of one bridge, one frame at a time is with the worker process. After that no other
-    is for as long as it took, so that the process is free half of the time at least.
+    The worker has at most one frame of a bridge at a time. After each frame the bridge
+    waits for as long as the decoding took, so the worker is free at least half of the
+    time.
     """
 
     def __init__(self) -> None:
         self._waiting: dict[str, deque[_Job]] = {}
-        """For each topic that is being decoded, what comes after."""
+        """For each topic that is being decoded, the messages that wait."""
         self._tasks: set[asyncio.Task[None]] = set()
         self._turn = asyncio.Lock()
         self._rests_until = 0.0
 
     def wants(self, message: ReceivedMessage) -> bool:
-        """Return whether ``message`` must not be decoded here and now."""
+        """Return whether ``message`` must be decoded by the worker."""
         return len(message.frame) > LARGE or message.topic in self._waiting
 
     def decode(
@@ -267,11 +268,11 @@ class Offload:
         types: frozenset[Any],
         then: Callable[[Any], None],
     ) -> None:
-        """Decode ``message`` as each of ``types`` elsewhere, and call ``then`` of each.
+        """Decode ``message`` in the worker as each of ``types``; then call ``then``.
 
-        It is called once, or for each part of what is ``separable``. What waits for its
-        turn is dropped when a newer message of its topic comes, and so is the rest of
-        what is handed over in parts.
+        ``then`` is called once for each type, or once for each part of a ``separable``
+        one. A newer message of the topic replaces a message that waits, and ends the
+        delivery of one that is delivered in parts.
         """
         job = _Job(message, types, (then,))
         waiting = self._waiting.get(message.topic)
@@ -325,13 +326,13 @@ class Offload:
         waiting: deque[_Job],
         turn: asyncio.Lock,
     ) -> None:
-        """Take a step at a time, and then leave as much time to all others.
+        """Deliver the message step by step, with a pause of the same length after each.
 
-        The lock is that of all bridges, so that many of them take no more time.
+        All bridges share the lock ``turn``, so many bridges take no more time than one.
         """
         steps, parts = 0, values(reply.answer, reply.parts, type)
         try:
-            # One that came as a whole is given, or a quick topic would show nothing.
+            # Deliver the first step even if late: else a fast topic would show nothing.
             while not (steps and _is_late(job, waiting)):
                 async with turn:
                     began = time.monotonic()
@@ -346,11 +347,11 @@ class Offload:
         except ProtocolError as error:
             job.message.prime(type, error)
             _call(job, type)
-        if steps > 1:  # of which the last part is not the message
+        if steps > 1:  # the last value is only a part of the message
             job.message.forget(type)
 
     async def stop(self) -> None:
-        """Forget what is under way, and end the process if nobody else uses it."""
+        """Cancel all work, and end the process if no other bridge uses it."""
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
@@ -359,7 +360,7 @@ class Offload:
 
 
 def _join(waiting: deque[_Job], job: _Job) -> None:
-    """Let a message wait instead of an older one; of static frames, each counts."""
+    """Queue a message in place of the older one; keep each static transform."""
     if waiting and waiting[-1].message is job.message:
         last = waiting.pop()
         job = _Job(job.message, last.types | job.types, last.then + job.then)
@@ -369,12 +370,12 @@ def _join(waiting: deque[_Job], job: _Job) -> None:
 
 
 def _is_late(job: _Job, waiting: deque[_Job]) -> bool:
-    """Return whether a newer message came, for which this one is dropped."""
+    """Return whether a newer message has come that replaces this one."""
     return bool(waiting) and not _counts(job)
 
 
 def _counts(job: _Job) -> bool:
-    """Return whether a message is sent but once, and says what no other does."""
+    """Return whether a message is sent only once and must not be dropped."""
     return job.message.topic.endswith("/tf_static")
 
 

@@ -1,4 +1,4 @@
-"""What a link hands over: messages as they came, its state, and its counts."""
+"""Received messages, the state of a connection, and its counts."""
 
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -11,10 +11,10 @@ LinkState: TypeAlias = Literal["new", "connecting", "open", "closed"]
 
 
 class ReceivedMessage:
-    """A message on a topic, as bytes until :meth:`decode` is called.
+    """A message on a topic, kept as bytes until :meth:`decode` is called.
 
-    So a message that nobody wants, or that comes faster than anybody wants it, is not
-    decoded. Each kind of link has a subclass that knows how its bytes are read.
+    So a message that no listener needs, or that comes too often, is not decoded. Each
+    kind of link has a subclass that reads its bytes.
     """
 
     __slots__ = ("_decoded", "frame", "topic")
@@ -22,17 +22,17 @@ class ReceivedMessage:
     def __init__(self, topic: str, frame: bytes | bytearray) -> None:
         self.topic = topic
         self.frame = frame
-        """The bytes as they came."""
+        """The bytes as received."""
         self._decoded: dict[Any, Any] = {}
 
     def decode(self, type: type[msgspec.Struct] | None = None) -> Any:
-        """Return the message as ``type``, or as a plain dict; decoded once each.
+        """Return the message as ``type``, or as a plain dict; each is decoded once.
 
-        In a plain dict a number that the link could not carry is ``None``, and a typed
-        array is an ``array.array``.
+        In a plain dict a number that the bridge could not encode is ``None``, and a
+        typed array is an ``array.array``.
 
         Raises:
-            ProtocolError: If the bytes are no message, or the message has not the
+            ProtocolError: If the bytes are not a message, or the message has not the
                 fields of ``type``.
 
         """
@@ -47,15 +47,15 @@ class ReceivedMessage:
         return value
 
     def is_decoded(self, type: type[msgspec.Struct] | None) -> bool:
-        """Return whether :meth:`decode` knows its answer already."""
+        """Return whether the message is already decoded as ``type``."""
         return type in self._decoded
 
     def prime(self, type: type[msgspec.Struct] | None, value: Any) -> None:
-        """Take over what another process decoded, or the error that it met."""
+        """Store the value, or the error, that another process has decoded."""
         self._decoded[type] = value
 
     def forget(self, type: type[msgspec.Struct] | None) -> None:
-        """Forget what :meth:`prime` took over: whoever asks next decodes anew."""
+        """Forget the stored value; the next :meth:`decode` decodes again."""
         self._decoded.pop(type, None)
 
     @property
@@ -64,10 +64,10 @@ class ReceivedMessage:
         raise NotImplementedError
 
     def check_count(self) -> None:
-        """Refuse a message with more values than anything would be built for.
+        """Check the number of values in the message before it is built.
 
         Raises:
-            TooLarge: If it holds more.
+            TooLarge: If the message has too many values.
 
         """
         raise NotImplementedError
@@ -81,12 +81,12 @@ class ReceivedMessage:
 
 @dataclass(slots=True)
 class BridgeStats:
-    """What came over a link, since the bridge was made."""
+    """Counts of a connection since the bridge was created."""
 
     frames: int = 0
     bytes: int = 0
     malformed: int = 0
-    """Frames that could not be understood."""
+    """Frames that could not be read."""
 
     links: int = 0
-    """How often the link was opened."""
+    """How often the connection was opened."""

@@ -1,4 +1,4 @@
-"""Who listens to which topic, how often each listener hears of it, and what fails."""
+"""The listeners of topics, their throttles, and the reports of failures."""
 
 import time
 from asyncio import AbstractEventLoop, TimerHandle
@@ -24,7 +24,7 @@ _LATCHED_TOPICS = ("/tf_static", "/robot_description")
 
 
 class SubscriptionOptions(NamedTuple):
-    """How the messages of a topic are wanted."""
+    """The options of one listener, or of all listeners of a topic."""
 
     type: str | None = None
     throttle: int = 0
@@ -37,10 +37,10 @@ class SubscriptionOptions(NamedTuple):
 def checked(
     options: SubscriptionOptions, callback: object, decode: object
 ) -> SubscriptionOptions:
-    """Return the options of a subscription if its arguments make sense.
+    """Return the options of a subscription after a check of its arguments.
 
     Raises:
-        ConfigError: If they do not.
+        ConfigError: If an argument is invalid.
 
     """
     if not callable(callback):
@@ -62,10 +62,10 @@ def _is_struct(decode: Any) -> bool:
 
 
 class Throttle(Generic[T]):
-    """Let one thing through in each period, and always the newest in the end.
+    """Lets one message through in each period, and always the newest in the end.
 
     Args:
-        period: Least time between two, in seconds; 0 lets everything through.
+        period: Least time between two messages, in seconds; 0 lets all through.
 
     """
 
@@ -77,7 +77,7 @@ class Throttle(Generic[T]):
         self._held: T | None = None
 
     def offer(self, thing: T, now: float) -> T | None:
-        """Return ``thing`` if its time has come; else hold it, instead of an older."""
+        """Return ``thing`` if it is due; else keep it in place of an older one."""
         if now < self._due:
             self._held = thing
             return None
@@ -85,36 +85,36 @@ class Throttle(Generic[T]):
 
     @property
     def due(self) -> float | None:
-        """When what is held may pass, or None if nothing is held."""
+        """When the held message is due, or None if none is held."""
         return None if self._held is None else self._due
 
     def take(self, now: float) -> T | None:
-        """Return what was held if its time has come."""
+        """Return the held message if it is due."""
         held = self._held
         if held is None or now < self._due:
             return None
         return self._let_through(held, now)
 
     def drop(self) -> None:
-        """Forget what is held: the link on which it came is gone."""
+        """Forget the held message: its connection has ended."""
         self._held = None
 
     def _let_through(self, thing: T, now: float) -> T:
-        # Half a period of slack: a topic of just this rate jitters, and one that
-        # comes a millisecond early must not make every second one wait.
+        # Half a period of slack: a topic at exactly this rate has jitter, and a message
+        # that comes 1 ms early must not delay every second one.
         self._due = max(self._due + self.period, now + self.period / 2)
         self._held = None
         return thing
 
 
 class _Silence(ProtocolError):
-    """Nothing comes at all."""
+    """No messages come."""
 
 
 class Subscription:
-    """One listener to a topic; made by :meth:`webmap.Bridge.subscribe`.
+    """One listener of a topic; created by :meth:`webmap.Bridge.subscribe`.
 
-    It ends when :meth:`remove` is called, or with the scope that it was made in.
+    It ends when :meth:`remove` is called, or with the scope in which it was created.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Subscription:
         self.decode = decode
         self.removed = False
         self.undecoded = False
-        """Whether it is handed each message as it came, at once and not decoded."""
+        """Whether the callback gets each message at once, without decoding."""
         self.throttle: Throttle[ReceivedMessage] = Throttle(options.throttle / 1000)
         self._of = topic
         self._callback = callback
@@ -141,7 +141,7 @@ class Subscription:
             self._scope.add(self)
 
     def remove(self) -> None:
-        """End this subscription and no other; the second call does nothing."""
+        """End this subscription and no other; the second call has no effect."""
         if self.removed:
             return
         self.removed = True
@@ -153,7 +153,7 @@ class Subscription:
         self._of.remove(self)
 
     def deliver(self, message: ReceivedMessage) -> None:
-        """Decode the message as the listener wants it and hand it over."""
+        """Decode the message as the listener's type and call the callback."""
         if self.removed:
             return
         if self.undecoded:
@@ -169,52 +169,52 @@ class Subscription:
         self._callback(value)
 
     def report(self, fault: BridgeError) -> None:
-        """Show whoever subscribed that the messages cannot be used."""
+        """Show to the listener's scope why its messages cannot be used."""
         if self._scope is not None and self._scope.report is not None:
             self._reported = True
             self._scope.report(str(fault), self)
 
     def take_back(self) -> None:
-        """Take back what :meth:`report` showed, if it did."""
+        """Withdraw the fault that :meth:`report` showed, if any."""
         if self._reported and self._scope is not None:
             self._reported = False
             if self._scope.mended is not None:
                 self._scope.mended(self)
 
     def mention(self, fault: ProtocolError) -> bool:
-        """Call the subscribers with a message; False if there are none."""
+        """Show a fault once, without keeping it; return whether it could be shown."""
         if self._scope is None or self._scope.report is None:
             return False
         self._scope.report(str(fault), None)
         return True
 
     def hold(self, loop: AbstractEventLoop, release: Callable[[], None]) -> None:
-        """Come back for what the throttle holds."""
+        """Set a timer for the message that the throttle holds."""
         due = self.throttle.due
         if due is not None and self._timer is None:
             self._timer = loop.call_later(max(0.0, due - time.monotonic()), release)
 
     def hush(self) -> None:
-        """Forget what the throttle holds."""
+        """Forget the message that the throttle holds."""
         self.throttle.drop()
         self.forget_timer()
 
     def forget_timer(self) -> None:
-        """Note that the timer of :meth:`hold` has fired, or keep it from firing."""
+        """Cancel or forget the timer of :meth:`hold`."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
 
 class Topic:
-    """All listeners to one topic of one bridge.
+    """All listeners of one topic of one bridge.
 
     Args:
         name: The resolved name.
-        changed: Called when the listeners want other messages than before.
-        emptied: Called when the last listener has gone.
-        complain: Is told of a message that does not decode, once for each link and
-            each kind of error.
+        changed: Called when the options of all listeners together have changed.
+        emptied: Called when the last listener has ended.
+        complain: Called with a message that does not decode, once for each connection
+            and each kind of error.
 
     """
 
@@ -229,27 +229,27 @@ class Topic:
         self.name = name
         self.listeners: dict[Subscription, None] = {}
         self.count = 0
-        """Messages since the link was opened."""
+        """Messages since the connection was opened."""
         self._changed = changed
         self._emptied = emptied
         self._complain = complain
         self.failing: set[object] = set()
-        """As what the newest messages could not be decoded."""
+        """The types as which the newest messages could not be decoded."""
         self._fault: BridgeError | None = None
         self._found: dict[type[ProtocolError], ProtocolError | None] = {}
-        """What was found out of each kind of error; None while it is looked for."""
+        """The reason for each kind of error; None while it is searched for."""
         self._latest: ReceivedMessage | None = None
 
     @property
     def message_type(self) -> str | None:
-        """The message type, if any listener said it."""
+        """The message type, if any listener has stated it."""
         return next((s.options.type for s in self.listeners if s.options.type), None)
 
     def check(self, options: SubscriptionOptions) -> None:
-        """Let a further listener join if what it wants goes with the others.
+        """Check that another listener can share the subscription.
 
         Raises:
-            ConfigError: If it names another type, or another kind of raw bytes.
+            ConfigError: If it states another type, or mixes raw and decoded messages.
 
         """
         mine = self.message_type
@@ -264,14 +264,14 @@ class Topic:
             )
 
     def add(self, listener: Subscription) -> None:
-        """Let ``listener`` join, and ask the bridge for more if it wants more."""
+        """Add ``listener``, and subscribe to more if it needs more."""
         self.listeners[listener] = None
         if self._fault is not None:
             listener.report(self._fault)
         self._changed(self)
 
     def remove(self, listener: Subscription) -> None:
-        """Let ``listener`` go, and ask the bridge for less if the others want less."""
+        """Remove ``listener``, and subscribe to less if the others need less."""
         self.listeners.pop(listener, None)
         if self.listeners:
             alone = all(o.decode is not listener.decode for o in self.listeners)
@@ -283,7 +283,7 @@ class Topic:
         self._emptied(self)
 
     def options(self) -> SubscriptionOptions:
-        """Return what serves every listener."""
+        """Return options that serve every listener."""
         each = [listener.options for listener in self.listeners]
         return SubscriptionOptions(
             self.message_type,
@@ -293,21 +293,21 @@ class Topic:
         )
 
     def begin_anew(self) -> None:
-        """Forget what was found out on an earlier link: there is a new one."""
+        """Forget the faults of an earlier connection: a new one is open."""
         self.count = 0
         self._found.clear()
         self._mend()
 
     def link_lost(self) -> None:
-        """Forget what the old link brought."""
+        """Forget the messages of the connection that has ended."""
         self._latest = None
         for listener in self.listeners:
             listener.hush()
 
     def received(self, message: ReceivedMessage) -> bool:
-        """Note a message that came; False if it is too large for its type.
+        """Count a received message; return False if it is too large for its type.
 
-        One that is too large is reported and belongs to nobody.
+        A message that is too large is reported and not delivered.
         """
         self.count += 1
         size = len(message.frame)
@@ -321,15 +321,15 @@ class Topic:
                 self._find_out(error, None)
                 return False
         self._latest = message
-        if size > LARGE and self.replay is None:  # nobody will ask for it
+        if size > LARGE and self.replay is None:  # too large to keep for nothing
             self._latest = None
         return True
 
     @property
     def replay(self) -> ReceivedMessage | None:
-        """What a listener that joins late is given, since it will not come again.
+        """The message that a new listener gets, since it will not come again.
 
-        A bridge sends a latched message once for each subscription of the wire.
+        A bridge sends a latched message once for each subscription on the wire.
         """
         latched = self.name in _LATCHED_TOPICS or self.count == 1
         if not latched and self.message_type is not None:
@@ -341,14 +341,14 @@ class Topic:
     ) -> None:
         """Report a message that does not decode.
 
-        Why that is so is found out once for each link and each kind of error. If one
-        was understood meanwhile, the same is said again.
+        The reason is determined once for each connection and each kind of error. If
+        other messages were decoded since, the known reason is shown again.
         """
         self.failing.add(decode)
         self._find_out(error, decode)
 
     def silent(self) -> None:
-        """Report that nothing comes, as of a topic of another type."""
+        """Report that no messages come, as for a topic of another type."""
         self.failing.add(_Silence)
         self._find_out(_Silence("nothing will come"), None)
 
@@ -366,11 +366,11 @@ class Topic:
             self._show(found)
 
     def failed(self, fault: ProtocolError, error: ProtocolError) -> None:
-        """Show everybody who listens why the messages cannot be used, if they cannot.
+        """Show to all listeners why the messages cannot be used, if that is still so.
 
         Args:
-            fault: What was found out.
-            error: What was complained of.
+            fault: The reason.
+            error: The error that was reported.
 
         """
         self._found[type(error)] = fault
@@ -378,11 +378,11 @@ class Topic:
             self._show(fault)
 
     def over(self, fault: BridgeError) -> None:
-        """Show everybody who listens why nothing comes any more."""
+        """Show to all listeners why no more messages come."""
         self._show(fault)
 
     def understood(self, decode: type[msgspec.Struct] | None) -> None:
-        """Note that messages decode so, and take back what is true no more."""
+        """Register that messages decode as ``decode``, and withdraw outdated faults."""
         self.failing -= {_Silence, TooLarge}
         self._succeeds(decode)
 

@@ -1,7 +1,7 @@
-"""Finding out, for people, why the messages of a topic cannot be used.
+"""Search for the reason why the messages of a topic cannot be used.
 
-Most bridges meet a subscription with a wrong type with silence, and send a message of
-whatever type the topic has where none was stated. So the bridge is asked for the type.
+For a subscription with a wrong type most bridges send nothing; for one without a type
+they send messages of any type. So WebMap asks the bridge for the type.
 """
 
 import asyncio
@@ -19,16 +19,16 @@ from webmap.ros.subscriptions import Topic
 log = logging.getLogger("webmap.ros")
 
 SILENCE = 3.0
-"""How long a topic of a stated type may be silent before its type is asked, in s."""
+"""Seconds without messages after which the stated type of a topic is checked."""
 
 
 class TopicFaults:
-    """The questions about one bridge's topics, each of them asked once.
+    """The questions about the topics of one bridge, each asked once.
 
     Args:
-        name: What people call the bridge.
+        name: The bridge's name, as shown to people.
         topic_type: Asks the bridge for the type of a topic.
-        report: Is told of each fault that was found.
+        report: Called with each fault that was found.
 
     """
 
@@ -44,30 +44,30 @@ class TopicFaults:
         self._tasks: set[asyncio.Task[None]] = set()
 
     def message_failed(self, topic: Topic, expected: str, error: ProtocolError) -> None:
-        """Report a message that does not decode, with the type that it really has."""
+        """Report a message that does not decode, with the actual type of the topic."""
         if isinstance(error, TooLarge):
             self._found(topic, TooLarge(f"{topic.name}: {error}"), error)
             return
         if isinstance(error, Unreadable):
-            # No type would make sense of it, so none is asked for or named.
+            # The frame matches no type, so do not ask for the type.
             words = "got a frame that was cut off, or is not one message"
             self._found(topic, ProtocolError(f"{topic.name}: {words}: {error}"), error)
             return
         self._begin(self._explain(topic, expected, error))
 
     def watch(self, topic: Topic) -> None:
-        """Report a topic that stays silent because its type was stated wrongly."""
+        """Report a topic that sends nothing because its stated type is wrong."""
         if topic.message_type is not None:
             self._begin(self._explain_silence(topic))
 
     async def stop(self) -> None:
-        """Ask no more."""
+        """Cancel all questions and wait for their end."""
         tasks = list(self._tasks)
         self.forget()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def forget(self) -> None:
-        """Drop the questions about a link that has ended."""
+        """Cancel the questions about a connection that has ended."""
         for task in self._tasks:
             task.cancel()
 

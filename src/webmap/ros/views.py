@@ -1,4 +1,4 @@
-"""Which view belongs to which message type, told by name or by shape."""
+"""The view for each message type, chosen by name or by shape."""
 
 from collections.abc import Mapping
 from typing import Any, TypeAlias
@@ -15,9 +15,9 @@ OdometryView: TypeAlias = (
     | messages.PoseMsg
     | messages.Pose2DMsg
 )
-"""Views that say where something is: with ``place``, ``frame_id`` and ``stamp``."""
+"""Views of a pose: with ``place``, ``frame_id`` and ``stamp``."""
 
-# The order matters where a shape is all there is: fuller types come first.
+# By shape alone, the order matters: types with more fields come first.
 ODOMETRY_VIEWS: dict[str, type[OdometryView]] = {
     "nav_msgs/Odometry": messages.OdometryMsg,
     "geometry_msgs/PoseWithCovarianceStamped": messages.PoseWithCovarianceStampedMsg,
@@ -25,14 +25,14 @@ ODOMETRY_VIEWS: dict[str, type[OdometryView]] = {
     "geometry_msgs/Pose": messages.PoseMsg,
     "geometry_msgs/Pose2D": messages.Pose2DMsg,
 }
-"""The views of the types that say where a robot is, by the name in ROS 1."""
+"""The views of the types that hold a robot's pose, by the name in ROS 1."""
 
 
 def odometry_view(type: str) -> type[OdometryView]:
-    """Return the view of a type that says where a robot is, in either dialect.
+    """Return the view of a type that holds a robot's pose, in either dialect.
 
     Raises:
-        ConfigError: If it is not such a type.
+        ConfigError: If the type does not hold a robot's pose.
 
     """
     view = ODOMETRY_VIEWS.get(str(split_type(type)))
@@ -43,10 +43,10 @@ def odometry_view(type: str) -> type[OdometryView]:
 
 
 def odometry_view_by_shape(message: Mapping[str, Any]) -> type[OdometryView]:
-    """Return the view that a plain message fits, when nobody knows its type.
+    """Return the view that fits a plain message of unknown type.
 
     Raises:
-        ProtocolError: If it says nowhere where a robot is.
+        ProtocolError: If the message holds no robot's pose.
 
     """
     for view in ODOMETRY_VIEWS.values():

@@ -1,8 +1,9 @@
 """The process that decodes large frames: ``python -m webmap.ros.worker``.
 
-It reads requests from its standard input and writes answers to its standard output,
-one after the other, and ends when its input does. Each is a length of 4 bytes,
-little-endian, that much MessagePack, and the bytes that it announces.
+It reads requests from standard input, writes answers to standard output, one after the
+other, and ends when its input ends. Each request and each answer is a length of 4
+bytes, little-endian, that many bytes of MessagePack, and then the data bytes that the
+MessagePack announces.
 """
 
 import importlib
@@ -26,43 +27,43 @@ LENGTH = struct.Struct("<I")
 MAX_MESSAGE = 512 << 20
 
 BACKGROUND = 10
-"""How nice the process is: a map may come later, what drives a robot may not."""
+"""Nice value of the process: a map may come late, commands may not."""
 
 MEMORY = 1536 << 20
 """Bytes of memory that the process may use; a message that needs more is an error."""
 
 PIECE = 32
-"""Items of a long list that are handed over at a time: a few milliseconds of work."""
+"""Items of a long list that are delivered at a time: a few milliseconds of work."""
 
 
 class Request(msgspec.Struct, array_like=True):
-    """One frame and what to make of it, or a function to be called with bytes."""
+    """One frame to decode, or a function to call with bytes."""
 
     size: int
-    """Bytes that follow: the frame, or the function's first argument."""
+    """Number of bytes that follow: the frame, or the function's first argument."""
 
     topic: str = ""
     message: str | None = None
     """``module:name`` of the :class:`ReceivedMessage` that reads the frame."""
 
     view: str | None = None
-    """``module:name`` of a view of WebMap's own, or None for a plain mapping."""
+    """``module:name`` of a view of WebMap, or None for a plain mapping."""
 
     call: str | None = None
-    """``module:name`` of a function of WebMap's own that returns bytes."""
+    """``module:name`` of a function of WebMap that returns bytes."""
 
     arguments: list[Any] = []
     """The further arguments of the function."""
 
 
 class Answer(msgspec.Struct, array_like=True):
-    """What became of it; the bytes of each part follow, one after the other."""
+    """The result of a request; the bytes of each part follow, one after the other."""
 
     sizes: list[int] = []
     """Bytes of each part: the message, then further items of one of its lists."""
 
     field: str | None = None
-    """Which list that is."""
+    """The field of that list."""
 
     error: str | None = None
     kind: str = ""
@@ -70,9 +71,10 @@ class Answer(msgspec.Struct, array_like=True):
 
 
 def view_name(thing: Any) -> str | None:
-    """Return how a view or a function is named to the worker, or None if it cannot be.
+    """Return the worker's name for a view or a function, or None if it has none.
 
-    Only WebMap's own are: a script's types would need the script to be run again.
+    Only types and functions of WebMap have one: for those of a script the worker would
+    have to run the script.
     """
     own = thing is not None and thing.__module__.startswith("webmap.")
     if not own or "<" in thing.__qualname__:
@@ -81,7 +83,7 @@ def view_name(thing: Any) -> str | None:
 
 
 def answer(request: Request, data: bytes) -> tuple[Answer, list[bytes]]:
-    """Return what became of a request, and the parts."""
+    """Return the answer to a request, and its parts."""
     try:
         if request.call is not None:
             made = _named(request.call)(data, *request.arguments)
@@ -98,7 +100,7 @@ def answer(request: Request, data: bytes) -> tuple[Answer, list[bytes]]:
         return Answer(error="it takes too much memory to be decoded"), []
     except ProtocolError as error:
         return Answer(error=str(error), kind=type(error).__name__), []
-    except Exception as error:  # whatever a robot sent, the next frame is due
+    except Exception as error:  # the worker must survive any data
         return Answer(error=f"it cannot be decoded: {error!r}"), []
 
 
@@ -126,7 +128,7 @@ def _slices(items: Sequence[Any]) -> Iterator[Sequence[Any]]:
 
 
 def long_list(message: Any) -> str | None:
-    """Return the name of the longest list of structs, None if it is no long one."""
+    """Return the name of the longest list of structs, None if it is not long."""
     found, most = None, PIECE
     if isinstance(message, msgspec.Struct):
         for name in message.__struct_fields__:
@@ -170,8 +172,8 @@ def read(stream: BinaryIO) -> tuple[Request, bytes] | None:
 
 
 def main() -> None:
-    """Serve until the input ends."""
-    # An interrupt from the keyboard is for the display, which then ends the input.
+    """Answer requests until the input ends."""
+    # The display handles an interrupt from the keyboard, and then ends the input.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if os.name == "posix":
         os.nice(BACKGROUND)
@@ -191,7 +193,7 @@ def main() -> None:
 def _bound_memory() -> None:
     import resource
 
-    with suppress(OSError, ValueError):  # a lower bound is in force already
+    with suppress(OSError, ValueError):  # a lower limit is already set
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 

@@ -1,4 +1,4 @@
-"""What people are told about a rosbridge itself, and what they can do about it."""
+"""Findings about a rosbridge itself, with advice."""
 
 from collections.abc import Sequence
 from urllib.parse import urlsplit
@@ -20,11 +20,11 @@ _AWAY = (
         "Start rosbridge_server on the robot, and look at address and firewall.",
     ),
 )
-"""What to do, by what is in the reason; the last holds for any."""
+"""Advice by a part of the reason; the last entry fits any reason."""
 
 
 def unreachable(trouble: str) -> Finding:
-    """Say why a rosbridge cannot be reached."""
+    """Return the finding that a rosbridge cannot be reached, with the reason."""
     return Finding(
         "wrong",
         BRIDGE,
@@ -34,11 +34,11 @@ def unreachable(trouble: str) -> Finding:
 
 
 def topics_not_listed(trouble: str, otherwise: str) -> Finding:
-    """Say that nobody lists the topics behind a rosbridge.
+    """Return the finding that the topics behind a rosbridge are not listed.
 
     Args:
-        trouble: What went wrong.
-        otherwise: What else helps; empty where somebody has given a list.
+        trouble: The error.
+        otherwise: What else helps; empty if a list of topics was given.
 
     """
     return Finding(
@@ -54,13 +54,13 @@ def topics_not_listed(trouble: str, otherwise: str) -> Finding:
 def openness(
     facts: LinkFacts, url: str, shown: Sequence[str], dialect: str | None
 ) -> Finding:
-    """Say who can reach a rosbridge.
+    """Return the finding about who can reach a rosbridge.
 
     Args:
-        facts: What was found out about it.
+        facts: The results of the checks of the bridge.
         url: Its address.
-        shown: Topics that no client needs and that it shows all the same.
-        dialect: ``ros1`` or ``ros2``; None if that is not known.
+        shown: Topics that the bridge shows although no client needs them.
+        dialect: ``ros1`` or ``ros2``; None if unknown.
 
     """
     parts = urlsplit(url)
@@ -104,7 +104,7 @@ def openness(
 
 
 def _listen_advice(dialect: str | None, where: str) -> str:
-    """Return how to keep others from the port."""
+    """Return advice on how to close the port to other machines."""
     if dialect == "ros1":
         return (
             "Close its port for others in the firewall: rosbridge 0.11 for ROS 1 "
@@ -114,12 +114,12 @@ def _listen_advice(dialect: str | None, where: str) -> str:
 
 
 def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
-    """Say whether a service that hangs holds up what comes after it.
+    """Return the finding about whether a hanging service delays later operations.
 
     Args:
-        facts: What was found out about the bridge.
+        facts: The results of the checks of the bridge.
         url: Its address.
-        dialect: ``ros1`` or ``ros2``; None if that is not known.
+        dialect: ``ros1`` or ``ros2``; None if unknown.
 
     """
     advice = (
@@ -167,10 +167,10 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
 
 
 def compression(facts: LinkFacts, packed: Sequence[str]) -> Finding:
-    """Say how what may be large comes.
+    """Return the finding about the encoding of large messages.
 
     Args:
-        facts: What was found out about the bridge.
+        facts: The results of the checks of the bridge.
         packed: The scans that came in a binary encoding.
 
     """
@@ -185,10 +185,10 @@ def compression(facts: LinkFacts, packed: Sequence[str]) -> Finding:
 
 
 def too_large(robot: str, topic: str, size: int) -> Finding:
-    """Say that messages of a topic are too large for the bridge's CBOR.
+    """Return the finding that messages of a topic are too large for the bridge's CBOR.
 
     Args:
-        robot: Whose topic it is.
+        robot: The robot's name.
         topic: The topic.
         size: Bytes of a message in JSON.
 
@@ -207,18 +207,18 @@ MAYBE_TOO_LARGE = (
     "If it is larger than max_message_size of rosbridge_websocket (10 MB unless set), "
     "set that higher."
 )
-"""What may help where a large message does not come."""
+"""Advice if a large message does not come."""
 
 
 def type_not_certain(robot: str, topic: str, type: str) -> Finding:
-    """Say that the type that is named may be that of another client.
+    """Return the finding that the reported type may be that of another client.
 
-    rosapi names one type of a topic, and of two the first in the alphabet.
+    rosapi reports one type of a topic; of two types, the first in the alphabet.
 
     Args:
-        robot: Whose velocity topic it is.
+        robot: The name of the robot with this velocity topic.
         topic: The topic.
-        type: The type that is named, without its package.
+        type: The reported type, without its package.
 
     """
     return Finding(
@@ -233,12 +233,12 @@ def type_not_certain(robot: str, topic: str, type: str) -> Finding:
 
 
 def client_writes(robot: str, topic: str, nodes: Sequence[str]) -> Finding:
-    """Say that a client of a rosbridge writes velocity.
+    """Return the finding that a client of a rosbridge publishes velocity.
 
     Args:
-        robot: Whose velocity topic it is.
+        robot: The name of the robot with this velocity topic.
         topic: The topic.
-        nodes: The nodes that write for their clients.
+        nodes: The nodes that publish for their clients.
 
     """
     return Finding(

@@ -1,8 +1,8 @@
-"""Calls of ROS services, on a lane of their own.
+"""Calls of ROS services, on a connection of their own.
 
-A rosbridge may handle what comes on one socket in order, so a service that takes its
-time holds up whatever was sent after it. Calls therefore share no socket with data,
-and a socket on which a call was not answered in time gets no further ones.
+A rosbridge may handle the operations of one socket in order, so a slow service delays
+all operations sent after it. Therefore calls share no socket with data, and a socket on
+which a call was not answered in time gets no further calls.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from webmap.ros.rosbridge.protocol import Protocol
 
 
 class Calls:
-    """The calls to one bridge; the socket is opened by the first of them."""
+    """The calls to one bridge; the first call opens the socket."""
 
     def __init__(self, url: str) -> None:
         self.url = url
@@ -33,13 +33,14 @@ class Calls:
         type: str | None,
         patience: float,
     ) -> Any:
-        """Call ``service`` and return the fields of its answer.
+        """Call ``service`` and return the fields of its response.
 
         Raises:
-            ServiceError: If it fails, or does not answer within ``patience`` seconds.
-            BridgeClosed: If the link cannot be opened, or ends before the answer.
+            ServiceError: If it fails, or does not respond within ``patience`` seconds.
+            BridgeClosed: If the connection cannot be opened, or ends before the
+                response.
             ValueError: If a number in ``args`` is NaN or infinite.
-            TypeError: If a value in ``args`` is nothing that JSON knows.
+            TypeError: If a value in ``args`` has no form in JSON.
 
         """
         id = generate_id()
@@ -58,7 +59,7 @@ class Calls:
         return answer.values
 
     def _retire(self, lane: "_CallsLane") -> None:
-        """Ask no more on ``lane``; other calls on it may still be answered."""
+        """Send no more calls on ``lane``; earlier calls on it may still be answered."""
         if self._lane is lane:
             self._lane = None
         self._retired = {each for each in self._retired if not each.is_over}
@@ -66,7 +67,7 @@ class Calls:
         lane.end_when_idle()
 
     async def stop(self) -> None:
-        """Close every socket; calls under way fail."""
+        """Close every socket; open calls fail."""
         lanes = [*self._retired, *([self._lane] if self._lane else [])]
         self._lane, self._retired = None, set()
         await asyncio.gather(*(lane.stop() for lane in lanes))
@@ -80,7 +81,7 @@ class _CallsLane:
         self._retired = False
         self._ending: asyncio.Task[None] | None = None
         self._unreadable: str | None = None
-        """What was wrong with the newest frame that could not be read."""
+        """The error of the newest frame that could not be read."""
         self._lane = Lane(
             url,
             opened=self._opened,
@@ -96,7 +97,7 @@ class _CallsLane:
         return self._lane.state == "closed"
 
     def why_unanswered(self, service: str, patience: float) -> str:
-        """Return a sentence on why a call got no answer."""
+        """Return a sentence on why a call got no response."""
         if self._unreadable is None:
             return f"{service} did not answer within {patience:g} s"
         return (
@@ -133,7 +134,7 @@ class _CallsLane:
     def _over(self, error: Exception) -> None:
         if not self._ready.done():
             self._ready.set_exception(error)
-            self._ready.exception()  # seen: nobody may be left to ask
+            self._ready.exception()  # mark as retrieved
         for answer in self._waiting.values():
             if not answer.done():
                 answer.set_exception(error)

@@ -1,4 +1,4 @@
-"""CBOR as rosbridge speaks it: maps, text, numbers and typed arrays, nothing else."""
+"""The CBOR of rosbridge: only maps, text, numbers and typed arrays."""
 
 import sys
 from array import array
@@ -8,8 +8,8 @@ from typing import Any, NoReturn
 from webmap.base.errors import ProtocolError
 from webmap.base.nesting import MAX_DEPTH
 
-# Dates, big numbers, shared references, regular expressions ... : tags that a
-# general decoder follows and that a robot has no reason to send.
+# Dates, big numbers, shared references, regular expressions ...: tags that a general
+# decoder decodes and that a robot has no reason to send.
 _REFUSED = (0, 1, 2, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256)
 _REFUSED_TOO = (258, 260, 261, 1004, 43000, 55799)
 
@@ -21,15 +21,15 @@ TYPED_ARRAY_TAGS = frozenset(_LITTLE) | frozenset(_BIG)
 
 
 def looks_like_cbor(frame: bytes | bytearray) -> bool:
-    """Return whether the frame begins as a CBOR map, which no JSON text does."""
+    """Return whether the frame begins like a CBOR map; no JSON text does."""
     return len(frame) > 0 and 0xA0 <= frame[0] <= 0xBF
 
 
 def decode(frame: bytes | bytearray) -> dict[str, Any]:
-    """Return the map that ``frame`` holds; typed arrays are ``array.array``.
+    """Return the map in ``frame``; typed arrays are ``array.array``.
 
     Raises:
-        ProtocolError: If the bytes are anything else.
+        ProtocolError: If the bytes are not such a map.
 
     """
     import cbor2
@@ -55,7 +55,7 @@ def typed_array(tag: int, value: object) -> "array[Any]":
     """Return the numbers of a CBOR typed array.
 
     Raises:
-        ValueError: If the value is not a whole number of such numbers.
+        ValueError: If the length is not a multiple of the size of a number.
 
     """
     if not isinstance(value, bytes):

@@ -1,6 +1,6 @@
-"""Checks of a rosbridge itself: where it listens, and what it does under load.
+"""Checks of a rosbridge itself: its listening addresses, and its behaviour under load.
 
-:mod:`~webmap.ros.rosbridge.advice` puts into words what they find.
+:mod:`~webmap.ros.rosbridge.advice` describes the results.
 """
 
 import asyncio
@@ -30,48 +30,48 @@ E = TypeVar("E")
 
 PARAMETER = "/rosbridge_websocket:call_services_in_new_thread"
 PATIENCE = 3.0
-"""Seconds in which rosapi has to tell a parameter."""
+"""Longest wait for a parameter from rosapi, in seconds."""
 
 TYPE = "std_srvs/Trigger"
 QUICK = "/rosapi/get_time"
-"""A service that is known to answer."""
+"""A service that is known to respond."""
 
 TRIES = 6
 COMES = 0.5
-"""Seconds until our own call has to have come back to us, at each try."""
+"""Longest wait for WebMap's own call to come back, at each try, in seconds."""
 
 HANGS = 1.0
-"""Seconds for which it is not answered."""
+"""Seconds for which that call stays unanswered."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkFacts:
-    """What was found out about a rosbridge itself."""
+    """The results of the checks of a rosbridge."""
 
     peer: str = ""
     """The address that answered."""
 
     listens: tuple[str, ...] = ()
-    """Where the bridge listens, if it is on this machine and that is known."""
+    """Listening addresses of the bridge, if known and on this machine."""
 
     deflate: bool = False
-    """Whether the bridge would compress its socket."""
+    """Whether the bridge offers compression of its socket."""
 
     calls_in_threads: bool | None = None
-    """Whether calls do not hold up what comes after them, if that is known."""
+    """Whether slow calls do not delay later operations; None if unknown."""
 
     tried: bool = False
-    """Whether that was tried with a call that hangs, and not only asked."""
+    """Whether a hanging call was tried, and not only the parameter read."""
 
     untold: str = ""
-    """Why trying it told nothing; empty if it did, or if it was not tried."""
+    """Why the try gave no result; empty if it did, or if there was none."""
 
     too_large: Mapping[str, int] = field(default_factory=dict)
-    """Bytes of a message in JSON, by topic, where it is too large for CBOR."""
+    """Bytes of a message in JSON, by topic, if it is too large for CBOR."""
 
 
 async def look(url: str) -> LinkFacts:
-    """Return what a handshake shows of a rosbridge.
+    """Return the facts that a WebSocket handshake shows of a rosbridge.
 
     Raises:
         OSError: If the bridge cannot be reached.
@@ -97,7 +97,7 @@ async def look(url: str) -> LinkFacts:
 async def asked_about_threads(
     facts: LinkFacts, call_service: Callable[..., Awaitable[Any]]
 ) -> LinkFacts:
-    """Return the facts with what rosbridge says of how it calls services."""
+    """Return the facts with rosbridge's parameter for calls in threads."""
     request = {"name": PARAMETER, "default_value": "", "default": ""}
     try:
         answer = await call_service("/rosapi/get_param", request, timeout=PATIENCE)
@@ -109,11 +109,11 @@ async def asked_about_threads(
 
 
 async def tried_a_call(facts: LinkFacts, url: str) -> LinkFacts:
-    """Return the facts with what a call that hangs holds up; it is tried.
+    """Make a call that hangs, and return the facts with what it delays.
 
     Args:
-        facts: What is known of the bridge.
-        url: Its address; its rosapi is known to answer.
+        facts: The known facts of the bridge.
+        url: Its address; its rosapi is known to respond.
 
     """
     facts = not_tried(facts)
@@ -129,33 +129,33 @@ async def tried_a_call(facts: LinkFacts, url: str) -> LinkFacts:
 def not_tried(
     facts: LinkFacts, why: str = "it takes a rosapi that answers"
 ) -> LinkFacts:
-    """Return the facts where a call could not be tried."""
-    if facts.tried:  # what was found out before may be so no more
+    """Return the facts after a call could not be tried."""
+    if facts.tried:  # the earlier result may be outdated
         facts = replace(facts, calls_in_threads=None, tried=False)
     return replace(facts, untold=why)
 
 
 def came_in_parts(message: ReceivedMessage) -> bool:
-    """Return whether a message came in fragments, as only JSON does.
+    """Return whether a message came in fragments; only JSON does.
 
-    A map that was asked for in CBOR and comes so is larger than the bridge sends in
-    CBOR.
+    A map that was requested in CBOR and comes in fragments is larger than the bridge
+    sends in CBOR.
     """
     return isinstance(message, Publish) and message.in_parts
 
 
 async def try_a_call(url: str) -> bool | None:
-    """Return whether a call that hangs leaves its socket open for others.
+    """Return whether a call that hangs leaves its socket free for other calls.
 
-    A service of our own is offered to the ROS system, under a name that nobody else
-    has, and called: so what hangs, for a moment, is ours, and no node of the robot is
-    asked. None if it cannot be told: the bridge offers no services of its clients.
+    WebMap advertises a service under a unique name and calls it. So the call that hangs
+    for a moment is WebMap's own, and no node of the robot is involved. None if the
+    result is unknown: the bridge offers no services of its clients.
 
     Args:
-        url: The bridge's address; its rosapi is known to answer.
+        url: The bridge's address; its rosapi is known to respond.
 
     Raises:
-        OSError: If the bridge cannot be reached, or ends the link.
+        OSError: If the bridge cannot be reached, or ends the connection.
 
     """
     from websockets.asyncio.client import connect
@@ -176,7 +176,7 @@ async def _try(
     offer = {"op": "advertise_service", "type": TYPE, "service": service}
     await ours.send(json.dumps(offer))
     try:
-        # A bridge takes a moment to offer it, and refuses a call that comes before.
+        # A bridge needs a moment to offer the service, and refuses earlier calls.
         for number in range(TRIES):
             call = ops.call_service(service, id=f"hanging {number}")
             await caller.send(call.decode())
@@ -195,7 +195,7 @@ async def _try(
         )
         await ours.send(answer.decode())
         if not free and not await _is_answered(caller, "quick"):
-            return None  # it does not answer in any case
+            return None  # it never answers, hanging call or not
         return free
     finally:
         await ours.send(json.dumps({"op": "unadvertise_service", "service": service}))
@@ -228,15 +228,15 @@ _LISTENS = "0A"
 
 
 def listening_addresses(port: int, tables: Iterable[str] = ()) -> tuple[str, ...]:
-    """Return the addresses at which something on this machine takes a port's links.
+    """Return the addresses on which this machine listens at a port.
 
     Args:
         port: The port.
         tables: The text of the kernel's tables; they are read if none is given.
 
     Returns:
-        Each once, such as ``0.0.0.0`` for all of this machine; nothing where the
-        system does not tell.
+        Each address once, such as ``0.0.0.0`` for all of this machine; empty if the
+        system does not report them.
 
     """
     found: dict[str, None] = {}
@@ -253,7 +253,7 @@ def listening_addresses(port: int, tables: Iterable[str] = ()) -> tuple[str, ...
 
 
 def is_loopback(address: str) -> bool:
-    """Tell whether only this machine reaches an address."""
+    """Return whether only this machine can reach an address."""
     try:
         found = ipaddress.ip_address(address.partition("%")[0])
         return (getattr(found, "ipv4_mapped", None) or found).is_loopback
@@ -262,7 +262,7 @@ def is_loopback(address: str) -> bool:
 
 
 def _address(text: str) -> str:
-    """Read an address as the kernel writes it: words in the machine's own order."""
+    """Parse an address of the kernel's tables, 32-bit groups in native byte order."""
     words = [text[i : i + 8] for i in range(0, len(text), 8)]
     packed = b"".join(struct.pack("=I", int(word, 16)) for word in words)
     return str(ipaddress.ip_address(packed))

@@ -1,4 +1,4 @@
-"""One lane to a rosbridge: a WebSocket that is kept open, or opened once."""
+"""One WebSocket connection to a rosbridge, kept open or opened once."""
 
 import asyncio
 import logging
@@ -24,39 +24,40 @@ CONNECT_TIMEOUT = 5.0
 MAX_UNSENT = 4 << 20
 
 MAX_WAITING = 4
-"""Whole frames that a link may hold before they are read; then its socket waits."""
+"""Complete frames that may wait to be read; then reading from the socket stops."""
 
 RATE = 128 << 20
-"""Bytes per second of large frames that are read from a link in the long run."""
+"""Bytes per second of large frames read from a connection, on average."""
 
 TURN = 64
-"""Frames that are read from a link before others get their turn."""
+"""Frames read from a connection before other tasks get their turn."""
 
 LOOK_PERIOD = 0.25
 
 MOST_FRAGMENTS = 4096
-"""Fragments of one message that end the link; a frame of 64 MiB makes 1025."""
+"""Fragments of one message that end the connection; 64 MiB make 1025."""
 
 MESSAGE_TOO_BIG = 1009
-"""The close code of a link that ends for that."""
+"""The close code for a message of too many fragments."""
 
 CLOSED_HERE = "the link was closed here"
 
 
 class Lane:
-    """A link that hands over frames and takes frames, and knows nothing of them.
+    """A connection that sends and receives frames without reading them.
 
-    Frames that cannot be sent now are refused, and what was not sent when the link
-    ends is thrown away: nothing waits for a later link.
+    Frames that cannot be sent now are refused, and unsent frames are dropped when the
+    connection ends: nothing waits for a later connection.
 
     Args:
         url: The bridge's address.
-        opened: Called when the link is open.
+        opened: Called when the connection is open.
         received: Called with each message, text or binary, as bytes.
-        closed: Called with the reason when an open link has ended.
-        failed: Called with the error when the link could not be opened.
-        again: Whether to open it again whenever it ends or fails.
-        busy: Whether the bridge may be busy with something large that was asked for.
+        closed: Called with the reason when an open connection has ended.
+        failed: Called with the error when the connection could not be opened.
+        again: Whether to reopen it whenever it ends or fails.
+        busy: Returns whether the bridge may be busy with a large message that was
+            requested.
 
     """
 
@@ -74,7 +75,7 @@ class Lane:
         self.url = url
         self.state: LinkState = "new"
         self.last_heard: float | None = None
-        """When the last bytes came, answers to pings too, on the monotonic clock."""
+        """When the last bytes came, including pongs, on the monotonic clock."""
         self._liveness: Liveness | None = None
         self._opened = opened
         self._received = received
@@ -88,20 +89,20 @@ class Lane:
 
     @property
     def lag(self) -> float:
-        """How many seconds what comes now was under way, as answers to pings show."""
+        """Approximate delay of the data that now comes, from pings, in seconds."""
         if self._liveness is None:
             return 0.0
         return self._liveness.lag(time.monotonic())
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to connect; a second call while it runs does nothing."""
+        """Begin to connect; a second call while it runs has no effect."""
         if self._task is None and self.state in ("new", "closed"):
             self.state = "connecting"
             self._wake = asyncio.Event()
             self._task = loop.create_task(self._run())
 
     async def stop(self) -> None:
-        """Close the link and do not open it again."""
+        """Close the connection and do not reopen it."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -112,7 +113,7 @@ class Lane:
         """Send ``frame`` as text, now.
 
         Raises:
-            BridgeClosed: If the link is not open, or does not take what is sent.
+            BridgeClosed: If the connection is not open, or accepts no more data.
 
         """
         if self.state == "new":
@@ -141,7 +142,7 @@ class Lane:
             self._task = None
 
     async def _one_link(self) -> float:
-        """Connect, serve the link until it ends, and return how long it was open."""
+        """Connect, serve the connection until it ends, and return its duration."""
         try:
             link = await _connect(self.url)
         except Exception as error:  # name lookup, TCP, TLS, handshake: all the same
@@ -160,7 +161,7 @@ class Lane:
         return time.monotonic() - began
 
     async def _serve(self, socket: "ClientConnection") -> str:
-        """Carry frames both ways until the link ends; return why it did."""
+        """Send and receive frames until the connection ends; return the reason."""
         from websockets.exceptions import ConnectionClosed
 
         self.state, self.last_heard = "open", time.monotonic()
@@ -176,7 +177,7 @@ class Lane:
                 if len(frame) > LARGE:
                     await asyncio.sleep(len(frame) / RATE)
                 count += 1
-                if count % TURN == 0:  # nothing is waited for if frames are there
+                if count % TURN == 0:  # reading does not yield if frames wait
                     await asyncio.sleep(0)
         except ConnectionClosed as error:
             if keeping.done() and not keeping.cancelled() and not keeping.exception():
@@ -212,10 +213,10 @@ class Lane:
                     await socket.send(frame, text=True)
                     self._unsent_size -= len(frame)
         except ConnectionClosed:
-            pass  # the reader says so
+            pass  # the reader reports it
 
     async def _keep_alive(self, socket: "ClientConnection") -> None:
-        """Return when the link is dead, after having dropped it."""
+        """Send pings; drop the connection and return when it is dead."""
         self._liveness = liveness = Liveness(time.monotonic())
         pinging: set[asyncio.Task[None]] = set()
         try:
@@ -235,7 +236,7 @@ class Lane:
         from websockets.exceptions import ConnectionClosed
 
         try:
-            # A link that takes no bytes holds up the ping itself: unanswered too.
+            # If the connection accepts no bytes, this send waits: also unanswered.
             await (await socket.ping())
         except ConnectionClosed:
             return
@@ -249,7 +250,7 @@ async def _connect(url: str) -> "ClientConnection":
     from webmap.ros.rosbridge.paced import PacedConnection
 
     class ConnectHere(connect):
-        """Connect to the address that was given and to no other."""
+        """Connect to the given address, without redirects."""
 
         def process_redirect(self, exc: Exception) -> Exception | str:
             return exc
@@ -271,8 +272,8 @@ async def _connect(url: str) -> "ClientConnection":
 async def _whole_message(socket: "ClientConnection") -> bytes | bytearray:
     """Return the next message.
 
-    Not by ``recv()``: that joins the fragments of a message at once, which delays every
-    other thread, by 0.1 s for 64 MiB.
+    ``recv()`` joins the fragments of a message at once, which delays every other
+    thread, by 0.1 s for 64 MiB. So this function joins them itself.
     """
     message: bytes | bytearray = b""
     number = 0
@@ -320,10 +321,10 @@ def _why(error: Exception) -> str:
 
 
 class Liveness:
-    """Decide from the times of pings and pongs; all times in monotonic seconds.
+    """Detects a dead connection from pings and pongs; times in monotonic seconds.
 
-    Only one ping is under way at a time. A link that is silent is not dead: a robot
-    may have nothing to say. Dead is a link whose ping is not answered.
+    Only one ping is open at a time. A connection without data is not dead, since a
+    robot may have nothing to send. A connection is dead if its ping is not answered.
     """
 
     LIMIT = 3.0
@@ -333,13 +334,13 @@ class Liveness:
     """Time from one answer to the next ping, in seconds."""
 
     LONGEST = 60.0
-    """Longest wait for the answer while something large is on its way, in seconds."""
+    """Longest wait for the answer while a large message is received, in seconds."""
 
     SLOW = 0.25
-    """Round trip, in seconds, from which on the next ping follows at once."""
+    """Time from ping to pong, in seconds, from which the next ping follows at once."""
 
     LATE = 0.75
-    """Time between two looks after which the looking itself was held up."""
+    """Seconds between two checks, above which this process itself was delayed."""
 
     def __init__(self, now: float) -> None:
         self._pinged: float | None = None
@@ -354,37 +355,38 @@ class Liveness:
         return self._took >= self.SLOW or now - self._ponged >= self.PERIOD
 
     def pinged(self, now: float) -> None:
-        """Note that a ping was sent."""
+        """Register a sent ping."""
         self._pinged = now
 
     def ponged(self, now: float) -> None:
-        """Note that the ping was answered."""
+        """Register the answer to the ping."""
         if self._pinged is not None:
             self._took = now - self._pinged
         self._pinged = None
         self._ponged = now
 
     def lag(self, now: float) -> float:
-        """Return how many seconds what comes now was under way, about.
+        """Return the approximate delay of the data that now comes, in seconds.
 
-        The answer to a ping comes after all that was sent before it. So a link that
-        has not answered yet may be as late as the ping is old. What became slow since
-        the newest ping is seen by the next one, three quarters of a second later.
+        The answer to a ping comes after all data that was sent before it. So the delay
+        of a connection with an open ping may be as large as the age of the ping. If a
+        connection became slow since the newest ping, the next one shows that, 0.75 s
+        later.
         """
         waiting = 0.0 if self._pinged is None else now - self._pinged
         return max(self._took, waiting)
 
     def is_dead(self, now: float, heard: float = -inf, *, busy: bool = False) -> bool:
-        """Return whether the last ping went unanswered for too long.
+        """Return whether the last ping was unanswered for too long.
 
-        A look that comes late judges nothing: where this process stood still, the
-        answer may lie unread. The answer comes after all that was sent before it, so a
-        large map on a slow link may hold it up for as long as its bytes come.
+        A late check decides nothing: if this process was delayed, the answer may be
+        unread. The answer comes after all data that was sent before it, so a large map
+        on a slow connection may delay it for as long as its bytes come.
 
         Args:
-            now: The time of the look.
+            now: The time of the check.
             heard: When the last bytes came.
-            busy: Whether the bridge is known to encode something large.
+            busy: Whether the bridge is known to encode a large message.
 
         """
         late = now - self._looked > self.LATE

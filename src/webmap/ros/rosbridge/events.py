@@ -1,7 +1,6 @@
-"""What a bridge says, as values.
+"""Received operations of a bridge, as values.
 
-Of a published message only the head is read before somebody calls
-:meth:`Publish.decode`.
+Of a published message only the head is read before :meth:`Publish.decode` is called.
 """
 
 from functools import lru_cache
@@ -24,7 +23,7 @@ class Publish(ReceivedMessage):
     def __init__(self, topic: str, frame: bytes | bytearray) -> None:
         self.topic = topic
         self.frame = frame
-        """The whole operation as it came, JSON or CBOR."""
+        """The whole operation as received, JSON or CBOR."""
         self.in_parts = False
         """Whether the bridge sent it in fragments."""
         self._decoded = {}
@@ -36,7 +35,7 @@ class Publish(ReceivedMessage):
         return cbor.looks_like_cbor(self.frame)
 
     def check_count(self) -> None:
-        """Refuse a message with more values than anything would be built for."""
+        """Check the number of values before any of them is built."""
         check_count(self.frame)
 
     def _decode(self, type: type[msgspec.Struct] | None) -> Any:
@@ -69,17 +68,17 @@ def _frame_of(type: type[msgspec.Struct] | None) -> Any:
 
 
 class ServiceResponse(msgspec.Struct, frozen=True):
-    """The answer to a call (3.4.2)."""
+    """The response to a call (3.4.2)."""
 
     service: str = ""
     id: str | int | float | None = None
     result: bool = True
     values: Any = None
-    """The fields of the answer, or a text that says what went wrong."""
+    """The fields of the response, or an error message."""
 
 
 class CallService(msgspec.Struct, frozen=True):
-    """The bridge asks a service of this client (3.4.1)."""
+    """A call of a service that this client offers (3.4.1)."""
 
     service: str
     id: str | int | float | None = None
@@ -87,7 +86,7 @@ class CallService(msgspec.Struct, frozen=True):
 
 
 class Status(msgspec.Struct, frozen=True):
-    """The bridge says how it is (3.2.2); Python's bridges never do."""
+    """A status message of the bridge (3.2.2); Python's bridges never send one."""
 
     level: str = "error"
     msg: Any = ""
@@ -95,13 +94,13 @@ class Status(msgspec.Struct, frozen=True):
 
 
 class Unknown(msgspec.Struct, frozen=True):
-    """An operation that means nothing to a client."""
+    """An operation without a meaning for a client."""
 
     op: str
 
 
 class Malformed(msgspec.Struct, frozen=True):
-    """Bytes that are not rosbridge; the link itself can still be used."""
+    """Bytes that are not rosbridge; the connection can still be used."""
 
     reason: str
     size: int

@@ -1,4 +1,4 @@
-"""How many values a frame may hold, counted before any of them is built."""
+"""Limits of the number of values in a frame, counted before any of them is built."""
 
 import re
 
@@ -8,18 +8,18 @@ MAX_OTHER = 4 * MIB
 """Most bytes of a frame that is not plainly a message on a topic."""
 
 MAX_NUMBERS = 200_000
-"""Most values in such a frame if only the slow decoder takes it, since it has NaN."""
+"""Most values of such a frame if it has NaN and only the slow decoder can read it."""
 
 MAX_ITEMS = 1_000_000
 """Most data items in one message in CBOR, where an array of numbers is one item."""
 
 
 def check_count(frame: bytes | bytearray) -> None:
-    """Refuse a frame that holds more values than anything would be built for.
+    """Check the number of values in a frame.
 
     Args:
-        frame: A whole frame, JSON or CBOR. One that is neither passes: whoever decodes
-            it says so.
+        frame: A whole frame, JSON or CBOR. Any other frame passes; the decoder reports
+            it.
 
     Raises:
         TooLarge: If there are more than :data:`MAX_VALUES` objects and lists, or more
@@ -30,13 +30,13 @@ def check_count(frame: bytes | bytearray) -> None:
         _count_cbor(frame)
     elif (
         _brackets(frame) > MAX_VALUES
-        # Texts may have brackets, too.
+        # Strings may contain brackets, too.
         and (count := _brackets(_TEXT.sub(b"", frame))) > MAX_VALUES
     ):
         raise _too_many(count, MAX_VALUES)
 
 
-# Possessive: nothing is kept in order to try again.
+# Possessive: no backtracking.
 _TEXT = re.compile(rb'"(?:[^"\\]++|\\.)*+"', re.DOTALL)
 
 
@@ -53,7 +53,7 @@ def _too_many(count: int, most: int) -> TooLarge:
 
 
 def _count_cbor(frame: bytes | bytearray) -> None:
-    """Walk from the head of one item to the next, as RFC 8949, 3 has them."""
+    """Walk from the head of one item to the next, as in RFC 8949, section 3."""
     at = items = values = 0
     end = len(frame)
     while at < end:

@@ -1,4 +1,4 @@
-"""What rosapi knows of the ROS graph: topics, services, their types and nodes."""
+"""The ROS graph as reported by rosapi: topics, services, their types and nodes."""
 
 import json
 from collections.abc import Awaitable, Callable, Mapping
@@ -13,28 +13,28 @@ from webmap.ros.messages import Time
 from webmap.ros.names import split_type
 
 ACTIONS = {"navigate_to_pose": "nav2_msgs/action/NavigateToPose"}
-"""Actions by the name that their servers have everywhere: rosapi tells no types."""
+"""Actions by the usual names of their servers: rosapi does not report action types."""
 
 BRIEF = 2.0
-"""Seconds for rosapi to name the type of a service: somebody pressed a button."""
+"""Seconds for rosapi to report the type of a service, after the press of a button."""
 
 CLIENTS = ("rosbridge", "webmap")
-"""What is in the names of nodes that publish for their clients, WebMap too."""
+"""Parts of the names of nodes that publish for their clients, such as WebMap."""
 
 
 def is_client_node(name: str) -> bool:
-    """Return whether a node publishes and listens for clients of a bridge."""
+    """Return whether a node publishes and subscribes for clients of a bridge."""
     return any(part in name for part in CLIENTS)
 
 
 class Graph:
-    """Questions to a bridge's rosapi; what it knows is remembered for one link.
+    """Questions to the rosapi of a bridge; answers are kept for one connection.
 
-    Neither ``get_param_names`` nor ``message_details`` is ever asked: on ROS 2 the
-    first hangs rosapi for good and the second kills it.
+    ``get_param_names`` and ``message_details`` are never called: on ROS 2 the first
+    hangs rosapi for ever and the second kills it.
 
     Args:
-        call: Calls a service and returns the fields of its answer.
+        call: Calls a service and returns the fields of its response.
 
     """
 
@@ -43,15 +43,15 @@ class Graph:
         self._types: dict[str, str] = {}
 
     def forget(self) -> None:
-        """Remember nothing: the robot may have been started anew."""
+        """Forget all answers: the robot may have been restarted."""
         self._types.clear()
 
     def known(self, topic: str) -> str | None:
-        """Return the type of ``topic`` if it was asked before."""
+        """Return the known type of ``topic``, without a question."""
         return self._types.get(topic)
 
     async def topic_type(self, topic: str) -> str | None:
-        """Return the type of ``topic``, or None if nobody knows or answers."""
+        """Return the type of ``topic``, or None if unknown or unanswered."""
         if topic in self._types:
             return self._types[topic]
         found = await self._type("/rosapi/topic_type", {"topic": topic})
@@ -60,7 +60,7 @@ class Graph:
         return found
 
     async def service_type(self, service: str) -> str | None:
-        """Return the type of ``service``, or None if nobody knows or answers."""
+        """Return the type of ``service``, or None if unknown or unanswered."""
         question = "/rosapi/service_type"
         return await self._type(question, {"service": service}, timeout=BRIEF)
 
@@ -75,19 +75,19 @@ class Graph:
         return found if isinstance(found, str) and found else None
 
     async def published(self, topic: str) -> bool | None:
-        """Return whether anybody publishes ``topic``, or None if nobody answers."""
+        """Return whether ``topic`` has a publisher, or None without an answer."""
         nodes = await self.nodes("publishers", topic)
         return None if nodes is None else bool(nodes)
 
     async def other_publishers(self, topic: str) -> list[str] | None:
-        """Return the nodes that publish ``topic``, but not for clients of a bridge."""
+        """Return the publishers of ``topic``, without those for clients of a bridge."""
         nodes = await self.nodes("publishers", topic)
         return nodes and [name for name in nodes if not is_client_node(name)]
 
     async def nodes(
         self, kind: Literal["publishers", "subscribers"], topic: str
     ) -> list[str] | None:
-        """Return the nodes that publish or hear a topic, or None if nobody answers."""
+        """Return the nodes of a kind of a topic, or None without an answer."""
         try:
             answer = await self._call(f"/rosapi/{kind}", {"topic": topic})
             nodes = answer.get(kind) if isinstance(answer, dict) else None
@@ -96,7 +96,7 @@ class Graph:
             return None
 
     async def time(self) -> float | None:
-        """Return the time of the ROS system in seconds, or None if nobody answers."""
+        """Return the time of the ROS system in seconds, or None without an answer."""
         try:
             answer = await self._call("/rosapi/get_time")
             told = answer.get("time") if isinstance(answer, dict) else None
@@ -106,7 +106,7 @@ class Graph:
         return seconds
 
     async def set_parameter(self, name: str, value: Any, patience: float) -> Any:
-        """Set a parameter of ROS 1; return the value that it has then.
+        """Set a parameter of ROS 1 and return its new value.
 
         Raises:
             BridgeError: If rosapi does not answer.
@@ -116,7 +116,7 @@ class Graph:
         await self._call(
             "/rosapi/set_param", {"name": name, "value": text}, timeout=patience
         )
-        # rosapi says nothing of a parameter that it may not set, so look.
+        # rosapi does not report a parameter that it may not set, so read it.
         answer = await self._call(
             "/rosapi/get_param", {"name": name, "default": ""}, timeout=patience
         )
@@ -127,13 +127,13 @@ class Graph:
             return now
 
     async def topics(self) -> dict[str, str]:
-        """Return the type of every topic.
+        """Return the topics and the type of each.
 
-        Of ROS 2 that is without hidden names, such as those of an action's topics. What
-        a known action says of its goals is added, since rosapi does name its server.
+        In ROS 2 hidden names are missing, such as those of an action's topics. The
+        feedback topics of known actions are added, since rosapi reports their servers.
 
         Raises:
-            BridgeError: If rosapi does not answer, or answers something else.
+            BridgeError: If rosapi does not answer, or the answer is invalid.
 
         """
         answer = await self._call("/rosapi/topics")
@@ -148,7 +148,7 @@ class Graph:
         return found
 
     async def _feedbacks(self) -> dict[str, str]:
-        """Return the hidden topics on which known actions say how goals go."""
+        """Return the hidden feedback topics of known actions."""
         try:
             answer = await self._call("/rosapi/action_servers")
             servers = convert(answer, _ActionServers).action_servers
@@ -162,7 +162,7 @@ class Graph:
         }
 
     async def is_ros2(self) -> bool | None:
-        """Return whether the types are those of ROS 2; None if that is not known."""
+        """Return whether the types are those of ROS 2; None if unknown."""
         try:
             types = (await self.topics()).values()
         except BridgeError:
@@ -173,18 +173,18 @@ class Graph:
         return False if 1 in slashes else None
 
     async def definitions(self, type: str, kind: str) -> Definitions:
-        """Return the definitions of a type and of all its parts, and the shipped ones.
+        """Return the definitions of a type and of all its parts, and the included ones.
 
-        A rosapi of ROS 2 may end for good when it is asked for definitions, so only
-        a bridge that is known to be of ROS 1 is asked.
+        A rosapi of ROS 2 may end for ever after a question for definitions, so only a
+        bridge that is known to be of ROS 1 is asked.
 
         Args:
             type: The type.
             kind: ``"msg"``, or ``"srv"`` for the request of a service.
 
         Raises:
-            ServiceError: If it may not be asked, or does not answer what makes sense.
-            BridgeClosed: If there is no link.
+            ServiceError: If rosapi may not be asked, or its answer is invalid.
+            BridgeClosed: If there is no connection.
 
         """
         ros2 = await self.is_ros2()
@@ -205,7 +205,8 @@ class Graph:
             texts = {part.type: _text(part) for part in parts}
         except (ProtocolError, ValueError) as error:
             raise ServiceError(f"{QUESTIONS[kind]} made no sense: {error}") from None
-        # The first is the one that was asked for; of a service it is called ...Request.
+        # The first text is that of the type itself; of a service it is named
+        # ...Request.
         texts[name] = texts[parts[0].type]
         return Definitions(texts, ros2=False)
 
@@ -224,7 +225,7 @@ QUESTIONS = {
     "srv": "/rosapi/service_request_details",
 }
 MAX_PARTS = 100
-"""Definitions that one answer may hold."""
+"""Most definitions in one answer."""
 
 
 class _Part(msgspec.Struct):
@@ -256,9 +257,9 @@ def _text(part: _Part) -> str:
 
 
 def _kind_of(part: _Part, constant: str) -> str:
-    """Return the type of the field that a constant is most likely for.
+    """Return the type of the field to which a constant most likely belongs.
 
-    rosapi tells the names and values of constants and not their types.
+    rosapi reports the names and values of constants but not their types.
     """
     for name, type in zip(part.fieldnames, part.fieldtypes, strict=True):
         if constant.startswith(f"{name.upper()}_"):

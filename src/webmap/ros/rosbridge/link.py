@@ -1,7 +1,7 @@
-"""The link of a bridge to a rosbridge v2 server.
+"""The connections of a bridge to a rosbridge v2 server.
 
-It keeps the sockets and what was asked on them; which listeners there are, and what
-may be published, is decided by :class:`webmap.Bridge`.
+This module keeps the sockets and their subscriptions; :class:`webmap.Bridge` keeps the
+listeners and decides what may be published.
 """
 
 import logging
@@ -32,7 +32,7 @@ from webmap.ros.subscriptions import Topic
 log = logging.getLogger("webmap.ros")
 
 PATIENCE = 5.0
-"""Seconds that a question about the ROS graph may take."""
+"""Longest wait for an answer about the ROS graph, in seconds."""
 
 
 class _Advertised(NamedTuple):
@@ -41,16 +41,16 @@ class _Advertised(NamedTuple):
 
 
 class RosbridgeLink:
-    """Carries topics and services over a rosbridge, and opens the link again when lost.
+    """Topics and services over a rosbridge; reconnects after each loss.
 
     Args:
         url: The bridge's address.
-        name: What people call the bridge.
-        opened: Called when the link is open.
-        closed: Called with the reason when an open link has ended.
-        received: Called with each message of a topic that is subscribed to; returns
-            whether anybody can use it.
-        report: Is told of each error that a person might want to know of.
+        name: The bridge's name, as shown to people.
+        opened: Called when the connection is open.
+        closed: Called with the reason when an open connection has ended.
+        received: Called with each message of a subscribed topic; returns whether the
+            message can be used.
+        report: Called with each error that a person may need to know.
 
     """
 
@@ -66,9 +66,9 @@ class RosbridgeLink:
     ) -> None:
         self.stats = BridgeStats()
         self.trouble: str | None = None
-        """Why the link is not open: how the last attempt failed or the link ended."""
+        """Why the connection is not open: the last failed attempt or the last loss."""
         self.over: str | None = None
-        """Why nothing is opened any more; None while there is no such reason."""
+        """Why no connection is opened any more; None if connections are allowed."""
         self.graph = Graph(self.call_service)
         self._url = url
         self._name = name
@@ -77,7 +77,7 @@ class RosbridgeLink:
         self._on_message = received
         self._report = report
         self._complained = False
-        """Whether this link, or the attempts to open it, were complained of."""
+        """Whether the failure of the connection has been logged."""
         self._protocol = Protocol()
         self._calls = Calls(url)
         self._subscriptions: dict[str, WireSubscription] = {}
@@ -93,13 +93,13 @@ class RosbridgeLink:
         )
 
     async def stop(self) -> None:
-        """Close every socket; what is subscribed to is kept for another start."""
+        """Close every socket; keep the subscriptions for another start."""
         await self.lane.stop()
         await self._calls.stop()
         await self._renewals.stop()
 
     def subscribe(self, topic: Topic) -> None:
-        """Ask for a topic as its listeners want it now, if that is not asked yet."""
+        """Subscribe to a topic as its listeners need it now, if not already done."""
         subscription = self._subscriptions.get(topic.name)
         if subscription is None:
             subscription = WireSubscription(
@@ -109,23 +109,23 @@ class RosbridgeLink:
         subscription.update()
 
     def unsubscribe(self, topic: Topic) -> None:
-        """Ask for a topic no more."""
+        """End the subscription to a topic."""
         subscription = self._subscriptions.pop(topic.name, None)
         if subscription is not None:
             subscription.end()
 
     def published_type(self, topic: str) -> str | None:
-        """Return as what type ``topic`` is published here, None if it is not."""
+        """Return the type with which ``topic`` is published here, None if it is not."""
         advertised = self._advertised.get(topic)
         return None if advertised is None else advertised.type
 
     def publish(self, topic: str, type: str, message: Mapping[str, Any]) -> None:
-        """Publish a message now, or not at all; the topic is advertised first.
+        """Publish a message now, or raise an error; the topic is advertised first.
 
         Raises:
-            BridgeClosed: If the link is not open.
+            BridgeClosed: If the connection is not open.
             ValueError: If a number in the message is NaN or infinite.
-            TypeError: If a value in the message is nothing that JSON knows.
+            TypeError: If a value in the message has no form in JSON.
 
         """
         text = ops.publish(topic, message)
@@ -137,7 +137,7 @@ class RosbridgeLink:
         self.lane.send(text)
 
     def unadvertise(self, topic: str) -> None:
-        """Publish no more on ``topic``; nothing happens if nobody did."""
+        """Stop publishing on ``topic``; no effect if it was not advertised."""
         before = self._advertised.pop(topic, None)
         if before is not None:
             self._send(ops.unadvertise(topic, id=before.id))
@@ -150,32 +150,33 @@ class RosbridgeLink:
         type: str | None = None,
         timeout: float = PATIENCE,
     ) -> Any:
-        """Call a ROS service on a socket of its own; return the fields of the answer.
+        """Call a ROS service on a socket of its own; return the fields of the response.
 
         Raises:
-            ServiceError: If the service fails or does not answer in time.
-            BridgeClosed: If the link cannot be opened, or ends before the answer.
+            ServiceError: If the service fails or does not respond in time.
+            BridgeClosed: If the connection cannot be opened, or ends before the
+                response.
 
         """
         self.refuse_if_over()
         return await self._calls.call(service, args, type, timeout)
 
     async def definitions(self, type: str, kind: str) -> Definitions:
-        """Return the definitions of a type and of all its parts, and the shipped ones.
+        """Return the definitions of a type and of all its parts, and the included ones.
 
         Args:
             type: The type.
             kind: ``"msg"``, or ``"srv"`` for the request of a service.
 
         Raises:
-            ServiceError: If it may not be asked, or does not answer what makes sense.
-            BridgeClosed: If there is no link.
+            ServiceError: If rosapi may not be asked, or its answer is invalid.
+            BridgeClosed: If there is no connection.
 
         """
         return await self.graph.definitions(type, kind)
 
     def _send(self, frame: bytes) -> None:
-        """Send what a new link will be told anyway; nothing happens while closed."""
+        """Send a frame if connected; a new connection repeats it anyway."""
         if self.lane.state == "open":
             try:
                 self.lane.send(frame)
@@ -183,7 +184,7 @@ class RosbridgeLink:
                 self._report(error)
 
     def refuse_if_over(self) -> None:
-        """Raise BridgeClosed if nothing is opened any more."""
+        """Raise BridgeClosed if no connection is opened any more."""
         if self.over is not None:
             raise BridgeClosed(self.over)
 
@@ -211,7 +212,7 @@ class RosbridgeLink:
         self._on_close(reason)
 
     def _not_opened(self, error: BridgeClosed) -> None:
-        # One line in the log for a bridge that is away, however long.
+        # Log one line for a bridge that cannot be reached, however long that lasts.
         level = logging.DEBUG if self._complained else logging.WARNING
         self._complained = True
         self.trouble = error.why
@@ -248,7 +249,7 @@ class RosbridgeLink:
             self._send(ops.service_response(event.service, answer, id=id, result=False))
 
     def _complain(self, event: Malformed) -> None:
-        """Report a frame that is not rosbridge's, to one subscriber too."""
+        """Report a frame that is not rosbridge, also to one subscriber."""
         error = ProtocolError(
             f"{self._name} sent {event.size} bytes that are not rosbridge: "
             f"{event.reason}"
@@ -265,10 +266,10 @@ class RosbridgeLink:
 
         Args:
             topic: The topic.
-            size: Bytes of a message in JSON; None if links ended before one came.
+            size: Bytes of a message in JSON; None if connections ended before one came.
 
         """
-        # A page shows three lines: what to do comes before the details.
+        # A page shows three lines: the advice comes before the details.
         if size is None:
             words = (
                 f"{topic.name}: nothing came in CBOR for {IN_CBOR:g} s, though it is "

@@ -1,7 +1,7 @@
-"""What a client says to rosbridge: one function per operation, each giving bytes.
+"""The operations that a client sends to rosbridge: one function each, returning bytes.
 
 Nothing here does I/O or keeps state. The text is strict JSON: NaN and the infinities
-are refused, because the JSON of some bridges would carry them to the robot as numbers.
+are refused, because the JSON of some bridges would send them to the robot as numbers.
 
 See Also:
     https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
@@ -16,9 +16,9 @@ LEAST_THROTTLE = 1
 """The least ``throttle_rate`` that is ever sent, in milliseconds."""
 
 BURST = 10
-"""Messages of a burst that the bridge keeps for a subscription to every message.
+"""Messages of a burst that the bridge queues for a subscription to every message.
 
-rosbridge for ROS 2 itself subscribes with a depth of 10: deeper bursts end there.
+rosbridge for ROS 2 itself subscribes with a depth of 10: it loses deeper bursts.
 """
 
 _dumps = json.JSONEncoder(
@@ -31,7 +31,7 @@ def _frame(**fields: Any) -> bytes:
 
     Raises:
         ValueError: If a number is NaN or infinite, or text is not Unicode.
-        TypeError: If a value is nothing that JSON knows.
+        TypeError: If a value has no form in JSON.
 
     """
     given = {name: value for name, value in fields.items() if value is not None}
@@ -44,7 +44,7 @@ def _frame(**fields: Any) -> bytes:
 def advertise(
     topic: str, type: str, *, id: str, queue_size: int = 1, latch: bool = False
 ) -> bytes:
-    """Announce that this client will publish ``type`` on ``topic``."""
+    """Advertise ``type`` on ``topic``."""
     return _frame(
         op="advertise",
         id=id,
@@ -56,7 +56,7 @@ def advertise(
 
 
 def unadvertise(topic: str, *, id: str | None = None) -> bytes:
-    """Take back the announcement made under ``id``."""
+    """End the advertisement made under ``id``."""
     return _frame(op="unadvertise", id=id, topic=topic)
 
 
@@ -64,8 +64,8 @@ def publish(topic: str, message: Mapping[str, Any], *, id: str | None = None) ->
     """Publish ``message``, a mapping of the message's fields, on ``topic``.
 
     Raises:
-        ValueError: If a number in it is NaN or infinite.
-        TypeError: If a value in it is nothing that JSON knows.
+        ValueError: If a number in the message is NaN or infinite.
+        TypeError: If a value in the message has no form in JSON.
 
     """
     return _frame(op="publish", id=id, topic=topic, msg=message)
@@ -81,16 +81,16 @@ def subscribe(
     compression: str | None = None,
     fragment_size: int | None = None,
 ) -> bytes:
-    """Ask for the messages of ``topic``.
+    """Subscribe to ``topic``.
 
     The frame never carries a ``throttle_rate`` of 0 or a ``queue_length`` of 0:
 
     - rosbridge 2.1.0 for ROS 2 keeps a queue and a thread for each subscription with a
       ``queue_length`` above 0. When the client unsubscribes, closes or is cut off while
-      a message is queued, the thread sends that message again and again until less
-      than ``throttle_rate`` has passed since the last one. With 0 it never ends: the
-      bridge uses all its processor time and answers no handshake (rosbridge_suite,
-      issue 891). With 1 ms it ends after one message.
+      a message is queued, the thread sends that message again and again until less than
+      ``throttle_rate`` has passed since the last one. With 0 it never ends: the bridge
+      uses all its processor time and answers no handshake (rosbridge_suite, issue 891).
+      With 1 ms it ends after one message.
     - A ``queue_length`` of 0 has no such thread, but with a ``throttle_rate`` of 1 it
       drops each message that comes within 1 ms of the one before. A burst loses its
       last messages: transforms of several publishers, latched ``tf_static``, feedback
@@ -99,21 +99,22 @@ def subscribe(
 
     The thread also spins when encoding one message takes longer than ``throttle_rate``.
     CBOR is encoded once and then kept, so it is safe. JSON is encoded for each sending:
-    ask for JSON of many megabytes with a ``throttle_rate`` above the time it takes.
+    request JSON of many megabytes with a ``throttle_rate`` above the time that encoding
+    takes.
 
-    A bridge serves several subscriptions of one link to a topic as one, with the lowest
-    ``throttle_rate`` and the lowest ``queue_length`` of them.
+    A bridge serves several subscriptions of one connection to a topic as one, with the
+    lowest ``throttle_rate`` and the lowest ``queue_length`` of them.
 
     Args:
         topic: The resolved name of the topic.
-        id: What :func:`unsubscribe` names later. Without one a bridge ends every
-            subscription of the link to the topic, so it is not optional here.
-        type: The message type; ``None`` leaves it to the bridge, which then needs
-            a publisher to be there already.
+        id: The id for :func:`unsubscribe`. Without an id a bridge ends every
+            subscription of the connection to the topic, so it is required here.
+        type: The message type; with ``None`` the bridge determines it, and then needs
+            an existing publisher.
         throttle_rate: Least time between two messages, in milliseconds. 0 asks for
             every message: it is sent as 1, and in JSON with a queue of at least
             :data:`BURST` messages.
-        queue_length: How many messages the bridge may hold back for us, at least 1.
+        queue_length: Most messages that the bridge may queue, at least 1.
         compression: ``"none"``, ``"png"``, ``"cbor"`` or ``"cbor-raw"``.
         fragment_size: Largest frame to be sent in one piece, in bytes.
 
@@ -145,11 +146,11 @@ def call_service(
     id: str,
     type: str | None = None,
 ) -> bytes:
-    """Call ``service``; the answer carries ``id``.
+    """Call ``service``; the response carries ``id``.
 
     Raises:
         ValueError: If a number in ``args`` is NaN or infinite.
-        TypeError: If a value in ``args`` is nothing that JSON knows.
+        TypeError: If a value in ``args`` has no form in JSON.
 
     """
     return _frame(
@@ -164,17 +165,17 @@ def call_service(
 def service_response(
     service: str, values: Mapping[str, Any] | str, *, id: str | None, result: bool
 ) -> bytes:
-    """Answer a call that the bridge passed on to this client."""
+    """Respond to a call that the bridge passed on to this client."""
     return _frame(
         op="service_response", id=id, service=service, values=values, result=result
     )
 
 
 def status(level: str, message: str, *, id: str | None = None) -> bytes:
-    """Tell the peer of something: ``level`` is error, warning, info or none."""
+    """Send a status message: ``level`` is error, warning, info or none."""
     return _frame(op="status", id=id, level=level, msg=message)
 
 
 def set_level(level: str) -> bytes:
-    """Ask for status messages from ``level`` on: error, warning, info or none."""
+    """Request status messages from ``level`` on: error, warning, info or none."""
     return _frame(op="set_level", level=level)

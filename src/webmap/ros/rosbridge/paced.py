@@ -1,7 +1,7 @@
-"""A WebSocket whose bytes are dealt with in turns, so that a flood holds up nobody.
+"""A WebSocket that reads its bytes in turns, so that a flood does not block the loop.
 
-The ``websockets`` package deals at once with all that asyncio has read, which may be
-256 KiB and 128,000 frames, and only then stops reading.
+The ``websockets`` package processes at once all data that asyncio has read, which may
+be 256 KiB and 128,000 frames, and only then stops reading.
 """
 
 import asyncio
@@ -15,7 +15,7 @@ from webmap.ros.rosbridge.pieces import Pieces
 from webmap.ros.rosbridge.turns import turns
 
 MAX_WAITING = 1 << 20
-"""Bytes that may wait for their turn until no more are read."""
+"""Bytes that may wait for their turn; above that, reading stops."""
 
 
 class PacedConnection(ClientConnection):
@@ -25,13 +25,13 @@ class PacedConnection(ClientConnection):
     """When the last bytes came, by :func:`time.monotonic`."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin."""
+        """Start reading, and limit the messages by turns only."""
         super().connection_made(transport)
         self._turns = turns()
         self._pieces = Pieces()
         self._waiting = bytearray()
         self._reading = True
-        # When too many messages wait for recv(), no more are cut out of the bytes.
+        # When too many messages wait for recv(), no more bytes are parsed.
         self.recv_messages.pause = lambda: None
         self.recv_messages.resume = self._ask
 
@@ -45,24 +45,24 @@ class PacedConnection(ClientConnection):
         self._ask()
 
     def resume_writing(self) -> None:
-        """Go on with what may have to be answered."""
+        """Continue with bytes that may need an answer."""
         super().resume_writing()
         self._ask()
 
     def eof_received(self) -> None:
-        """Deal with the last bytes, and with their end."""
+        """Process the last bytes, and the end of the stream."""
         while self._feed():
             pass
         super().eof_received()
 
     def take(self, until: float) -> float | None:
-        """Deal with what waits, for as long as the turn lasts.
+        """Process waiting bytes until the turn ends.
 
         Args:
             until: When to end, by :func:`time.thread_time`.
 
         Returns:
-            Seconds until it wants another turn; ``None`` if it will ask for one.
+            Seconds until it needs another turn; ``None`` if it will ask for one.
 
         """
         while not (self.paused or self.recv_messages.paused):
@@ -79,7 +79,7 @@ class PacedConnection(ClientConnection):
         self._turns.ask(self)
 
     def _feed(self) -> bool:
-        """Deal with one piece; return whether there was one."""
+        """Process one piece; return whether there was one."""
         shaken = self.protocol.state is not State.CONNECTING
         if self.protocol.state is State.CLOSED:
             return False

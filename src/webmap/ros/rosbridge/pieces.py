@@ -1,7 +1,7 @@
-"""Where to cut the bytes of a WebSocket, so that each piece costs little. No I/O.
+"""Cuts the bytes of a WebSocket into pieces that are cheap to process. No I/O.
 
-A quarter of a mebibyte, which is what asyncio reads at once, may be 128,000 frames. So
-the bytes are handed on frame by frame, and those of a long frame in parts.
+256 KiB, which asyncio reads at once, may be 128,000 frames. So the bytes are passed on
+frame by frame, and those of a long frame in parts.
 """
 
 from webmap.ros.limits import MAX_FRAME
@@ -10,7 +10,7 @@ PIECE = (1 << 16) - 1
 """The longest piece, in bytes."""
 
 _TWO, _EIGHT = 126, 127
-"""Lengths that say in how many further bytes the length stands."""
+"""Length values that state how many further bytes hold the length."""
 
 _FIN = 0x80
 """The bit of a head's first byte that ends a message."""
@@ -23,21 +23,21 @@ _CONTINUATION = 0
 
 
 class Pieces:
-    """Cuts what one bridge sends."""
+    """Cuts the bytes of one bridge."""
 
     def __init__(self) -> None:
         self._rest = 0
-        """Bytes of the frame that was begun that are still to come."""
+        """Missing bytes of the current frame."""
         self._long = False
-        """Whether that frame is handed on as several."""
+        """Whether the current frame is passed on as several."""
         self._fin = self._opcode = 0
 
     def next(self, waiting: bytearray, *, shaken: bool) -> int:
-        """Return the length of the next piece; 0 if it has not all come yet.
+        """Return the length of the next piece; 0 if it is incomplete.
 
         Args:
-            waiting: The bytes that wait; what is returned is taken out of them.
-            shaken: Whether the handshake has ended. Before, each line is a piece.
+            waiting: The bytes that wait; the piece is at their beginning.
+            shaken: Whether the handshake has ended. Before that, each line is a piece.
 
         """
         if not shaken:
@@ -49,10 +49,10 @@ class Pieces:
         return size
 
     def take(self, waiting: bytearray, *, shaken: bool) -> bytes:
-        """Cut the next piece off ``waiting``; empty if it has not all come yet.
+        """Remove the next piece from ``waiting`` and return it; empty if incomplete.
 
-        A long frame becomes several, as a message may come in fragments (RFC 6455,
-        section 5.4). Who reads the long one has to copy it at once.
+        A long frame becomes several, since a message may come in fragments (RFC 6455,
+        section 5.4). A reader of one long frame would have to copy it at once.
 
         Args:
             waiting: The bytes that wait.
@@ -67,7 +67,7 @@ class Pieces:
 
     def _begin(self, waiting: bytearray) -> None:
         head, length = _head(waiting)
-        # What is too long, or masked, is refused by its head.
+        # The receiver refuses a frame that is too long or masked by its head.
         if PIECE < length <= MAX_FRAME and not waiting[1] & _MASK:
             self._long, self._rest = True, length
             self._fin, self._opcode = waiting[0] & _FIN, waiting[0] & ~_FIN
@@ -92,12 +92,12 @@ def _cut(waiting: bytearray, size: int) -> bytes:
 
 
 def _size_of_frame(waiting: bytearray) -> int:
-    """Return the length of the frame that begins here; 0 if its head is not whole."""
+    """Return the length of the frame that begins here; 0 if its head is incomplete."""
     return sum(_head(waiting))
 
 
 def _head(waiting: bytearray) -> tuple[int, int]:
-    """Return how long a frame's head and rest are; 0 if the head is not whole."""
+    """Return the lengths of a frame's head and payload; 0 if the head is incomplete."""
     if len(waiting) < 2:
         return 0, 0
     length = waiting[1] & 0x7F

@@ -34,7 +34,7 @@ def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
     """Return the text in the pixels of a PNG given in base64 (protocol, 2.2.3).
 
     Raises:
-        ProtocolError: If it is no RGB picture in PNG, or one of more than
+        ProtocolError: If the data is not an RGB picture in PNG, or has more than
             ``max_bytes`` of pixels.
 
     """
@@ -48,7 +48,7 @@ def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
 def _pixels(packed: bytes, max_bytes: int) -> bytes:
     from PIL import Image
 
-    # Its size stands in its first 24 bytes: refused before anything is unpacked.
+    # The first 24 bytes hold the size: refuse the PNG before unpacking it.
     width = int.from_bytes(packed[16:20], "big")
     height = int.from_bytes(packed[20:24], "big")
     if width * height * 3 > max_bytes:
@@ -64,7 +64,7 @@ def _pixels(packed: bytes, max_bytes: int) -> bytes:
             return image.tobytes()
     except ProtocolError:
         raise
-    except Exception as error:  # Pillow raises whatever its parsers meet
+    except Exception as error:  # Pillow raises the errors of its parsers
         raise ProtocolError(f"not a PNG: {error!r}") from None
 
 
@@ -78,12 +78,12 @@ class Fragment(msgspec.Struct, frozen=True):
 
     @property
     def count(self) -> int:
-        """How many pieces there are."""
+        """Number of pieces."""
         return math.floor(self.total)
 
 
 class _Assembly:
-    """The pieces of one message, as far as they came."""
+    """The received pieces of one message."""
 
     def __init__(self, count: int, began: float) -> None:
         self.count = count
@@ -101,7 +101,7 @@ class _Assembly:
         self.received += 1
         self.size += len(data)
         if fragment.num in self.pieces:
-            # Another message of just this length: its pieces cannot be told apart.
+            # Another message of the same length: its pieces cannot be told apart.
             if fragment.num == 0:
                 self.messages += 1
             self.messages = max(self.messages, 2)
@@ -120,23 +120,23 @@ class _Assembly:
 
 
 class Fragments:
-    """The messages of one link that came in part (rosbridge protocol, 2.2.2).
+    """The messages of one connection that came in part (rosbridge protocol, 2.2.2).
 
     Python's bridges give every message the same ``id`` and let the fragments of several
-    topics interleave under it, with a ``total`` that is the length less one, divided by
-    the size of a fragment, plus one: 5.1446 for five fragments. So a message is known
-    by ``id`` and ``total`` together; where two of one length interleave neither is
-    believed.
+    topics interleave under it. Their ``total`` is the length less one, divided by the
+    size of a fragment, plus one: 5.1446 for five fragments. So ``id`` and ``total``
+    together identify a message; if two messages of one length interleave, both are
+    dropped.
 
     Args:
         max_count: Most fragments of a message.
-        max_bytes: Most bytes that wait for their rest, in all.
+        max_bytes: Most bytes of all incomplete messages.
         max_age: Longest time from the first fragment to the last, in seconds.
 
     """
 
     MAX_OPEN = 16
-    """Most messages that wait for their rest at a time."""
+    """Most incomplete messages at a time."""
 
     def __init__(
         self, *, max_count: int = 64, max_bytes: int = 64 << 20, max_age: float = 60.0
@@ -150,11 +150,11 @@ class Fragments:
         return len(self._open)
 
     def add(self, fragment: Fragment, now: float) -> bytes | None:
-        """Take one fragment; return the whole text if this was its last.
+        """Add one fragment; return the whole text if this was the last.
 
         Raises:
-            ProtocolError: If it makes no sense, a bound is met, or two messages
-                were mixed; what belongs to it is forgotten.
+            ProtocolError: If the fragment is invalid, a limit is exceeded, or two
+                messages were mixed; the pieces of the message are then dropped.
 
         """
         self._expire(now)
@@ -204,7 +204,7 @@ class Fragments:
             )
 
 
-# How every bridge measured begins a message on a topic.
+# The beginning of a message on a topic from every bridge that was measured.
 _JSON_HEAD = re.compile(
     rb'\s*\{\s*"op"\s*:\s*"publish"\s*,\s*"topic"\s*:\s*"((?:[^"\\]|\\/){1,600})"'
 )
@@ -239,10 +239,10 @@ _PLAIN_EVENTS: dict[str, Any] = {
 
 
 class Protocol:
-    """One link's reading side; a new link needs a new one.
+    """The reading side of one connection; a new connection needs a new one.
 
     Args:
-        fragments: Bounds on messages that come in parts.
+        fragments: Limits of messages that come in parts.
 
     """
 
@@ -250,17 +250,17 @@ class Protocol:
         self._fragments = Fragments() if fragments is None else fragments
 
     def receive(self, frame: bytes | bytearray | str, now: float) -> Event | None:
-        """Return what ``frame`` says, or None if it is a part of something.
+        """Return the event in ``frame``, or None if it is a part of a message.
 
         Args:
-            frame: One WebSocket message, text or binary; which of them it is
-                does not matter, its first byte tells.
-            now: Seconds of a monotonic clock, to give up on parts.
+            frame: One WebSocket message, text or binary; its first byte shows the
+                encoding.
+            now: Seconds of a monotonic clock, to drop old parts.
 
         Returns:
             :class:`~webmap.ros.rosbridge.events.Malformed` for bytes that are not
-            rosbridge. A :class:`~webmap.ros.rosbridge.events.Publish` may still turn
-            out to be malformed when its message is decoded.
+            rosbridge. The message of a :class:`~webmap.ros.rosbridge.events.Publish`
+            may still fail to decode.
 
         """
         if isinstance(frame, str):
@@ -317,7 +317,7 @@ class Protocol:
 
 
 def _check_other(frame: bytes | bytearray) -> None:
-    """Let a large frame pass that is decoded here and now, and not by the worker."""
+    """Check a large frame that is decoded in this process and not by the worker."""
     if len(frame) > MAX_OTHER:
         raise ProtocolError(
             f"a frame of {len(frame) / MIB:.1f} MiB that does not begin as a message "
@@ -333,10 +333,10 @@ def _check_other(frame: bytes | bytearray) -> None:
 
 
 def topic_in_head(frame: bytes | bytearray) -> str | None:
-    """Return the topic of a publish operation, told from the frame's first bytes.
+    """Return the topic of a publish operation, from the frame's first bytes.
 
-    None where a closer look is needed;
-    :meth:`~webmap.ros.rosbridge.events.Publish.decode` verifies the topic.
+    None if that is not enough; :meth:`~webmap.ros.rosbridge.events.Publish.decode`
+    verifies the topic.
     """
     match = _JSON_HEAD.match(frame)
     if match is not None:
@@ -357,7 +357,7 @@ def _text(name: bytes | bytearray) -> str | None:
 
 
 def _flat(event: ServiceResponse | CallService | Status) -> Event:
-    """Return an event whose free part is not nested too deeply."""
+    """Return an event after a check of the depth of its free part."""
     for name in ("values", "args", "msg"):
         check_depth(getattr(event, name, None))
     return event

@@ -1,9 +1,9 @@
-"""Turns for the links of one event loop, so that none of them holds up the rest.
+"""Turns for the connections of one event loop, so that none of them blocks the rest.
 
-What comes on a link waits for the link's turn. All links together have a few
-milliseconds, one after the other; then the loop does everything else: in the gate what
-the display says, the gate's step and its pings. However much comes, the links get half
-of the time.
+Received data waits for the connection's turn. All connections together have a few
+milliseconds, one after the other; then the loop does everything else, in the gate: the
+messages of the display, the gate's step and its pings. With any amount of data, the
+connections get half of the time.
 """
 
 import asyncio
@@ -13,23 +13,23 @@ from typing import Protocol
 from weakref import WeakKeyDictionary
 
 STEP = 0.002
-"""Seconds of a processor for all links together, until the rest has its turn."""
+"""Seconds of processor time for all connections together, before the rest runs."""
 
 SHARE = 0.0005
-"""Seconds of a processor that a link has at a time."""
+"""Seconds of processor time for one connection at a time."""
 
 
 class Taker(Protocol):
-    """What takes turns: a socket."""
+    """An object that takes turns: a socket."""
 
     def take(self, until: float) -> float | None:
-        """Deal with what waits.
+        """Process waiting data.
 
         Args:
-            until: When to end, by the clock of this thread's own time.
+            until: When to end, by the clock of this thread's processor time.
 
         Returns:
-            Seconds until it wants another turn; ``None`` if it will ask for one.
+            Seconds until it needs another turn; ``None`` if it will ask for one.
 
         """
 
@@ -42,7 +42,7 @@ class Turns:
         self._stepping = False
 
     def ask(self, taker: Taker) -> None:
-        """Give ``taker`` a turn soon; asking again before that does nothing."""
+        """Give ``taker`` a turn soon; a second request before that has no effect."""
         if taker not in self._queue:
             self._queue.append(taker)
         if not self._stepping:
@@ -69,5 +69,5 @@ _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, Turns] = WeakKeyDictionary(
 
 
 def turns() -> Turns:
-    """Return the turns of the running loop, whose time all its links share."""
+    """Return the turns of the running loop; all its connections share them."""
     return _turns.setdefault(asyncio.get_running_loop(), Turns())

@@ -1,9 +1,9 @@
-"""What a link asks of its bridge for one topic: its type, its encoding and its pace.
+"""The subscription to one topic of a bridge: type, encoding and pace.
 
-rosbridge for ROS 2 splits what is larger than its parameter ``max_message_size`` (10 MB
-unless somebody sets it) into fragments. It does so for JSON; for CBOR it fails, logs an
-error and sends nothing. So a large map, which is published once, would never come, and
-is asked for in JSON.
+rosbridge for ROS 2 splits JSON that is larger than its parameter ``max_message_size``
+(10 MB by default) into fragments. CBOR of that size it does not split: it logs an error
+and sends nothing. So a large map, which is published once, would never come, and is
+requested in JSON.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from webmap.ros.rosbridge.events import Publish
 from webmap.ros.subscriptions import Topic
 
 COMPRESSION = {"text": "none", "binary": "cbor", "raw": "cbor-raw"}
-"""What rosbridge calls the encodings of a subscription."""
+"""The names in rosbridge for the encodings of a subscription."""
 
 BULK = (
     "sensor_msgs/LaserScan",
@@ -31,11 +31,11 @@ BULK = (
     "visualization_msgs/Marker",
     "visualization_msgs/MarkerArray",
 )
-"""Types that come in CBOR unless a listener asks for something else.
+"""Types that come in CBOR unless a listener asks for another encoding.
 
 A bridge encodes CBOR faster, and only once. JSON that it encodes for longer than the
-throttle can hang it when a client leaves: see :func:`.ops.subscribe`.
-No type with an array of fixed length is here, since bridges cannot send that as CBOR.
+throttle can hang it when a client leaves: see :func:`.ops.subscribe`. Types with an
+array of fixed length are excluded, since bridges cannot send them as CBOR.
 """
 
 REPLACED = (
@@ -44,17 +44,17 @@ REPLACED = (
     "sensor_msgs/Image",
     "sensor_msgs/CompressedImage",
 )
-"""Types above 10 MB at times, of which each message takes the place of the last.
+"""Types that may exceed 10 MB, of which each message replaces the last.
 
-No others are asked for in JSON: with the throttle that this takes, messages would be
-lost that count, such as changes of a map.
+Only these are requested in JSON: it needs a long throttle, which would lose messages
+that must not be lost, such as changes of a map.
 """
 
 THROTTLE = 300_000
-"""Least milliseconds between two messages that come in JSON in place of CBOR.
+"""Least milliseconds between two messages that come in JSON instead of CBOR.
 
 A bridge needs 10 s of processor time to encode 16 million cells, and answers everything
-else late meanwhile. The throttle has to be longer than that takes, or the bridge can
+else late meanwhile. The throttle must be longer than the encoding, or the bridge can
 hang when a client leaves: see :func:`.ops.subscribe`.
 """
 
@@ -62,13 +62,13 @@ PATIENCE = {"cbor": 20.0, "none": 120.0}
 """Seconds for which a bridge may be busy with the first message, by its encoding."""
 
 MOST_LOST = 2
-"""Links that may end while a message in JSON is awaited, until none is asked for."""
+"""Connections that may end while JSON is awaited; then it is no longer requested."""
 
 Answer = Literal["ask", "given up"]
 
 
 class InJson:
-    """Decides whether a topic is asked for in JSON in place of CBOR."""
+    """Decides whether a topic is requested in JSON instead of CBOR."""
 
     def __init__(self) -> None:
         self._state: Literal["cbor", "asked", "json", "not again"] = "cbor"
@@ -76,15 +76,15 @@ class InJson:
 
     @property
     def on(self) -> bool:
-        """Whether JSON is to be asked for now."""
+        """Whether to request JSON now."""
         return self._state in ("asked", "json")
 
     def silent(self, type: str | None, compression: str | None) -> Answer | None:
-        """Take in that a published topic stays silent; return what to do, if anything.
+        """Handle a published topic that sends nothing; return what to do, if anything.
 
         Args:
             type: The type of the topic.
-            compression: As what it was asked for.
+            compression: The encoding of the request.
 
         """
         if compression != "cbor" or type is None or not is_type(type, *REPLACED):
@@ -98,11 +98,11 @@ class InJson:
         return "ask"
 
     def received(self, *, in_parts: bool) -> bool | None:
-        """Take in a message; return whether it was too large for CBOR.
+        """Handle a message; return whether it was too large for CBOR.
 
-        None if that is known already, or CBOR was not doubted. A message that came in
-        one part was not too large but published late, so CBOR is asked for again, and
-        JSON no more on this link.
+        None if that is already known, or CBOR was not in question. A message that came
+        in one part was not too large but published late, so CBOR is requested again,
+        and JSON no more on this connection.
         """
         if self._state != "asked":
             return None
@@ -111,20 +111,20 @@ class InJson:
         return in_parts
 
     def begin(self) -> None:
-        """Begin anew with CBOR: there is a new link, maybe to a bridge set anew."""
+        """Start again with CBOR: the new connection may lead to a changed bridge."""
         if self._state == "asked":
             self._lost += 1
         self._state = "cbor"
 
 
 class WireSubscription:
-    """What a link asked of its bridge for one topic, on behalf of all its listeners.
+    """The subscription of one connection to one topic, for all its listeners.
 
     Args:
         topic: The topic and its listeners.
-        send: Sends a frame if the link is open, else does nothing.
-        too_large: Called when messages turn out to be too large for CBOR, with the
-            bytes of one in JSON; with None if links ended before one came.
+        send: Sends a frame if the connection is open.
+        too_large: Called when messages prove too large for CBOR, with the bytes of one
+            in JSON; with None if connections ended before one came.
 
     """
 
@@ -137,19 +137,19 @@ class WireSubscription:
     ) -> None:
         self.topic = topic
         self.doubts_cbor = False
-        """Whether JSON was asked for, and :meth:`received` shows if that was needed."""
+        """Whether JSON was requested; :meth:`received` checks if that was needed."""
         self._send = send
         self._too_large = too_large
         self._in_json = InJson()
         self._asked: _Asked | None = None
         self._asked_at = 0.0
-        """When the bridge was asked for the first message of this encoding."""
+        """When the first message of this encoding was requested."""
         self._id = ""
 
     def update(self) -> None:
-        """Ask the bridge anew if what is wanted has changed.
+        """Subscribe again if the wanted options have changed.
 
-        The new subscription begins before the old one ends, so nothing is missed.
+        The new subscription begins before the old one ends, so no message is missed.
         """
         wanted = self._wanted()
         if self._asked == wanted:
@@ -160,32 +160,32 @@ class WireSubscription:
             self._send(ops.unsubscribe(self.topic.name, id=old))
 
     def again(self) -> None:
-        """Ask the bridge on a new link, which knows nothing of the old one."""
+        """Subscribe on a new connection."""
         self.doubts_cbor = False
         self._in_json.begin()
         self._ask(self._wanted())
 
     def renew(self) -> None:
-        """Give the subscription up and ask for it anew.
+        """End the subscription and subscribe again.
 
-        While there is one, a bridge goes on with the old one's quality of service.
+        A bridge keeps the quality of service of the old subscription while one exists.
         """
         if self._asked is not None:
             self._send(ops.unsubscribe(self.topic.name, id=self._id))
             self._ask(self._wanted())
 
     def end(self) -> None:
-        """Ask for no more messages."""
+        """End the subscription."""
         if self._asked is not None:
             self._send(ops.unsubscribe(self.topic.name, id=self._id))
         self._asked = None
 
     def link_lost(self) -> None:
-        """Forget what was asked on the link that has ended."""
+        """Forget the subscription of the connection that has ended."""
         self._asked = None
 
     def ask_in_json(self) -> bool:
-        """Ask for JSON because CBOR does not come; return whether that was done."""
+        """Subscribe in JSON because no CBOR comes; return whether that was done."""
         if self._asked is None:
             return False
         answer = self._in_json.silent(self._asked.type, self._asked.compression)
@@ -197,7 +197,7 @@ class WireSubscription:
         return answer == "ask"
 
     def received(self, message: Publish) -> None:
-        """Take in the first message that came in JSON in place of CBOR."""
+        """Handle the first message that came in JSON instead of CBOR."""
         self.doubts_cbor = False
         too_large = self._in_json.received(in_parts=message.in_parts)
         if too_large:
@@ -217,7 +217,7 @@ class WireSubscription:
         return waited < PATIENCE.get(asked.compression or "", 0.0)
 
     def _wanted(self) -> "_Asked":
-        """Return what serves every listener."""
+        """Return options that serve every listener."""
         options = self.topic.options()
         type, throttle = options.type, options.throttle
         compression = COMPRESSION.get(options.encoding or "")
@@ -225,7 +225,7 @@ class WireSubscription:
             compression = "cbor"
         if compression == "cbor" and self._in_json.on:
             throttle, compression = max(throttle, THROTTLE), "none"
-        # The name as in ROS 1, which bridges of both kinds understand.
+        # The name of ROS 1, which bridges of both kinds accept.
         name = str(split_type(type)) if type else None
         return _Asked(name, throttle, options.queue_length, compression)
 
@@ -253,21 +253,21 @@ class _Asked(NamedTuple):
 
 
 FIRST = 2.0
-"""Seconds of silence after which a topic is looked after."""
+"""Seconds without messages after which a topic is checked."""
 
 LONGEST = 8.0
-"""The longest time between two looks, in seconds."""
+"""The longest time between two checks, in seconds."""
 
 AGAIN = 30.0
-"""Seconds after which a topic that is published and stays silent is asked for anew."""
+"""Seconds after which a published topic without messages is subscribed to again."""
 
 IN_CBOR = 10.0
-"""Seconds of silence after which a published topic is asked for in JSON, not CBOR."""
+"""Seconds without messages after which a published topic is requested in JSON."""
 
 UNANSWERED = 3
-"""Questions in a row that go unanswered until no more are asked on a link.
+"""Unanswered questions in a row after which none is asked on a connection.
 
-A call that hangs can hold up every later one.
+A call that hangs can delay every later one.
 """
 
 PERIOD = 1.0
@@ -275,7 +275,7 @@ PERIOD = 1.0
 
 
 class Silence:
-    """When to look after one silent topic, and when to subscribe to it again. No I/O.
+    """When to check one topic without messages, and when to subscribe again. No I/O.
 
     Args:
         now: Seconds, monotonic.
@@ -289,21 +289,21 @@ class Silence:
         self._renewed = now
         self._began = now
         self._unsent_at: float | None = None
-        """When it will have been published and silent for :data:`IN_CBOR`."""
+        """When it will have been published without messages for :data:`IN_CBOR`."""
 
     def due(self, now: float) -> bool:
-        """Return whether it is time to ask who publishes it."""
+        """Return whether to ask for its publishers now."""
         return now >= self._next
 
     def is_unsent(self, now: float) -> bool:
-        """Return whether it has been published and silent for :data:`IN_CBOR`."""
+        """Return whether it was published without messages for :data:`IN_CBOR`."""
         return self._unsent_at is not None and now >= self._unsent_at
 
     def heard(self, published: bool | None, now: float) -> bool:
-        """Take in whether anybody publishes it; return whether to subscribe again.
+        """Handle the answer about publishers; return whether to subscribe again.
 
         Args:
-            published: None if the bridge cannot tell.
+            published: Whether the topic has a publisher; None if unknown.
             now: Seconds, monotonic.
 
         """
@@ -325,17 +325,16 @@ class Silence:
 
 
 class Renewals:
-    """Looks after the silent topics of one bridge, and subscribes to them again.
+    """Checks the topics of one bridge without messages, and subscribes again.
 
-    A bridge of ROS 2 chooses how it subscribes by those who publish a topic at that
-    moment. A map that is published later and once, or a topic whose type was not
-    stated, would never come; nor would either come by itself.
-    A message above ``max_message_size`` does not come in CBOR at all: after some time
-    it is asked for in JSON.
+    A bridge of ROS 2 chooses its quality of service by the publishers that a topic has
+    at that moment. A map that is published later and once, or a topic whose type was
+    not stated, would never come. A message above ``max_message_size`` does not come in
+    CBOR at all: after some time it is requested in JSON.
 
     Args:
-        published: Asks the bridge whether anybody publishes a topic.
-        subscriptions: What is subscribed to now.
+        published: Asks the bridge whether a topic has a publisher.
+        subscriptions: Returns the current subscriptions.
 
     """
 
@@ -350,20 +349,20 @@ class Renewals:
         self._unanswered = 0
 
     def begin(self) -> None:
-        """Begin anew: there is a new link."""
+        """Start again for a new connection."""
         self.forget()
         self._unanswered = 0
         with no_scope():
             self._task = asyncio.get_running_loop().create_task(self._look_on())
 
     def forget(self) -> None:
-        """Look no more: the link has ended."""
+        """Stop the checks: the connection has ended."""
         if self._task is not None:
             self._task.cancel()
             self._task = None
 
     async def stop(self) -> None:
-        """Look no more, and wait until that is so."""
+        """Stop the checks, and wait until they have stopped."""
         task = self._task
         self.forget()
         if task is not None:

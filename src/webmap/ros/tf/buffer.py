@@ -20,19 +20,19 @@ HISTORY = 10.0
 """Seconds of transforms that are kept."""
 
 GAP = 1.0
-"""Seconds between two transforms beyond which nothing is interpolated."""
+"""Seconds between two transforms above which nothing is interpolated."""
 
 JUMP = 1.0
 """Seconds by which a stamp may be older than the newest; more is a jump of time."""
 
 SHARED = ("map", "world", "earth")
-"""Frames that are the same for all robots, in whatever namespace they are published."""
+"""Frames that are the same for all robots, in any namespace."""
 
 MOST_FRAMES = 4096
-"""Frames that are kept; of more, those without news for the longest time go."""
+"""Most frames; above that, the one without a transform for the longest time goes."""
 
 LONGEST_NAME = 256
-"""Characters of a frame's name."""
+"""Most characters of a frame's name."""
 
 MOST_COMPARED = 200
 """Frames up to which a name like that of a missing frame is searched."""
@@ -43,16 +43,16 @@ _WAYS = 1000
 
 
 class Found(NamedTuple):
-    """One frame in another, as well as that is known."""
+    """The transform between two frames, as far as it is known."""
 
     transform: Transform
-    """Takes coordinates of the one to those of the other."""
+    """From coordinates of the source to those of the target."""
 
     newest: float | None
-    """The newest time at which all between is known; None for all times."""
+    """The newest time at which all transforms between are known; None for all times."""
 
     on_time: bool
-    """Whether the transform is of the time that was asked for, and not the newest."""
+    """Whether the transform is of the requested time, not of the newest."""
 
 
 class _Way(NamedTuple):
@@ -66,7 +66,7 @@ class _Way(NamedTuple):
 
     @property
     def newest(self) -> float | None:
-        """The newest time at which all of it is known; None for all times."""
+        """The newest time at which all tracks are known; None for all times."""
         found = None
         for tracks in self:
             for track in tracks:
@@ -80,9 +80,9 @@ class Buffer:
     """The frames of one ROS system, each in its parent, over the last seconds.
 
     Args:
-        history: How much is kept before the newest transform, in seconds.
-        gap: The longest time between two transforms that is bridged, in seconds.
-        shared: Frames that no namespace gets in front of.
+        history: Time before the newest transform that is kept, in seconds.
+        gap: The longest time between two transforms for interpolation, in seconds.
+        shared: Frames whose names get no namespace.
 
     """
 
@@ -97,15 +97,15 @@ class Buffer:
         self.gap = gap
         self.shared = frozenset(shared)
         self.notes: deque[str] = deque(maxlen=20)
-        """Faults that were dealt with, in sentences, the newest last."""
+        """Faults that were handled, in sentences, the newest last."""
         self._tracks: dict[str, Track] = {}
-        """By the frame; the first one is without news for the longest time."""
+        """By the frame; the first one has had no transform for the longest time."""
         self._roots: dict[str, int] = {}
         """The number of child frames of each parent frame."""
         self._missing: dict[str, str] = {}
-        """The sentences about missing frames, until frames come or go."""
+        """The sentences about missing frames, until the frames change."""
         self._ways: dict[tuple[str, str], _Way] = {}
-        """Those that were looked up since the tree of frames last changed."""
+        """The results of lookups since the tree of frames last changed."""
 
     @property
     def frames(self) -> list[str]:
@@ -113,11 +113,11 @@ class Buffer:
         return sorted({*self._tracks, *self._roots})
 
     def name(self, frame: str, namespace: str = "") -> str:
-        """Return the whole name of a frame that was published in a namespace.
+        """Return the full name of a frame that was published in a namespace.
 
-        ``base_link`` on ``/robot_0/tf`` is ``robot_0/base_link``. A slash in front,
-        as ROS 1 had it once, is left out, and what has the namespace in front
-        already keeps its name.
+        ``base_link`` on ``/robot_0/tf`` is ``robot_0/base_link``. A leading slash, as
+        in early ROS 1, is removed. A name that already begins with the namespace is
+        unchanged.
         """
         frame, space = frame.strip().strip("/"), namespace.strip("/")
         if not space or frame in self.shared or frame.startswith(f"{space}/"):
@@ -134,23 +134,23 @@ class Buffer:
         static: bool = False,
         namespace: str = "",
     ) -> str | None:
-        """Take one transform.
+        """Add one transform.
 
         Args:
-            parent: The frame that the numbers are in: the header's.
-            child: The frame whose place they are.
-            transform: Takes coordinates of the child to those of the parent.
-            stamp: When it held, in seconds of the robot's clock.
+            parent: The frame of the header.
+            child: The frame whose position and rotation the numbers give.
+            transform: From coordinates of the child to those of the parent.
+            stamp: The time of the transform, in seconds of the robot's clock.
             static: Whether it holds for all times: it came on ``/tf_static``.
-            namespace: Of the topic: ``/robot_0`` for ``/robot_0/tf``.
+            namespace: The namespace of the topic: ``/robot_0`` for ``/robot_0/tf``.
 
         Returns:
-            A fault that was dealt with, in a sentence; None if there was none.
+            A fault that was handled, in a sentence; None if there was none.
 
         Raises:
             TransformError: If the transform is invalid, would close a loop, or is of
-                one frame too many; nothing is changed. A frame is too many if no
-                other can go: those that are static or have children stay.
+                one frame too many; nothing is changed. A frame is too many if no other
+                can be dropped: static frames and frames with children stay.
 
         """
         parent, child = self.name(parent, namespace), self.name(child, namespace)
@@ -190,18 +190,18 @@ class Buffer:
         *,
         ahead: float = 0.0,
     ) -> Transform:
-        """Return what takes coordinates of ``source`` to those of ``target``.
+        """Return the transform from coordinates of ``source`` to those of ``target``.
 
         Args:
-            target: The frame that is wanted.
-            source: The frame that the numbers are in.
-            time: When, in seconds of the robot's clock; None for the newest time at
-                which the whole way is known.
-            ahead: Seconds after the newest transform of a frame for which its motion
-                is extrapolated.
+            target: The frame of the result.
+            source: The frame of the given coordinates.
+            time: The time, in seconds of the robot's clock; None for the newest time at
+                which all transforms between are known.
+            ahead: Seconds after the newest transform of a frame for which its motion is
+                extrapolated.
 
         Raises:
-            FrameMissing: If there is no such frame; the sentence names those there are.
+            FrameMissing: If a frame does not exist; the sentence names existing ones.
             NotConnected: If the frames are in two trees.
             NotKnownThen: If a transform between them is not known at that time.
 
@@ -210,17 +210,17 @@ class Buffer:
         return self._along(way, (way.newest or 0.0) if time is None else time, ahead)
 
     def find(self, target: str, source: str, time: float = 0.0) -> Found:
-        """Return one frame in another at a time, or as it is now if that is not known.
+        """Return the transform at a time, or the newest one if that time is not known.
 
         Args:
-            target: The frame that is wanted.
-            source: The frame that the numbers are in.
-            time: When, in seconds of the robot's clock; 0 for now.
+            target: The frame of the result.
+            source: The frame of the given coordinates.
+            time: The time, in seconds of the robot's clock; 0 for the newest.
 
         Raises:
-            FrameMissing: If there is no such frame; the sentence names those there are.
+            FrameMissing: If a frame does not exist; the sentence names existing ones.
             NotConnected: If the frames are in two trees.
-            NotKnownThen: If there is no time at which all of them are known.
+            NotKnownThen: If there is no time at which all transforms between are known.
 
         """
         way = self._way(target, source)
@@ -236,7 +236,7 @@ class Buffer:
         """Return the newest time at which all between is known; None for all times.
 
         Raises:
-            FrameMissing: If there is no such frame.
+            FrameMissing: If a frame does not exist.
             NotConnected: If the frames are in two trees.
 
         """
@@ -272,10 +272,10 @@ class Buffer:
         return found, note
 
     def _make_room(self, parent: str, child: str) -> None:
-        """Forget the frame without news for the longest time, for one that is new.
+        """Drop the frame without a transform for the longest time, for a new frame.
 
-        A detector may name a new frame for each thing that it sees. Static frames stay,
-        as they are published once, and so do frames with children.
+        A detector may name a new frame for each detected object. Static frames stay,
+        since they are published once, and so do frames with children.
         """
         for frame, track in self._tracks.items():
             if not track.static and frame not in self._roots and frame != parent:
@@ -312,7 +312,7 @@ class Buffer:
                 f"{LONGEST_NAME} are the limit: {name[:40]!r}..."
             )
         sentence = self._missing.get(name)
-        if sentence is None:  # It is needed at each message.
+        if sentence is None:  # asked for at each message
             if len(self._missing) >= _SENTENCES:
                 self._missing.clear()
             self._missing[name] = sentence = self._sentence(name)
@@ -330,7 +330,7 @@ class Buffer:
         return f"there is no frame {name!r}{hint}; there are: {listed}{more}"
 
     def _way(self, target: str, source: str) -> _Way:
-        """Return the tracks between two frames, by their names as they were given."""
+        """Return the tracks between two frames, by their names as given."""
         way = self._ways.get((target, source))
         if way is None:
             way = self._find_way(self._known(target), self._known(source))
@@ -360,7 +360,7 @@ class Buffer:
         return way
 
     def _along(self, way: _Way, time: float, ahead: float) -> Transform:
-        """Return what takes coordinates of the way's source to those of its target."""
+        """Return the transform from the source of the tracks to their target."""
         if not way.down:
             return self._to_the_meeting(way.up, time, ahead)
         down = self._to_the_meeting(way.down, time, ahead)
@@ -369,7 +369,7 @@ class Buffer:
     def _to_the_meeting(
         self, tracks: list[Track], time: float, ahead: float
     ) -> Transform:
-        """Return what takes the first frame's coordinates to the last one's parent."""
+        """Return the transform from the first frame to the last one's parent."""
         total = None
         for track in reversed(tracks):
             try:

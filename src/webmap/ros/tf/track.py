@@ -1,4 +1,4 @@
-"""What is known of one frame in its parent, over time."""
+"""The known transforms of one frame in its parent, over time."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -6,19 +6,19 @@ from bisect import bisect_left, bisect_right
 from webmap.ros.tf.transform import NotKnownThen, Transform, between
 
 MOST = 4096
-"""Transforms that are kept of one frame, whatever their times."""
+"""Most transforms that are kept of one frame."""
 
 SPAN = 0.1
-"""Seconds of a motion from which it is extrapolated."""
+"""Seconds of motion that are used for extrapolation."""
 
 EVEN = 0.5
-"""Seconds between two transforms beyond which a motion is not extrapolated."""
+"""Seconds between two transforms above which a motion is not extrapolated."""
 
 FASTEST = 5.0
-"""Metres per second; what is faster is no motion but a correction."""
+"""Metres per second; a faster change is a correction, not a motion."""
 
 FASTEST_TURN = 10.0
-"""Radians per second, likewise."""
+"""Radians per second; a faster change is a correction, not a motion."""
 
 
 class Track:
@@ -27,21 +27,21 @@ class Track:
     Args:
         parent: The parent's name.
         frame: The frame's own name.
-        static: Whether the one transform holds for all times.
+        static: Whether the only transform holds for all times.
 
     """
 
     def __init__(self, parent: str, frame: str = "", *, static: bool = False) -> None:
         self.parent = parent
         self.name = f"{parent!r} -> {frame!r}"
-        """What people call it."""
+        """The name in error messages."""
         self.static = static
         self._stamps: list[float] = []
         self._transforms: list[Transform] = []
 
     @property
     def newest(self) -> float | None:
-        """The newest stamp; None if there is none, or all times are alike."""
+        """The newest stamp; None if there is none, or the transform is static."""
         return self._stamps[-1] if self._stamps and not self.static else None
 
     def clear(self) -> None:
@@ -50,12 +50,12 @@ class Track:
         self._transforms.clear()
 
     def add(self, transform: Transform, stamp: float, history: float) -> None:
-        """Take a transform, in whatever order they come.
+        """Add a transform; transforms may come in any order.
 
         Args:
             transform: The frame in its parent.
-            stamp: When it held, in seconds.
-            history: How much is kept before the newest, in seconds.
+            stamp: The time of the transform, in seconds.
+            history: Time before the newest transform that is kept, in seconds.
 
         """
         if self.static:
@@ -76,13 +76,14 @@ class Track:
         """Return the transform at a time.
 
         Args:
-            time: When, in seconds.
-            gap: The longest time between two transforms that is bridged, in seconds.
+            time: The time, in seconds.
+            gap: The longest time between two transforms for interpolation, in seconds.
             ahead: Seconds after the newest transform for which the motion is
                 extrapolated.
 
         Raises:
-            NotKnownThen: If that time is not known; the sentence names no frames.
+            NotKnownThen: If the transform is not known at that time; the sentence names
+                no frames.
 
         """
         if not self._stamps:
@@ -116,7 +117,7 @@ class Track:
     def _going_on(self, time: float) -> Transform:
         """Return the extrapolated transform; the newest one after a leap."""
         newest, last = self._transforms[-1], self._stamps[-1]
-        # Stamps that are close together give a bad speed.
+        # Stamps that are close together give an inexact speed.
         place = bisect_right(self._stamps, last - SPAN) - 1
         took = last - self._stamps[max(place, 0)]
         before = self._transforms[max(place, 0)]
@@ -126,12 +127,12 @@ class Track:
 
 
 def leapt(one: Transform, other: Transform, took: float) -> bool:
-    """Return whether nothing moves that fast.
+    """Return whether a change is too fast for a motion.
 
     Args:
-        one: Where it was.
-        other: Where it is.
-        took: The time in between, in seconds.
+        one: The transform before.
+        other: The transform after.
+        took: The time between them, in seconds.
 
     """
     p, q = one.rotation, other.rotation

@@ -1,4 +1,4 @@
-"""One frame in another, in space, and what can be wrong with that."""
+"""The transform between two frames, in space, and its errors."""
 
 import math
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from webmap.base.errors import WebMapError
 from webmap.base.geometry import FARTHEST, Affine, Pose, Quaternion, Vector3
 
 NEARLY = 0.1
-"""How far the norm of a quaternion may be from 1; it is set right then."""
+"""Greatest difference of a quaternion's norm from 1; it is then normalised."""
 
 _PARALLEL = 0.9995
-"""Cosine of half an angle above which a straight line between rotations will do."""
+"""Cosine of half an angle above which rotations are interpolated linearly."""
 
 _LEVEL = 1e-6
-"""Sine of half an angle below which a tilt cannot be seen."""
+"""Sine of half an angle below which a tilt is invisible."""
 
 _HERE = Vector3()
 _STRAIGHT = Quaternion()
@@ -28,26 +28,26 @@ class FrameMissing(TransformError, LookupError):
 
 
 class NotConnected(TransformError):
-    """Both frames exist, in two trees that nothing connects."""
+    """Both frames exist, but in two trees without a connection."""
 
 
 class NotKnownThen(TransformError):
-    """Both frames are connected, and a part between is not known at that time."""
+    """Both frames are connected, but a transform between is not known at that time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """Takes coordinates of one frame to those of another: turns, then moves.
+    """A transform from coordinates of one frame to those of another: turns, then moves.
 
-    It is named for what it gives: ``map_from_base`` takes coordinates of the base to
-    coordinates of the map, and ``map_from_odom @ odom_from_base`` is that too.
+    Its name shows the frames: ``map_from_base`` transforms coordinates of the base to
+    coordinates of the map, and so does ``map_from_odom @ odom_from_base``.
     """
 
     translation: Vector3 = _HERE
-    """Where the origin of the one frame is in the other, in metres."""
+    """The origin of the one frame in the other, in metres."""
 
     rotation: Quaternion = _STRAIGHT
-    """How the one frame is turned in the other, of norm 1."""
+    """The rotation of the one frame in the other, of norm 1."""
 
     @classmethod
     def from_pose(cls, pose: Pose) -> "Transform":
@@ -56,14 +56,15 @@ class Transform:
 
     @property
     def planar(self) -> Pose:
-        """Place and heading seen from above."""
+        """Position and heading seen from above."""
         return Pose(self.translation.x, self.translation.y, self.rotation.yaw)
 
     @property
     def from_above(self) -> Affine:
-        """What it does to points of its own plane, seen from above.
+        """The affine transform of the points of its own plane, seen from above.
 
-        It mirrors what hangs upside down, and flattens what stands upright.
+        It mirrors a frame that is upside down, and flattens one whose plane is
+        vertical.
         """
         q, by = self.rotation, self.translation
         x, y = _turn(q, Vector3(1.0)), _turn(q, Vector3(0.0, 1.0))
@@ -71,15 +72,15 @@ class Transform:
 
     @property
     def upright(self) -> bool:
-        """Whether z points up: it turns about z alone."""
+        """Whether z points up: the rotation is about z alone."""
         return abs(self.rotation.x) < _LEVEL and abs(self.rotation.y) < _LEVEL
 
     @property
     def heading_and_tilt(self) -> tuple[Pose, "Transform"]:
-        """Place and heading seen from above, and the rest.
+        """Return position and heading seen from above, and the rest.
 
-        The rest tilts and lifts, and comes first: ``Transform.from_pose(pose) @ tilt``
-        is the whole. Of a frame that stands upright it only lifts.
+        The rest tilts and lifts, and is applied first. The whole transform is
+        ``Transform.from_pose(pose) @ tilt``. For an upright frame the rest only lifts.
         """
         pose = self.planar
         lift = Vector3(0.0, 0.0, self.translation.z)
@@ -90,7 +91,7 @@ class Transform:
 
     @property
     def rows(self) -> tuple[tuple[float, float, float, float], ...]:
-        """The upper three rows of its matrix: turn, and in the last column move."""
+        """The upper three rows of its matrix; the last column is the translation."""
         q, by = self.rotation, self.translation
         x, y, z = (
             _turn(q, axis)
@@ -103,7 +104,7 @@ class Transform:
         )
 
     def apply(self, point: Vector3) -> Vector3:
-        """Return where a point is in the other frame."""
+        """Return the coordinates of a point in the other frame."""
         turned, by = _turn(self.rotation, point), self.translation
         return Vector3(turned.x + by.x, turned.y + by.y, turned.z + by.z)
 
@@ -115,17 +116,17 @@ class Transform:
 
     @property
     def inverse(self) -> "Transform":
-        """The transform that undoes this one."""
+        """The inverse transform."""
         back = _conjugate(self.rotation)
         moved = _turn(back, self.translation)
         return Transform(Vector3(-moved.x, -moved.y, -moved.z), back)
 
     def checked(self) -> "Transform":
-        """Return the same with a rotation of norm 1.
+        """Return the same transform with a rotation of norm 1.
 
         Raises:
-            TransformError: If a number is not finite, the rotation is none, or the
-                frame is farther away than anything can be.
+            TransformError: If a number is not finite, the rotation is zero, or the
+                frame is farther away than any robot can be.
 
         """
         t, q = self.translation, self.rotation
@@ -144,13 +145,15 @@ class Transform:
 
 
 def between(one: Transform, other: Transform, share: float) -> Transform:
-    """Return a transform on the way from one to another.
+    """Return the interpolated transform between two transforms.
+
+    Positions are interpolated on a straight line, rotations evenly over the shorter
+    angle.
 
     Args:
-        one: Where the way begins; the result at 0.
-        other: Where it ends; the result at 1.
-        share: How much of it lies behind, from 0 to 1. Places lie on a straight line,
-            and rotations turn evenly the shorter way about.
+        one: The result at 0.
+        other: The result at 1.
+        share: The fraction, from 0 to 1.
 
     """
     a, b = one.translation, other.translation
@@ -165,23 +168,23 @@ def alike(one: Transform, other: Transform, apart: float, turned: float) -> bool
     """Return whether two transforms are the same within tolerances.
 
     Args:
-        one: The one.
-        other: The other.
-        apart: Metres that do not matter.
-        turned: Radians that do not matter.
+        one: One transform.
+        other: The other transform.
+        apart: Tolerance of the position, in metres.
+        turned: Tolerance of the rotation, in radians.
 
     """
     a, b, p, q = one.translation, other.translation, one.rotation, other.rotation
     if math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) > apart:
         return False
-    # Half an angle, of which the sine is exact where the cosine is not.
+    # Half the angle: its sine is exact where its cosine is not.
     rest = _times(_conjugate(p), q)
     return math.hypot(rest.x, rest.y, rest.z) <= math.sin(min(turned, math.pi) / 2)
 
 
 def _slerp(p: Quaternion, q: Quaternion, share: float) -> Quaternion:
     cosine = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w
-    sign = 1.0 if cosine >= 0 else -1.0  # both mean one rotation; take the nearer
+    sign = 1.0 if cosine >= 0 else -1.0  # both are one rotation; take the nearer
     cosine = min(abs(cosine), 1.0)
     if cosine > _PARALLEL:
         first, second = 1.0 - share, share

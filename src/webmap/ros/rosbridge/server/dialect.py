@@ -1,4 +1,4 @@
-"""How ROS 1 and ROS 2 spell the same types, times and headers."""
+"""The names of types, times and headers in ROS 1 and ROS 2."""
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -11,7 +11,7 @@ _SERVICE_PACKAGES = {"rosapi": "rosapi_msgs"}
 
 @dataclass(slots=True)
 class Dialect:
-    """One of the two spellings; it counts a publisher's headers, so use one a graph."""
+    """One dialect; it numbers the headers of topics, so use one per graph."""
 
     name: DialectName = "ros1"
 
@@ -19,11 +19,11 @@ class Dialect:
 
     @property
     def is_ros2(self) -> bool:
-        """Whether this is the spelling of ROS 2."""
+        """Whether this is the dialect of ROS 2."""
         return self.name == "ros2"
 
     def spell(self, canonical: str, kind: Kind = "msg") -> str:
-        """Return the name of a type that this dialect uses, from ``pkg/Name``."""
+        """Return the name of a type in this dialect, from ``pkg/Name``."""
         if not self.is_ros2:
             return canonical
         package, _, name = canonical.partition("/")
@@ -49,7 +49,7 @@ class Dialect:
 
 
 def canonical(type_name: str) -> str:
-    """Return ``pkg/Name`` for either spelling of a type's name."""
+    """Return ``pkg/Name`` for a type's name in either dialect."""
     parts = type_name.strip().strip("/").split("/")
     if len(parts) == 3 and parts[1] in ("msg", "srv", "action"):
         del parts[1]

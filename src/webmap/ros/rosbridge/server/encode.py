@@ -1,4 +1,4 @@
-"""One published message in the forms that subscribers ask for."""
+"""One published message in the encodings that subscribers request."""
 
 import base64
 import io
@@ -31,7 +31,7 @@ _NAN = msgspec.Raw(b"NaN")
 
 
 class Publication:
-    """A message on a topic; each form is made once, however many want it."""
+    """A message on a topic; each encoding is made once for all subscribers."""
 
     __slots__ = ("_forms", "message", "stamp", "topic", "type")
 
@@ -45,24 +45,24 @@ class Publication:
         self._forms: dict[str, str | bytes | None] = {}
 
     def form(self, compression: str, encoder: "Encoder") -> str | bytes | None:
-        """Return the frame, or None if this server cannot send that form."""
+        """Return the frame, or None if this server cannot send that encoding."""
         if compression not in self._forms:
             self._forms[compression] = encoder.publication(self, compression)
         return self._forms[compression]
 
 
 MAX_MESSAGE_SIZE = 10_000_000
-"""What ``max_message_size`` of rosbridge_websocket is unless somebody sets it."""
+"""The default of ``max_message_size`` in rosbridge_websocket."""
 
 
 class Encoder:
-    """Makes frames in one dialect, with one server's quirks.
+    """Builds frames in one dialect, with the quirks of one server.
 
     Args:
         schema: The types.
-        quirks: Of the server.
+        quirks: The quirks of the server.
         max_message_size: Bytes above which a server with the quirk ``no_large_cbor``
-            sends JSON in parts and CBOR never.
+            sends JSON in parts and no CBOR.
 
     """
 
@@ -82,7 +82,7 @@ class Encoder:
     def publication(
         self, publication: Publication, compression: str
     ) -> str | bytes | None:
-        """Return a publication's frame in a form, or None if it is never sent."""
+        """Return a publication's frame in an encoding, or None if it is never sent."""
         operation = {
             "op": "publish",
             "topic": publication.topic,
@@ -117,13 +117,13 @@ class Encoder:
             {
                 "op": "publish",
                 "topic": publication.topic,
-                # Both dialects say secs and nsecs here.
+                # Both dialects have secs and nsecs here.
                 "msg": {"secs": seconds, "nsecs": rest, "bytes": octets},
             }
         )
 
     def has_fixed_array(self, type_name: str) -> bool:
-        """Whether a type has, at any depth, a fixed array that is not of bytes."""
+        """Return whether a type has, at any depth, a fixed array not of bytes."""
         known = self._fixed.get(type_name)
         if known is None:
             known = _has_fixed_array(self.schema.fields(type_name))
@@ -151,7 +151,7 @@ class Encoder:
         pieces = [text[start : start + size] for start in range(0, len(text), size)]
         total: float = len(pieces)
         if self.quirks.float_fragments:
-            # Written for a division that drops the rest; the count is its floor.
+            # Meant for an integer division; the count is its floor.
             total = (len(text) - 1) / size + 1
         return [
             self.json(
@@ -192,7 +192,7 @@ def _tag_array(encoder: cbor2.CBOREncoder, value: Any) -> None:
 
 
 def _bare_nan(value: Any) -> Any:
-    """Return a message whose fixed arrays carry the token that JSON does not have."""
+    """Return a message whose fixed arrays contain the token NaN, which JSON lacks."""
     if isinstance(value, dict):
         return {name: _bare_nan(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -219,12 +219,12 @@ _TIMES = {
 def serialize(
     fields: Sequence[Field], message: Mapping[str, Any], *, ros2: bool
 ) -> bytes:
-    """Return a message's bytes.
+    """Return the serialized bytes of a message.
 
     Args:
-        fields: Those of its type.
-        message: All of them; arrays of numbers are lists, arrays or bytes.
-        ros2: Whether as CDR, as in ROS 2; else in the serialisation of ROS 1.
+        fields: The fields of its type.
+        message: The values of all fields; arrays of numbers are lists, arrays or bytes.
+        ros2: Whether to serialize as CDR, as in ROS 2; else as in ROS 1.
 
     Raises:
         struct.error: If a number does not fit its type.

@@ -1,4 +1,4 @@
-"""The ROS graph behind the server: topics, services, actions and who has them."""
+"""The ROS graph behind the server: topics, services, actions and their nodes."""
 
 import logging
 import time
@@ -19,7 +19,7 @@ Deliver = Callable[[Publication], None]
 
 
 class GraphError(Exception):
-    """A request that the graph refuses; the text is for the client that asked."""
+    """A request that the graph refuses; the text is for the client."""
 
 
 class ServiceFailed(Exception):
@@ -27,10 +27,10 @@ class ServiceFailed(Exception):
 
 
 class Respond(Protocol):
-    """Ends a service call, once."""
+    """Ends a service call; called once."""
 
     def __call__(self, values: Any, *, ok: bool = True) -> None:
-        """Give the response's values, or the reason of the failure."""
+        """End the call with the response's values, or the reason of the failure."""
 
 
 ServiceHandler = Callable[[dict[str, Any], Respond], None]
@@ -38,7 +38,7 @@ ServiceHandler = Callable[[dict[str, Any], Respond], None]
 
 @dataclass(slots=True)
 class Topic:
-    """A topic with its type, and who publishes and subscribes."""
+    """A topic with its type, publishers and subscribers."""
 
     name: str
     type: str
@@ -51,7 +51,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """A service with its type and the one who answers."""
+    """A service with its type and its server."""
 
     name: str
     type: str
@@ -61,14 +61,14 @@ class Service:
 
 
 class GoalHandle(Protocol):
-    """A goal that an action server took."""
+    """A goal that an action server has accepted."""
 
     def cancel(self) -> None:
-        """Ask for the end of the goal; its result still comes."""
+        """Request the end of the goal; its result still comes."""
 
 
 class ActionServer(Protocol):
-    """What answers an action's goals."""
+    """Executes the goals of an action."""
 
     type: str
 
@@ -78,7 +78,7 @@ class ActionServer(Protocol):
         on_feedback: Callable[[dict[str, Any]], None],
         on_result: Callable[[int, dict[str, Any]], None],
     ) -> GoalHandle:
-        """Take a goal; ``on_result`` is called once, with action_msgs' status."""
+        """Accept a goal; ``on_result`` is called once, with a status of action_msgs."""
 
 
 class Graph:
@@ -102,7 +102,7 @@ class Graph:
         node: str = BRIDGE_NODE,
         latch: bool = False,
     ) -> None:
-        """Let ``owner`` publish on a topic.
+        """Register ``owner`` as publisher of a topic.
 
         Raises:
             GraphError: If the type is unknown, or the topic has another.
@@ -114,7 +114,7 @@ class Graph:
             topic.latched.setdefault(owner, None)
 
     def unadvertise(self, owner: object, name: str) -> None:
-        """Take the publisher away, with the message that it latched."""
+        """Remove the publisher and its latched message."""
         topic = self.topics.get(resolve(name))
         if topic:
             topic.publishers.pop(owner, None)
@@ -130,7 +130,7 @@ class Graph:
         *,
         node: str = BRIDGE_NODE,
     ) -> None:
-        """Let ``owner`` hear a topic, what is latched included.
+        """Subscribe ``owner`` to a topic, and deliver its latched messages.
 
         Raises:
             GraphError: If the type is unknown, missing or not the topic's.
@@ -141,26 +141,26 @@ class Graph:
         self.repeat_latched(topic.name, deliver)
 
     def repeat_latched(self, name: str, deliver: Deliver) -> None:
-        """Deliver what a topic has latched."""
+        """Deliver the latched messages of a topic."""
         topic = self.topics.get(name)
         for publication in tuple(topic.latched.values()) if topic else ():
             if publication:
                 deliver(publication)
 
     def unsubscribe(self, owner: object, name: str) -> None:
-        """Take the subscriber away."""
+        """Remove the subscriber."""
         topic = self.topics.get(resolve(name))
         if topic:
             topic.subscribers.pop(owner, None)
             self._forget_if_unused(topic)
 
     def is_wanted(self, name: str) -> bool:
-        """Whether anybody would get a message on this topic, now or later."""
+        """Return whether a message on this topic would be delivered, now or later."""
         topic = self.topics.get(name)
         return bool(topic and (topic.subscribers or topic.latched))
 
     def publish(self, owner: object, name: str, message: dict[str, Any]) -> None:
-        """Deliver a message that fits the topic's type to all who subscribed."""
+        """Deliver a message, which must fit the topic's type, to all subscribers."""
         topic = self.topics[resolve(name)]
         publication = Publication(topic.name, topic.type, message, self.clock())
         if owner in topic.latched:
@@ -172,10 +172,10 @@ class Graph:
                 log.exception("a subscriber of %s failed", name)
 
     def conform(self, type_name: str, value: Any, *, finite: bool) -> dict[str, Any]:
-        """Return a client's message in full.
+        """Return a complete message from a client's values.
 
         Raises:
-            GraphError: If it does not fit its type.
+            GraphError: If the values do not fit the type.
 
         """
         try:
@@ -192,12 +192,12 @@ class Graph:
         *,
         node: str = BRIDGE_NODE,
     ) -> None:
-        """Let ``owner`` answer a service; the newest one who says so does."""
+        """Register ``owner`` as the server of a service; the newest server responds."""
         name = resolve(name)
         self.services[name] = Service(name, canonical(type_name), node, owner, handle)
 
     def unserve(self, owner: object, name: str) -> None:
-        """Take a service away, if it is still ``owner``'s."""
+        """Remove a service, if ``owner`` is still its server."""
         service = self.services.get(resolve(name))
         if service and service.owner is owner:
             del self.services[service.name]
@@ -221,7 +221,7 @@ class Graph:
         try:
             self.schema.fields(request)
         except UnknownType:
-            # A client's own type: it knows the fields, the graph does not.
+            # A type of the client: the client knows its fields, the graph does not.
             return dict(args) if isinstance(args, Mapping) else {}
         return self.schema.conform(request, args)
 

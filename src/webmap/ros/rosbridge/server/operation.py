@@ -1,4 +1,4 @@
-"""What one client sent, field by field, and what waits to be sent to it."""
+"""The fields of a client's operation, and the frames that wait to be sent."""
 
 import math
 from collections import deque
@@ -13,10 +13,10 @@ Handlers = dict[str, Callable[[Operation], None]]
 
 
 def text(operation: Operation, name: str) -> str:
-    """Return a field that must be a text.
+    """Return a field that must be a string.
 
     Raises:
-        GraphError: If it is absent, empty or something else.
+        GraphError: If the field is absent, empty or not a string.
 
     """
     value = operation.get(name)
@@ -26,10 +26,10 @@ def text(operation: Operation, name: str) -> str:
 
 
 def whole_number(operation: Operation, name: str) -> int:
-    """Return a field that must be a number from 0 up; 0 if it is absent.
+    """Return a field that must be a number of at least 0; 0 if absent.
 
     Raises:
-        GraphError: If it is something else.
+        GraphError: If the field is not such a number.
 
     """
     value = operation.get(name, 0)
@@ -40,28 +40,28 @@ def whole_number(operation: Operation, name: str) -> int:
 
 
 DEFAULT_DEPTH = 100
-"""Publications of a topic that wait when the client asked for no queue length."""
+"""Publications of a topic that may wait if the client stated no queue length."""
 
 MOST_REPLIES = 10_000
-"""Replies that may wait before the client counts as gone."""
+"""Replies that may wait; a client with more is disconnected."""
 
 
 class Outbox:
-    """Frames in the order they were made; each topic keeps only its newest ones."""
+    """Frames to send, in order; each topic keeps only its newest ones."""
 
     def __init__(self) -> None:
         self._order: deque[str | list[str]] = deque()
         self._topics: dict[str, deque[Publication]] = {}
         self._replies = 0
         self.dropped = 0
-        """Publications that a newer one of their topic pushed out."""
+        """Publications that were replaced by newer ones of their topic."""
 
     def __len__(self) -> int:
         return len(self._order)
 
     @property
     def overflowed(self) -> bool:
-        """Whether more replies wait than any client that reads lets pile up."""
+        """Whether more replies wait than a client that reads would have."""
         return self._replies > MOST_REPLIES
 
     def reply(self, frames: list[str]) -> None:
@@ -70,18 +70,19 @@ class Outbox:
         self._order.append(frames)
 
     def publication(self, publication: Publication, depth: int) -> None:
-        """Append a publication; beyond ``depth`` the topic's oldest goes."""
+        """Append a publication; above ``depth`` the oldest of the topic is dropped."""
         waiting = self._topics.setdefault(publication.topic, deque())
         waiting.append(publication)
         self._order.append(publication.topic)
         while len(waiting) > max(depth, 1):
             waiting.popleft()
-            # The order keeps one place for each that waits: the oldest place stays.
+            # The order has one entry for each waiting publication; keep the oldest
+            # entry.
             self._order.pop()
             self.dropped += 1
 
     def pop(self) -> list[str] | Publication | None:
-        """Return what goes out next: a reply's frames or a publication."""
+        """Return the next reply's frames or publication to send."""
         while self._order:
             entry = self._order.popleft()
             if not isinstance(entry, str):
@@ -93,19 +94,19 @@ class Outbox:
         return None
 
     def forget(self, topic: str) -> None:
-        """Drop what waits of a topic that the client unsubscribed."""
+        """Drop the waiting publications of a topic that the client unsubscribed."""
         if self._topics.pop(topic, None):
             self._order = deque(entry for entry in self._order if entry != topic)
 
 
 class Client:
-    """One client of the server: the graph that it sees, and what goes out to it.
+    """One client of the server: its graph, and its outgoing frames.
 
     Args:
         graph: The ROS graph that the client sees.
-        encoder: Makes the frames; its quirks are those of the client's server.
+        encoder: Builds the frames; its quirks are those of the client's server.
         clock: Returns monotonic seconds.
-        wake: Called when the outbox or a throttled subscription has something.
+        wake: Called when the outbox or a throttled subscription has a frame to send.
 
     """
 

@@ -1,4 +1,4 @@
-"""What real rosbridge servers do that their protocol text does not say."""
+"""Behaviour of real rosbridge servers that differs from the protocol text."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -7,10 +7,10 @@ from webmap.base.errors import ConfigError
 
 @dataclass(frozen=True, slots=True)
 class Quirks:
-    """Departures from the protocol text; without any the server is polite."""
+    """Differences from the protocol text; without any the server follows it."""
 
     silent: bool = False
-    """A bad request is answered with silence, never with ``op: status``."""
+    """A bad request is never answered; the protocol has ``op: status``."""
 
     bare_nan: bool = False
     """NaN in a fixed array (a covariance) is written as the token ``NaN``."""
@@ -19,7 +19,7 @@ class Quirks:
     """A message with a fixed array (Odometry) is never sent as CBOR."""
 
     no_png: bool = False
-    """A subscription with compression png is never served."""
+    """A subscription with compression png gets no messages."""
 
     no_cbor_fragments: bool = False
     """CBOR with a fragment size is never sent."""
@@ -31,7 +31,7 @@ class Quirks:
     """The total of fragments is a float, and publications share the id 0."""
 
     escaped_slashes: bool = False
-    r"""JSON has ``\/`` for every slash, as the ujson library writes it."""
+    r"""JSON has ``\/`` for every slash, as written by the ujson library."""
 
     lenient_numbers: bool = False
     """NaN, Infinity and 1e999 from a client reach the robot."""
@@ -43,21 +43,21 @@ class Quirks:
     """An action goal blocks its socket's other messages until it ends."""
 
     hanging_param_names: bool = False
-    """``/rosapi/get_param_names`` never answers, nor does rosapi after it."""
+    """``/rosapi/get_param_names`` never answers; afterwards rosapi never answers."""
 
     deadly_message_details: bool = False
-    """``/rosapi/message_details`` never answers, and rosapi is gone after it."""
+    """``/rosapi/message_details`` never answers, and rosapi ends."""
 
     spinning_queue: bool = False
-    """The server hangs for good when a client ends a subscription in any way that had a
-    ``throttle_rate`` of 0 and a ``queue_length`` above 0 and that got a message.
+    """The server hangs for ever when certain subscriptions end, in any way.
 
-    rosbridge 2.1.0 hangs only if a message is queued at that moment. A test cannot time
-    that, so here a message always is.
+    These have a ``throttle_rate`` of 0, a ``queue_length`` above 0, and have got a
+    message. rosbridge 2.1.0 hangs only if a message is queued at that moment. A test
+    cannot time that, so here a message always is.
     """
 
     hanging_stop: bool = False
-    """``/robot_N/stop`` never answers. No server does this by nature: it is a fault."""
+    """``/robot_N/stop`` never answers. No real server does this; it is a fault."""
 
 
 POLITE = Quirks()
@@ -87,7 +87,7 @@ REAL = {
         deadly_message_details=True,
     ),
 }
-"""What rosbridge 0.11.17 (ROS 1) and 2.1.0 (ROS 2) were seen to do."""
+"""The measured behaviour of rosbridge 0.11.17 (ROS 1) and 2.1.0 (ROS 2)."""
 
 
 def parse_quirks(text: str, dialect: str) -> Quirks:
@@ -95,11 +95,11 @@ def parse_quirks(text: str, dialect: str) -> Quirks:
 
     Args:
         text: ``real`` or ``polite``, then any number of ``,NAME`` to add a quirk or
-            ``,-NAME`` to take one away: ``polite,bare_nan`` or ``real,-silent``.
-        dialect: ``ros1`` or ``ros2``; says what ``real`` is.
+            ``,-NAME`` to remove one: ``polite,bare_nan`` or ``real,-silent``.
+        dialect: ``ros1`` or ``ros2``; selects the quirks of ``real``.
 
     Raises:
-        ConfigError: If the text names something else.
+        ConfigError: If the text contains another name.
 
     """
     base, *changes = (part.strip() for part in text.split(","))

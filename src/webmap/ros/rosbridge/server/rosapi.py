@@ -28,7 +28,7 @@ class Rosapi:
     hung: bool = False
 
     def start(self) -> None:
-        """Put the services into the graph."""
+        """Add the services to the graph."""
         services: dict[str, tuple[str, Callable[[Args], Any]]] = {
             "topics": ("Topics", self._topics),
             "topics_for_type": ("TopicsForType", self._topics_for_type),
@@ -82,7 +82,7 @@ class Rosapi:
         return self.graph.schema.dialect.spell(type_name)
 
     def _listed(self) -> list[Topic]:
-        """Return the topics that rosapi tells of: in ROS 2, those with a plain name."""
+        """Return the topics that rosapi lists: in ROS 2, those with a plain name."""
         hides = self.graph.schema.dialect.is_ros2
         return [
             topic
@@ -186,7 +186,7 @@ class Rosapi:
         return {"time": self.graph.schema.dialect.time(self.graph.clock())}
 
     def _get_param(self, request: Args) -> Any:
-        # There are no parameters; as rosapi, the default comes back as it was sent.
+        # There are no parameters; like rosapi, return the default unchanged.
         return {"value": request["default"]}
 
     def _get_param_names(self, _: Args) -> Any:
@@ -197,17 +197,17 @@ class Rosapi:
 
 
 def type_definitions(schema: Schema, type_name: str) -> list[dict[str, Any]]:
-    """Return rosapi's type definitions of a type and of all that it holds.
+    """Return rosapi's definitions of a type and of all types in it.
 
     Raises:
-        UnknownType: If the schema does not know it.
+        UnknownType: If the type is not in the schema.
 
     """
     return [_definition(schema, name) for name in _closure(schema, type_name)]
 
 
 def definition_text(schema: Schema, type_name: str) -> str:
-    """Return the text of a type's definition and of all that it holds."""
+    """Return the text of the definitions of a type and of all types in it."""
     first, *others = (name for name in _closure(schema, type_name) if name not in TIMES)
     parts = [_text(schema, first)]
     parts += [f"{_RULE}\nMSG: {name}\n{_text(schema, name)}" for name in others]
@@ -234,7 +234,7 @@ def _fields(schema: Schema, name: str) -> tuple[Field, ...]:
 
 
 def _spell(schema: Schema, name: str) -> str:
-    # Definitions say pkg/Name in both dialects.
+    # Definitions have pkg/Name in both dialects.
     if name in TIMES and schema.dialect.is_ros2:
         return f"builtin_interfaces/{name.capitalize()}"
     return name

@@ -1,4 +1,4 @@
-"""The types of the graph behind the server, and messages made to fit them."""
+"""The types of the graph behind the server, and complete messages of these types."""
 
 import base64
 import binascii
@@ -36,11 +36,11 @@ DTYPES: dict[str, str] = {
     "float32": "<f4",
     "float64": "<f8",
 }
-"""The numeric types and their little-endian form."""
+"""The numeric types and their little-endian format."""
 
 
 class MessageMismatch(Exception):
-    """A message does not fit its type; the text says where, in rosbridge's words."""
+    """A message does not fit its type; the text names the field, as in rosbridge."""
 
 
 class Schema:
@@ -54,20 +54,20 @@ class Schema:
         self._finite = _FromClient(dialect, finite=True)
 
     def define(self, texts: Mapping[str, str]) -> None:
-        """Add definitions, which count more than the shipped ones.
+        """Add definitions, which replace the included ones.
 
         Args:
-            texts: Those of a type and of all types in it, by name.
+            texts: The texts of a type and of all types in it, by name.
 
         """
         self._texts.update(texts)
         self._known = Definitions(self._texts, ros2=self.dialect.is_ros2)
 
     def definition(self, type_name: str) -> Definition:
-        """Return the definition of a message type, in either spelling.
+        """Return the definition of a message type, in either dialect.
 
         Raises:
-            UnknownType: If the graph does not know it.
+            UnknownType: If the type is not in the graph.
 
         """
         name = canonical(type_name)
@@ -76,10 +76,10 @@ class Schema:
         return self._known.definition(name)
 
     def fields(self, type_name: str) -> tuple[Field, ...]:
-        """Return the fields of a message type, in either spelling.
+        """Return the fields of a message type, in either dialect.
 
         Raises:
-            UnknownType: If the graph does not know it.
+            UnknownType: If the type is not in the graph.
 
         """
         return self.definition(type_name).fields
@@ -89,22 +89,22 @@ class Schema:
         return self._known.text(canonical(type_name))
 
     def knows(self, type_name: str) -> bool:
-        """Whether this is a message type of the graph."""
+        """Return whether this is a message type of the graph."""
         return canonical(type_name) in self._known
 
     def conform(
         self, type_name: str, value: Any, *, finite: bool = False
     ) -> dict[str, Any]:
-        """Return a whole message: absent fields are zero, sequences are arrays.
+        """Return a complete message: absent fields are zero, sequences are arrays.
 
         Args:
-            type_name: Of the message, in either spelling.
-            value: What a client sent; a list gives the fields in their order.
-            finite: Refuse NaN and infinity.
+            type_name: The type, in either dialect.
+            value: The values from a client; a list holds the fields in their order.
+            finite: Whether to refuse NaN and infinity.
 
         Raises:
             MessageMismatch: If a field is unknown or of another type.
-            UnknownType: If the type is.
+            UnknownType: If the type is unknown.
 
         """
         conformer = self._finite if finite else self._conformer
@@ -123,7 +123,7 @@ class Schema:
 
 
 class _FromClient(Conformer):
-    """Takes what rosbridge takes from a client."""
+    """Accepts the values that rosbridge accepts from a client."""
 
     def __init__(self, dialect: Dialect, *, finite: bool = False) -> None:
         super().__init__(ros2=dialect.is_ros2)
@@ -166,7 +166,7 @@ class _FromClient(Conformer):
         return value
 
     def time(self, field: Field, value: Any) -> dict[str, int]:
-        # rosbridge takes the names of both dialects, and fills the stamp "now" in.
+        # rosbridge accepts the names of both dialects, and replaces the stamp "now".
         if value == "now":
             return self.spelled(*divmod(round(time.time() * 1e9), 1_000_000_000))
         if not isinstance(value, Mapping):
@@ -206,7 +206,7 @@ def _as_float(value: float) -> float:
 
 
 def _octets(field: Field, value: Any) -> bytes:
-    """Return the bytes of a ``uint8[]``, which JSON carries as base64 or a list."""
+    """Return the bytes of a ``uint8[]``, which in JSON is base64 or a list."""
     if not isinstance(value, str | list):
         raise wrong(value, "base64 or a list of bytes")
     try:

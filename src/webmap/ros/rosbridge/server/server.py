@@ -1,4 +1,4 @@
-"""The WebSocket shell around the sessions."""
+"""The WebSocket server of the sessions."""
 
 import asyncio
 import contextlib
@@ -27,7 +27,7 @@ class RosbridgeServer:
         self.encoder = encoder
         self.sessions: set[Session] = set()
         self.hangs = False
-        """Whether it does nothing any more: no handshake, no operation, no message."""
+        """Whether the server hangs: no handshake, no operation, no message."""
         self._stopped = asyncio.Event()
         self._server: Server | None = None
 
@@ -47,7 +47,7 @@ class RosbridgeServer:
             process_request=self._let_in,
             compression=None,
             max_size=_LARGEST_FRAME,
-            ping_interval=None,  # as rosbridge: pings are off unless asked for
+            ping_interval=None,  # as in rosbridge: pings are off by default
             server_header=None,
         )
         bound = self._server.sockets[0].getsockname()[1]

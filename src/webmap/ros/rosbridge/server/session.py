@@ -20,13 +20,13 @@ _MOST_INPUT = 10_000
 
 
 class Session(Client):
-    """Takes a client's frames, and has the frames that go to it.
+    """Handles a client's frames, and builds the frames for the client.
 
     Args:
         graph: The ROS graph that the client sees.
-        encoder: Makes the frames; its quirks are the session's.
-        clock: Monotonic seconds.
-        wake: Called when :meth:`next_frames` may have something.
+        encoder: Builds the frames; its quirks are those of the session.
+        clock: Returns monotonic seconds.
+        wake: Called when :meth:`next_frames` may return frames.
 
     """
 
@@ -54,7 +54,7 @@ class Session(Client):
         }
 
     def receive(self, data: str | bytes) -> None:
-        """Take a frame of the client; it never raises, whatever came."""
+        """Handle a frame of the client; never raises."""
         operations = self._incoming.feed(data)
         if not operations and not self._incoming.waits:
             self._complain(None, "no JSON object in the frame")
@@ -62,7 +62,7 @@ class Session(Client):
         self._run_queued()
 
     def next_frames(self) -> list[str | bytes]:
-        """Return the frames of what goes out next; empty when nothing waits."""
+        """Return the next frames to send; empty when nothing waits."""
         while (entry := self.outbox.pop()) is not None:
             if isinstance(entry, list):
                 return list(entry)
@@ -71,16 +71,16 @@ class Session(Client):
         return []
 
     def poll(self) -> float | None:
-        """Release what throttling held back; return seconds to the next, if any."""
+        """Release throttled messages; return seconds to the next one, if any."""
         return self._topics.poll()
 
     @property
     def overflowed(self) -> bool:
-        """Whether so much waits that the client should be let go."""
+        """Whether so many frames wait that the client must be disconnected."""
         return self.outbox.overflowed or len(self._queued) > _MOST_INPUT
 
     def close(self) -> None:
-        """Take everything of this client out of the graph; its goals go on."""
+        """Remove all of this client from the graph; its goals continue."""
         self._closed = True
         self._topics.close()
         self._services.close()
@@ -91,9 +91,9 @@ class Session(Client):
         """Send an operation to the client.
 
         Args:
-            operation: What to send.
+            operation: The operation.
             identifier: The id of the request, if it had one.
-            fragment_size: What the request asked for; anything but a number is none.
+            fragment_size: The fragment size in the request; ignored if not a number.
 
         """
         if self._closed:
@@ -109,7 +109,7 @@ class Session(Client):
         self.wake()
 
     def block(self) -> Callable[[], None]:
-        """Hold the client's next operations back until the result is called."""
+        """Hold back the client's operations until the returned function is called."""
         cause = self._blocked_by = object()
 
         def unblock() -> None:
@@ -121,7 +121,7 @@ class Session(Client):
 
     def _run_queued(self) -> None:
         if self._running:
-            return  # an operation that ended at once: the loop below goes on
+            return  # a nested call: the loop below continues
         self._running = True
         while self._queued and self._blocked_by is None and not self._closed:
             self._run(self._queued.popleft())
@@ -161,29 +161,29 @@ _MOST_FAILURES = 50
 
 
 class IncomingText:
-    """Finds whole JSON objects; half of one waits for the rest, garbage is dropped.
+    """Finds complete JSON objects; an incomplete one is kept, garbage is dropped.
 
-    As rosbridge: two objects in a frame are both run, and an object may come in
-    pieces. What cannot become one is let go of, and never costs more than a bounded
-    number of attempts.
+    As in rosbridge, two objects in a frame are both executed, and an object may come in
+    pieces. Text that cannot become an object is dropped, after a limited number of
+    attempts.
     """
 
     def __init__(self) -> None:
         self._kept = ""
-        # The real parser takes NaN, Infinity and 1e999: json does too.
+        # The parser of rosbridge accepts NaN, Infinity and 1e999, and so does json.
         self._decoder = json.JSONDecoder()
 
     @property
     def waits(self) -> bool:
-        """Whether the beginning of an object is kept for its rest."""
+        """Whether the beginning of an object is kept."""
         return bool(self._kept)
 
     def feed(self, data: str | bytes) -> list[dict[str, Any]]:
-        """Return the operations that are complete now, in order."""
+        """Return the operations that are now complete, in order."""
         text = data.decode("utf-8", "replace") if isinstance(data, bytes) else data
         found, rest = self._scan(self._kept + text)
         if not found and self._kept:
-            # The new frame may be whole and only the kept half be garbage.
+            # The new frame may be complete while the kept text is garbage.
             found, rest_alone = self._scan(text)
             rest = rest_alone if found else rest
         self._kept = rest if len(rest) <= _MOST_KEPT else ""
@@ -210,7 +210,7 @@ class IncomingText:
 
 
 class Services:
-    """One client's calls and the services that it advertised."""
+    """One client's calls and the services that it has advertised."""
 
     def __init__(self, client: Session) -> None:
         self._client = client
@@ -221,7 +221,7 @@ class Services:
 
     @property
     def handlers(self) -> Handlers:
-        """What serves each operation."""
+        """The handler of each operation."""
         return {
             "call_service": self._call,
             "advertise_service": self._advertise,
@@ -230,7 +230,7 @@ class Services:
         }
 
     def close(self) -> None:
-        """Take the services out of the graph; calls that wait for them fail."""
+        """Remove the services from the graph; calls that wait for them fail."""
         for service in self._served:
             self._graph.unserve(self, service)
         self._served.clear()
@@ -284,14 +284,14 @@ class Services:
 
 
 def _nothing() -> None:
-    """Unblock nothing."""
+    """Do nothing: the operation blocks nothing."""
 
 
 _UNKNOWN = 0
 
 
 class Goals:
-    """One client's goals. Their handles are its own: no other can cancel by id."""
+    """One client's goals. Another client cannot cancel them by id."""
 
     def __init__(self, client: Session) -> None:
         self._client = client
@@ -300,7 +300,7 @@ class Goals:
 
     @property
     def handlers(self) -> Handlers:
-        """What serves each operation."""
+        """The handler of each operation."""
         return {"send_action_goal": self._send, "cancel_action_goal": self._cancel}
 
     def _send(self, operation: Operation) -> None:

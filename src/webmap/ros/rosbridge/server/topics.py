@@ -1,4 +1,4 @@
-"""What a client does with topics: advertise, publish, subscribe."""
+"""The topic operations of a client: advertise, publish, subscribe."""
 
 import logging
 from collections import deque
@@ -23,7 +23,7 @@ log = logging.getLogger("webmap.sim")
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What one ``op: subscribe`` asked for."""
+    """The options of one ``op: subscribe``."""
 
     throttle: float = 0.0
     """The least time between two messages, in seconds."""
@@ -51,7 +51,7 @@ class Subscription:
         return is_new
 
     def drop(self, identifier: str | None) -> bool:
-        """Take a request away, all for None; return whether none is left."""
+        """Remove a request, or all for None; return whether none is left."""
         if identifier is None:
             self._requests.clear()
         else:
@@ -74,7 +74,7 @@ class Subscription:
         )
 
     def offer(self, publication: Publication, now: float) -> None:
-        """Send a message on, keep it until its time comes, or drop it."""
+        """Send a message, keep it until it is due, or drop it."""
         self._got_any = True
         depth = self.merged.queue_length
         if now >= self.due and not self._waiting:
@@ -93,16 +93,16 @@ class Subscription:
 
     @property
     def due(self) -> float:
-        """When the next message may go, on the clock of ``offer``."""
+        """When the next message may be sent, on the clock of ``offer``."""
         return self._sent_at + self.merged.throttle
 
     @property
     def next_due(self) -> float | None:
-        """When a message that waits may go; None if none waits."""
+        """When a waiting message may be sent; None if none waits."""
         return self.due if self._waiting else None
 
     def poll(self, now: float) -> None:
-        """Send what waited long enough."""
+        """Send the messages that are due."""
         while self._waiting and now >= self.due:
             self._pass_on(self._waiting.popleft(), now)
 
@@ -125,7 +125,7 @@ class Topics:
 
     @property
     def handlers(self) -> Handlers:
-        """What serves each operation."""
+        """The handler of each operation."""
         return {
             "advertise": self._advertise,
             "unadvertise": self._unadvertise,
@@ -135,7 +135,7 @@ class Topics:
         }
 
     def poll(self) -> float | None:
-        """Release what throttling held back; return seconds to the next, if any."""
+        """Release throttled messages; return seconds to the next one, if any."""
         now = self._client.now()
         for subscription in self._subscriptions.values():
             subscription.poll(now)
@@ -144,7 +144,7 @@ class Topics:
         return None if soonest is None else max(soonest - now, 0.0)
 
     def frames(self, publication: Publication) -> list[str | bytes]:
-        """Return a publication as this client asked for it; empty if it cannot be."""
+        """Return a publication in the requested encoding; empty if impossible."""
         subscription = self._subscriptions.get(publication.topic)
         if subscription is None:
             return []
@@ -178,7 +178,7 @@ class Topics:
         return [frame]
 
     def close(self) -> None:
-        """Take the publishers and subscriptions out of the graph."""
+        """Remove the publishers and subscriptions from the graph."""
         for topic, subscription in self._subscriptions.items():
             self._graph.unsubscribe(self, topic)
             self._spin_if_queued(topic, subscription)
@@ -231,7 +231,7 @@ class Topics:
                 del self._subscriptions[topic]
                 raise
         elif subscription.ask(identifier, request):
-            # Each new id gets what is latched once more, as in rosbridge.
+            # As in rosbridge, each new id gets the latched messages again.
             self._graph.repeat_latched(topic, partial(self._enqueue, depth=0))
 
     def _unsubscribe(self, operation: Operation) -> None:
