@@ -399,8 +399,7 @@ class Driven(Extendable):
     # Reports of the gate.
 
     def on_gate_down(self) -> None:
-        """Wait for the next gate's report before taking control; pages keep the last.
-        """
+        """Mark the report as old: taking control needs one of the next gate."""
         self._report_is_old = True
 
     def on_gate_report(self, report: RobotReport) -> None:

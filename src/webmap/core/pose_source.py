@@ -154,7 +154,7 @@ class PoseSource:
     # Listeners.
 
     def join(self, listener: Callable[[], object]) -> Removal:
-        """Call ``listener`` on changes of pose, frames or alignment, until the removal.
+        """Call ``listener`` when pose, frames or alignment change; return the removal.
         """
         key = id(listener)
         self._listeners[key] = listener

@@ -326,9 +326,7 @@ class WorldView(Extendable):
         self.notify_modules("on_view")
 
     def on_module_message(self, instance: int, message: Any) -> bool:
-        """Pass a browser half's message to its module; return whether it is of this
-        map.
-        """
+        """Pass a message to its module; return whether the module is of this map."""
         half = self._halves.get(instance)
         if half is None:
             return False

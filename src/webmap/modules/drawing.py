@@ -71,7 +71,7 @@ def levelled(
     Args:
         points: Of shape (N, 2) in the plane of ``tilt``'s own coordinates, or (N, 3),
             in metres.
-        tilt: What takes them to coordinates whose z points up.
+        tilt: The transform to coordinates whose z points up.
 
     Returns:
         Points of shape (N, 2) and heights of shape (N,), in metres.
@@ -214,8 +214,7 @@ def check_finite(points: list[tuple[float, float]], what: str) -> None:
 
 
 def thinned(count: int, most: int) -> range | list[int]:
-    """Return the indices to keep of ``count`` items: evenly chosen, and the last one.
-    """
+    """Return which of ``count`` items to keep: evenly chosen, and the last one."""
     if count <= most:
         return range(count)
     step = count / most

@@ -67,8 +67,7 @@ class LayerFrames:
         return alignments.of(self._bridge) if own is None else own
 
     def _source(self, frame_id: str) -> str | None:
-        """Return the full name of a frame; None to draw its data without a transform.
-        """
+        """Return the full name of a frame; None to draw data without a transform."""
         if self._map_frame is None or not frame_id:
             return None
         if self._frames is None:
@@ -93,8 +92,7 @@ class LayerFrames:
         return newest_or_at(buffer, target, source, stamp)
 
     def _say(self, words: str) -> None:
-        """Show a problem of the frames once it has lasted; clear it without ``words``.
-        """
+        """Show a problem of the frames once it has lasted, or clear it."""
         if lasting(self._lasting, "lost" if words else "", self._frames):
             self._layer.set_problem(self, words)
         elif not words:

@@ -78,8 +78,7 @@ class MapLayer(TopicLayer, Layer):
         self._subscribe(self)
 
     def lay(self) -> None:
-        """Put the layer on the common map, where it moves with the frames of its data.
-        """
+        """Put the layer on the common map; it moves with the frames of its data."""
         self.anchor = Anchored(
             self, self.bridge, self.map_frame, self.namespace, self.robot
         )

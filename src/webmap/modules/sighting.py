@@ -101,7 +101,7 @@ class Sightings:
                 ground = _height(buffer, world, base, stamp)
                 return Sighting(found @ mount, ground)
             except TransformError:
-                pass  # The poses may know what the frames do not.
+                pass  # The poses may be known when the frames are not.
         if source != base:
             try:
                 self._known[source], _ = newest_or_at(buffer, base, source, stamp)

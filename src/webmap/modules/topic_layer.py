@@ -71,14 +71,12 @@ class Message:
 
     @property
     def stamp(self) -> float:
-        """The time of measurement in seconds of the robot's clock; 0 if there is none.
-        """
+        """The time of measurement by the robot's clock, in seconds; 0 if unknown."""
         return self._header.stamp.seconds
 
     @property
     def _header(self) -> Header:
-        """The message's header; for a header, or without one, the message's own fields.
-        """
+        """The header; for a header, or without one, the message's own fields."""
         found = self._fields.get("header")
         if found is None:
             kinds = {"frame_id": str, "stamp": dict}
@@ -181,8 +179,7 @@ class TopicLayer(LayerOptions):
 
     @classmethod
     def options_for(cls, found: FoundTopic) -> dict[str, Any]:
-        """Return the options with which the layer draws a topic that discovery found.
-        """
+        """Return the options for a topic that discovery found."""
         return usual_options(cls, found)
 
     def build(self) -> None:
