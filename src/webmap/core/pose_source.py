@@ -154,8 +154,7 @@ class PoseSource:
     # Listeners.
 
     def join(self, listener: Callable[[], object]) -> Removal:
-        """Call ``listener`` when pose, frames or alignment change; return the removal.
-        """
+        """Call ``listener`` when pose, frames or alignment change, until removed."""
         key = id(listener)
         self._listeners[key] = listener
         return Removal(lambda: self._listeners.pop(key, None))

@@ -179,7 +179,7 @@ class PosePipeline:
     def _look_for_problems(
         self, frames: "Frames | None", now: float
     ) -> tuple[Mapping[str, Problem], float | None]:
-        """Return all problems, and when to look again if one has not lasted yet."""
+        """Return all problems, and when to check again if one has not lasted yet."""
         placing = self.placing
         kind, fault = "", None
         if placing is not None and frames is not None:

@@ -62,14 +62,11 @@ class PoseReading(NamedTuple):
 
     @property
     def transform(self) -> Transform:
-        """The pose as the transform from coordinates of the robot to those of its
-        frame.
-        """
+        """The transform from coordinates of the robot to those of the pose's frame."""
         return Transform(self.position, self.orientation)
 
     def moved(self, by: Transform, frame_id: str) -> "PoseReading":
-        """Return the pose in another frame, given the transform ``by`` to that frame.
-        """
+        """Return the pose in another frame, to which ``by`` transforms it."""
         placed = by @ self.transform
         return PoseReading(
             placed.translation, placed.rotation, self.twist, frame_id, self.stamp

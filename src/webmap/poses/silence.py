@@ -135,7 +135,7 @@ class SilenceWatch:
         if bridge is None:
             return
         now = time.monotonic()
-        if now - self._due_at > LATE:  # poses received meanwhile may not be processed yet
+        if now - self._due_at > LATE:  # received poses may not be processed yet
             self._look_at(loop, now + LATE)
             return
         before, self._links = self._links, bridge.stats.links

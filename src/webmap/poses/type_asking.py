@@ -79,7 +79,7 @@ class TypeAsking:
             return
         if self._unknown is not None:
             self._unknown()
-        if not self._known:  # a type returned before the connection was lost stays valid
+        if not self._known:  # a type from before the connection was lost stays valid
             took = time.monotonic() - began
             pause = max(SOON if number <= FEW else LATER, SHARE * took)
             # No task waits meanwhile, so none is left when the process ends.

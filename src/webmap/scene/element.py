@@ -389,14 +389,15 @@ class Element(Live):
     def dispatch(
         self, event: Event, report: Report, spawn: Spawn | None = None
     ) -> None:
-        """Call every handler of ``event.kind``, each in the scope it was added in.
+        """Call every handler of ``event.kind``, each in the scope in which it was
+        added.
 
         Args:
-            event: What happened.
-            report: Called with each exception that a handler lets out; the other
-                handlers are called all the same.
-            spawn: Called with what a coroutine function returned, in the context
-                in which it is to run.
+            event: The event.
+            report: Called with each exception that a handler raises; the other handlers
+                are still called.
+            spawn: Called with the coroutine that a handler returned, in the context in
+                which it is to run.
 
         """
         for listener in tuple(self._listeners.get(event.kind, ())):

@@ -110,7 +110,7 @@ class Fragment:
             new._attached = self.revision
             self._nodes[new.id] = new
 
-    # Requests of viewers ----------------------------------------------------------
+    # Requests of viewers --------------------------------------------------------
 
     def mark_told(self) -> None:
         """Record that the current state was sent to a page."""
