@@ -389,8 +389,7 @@ class Element(Live):
     def dispatch(
         self, event: Event, report: Report, spawn: Spawn | None = None
     ) -> None:
-        """Call every handler of ``event.kind``, each in the scope in which it was
-        added.
+        """Call every handler of ``event.kind``, each in the scope of its addition.
 
         Args:
             event: The event.

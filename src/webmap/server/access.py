@@ -60,7 +60,8 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class RequestHead:
-    """What access depends on in a request, or in one that opens a socket."""
+    """The parts of a request, or of the request for a socket, that access depends on.
+    """
 
     path: str
     """Decoded, with the prefix under which the application is mounted."""
@@ -117,7 +118,7 @@ class RequestHead:
 
     @property
     def host(self) -> str:
-        """The one Host header, empty if there is none or more than one."""
+        """The only Host header; empty if there is none or more than one."""
         return self.hosts[0] if len(self.hosts) == 1 else ""
 
     @property
@@ -182,7 +183,7 @@ def _headers(scope: Scope, name: bytes) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A request that is turned away."""
+    """A refused request."""
 
     status: int
     text: str
@@ -194,14 +195,14 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Redirect:
-    """A request whose URL holds what must not stay there: the browser goes on."""
+    """A redirect to a URL without the token or the code."""
 
     location: str
 
 
 @dataclass(frozen=True, slots=True)
 class SignedIn:
-    """A request that used a one-time code up: it is answered, with the new secrets."""
+    """A request with a valid one-time code: it is answered, with the new secrets."""
 
     viewer: Viewer
     key: str

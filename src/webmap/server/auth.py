@@ -143,8 +143,7 @@ class Attempts:
         self._failures: OrderedDict[str, deque[float]] = OrderedDict()
 
     def wait(self, address: str, now: float) -> int:
-        """Return how many whole seconds the address must wait; 0 if it need not wait.
-        """
+        """Return how many whole seconds the address must wait; 0 for no wait."""
         failures = self._failures.get(address)
         if failures is None:
             return 0

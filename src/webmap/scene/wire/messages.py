@@ -80,8 +80,7 @@ class ElementEvent(Message, frozen=True, tag="event"):
 
 
 class ViewReport(Message, frozen=True, tag="view"):
-    """The current view of a map: the matrix from the world to its pixels, and its size.
-    """
+    """The current view of a map: the matrix from the world to pixels, and its size."""
 
     map_element: _Id
     a: float

@@ -261,9 +261,7 @@ class SceneSession:
     # The socket -----------------------------------------------------------------
 
     def restart(self) -> None:
-        """Send the whole state again, because the page has a new socket or missed a
-        frame.
-        """
+        """Send the whole state again, to a new socket or after a missed frame."""
         self._pending.send_all = True
         self._seen = self._frame
 
