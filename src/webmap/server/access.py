@@ -60,8 +60,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class RequestHead:
-    """The parts of a request, or of the request for a socket, that access depends on.
-    """
+    """The parts of a request, or of a socket's opening, that decide on access."""
 
     path: str
     """Decoded, with the prefix under which the application is mounted."""

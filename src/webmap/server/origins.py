@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from webmap.base.errors import ConfigError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
-WILDCARD = frozenset({"", "0.0.0.0", "::"})  # to recognise, not to bind
+WILDCARD = frozenset({"", "0.0.0.0", "::"})  # noqa: S104 - to recognise, not to bind
 
 _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::([0-9]{1,5}))?", re.IGNORECASE)
 _ORIGIN = re.compile(r"https?://[^/?#@\s]+")
@@ -29,7 +29,7 @@ class Hosts:
     """Host names and addresses, lower-case, IPv6 in brackets, without a port."""
 
     addresses: bool = False
-    """Whether any IP address will do; no name can be rebound to one."""
+    """Whether any IP address is accepted; no name can be rebound to one."""
 
     def allow(self, header: str) -> bool:
         """Return whether a Host header names this server, with any port."""
@@ -44,8 +44,9 @@ class Hosts:
         """Return the names of a server that listens on ``host``.
 
         Args:
-            host: What it listens on; ``"0.0.0.0"`` and ``"::"`` are all addresses.
-            extra: More names by which it may be called.
+            host: The address to listen on; ``"0.0.0.0"`` and ``"::"`` mean all
+                addresses.
+            extra: More accepted names.
 
         Raises:
             ConfigError: If an extra name is not a host name or an address.

@@ -51,7 +51,7 @@ REPLACED = 4001
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What one socket may send."""
+    """The limits of one socket."""
 
     max_bytes: int
     """The greatest message size, in bytes of UTF-8."""

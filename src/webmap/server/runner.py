@@ -139,9 +139,7 @@ def serve(
 
 
 def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
-    """Return the server of :func:`serve`, for callers that start and stop it
-    themselves.
-    """
+    """Return the server of :func:`serve`, for callers that run it themselves."""
     http, ws = protocols()
     config = uvicorn.Config(
         app,
