@@ -213,8 +213,7 @@ def message_type(*allowed: str) -> Check:
 
 
 def _number(value: Any) -> bool:
-    """Return whether a value is a number within the limits; NaN and infinity are not.
-    """
+    """Return whether a value is a number within limits; NaN and infinity are not."""
     real = isinstance(value, Real) and not isinstance(value, bool)
     return real and abs(value) <= LARGEST
 

@@ -41,7 +41,7 @@ class BridgeConfig(Config, kw_only=True, frozen=True):
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any]:
-        """Return the table for an address alone."""
+        """Return the table for a URL alone."""
         return {"url": value}
 
 

@@ -53,10 +53,10 @@ class Config(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any] | None:
-        """Return the table that a short form stands for; None if it means nothing.
+        """Return the table for its short form; None if the part is absent.
 
         Raises:
-            ConfigError: If it is no short form, with what was expected.
+            ConfigError: If it is not a short form, with what was expected.
 
         """
         such = f" such as {cls.example}" if cls.example else " of keys and values"

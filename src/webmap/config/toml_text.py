@@ -163,8 +163,7 @@ class Lines:
         self._document()
 
     def of(self, path: Way) -> int:
-        """Return the line of a path, or of the nearest one around it; 1 for the file.
-        """
+        """Return the line of a path, or of its nearest parent; 1 for the file."""
         while path and path not in self._found:
             path = path[:-1]
         return self._found.get(path, 1)

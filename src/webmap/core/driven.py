@@ -270,7 +270,7 @@ class Driven(Extendable):
             The lease's epoch.
 
         Raises:
-            NoLease: If somebody else has control.
+            NoLease: If another operator or program has control.
             MotionError: If the robot cannot be driven; the message has the reason.
 
         """
@@ -384,7 +384,7 @@ class Driven(Extendable):
         self.motion.stop()
 
     def reset_stop(self) -> None:
-        """End the STOP in ``report``; nothing moves and nobody gets control by it.
+        """End the STOP in ``report``; nothing moves, and control does not change.
 
         The gate refuses this if STOP was pressed again since then. Read the newer STOP
         from ``report`` and call this again.

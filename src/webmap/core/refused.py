@@ -1,7 +1,7 @@
 """Counts of the refused messages of pages, for administrators.
 
 A refused message does nothing. A large number still points to a problem: a broken page,
-a slow connection, or somebody who probes WebMap.
+a slow connection, or a person who probes WebMap.
 """
 
 from collections import OrderedDict

@@ -1,4 +1,4 @@
-"""The web application: pages, files, sign-in, the two sockets, and what runs it.
+"""The web application: pages, files, sign-in, the two sockets, and the server.
 
 The only package that imports the web stack, which is loaded when a program starts to
 serve: ``import webmap`` loads none of it. What a page shows and does is decided below,

@@ -27,9 +27,8 @@ seconds."""
 STRANGERS = 256
 STRANGERS_PER_ADDRESS = 64
 SIGNED_IN = 256
-"""The greatest numbers of waiting connections: those on which nobody has signed in yet,
-and those between two requests of people who have signed in. Neither can displace the
-other."""
+"""The greatest numbers of waiting connections: those without a sign-in yet, and those
+between two requests of people who have signed in. Neither can displace the other."""
 
 _LOG_EVERY_S = 60.0
 _FLUSH_S = 1.0
