@@ -54,8 +54,8 @@ class Mistakes:
     """The number of further mistakes; only counted, since many texts take long to write
     and read."""
     wrong: set[Way] = field(default_factory=set)
-    """The path of each mistake, reported or counted, up to three keys: ``("robots", 3,
-    "twist")``."""
+    """The path of each mistake, reported or counted, up to three keys:
+    ``("robots", 3, "twist")``."""
 
     def add(self, way: Way, words: str) -> None:
         """Add one mistake."""

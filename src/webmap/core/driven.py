@@ -86,10 +86,10 @@ class Driven(Extendable):
             a_max: The greatest acceleration in metres per second squared. It never
                 delays slowing down.
             holonomic: Whether the base can move sideways.
-            stop_hooks: What else is sent over ``bridge`` on STOP: ``{"topic": "/lock",
-                "type": "std_msgs/Bool"}`` publishes true, and false on Reset;
-                ``{"service": "/e_stop", "type": "std_srvs/Trigger"}`` calls the
-                service.
+            stop_hooks: What else is sent over ``bridge`` on STOP:
+                ``{"topic": "/lock", "type": "std_msgs/Bool"}`` publishes true, and
+                false on Reset; ``{"service": "/e_stop", "type": "std_srvs/Trigger"}``
+                calls the service.
             z_max: The greatest speed upward and downward in metres per second. Without
                 it, the robot takes no ``z``.
             rx_max: The greatest rate of turn about the forward axis in radians per

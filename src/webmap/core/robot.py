@@ -341,8 +341,8 @@ class Robot(Driven):
     def to_dict(self) -> dict[str, Any]:
         """Return the robot, its topics and its named modules as plain data.
 
-        The data fits JSON and TOML: ``None`` among a module's arguments is ``{"none":
-        True}``, and a bridge is ``{"bridge": URL}``.
+        The data fits JSON and TOML: ``None`` among a module's arguments is
+        ``{"none": True}``, and a bridge is ``{"bridge": URL}``.
 
         Raises:
             ConfigError: If an argument of a module has no form in such a file.

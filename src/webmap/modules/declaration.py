@@ -1,7 +1,7 @@
 """The declaration of a layer: its topics, its switch and its CSS class.
 
-Discovery, the limit of layers per robot, the list of layers on the page, ``webmap view
---show`` and the reference are derived from it.
+Discovery, the limit of layers per robot, the list of layers on the page,
+``webmap view --show`` and the reference are derived from it.
 """
 
 import inspect

@@ -23,9 +23,9 @@ class RobotLayer(TopicLayer):
     module.
 
     Annotated attributes of the class that have a value are options of the module. A
-    layer whose messages are in the robot's frame unless they name another sets ``frame
-    = "robot"``; ``x``, ``y`` and ``angle`` are then the pose of its sensor on the
-    robot, in metres and degrees. Annotated, these are options too.
+    layer whose messages are in the robot's frame unless they name another sets
+    ``frame = "robot"``; ``x``, ``y`` and ``angle`` are then the pose of its sensor on
+    the robot, in metres and degrees. Annotated, these are options too.
 
     The argument ``at`` of :meth:`draw` is the transform from coordinates of the message
     to those of the drawing, which is level: x and y are drawn, and z is metres above
