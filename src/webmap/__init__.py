@@ -13,7 +13,7 @@
 
     webmap.run()
 
-Names are loaded when they are first used, so that importing this costs little.
+Names are loaded on first use, so importing the package is cheap.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""What a button does, from its configuration: one call, one message or one value."""
+"""The configuration of a button: one service call, one message or one parameter."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from webmap.ros.names import normalise_topic, split_type
 Kind = Literal["service", "topic", "parameter"]
 
 TIMEOUT = 10.0
-"""Seconds that a service has to answer, if nobody says otherwise."""
+"""The default time for a service to answer, in seconds."""
 
 LONGEST_TIMEOUT = 3600.0
 MAX_LABEL = 60
@@ -32,7 +32,7 @@ _KEYS: dict[Kind, tuple[str, ...]] = {
 
 
 def value_kind(value: Any) -> tuple[int, str]:
-    """Return how ROS 2 calls the kind of a parameter's value: number and field.
+    """Return the number and the field of ROS 2 for the type of a parameter's value.
 
     Raises:
         ConfigError: If a parameter cannot have such a value.
@@ -66,11 +66,11 @@ def _check_number(value: Any) -> None:
 
 
 class ButtonMistake(ConfigError):
-    """Something in a button's configuration that does not make sense.
+    """A mistake in a button's configuration.
 
     Attributes:
         key: The key; empty if it is about the button as a whole.
-        words: What is wrong with it.
+        words: The mistake.
 
     """
 
@@ -82,7 +82,7 @@ class ButtonMistake(ConfigError):
 
 @dataclass(frozen=True, slots=True)
 class ButtonSpec:
-    """What one button does."""
+    """The action of one button."""
 
     label: str
     kind: Kind
@@ -91,30 +91,30 @@ class ButtonSpec:
 
     type: str | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
-    """The fields of the request or of the message; what a form begins with."""
+    """The fields of the request or of the message; initial values of a form."""
 
     node: str | None = None
     """The node of ROS 2 that has the parameter; None for a parameter of ROS 1."""
 
     value: Any = None
-    """Of the parameter."""
+    """The value of the parameter."""
 
     confirm: str | None = None
-    """What is asked before it acts; None if nothing is."""
+    """The question before it acts; None without a question."""
 
     timeout: float = TIMEOUT
     form: bool = False
-    """Whether people fill in the fields first."""
+    """Whether a person fills in the fields first."""
 
     during_stop: bool = False
-    """Whether it acts while STOP stands too."""
+    """Whether it also acts while STOP is active."""
 
 
 def read_buttons(data: Iterable[Mapping[str, Any]]) -> list[ButtonSpec]:
-    """Return what buttons do.
+    """Return the actions of buttons.
 
     Raises:
-        ConfigError: If one makes no sense, or two have one label.
+        ConfigError: If one is not valid, or two have the same label.
 
     """
     specs: list[ButtonSpec] = []
@@ -134,12 +134,12 @@ def read_buttons(data: Iterable[Mapping[str, Any]]) -> list[ButtonSpec]:
 
 
 def check_buttons(buttons: Iterable[Any], way: Way, mistakes: Mistakes) -> None:
-    """Note all mistakes in buttons.
+    """Add all mistakes in buttons.
 
     Args:
         buttons: A table for each.
-        way: The way to all of them.
-        mistakes: Where every mistake goes.
+        way: The path of the list.
+        mistakes: The list for every mistake.
 
     """
     first: dict[str, int] = {}
@@ -156,10 +156,10 @@ def check_buttons(buttons: Iterable[Any], way: Way, mistakes: Mistakes) -> None:
 
 
 def read_button(data: Mapping[str, Any]) -> ButtonSpec:
-    """Return what one button does.
+    """Return the action of one button.
 
     Raises:
-        ButtonMistake: If it makes no sense, or it would move a robot.
+        ButtonMistake: If it is not valid, or would move a robot.
 
     """
     if not isinstance(data, Mapping):
@@ -204,9 +204,9 @@ def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
     """Return why no button may write something, or None if it may.
 
     Args:
-        kind: What it is.
+        kind: The kind of the button.
         name: The resolved name.
-        type: The type, as far as it is known.
+        type: The type, if known.
 
     """
     if kind == "parameter":
@@ -253,7 +253,7 @@ def _type(data: Mapping[str, Any], kind: Kind) -> str | None:
     if type is None and kind != "topic":
         return None
     try:
-        split_type(type)  # type: ignore[arg-type]  # it refuses what is no text
+        split_type(type)  # type: ignore[arg-type]  # refuses values that are not text
     except ConfigError:
         example = "std_msgs/Bool" if kind == "topic" else "std_srvs/Trigger"
         raise ButtonMistake(

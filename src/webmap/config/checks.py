@@ -1,4 +1,4 @@
-"""Checks of one value each: what was got, what was expected, and where."""
+"""Checks of single values, with what was got, what was expected, and where."""
 
 import difflib
 import math
@@ -14,22 +14,23 @@ from webmap.base.outside_text import one_line
 from webmap.ros.names import normalise_topic, split_type
 
 Way: TypeAlias = tuple[str | int, ...]
-"""Keys and indices on the way to a value."""
+"""Keys and indices that lead to a value."""
 
 Check: TypeAlias = Callable[[Any], Any]
-"""Returns the value in its one form, or raises ConfigError with what was expected."""
+"""Returns the value in its canonical form, or raises ConfigError with what was
+expected."""
 
 MOST_MISTAKES = 100
-"""How many mistakes are reported in full; others are only counted."""
+"""How many mistakes are reported in full; the rest are only counted."""
 
 LARGEST = 1e6
-"""No speed, time or length is larger."""
+"""The greatest speed, time or length."""
 
 LONGEST_NAME = 100
-"""Characters of a name that still fits into a list."""
+"""The greatest length of a name, for lists, in characters."""
 
 HEAD = ("title", "floor")
-"""Keys of a fleet file that are texts, of the file itself and of no table in it."""
+"""Keys of a fleet file that are texts of the file itself, not of a table."""
 
 _SHOWN = 60
 
@@ -46,17 +47,18 @@ _KINDS: tuple[tuple[type, str], ...] = (
 
 @dataclass(slots=True)
 class Mistakes:
-    """What is wrong, with the way to each of it."""
+    """The mistakes found, each with its path."""
 
     found: list[tuple[Way, str]] = field(default_factory=list)
     more: int = 0
-    """How many more there are: nobody reads thousands, and writing them takes long."""
+    """The number of further mistakes; only counted, since many texts take long to write
+    and read."""
     wrong: set[Way] = field(default_factory=set)
-    """The way to each mistake, reported or counted, up to three keys:
+    """The path of each mistake, reported or counted, up to three keys:
     ``("robots", 3, "twist")``."""
 
     def add(self, way: Way, words: str) -> None:
-        """Note one mistake."""
+        """Add one mistake."""
         self.wrong.add(way[:3])
         if self.full:
             self.more += 1
@@ -64,7 +66,7 @@ class Mistakes:
             self.found.append((way, words))
 
     def take(self, way: Way, others: "Mistakes") -> None:
-        """Note mistakes of a part, to which ``way`` leads."""
+        """Add the mistakes of a part whose path is ``way``."""
         for inner, words in others.found:
             self.add((*way, *inner), words)
         self.more += others.more
@@ -72,22 +74,22 @@ class Mistakes:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of mistakes."""
         return len(self.found) + self.more
 
     @property
     def full(self) -> bool:
-        """Whether no more mistakes are worded."""
+        """Whether further mistakes are only counted."""
         return len(self.found) >= MOST_MISTAKES
 
     def refuse(self, what: str) -> None:
         """Raise all mistakes at once, if there are any.
 
         Args:
-            what: What is configured, such as ``robot 'Bob'``.
+            what: The configured thing, such as ``robot 'Bob'``.
 
         Raises:
-            WrongConfig: If there are.
+            WrongConfig: If there are mistakes.
 
         """
         if self.count:
@@ -98,8 +100,8 @@ class WrongConfig(ConfigError):
     """A configuration with mistakes: a line for each.
 
     Args:
-        what: What is configured.
-        mistakes: All that is wrong.
+        what: The configured thing.
+        mistakes: All mistakes.
 
     """
 
@@ -115,7 +117,7 @@ class WrongConfig(ConfigError):
 
 
 def way_in_words(way: Way) -> str:
-    """Return the way to a value as TOML writes it: ``robots[0].twist.v_max``."""
+    """Return the path of a value as in TOML: ``robots[0].twist.v_max``."""
     words = ""
     for part in way:
         dot = "." if words else ""
@@ -124,7 +126,7 @@ def way_in_words(way: Way) -> str:
 
 
 def show(value: object) -> str:
-    """Return a value and its kind, for people."""
+    """Return a value and its type, for people."""
     if isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, int) and abs(value) >= 10**_SHOWN:
@@ -136,7 +138,7 @@ def show(value: object) -> str:
 
 
 def did_you_mean(got: object, known: Iterable[str]) -> str:
-    """Return a hint at what was meant, empty if nothing is like it."""
+    """Return a hint at the nearest known word; empty if none is similar."""
     found = difflib.get_close_matches(str(got), list(known), n=1)
     return f'; did you mean "{found[0]}"?' if found else ""
 
@@ -156,7 +158,7 @@ def any_text(value: Any) -> str:
 
 
 def bridge(value: Any) -> str:
-    """Check the name or the address of a bridge."""
+    """Check the name or the URL of a bridge."""
     try:
         return text(value)
     except ConfigError:
@@ -164,12 +166,12 @@ def bridge(value: Any) -> str:
 
 
 def is_name(text: str) -> bool:
-    """Return whether a text can stand in a list of robots: one line, not too long."""
+    """Return whether a text fits in a list of robots: one line, not too long."""
     return text.strip() != "" and text.isprintable() and len(text) <= LONGEST_NAME
 
 
 def same_name(name: str) -> str:
-    """Return what two names have in common that people would take for one."""
+    """Return the form that is equal for names that look the same to people."""
     return unicodedata.normalize("NFKC", name).casefold().strip()
 
 
@@ -184,7 +186,7 @@ def name(value: Any) -> str:
 
 
 def topic(value: Any) -> str:
-    """Check the name of a topic, and return it in its one spelling."""
+    """Check the name of a topic, and return it in canonical form."""
     try:
         return normalise_topic(value)
     except ConfigError:
@@ -192,12 +194,12 @@ def topic(value: Any) -> str:
 
 
 def frame(value: Any) -> str:
-    """Check the name of a frame; the leading slash of ROS 1 is left out."""
+    """Check the name of a frame; the leading slash of ROS 1 is removed."""
     return text(value).removeprefix("/")
 
 
 def message_type(*allowed: str) -> Check:
-    """Return the check of a type: one of these, in either dialect."""
+    """Return the check of a type: one of these, in the form of either ROS version."""
 
     def check(value: Any) -> str:
         try:
@@ -211,19 +213,19 @@ def message_type(*allowed: str) -> Check:
 
 
 def _number(value: Any) -> bool:
-    """Return whether it is a number that makes sense; NaN and infinity do not."""
+    """Return whether a value is a number within limits; NaN and infinity are not."""
     real = isinstance(value, Real) and not isinstance(value, bool)
     return real and abs(value) <= LARGEST
 
 
 def _most(value: Any) -> str:
-    """Return how large a number may be, if this one is larger."""
+    """Return the limit of numbers for an error message, if this one is larger."""
     real = isinstance(value, Real) and not isinstance(value, bool)
     return f", {LARGEST:g} at the most" if real and LARGEST < value < math.inf else ""
 
 
 def above_zero(unit: str) -> Check:
-    """Return the check of a finite number above zero."""
+    """Return a check for a finite number above zero."""
 
     def check(value: Any) -> float:
         if not _number(value) or not value > 0:
@@ -234,7 +236,7 @@ def above_zero(unit: str) -> Check:
 
 
 def from_zero(unit: str) -> Check:
-    """Return the check of a finite number that is not negative."""
+    """Return a check for a finite number of 0 or more."""
 
     def check(value: Any) -> float:
         if not _number(value) or value < 0:
@@ -245,7 +247,7 @@ def from_zero(unit: str) -> Check:
 
 
 def finite(expected: str) -> Check:
-    """Return the check of any finite number that is not absurdly large."""
+    """Return a check for any finite number within the limits."""
 
     def check(value: Any) -> float:
         if not _number(value):
@@ -256,7 +258,7 @@ def finite(expected: str) -> Check:
 
 
 def between(low: float, high: float, unit: str) -> Check:
-    """Return the check of a number from ``low`` to ``high``."""
+    """Return a check for a number from ``low`` to ``high``."""
 
     def check(value: Any) -> float:
         if not _number(value) or not low <= value <= high:
@@ -267,7 +269,7 @@ def between(low: float, high: float, unit: str) -> Check:
 
 
 def whole(low: int, high: int) -> Check:
-    """Return the check of a whole number from ``low`` to ``high``."""
+    """Return a check for a whole number from ``low`` to ``high``."""
 
     def check(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, Integral):
@@ -295,7 +297,7 @@ def yes_or_no(value: Any) -> bool:
 
 
 def one_of(*words: str) -> Check:
-    """Return the check of a word: one of these."""
+    """Return a check for a word: one of these."""
 
     def check(value: Any) -> str:
         if not isinstance(value, str) or value not in words:
@@ -321,7 +323,7 @@ def table(value: Any) -> dict[str, Any]:
 
 
 def checked(check: Check, value: Any, way: Way, mistakes: Mistakes) -> Any:
-    """Return what a value means; None, and a mistake, if it is wrong."""
+    """Return the checked value; None, and a mistake, if it is wrong."""
     try:
         return check(value)
     except ConfigError as error:
@@ -331,7 +333,7 @@ def checked(check: Check, value: Any, way: Way, mistakes: Mistakes) -> Any:
 
 
 def _otherwise(check: Check, value: Any) -> str:
-    """Return a hint if quotes, or their absence, are all that is wrong."""
+    """Return a hint if quotes, or missing quotes, are the only mistake."""
     try:
         if isinstance(value, str):
             plain = value.strip().lower()

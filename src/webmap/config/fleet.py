@@ -1,7 +1,7 @@
-"""Fleet files: which bridges, robots, maps and modules there are.
+"""Fleet files: the bridges, robots, maps and modules of a fleet.
 
-A file is read strictly: every mistake in it is named with its line. What its keys mean
-is in ``docs/howto/fleet-file.md``.
+A file is read strictly: every mistake is reported with its line. The keys are
+documented in ``docs/howto/fleet-file.md``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,7 +41,7 @@ class BridgeConfig(Config, kw_only=True, frozen=True):
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any]:
-        """Return the table for an address alone."""
+        """Return the table for a URL alone."""
         return {"url": value}
 
 
@@ -56,7 +56,7 @@ class MapConfig(Config, kw_only=True, frozen=True):
 
 
 class ImageConfig(Config, kw_only=True, frozen=True):
-    """A picture under everything."""
+    """A picture under everything else."""
 
     file: Annotated[str, checks.text]
     x: Annotated[float, checks.finite("a number of metres: the left edge")]
@@ -123,7 +123,7 @@ def _robots(value: Any, way: Way, mistakes: Mistakes) -> list[RobotConfig]:
 
 
 class FleetConfig(Config, kw_only=True, frozen=True):
-    """What a fleet file says."""
+    """The content of a fleet file."""
 
     title: Annotated[str, checks.name] = ""
     floor: Annotated[str, checks.text] = ""
@@ -138,18 +138,18 @@ class FleetConfig(Config, kw_only=True, frozen=True):
     robots: Annotated[list[RobotConfig], ReadBy(_robots)] = []
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, as a file has it."""
+        """Return the configuration as plain data, as in a file."""
         data: dict[str, Any] = msgspec.to_builtins(self)
         data["robots"] = [robot.to_dict() for robot in self.robots]
         return data
 
 
 def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
-    """Return what a file's table means; what is wrong is noted.
+    """Return the configuration in a file's table; mistakes are added.
 
     Args:
-        data: The table as the TOML reader gives it.
-        mistakes: Where every mistake goes. What one is about is of no use in the
+        data: The table from the TOML reader.
+        mistakes: The list for every mistake. Parts with a mistake are unusable in the
             result.
 
     """
@@ -202,7 +202,7 @@ def _linked(fleet: FleetConfig, mistakes: Mistakes) -> FleetConfig:
 
 
 def _no_base_twice(fleet: FleetConfig, mistakes: Mistakes) -> None:
-    """Refuse two robots with one base: who drives the one would move the other."""
+    """Refuse two robots with one base: driving one would move the other."""
     first: dict[tuple[str, str], int] = {}
     for index, robot in enumerate(fleet.robots):
         twist = robot.resolved().motion.twist
@@ -234,10 +234,10 @@ def _no_name_twice(robots: Sequence[RobotConfig], mistakes: Mistakes) -> None:
             )
 
 
-# Writing a file.
+# Writing of files.
 
 SHORT = ("odometry", "twist", "move", "initial_pose", "cameras")
-"""Keys for which a topic alone may stand."""
+"""Keys whose value may be a topic alone."""
 
 Remarks = Mapping[Way, str]
 
@@ -249,13 +249,13 @@ def dump(
     below: Mapping[Way, Sequence[str]] | None = None,
     head: str = "",
 ) -> str:
-    """Return a fleet file.
+    """Return the text of a fleet file.
 
     Args:
-        data: What it says, as :meth:`FleetConfig.to_dict` returns it.
-        remarks: What stands behind a value, by the way to it.
-        below: Remarks that stand on lines of their own below a value.
-        head: What stands before all of it.
+        data: The content, from :meth:`FleetConfig.to_dict`.
+        remarks: Comments after values, by path.
+        below: Comments on separate lines below values.
+        head: Text before everything else.
 
     """
     writer = _Writer(remarks or {}, below or {})
@@ -271,7 +271,7 @@ def dump(
             for index, each in enumerate(value):
                 table = writer.pairs((key, index), each)
                 lines += ["", f"[[{key}]]", *table, *writer.under((key, index))]
-    # Remarks hold names of topics, too; a line break in one would begin a table.
+    # Remarks contain topic names too; a line break in one would begin a table.
     text = "\n".join(map(escaped, lines)).lstrip("\n")
     return f"{head}\n{text}\n" if head else f"{text}\n"
 
@@ -284,14 +284,14 @@ def _is_table(value: object) -> bool:
 
 
 class _Writer:
-    """Writes tables of TOML, with remarks."""
+    """Writes TOML tables with comments."""
 
     def __init__(self, remarks: Remarks, below: Mapping[Way, Sequence[str]]) -> None:
         self._remarks = remarks
         self._below = below
 
     def pairs(self, way: Way, table: Mapping[str, Any]) -> list[str]:
-        """Return the lines of a table, a key each, without its header."""
+        """Return the lines of a table, one per key, without its header."""
         lines = []
         for key, value in table.items():
             lines += self._pair((*way, key), _key(key), value)
@@ -299,7 +299,7 @@ class _Writer:
         return lines
 
     def under(self, way: Way) -> list[str]:
-        """Return the remarks below a value."""
+        """Return the comments below a value."""
         return [f"# {each}" for each in self._below.get(way, ())]
 
     def _pair(self, way: Way, name: str, value: Any) -> list[str]:
@@ -337,7 +337,7 @@ class _Writer:
 
 
 def _text(value: str) -> str:
-    # A JSON text is a TOML text too, but for the characters that are not printable.
+    # A JSON text is also a TOML text, except for unprintable characters.
     text = msgspec.json.encode(value).decode()
     return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
 

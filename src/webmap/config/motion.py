@@ -1,6 +1,6 @@
 """Everything that moves a robot: velocity, goals, limits, stop hooks, scan assist.
 
-A process that only moves robots can load this file: it needs no display.
+It needs no display, so a process that only moves robots can import it.
 """
 
 import math
@@ -17,7 +17,7 @@ from webmap.config.reading import Config
 from webmap.ros.names import normalise_topic
 
 TWIST_TYPES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
-"""What carries a velocity."""
+"""The message types for velocities."""
 
 NAVIGATE_TO_POSE = "nav2_msgs/action/NavigateToPose"
 MOVE_BASE = "move_base_msgs/MoveBaseAction"
@@ -29,7 +29,7 @@ _ACCELERATION = checks.above_zero("metres per second squared")
 
 
 class TopicConfig(Config, frozen=True):
-    """A table for which the name of its topic may stand."""
+    """A table that may be written as its topic's name alone."""
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any]:
@@ -81,14 +81,14 @@ def _each(value: Any) -> Iterable[Any]:
 
 
 class StopHook(Config, kw_only=True, frozen=True):
-    """What else the robot's bridge is sent on STOP."""
+    """What else is sent over the robot's bridge on STOP."""
 
     example: ClassVar[str] = '{topic = "/lock"} or {service = "/e_stop"}'
 
     topic: Annotated[str, _hook_name] = ""
-    """A topic of ``std_msgs/Bool``: true is published, and false on reset."""
+    """A topic of type ``std_msgs/Bool``: true is published, and false on Reset."""
     service: Annotated[str, _hook_name] = ""
-    """A service of ``std_srvs/Trigger``, which is called."""
+    """A service of type ``std_srvs/Trigger``, which is called."""
     type: Annotated[str, checks.text] = ""
 
     def __post_init__(self) -> None:
@@ -97,7 +97,7 @@ class StopHook(Config, kw_only=True, frozen=True):
             msgspec.structs.force_setattr(self, "type", type)
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its fields together."""
+        """Add mistakes that concern several fields."""
         if bool(self.topic) == bool(self.service):
             words = 'expected the key "topic" or the key "service", one of them'
             mistakes.add(way, words)
@@ -109,34 +109,34 @@ class StopHook(Config, kw_only=True, frozen=True):
 
 
 class TwistConfig(TopicConfig, kw_only=True, frozen=True):
-    """Where velocity goes, and what is known of the base behind it."""
+    """The topic for velocity, and the limits of the base."""
 
     topic: Annotated[str, checks.topic]
     type: Annotated[str, checks.message_type(*TWIST_TYPES)] | None = None
-    """If not given, the bridge is asked, and Twist is assumed."""
+    """If not given, the bridge is queried, and Twist is assumed."""
     stops_within: Annotated[float, checks.above_zero("seconds")] | None = None
-    """The time within which the base stops by itself when velocity ceases, if known."""
+    """The command timeout of the base, if known."""
     v_max: Annotated[float, checks.from_zero("metres per second")] | None = None
-    """The highest speed, whatever the direction."""
+    """The greatest speed, in any direction."""
     w_max: Annotated[float, checks.from_zero("radians per second")] | None = None
-    """The highest rate of turn, whatever the axis."""
+    """The greatest rate of turn, about any axis."""
     z_max: Annotated[float, checks.above_zero("metres per second")] | None = None
-    """The highest speed upward and downward; without it the robot takes no ``z``."""
+    """The greatest speed upward and downward; without it the robot takes no ``z``."""
     rx_max: Annotated[float, checks.above_zero("radians per second")] | None = None
-    """The highest rate of turn about the forward axis; likewise."""
+    """The greatest rate of turn about the forward axis; without it, no ``rx``."""
     ry_max: Annotated[float, checks.above_zero("radians per second")] | None = None
-    """The highest rate of turn about the left axis; likewise."""
+    """The greatest rate of turn about the left axis; without it, no ``ry``."""
     a_max: Annotated[float, checks.above_zero("metres per second squared")] | None = (
         None
     )
-    """The highest acceleration; slowing down is never delayed."""
+    """The greatest acceleration; it never delays slowing down."""
     holonomic: bool = False
     """Whether the base can move sideways."""
     stop_hooks: list[StopHook] = []
     bridge: str = ""
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its fields together."""
+        """Add mistakes that concern several fields."""
         for index, hook in enumerate(self.stop_hooks):
             if self.topic in (hook.topic, hook.service):
                 words = f"its velocity goes to {self.topic}, so that is no stop hook"
@@ -144,10 +144,10 @@ class TwistConfig(TopicConfig, kw_only=True, frozen=True):
 
 
 class MoveConfig(TopicConfig, kw_only=True, frozen=True):
-    """Where goals go, and how one is called off."""
+    """Where goals go, and how one is cancelled."""
 
     action: Annotated[str, checks.topic] | None = None
-    """The action that goals go to, which says how they go and how they end."""
+    """The action for goals, which reports their progress and their end."""
     action_type: Annotated[
         str,
         checks.message_type(
@@ -155,18 +155,18 @@ class MoveConfig(TopicConfig, kw_only=True, frozen=True):
         ),
     ] = NAVIGATE_TO_POSE
     topic: Annotated[str, checks.topic] = ""
-    """A topic of ``geometry_msgs/PoseStamped``; besides an action it is for bridges
-    that take no goals of actions."""
+    """A topic of type ``geometry_msgs/PoseStamped``; together with an action it is for
+    bridges that take no goals of actions."""
     cancel_topic: Annotated[str, checks.topic] | None = None
-    """actionlib's topic by which goals are called off."""
+    """The topic of actionlib that cancels goals."""
     frame: Annotated[str, checks.text] = "map"
     """The frame of the goals."""
     on_operator_loss: Annotated[str, checks.one_of("continue", "cancel")] = "continue"
-    """What becomes of a goal when its operator is lost."""
+    """Whether a goal continues or is cancelled when its operator is lost."""
     bridge: str = ""
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its fields together."""
+        """Add mistakes that concern several fields."""
         if not self.topic and not self.action:
             missing = 'the key "topic" is missing'
             words = "goals go to a topic or to an action, and neither is given"
@@ -177,50 +177,52 @@ class InitialPoseConfig(TopicConfig, kw_only=True, frozen=True):
     """The topic for the robot's initial pose, and how certain that pose is."""
 
     topic: Annotated[str, checks.topic]
-    """A topic of ``geometry_msgs/PoseWithCovarianceStamped``."""
+    """A topic of type ``geometry_msgs/PoseWithCovarianceStamped``."""
     covariance: Annotated[tuple[float, float, float], _covariance] = COVARIANCE
-    """The variances of x and y in m², of yaw in rad²."""
+    """The variances of x and y in m², and of yaw in rad²."""
     frame: Annotated[str, checks.text] = "map"
-    """The frame of its map, which counts if the robot takes no goals."""
+    """The map frame of the pose; used if the robot takes no goals."""
     bridge: str = ""
 
 
 class ScanAssistConfig(Config, kw_only=True, frozen=True):
-    """How the robot is slowed down before what a laser scan sees."""
+    """Scan assist: slows the robot down before obstacles in its scan."""
 
     topic: Annotated[str, checks.topic]
-    """Of ``sensor_msgs/LaserScan``, on the bridge of the velocity."""
+    """A topic of type ``sensor_msgs/LaserScan``, on the bridge of the velocity."""
     footprint: Annotated[float | list[tuple[float, float]], _footprint]
-    """The robot's radius, or its corners in its own frame, in order; metres."""
+    """The robot's radius, or its corners in its own frame, in order, in metres."""
     x: Annotated[float, checks.finite("a number of metres")] = 0.0
-    """Where the scanner is, forward of the base."""
+    """The scanner's position, forward of the base."""
     y: Annotated[float, checks.finite("a number of metres")] = 0.0
-    """Where it is, left of the base."""
+    """The scanner's position, left of the base."""
     angle: Annotated[float, checks.finite("a number of degrees")] = 0.0
-    """Where it looks, counter-clockwise from the robot's x."""
+    """The scanner's direction, counter-clockwise from the robot's x."""
     upside_down: bool = False
-    """Whether it hangs head down, so that its rays go round the other way."""
+    """Whether the scanner is mounted upside down, so that its rays turn the other
+    way."""
     frame: Annotated[str, checks.frame] = ""
-    """The frame that its scans must name; empty for any."""
+    """The frame that the scans must have; any if empty."""
     stop_distance: Annotated[float, checks.from_zero("metres")] = 0.15
-    """What stays free before the robot."""
+    """The distance that stays free before the robot."""
     brake: Annotated[float, _ACCELERATION] = 0.5
-    """How hard the robot slows down."""
+    """The deceleration of the robot."""
     blind: Literal["stop", "creep"] = "stop"
-    """What happens while the scan is old, empty or mostly unknown."""
+    """Whether the robot stops or creeps while the scan is stale, empty or mostly
+    unknown."""
     creep: Annotated[float, checks.from_zero("metres per second")] = 0.1
-    """The speed of creeping."""
+    """The speed when creeping."""
 
     @property
     def yaw(self) -> float:
-        """Where the scanner looks, in radians."""
+        """The scanner's direction, in radians."""
         return math.radians(self.angle)
 
 
 class MotionConfig(Config, kw_only=True, frozen=True):
-    """Everything that moves a robot; what it does not have is None.
+    """Everything that moves a robot; parts that it does not have are None.
 
-    Each part that goes over a bridge may name one; else it is the robot's.
+    A part that uses a bridge may name one; otherwise it uses the robot's.
     """
 
     twist: TwistConfig | None = None
@@ -229,7 +231,7 @@ class MotionConfig(Config, kw_only=True, frozen=True):
     scan_assist: ScanAssistConfig | None = None
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its parts together."""
+        """Add mistakes that concern several parts."""
         move, pose = self.move, self.initial_pose
         if move is not None and pose is not None and move.bridge != pose.bridge:
             mistakes.add(

@@ -1,9 +1,9 @@
-"""From plain values to a Struct: the one check of a configuration.
+"""Reading of plain values into a Struct, with all checks of a configuration.
 
-A configuration is a Struct. The annotation of each field names the check of its value:
+A configuration is a Struct. The annotation of each field has the check of its value:
 ``v_max: Annotated[float, checks.from_zero("metres per second")] | None = None``.
-:func:`read` makes the Struct from plain values, as TOML, JSON or the arguments of a
-method give them, and notes every mistake with the way to it.
+:func:`read` makes the Struct from plain values, such as TOML, JSON or the arguments of
+a method, and adds every mistake with its path.
 """
 
 import functools
@@ -30,57 +30,57 @@ from webmap.config import checks
 from webmap.config.checks import Mistakes, Way, checked, did_you_mean, show
 
 ONE_OR_MORE = "one or more"
-"""Among the annotations of a list: one value may stand for a list of one."""
+"""Annotation of a list: a single value is read as a list of one."""
 
 Reader: TypeAlias = Callable[[Any, Way, Mistakes], Any]
 
 
 @dataclass(frozen=True, slots=True)
 class ReadBy:
-    """Among the annotations of a field: what reads its value."""
+    """Annotation of a field: the function that reads its value."""
 
     read: Reader
 
 
 class Config(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One table of a configuration, from which the others derive."""
+    """Base class of the tables of a configuration."""
 
     example: ClassVar[str] = ""
-    """A table, for people."""
+    """An example of the table, for error messages."""
 
     inline: ClassVar[str] = ""
-    """A field that is a table itself, whose keys are keys of this one."""
+    """A field that is itself a table, whose keys are written in this one."""
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any] | None:
-        """Return the table that a short form stands for; None if it means nothing.
+        """Return the table for its short form; None if the part is absent.
 
         Raises:
-            ConfigError: If it is no short form, with what was expected.
+            ConfigError: If it is not a short form, with what was expected.
 
         """
         such = f" such as {cls.example}" if cls.example else " of keys and values"
         raise ConfigError(f"a table{such}")
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its fields together; each by itself is right."""
+        """Add mistakes that concern several fields; each alone is valid."""
 
 
 S = TypeVar("S", bound=Config)
 
 
 def read(cls: type[S], value: Any, way: Way, mistakes: Mistakes) -> S | None:
-    """Return a table of plain values as its Struct; every mistake is noted.
+    """Return the Struct for a table of plain values; every mistake is added.
 
     Args:
         cls: The Struct.
-        value: A table of keys and values, or a short form of it.
-        way: The way to it.
-        mistakes: Where every mistake goes. If there is one, the result is of no use:
-            what must be there and is wrong or missing is None.
+        value: A table of keys and values, or its short form.
+        way: The path of the table.
+        mistakes: The list for every mistake. If there is one, the result is unusable:
+            required fields that are wrong or missing are None.
 
     Returns:
-        The Struct; None if the value is no table, or means nothing.
+        The Struct; None if the value is no table, or the part is absent.
 
     """
     if isinstance(value, Mapping):
@@ -127,18 +127,18 @@ def _read_table(
 def read_part(
     cls: type[S], key: str, values: Mapping[str, Any], what: str, bridge: str = ""
 ) -> S:
-    """Return one part of a configuration, as the arguments of a method give it.
+    """Return one part of a configuration from the arguments of a method.
 
     Args:
-        cls: The part.
-        key: What it is called in the whole.
-        values: The arguments. One that is empty where that is the default counts as
-            left out.
-        what: What is configured, such as ``robot 'Bob'``.
-        bridge: The address of the bridge that it goes over.
+        cls: The class of the part.
+        key: The key of the part in the whole.
+        values: The arguments. An empty value counts as left out where that is the
+            default.
+        what: The configured thing, such as ``robot 'Bob'``.
+        bridge: The URL of its bridge.
 
     Raises:
-        ConfigError: If something in it is wrong; every mistake is named.
+        ConfigError: If a value is wrong; the message lists every mistake.
 
     """
     empty = {each.name for each in msgspec.structs.fields(cls) if each.default == ""}
@@ -153,9 +153,9 @@ def read_part(
 
 
 def unknown(key: object, known: Iterable[str], way: Way, mistakes: Mistakes) -> None:
-    """Note a key that means nothing."""
+    """Add the mistake of an unknown key."""
     if mistakes.full:
-        mistakes.add(way, str(key))  # counted alone: a hint takes long
+        mistakes.add(way, str(key))  # only counted: a hint takes long
         return
     listed = ", ".join(known)
     hint = did_you_mean(key, known)
@@ -189,7 +189,7 @@ def _inline(cls: type[Config]) -> type[Config]:
 
 
 def _reader_of(hint: Any) -> Reader:
-    """Return what reads the value of a field with this annotation."""
+    """Return the reader for the value of a field with this annotation."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin is Annotated:
         for each in inner[1:]:

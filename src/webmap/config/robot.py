@@ -1,7 +1,7 @@
-"""The configuration of one robot, wherever it comes from.
+"""The configuration of one robot, from any source.
 
 A fleet file, the command line, discovery, ``Robot.from_dict`` and ``Robot.to_dict`` all
-have this one form.
+use this form.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,13 +25,13 @@ ODOMETRY_TYPES = (
     "geometry_msgs/PoseWithCovarianceStamped",
     "geometry_msgs/Pose2D",
 )
-"""What has a pose."""
+"""The message types with a pose."""
 
 MOTION = tuple(MotionConfig.__struct_fields__)
 """Keys of a robot's table that are parts of its motion."""
 
 LINKED = ("odometry", "tf", "twist", "move", "initial_pose")
-"""Parts that go over a bridge."""
+"""Parts that use a bridge."""
 
 
 class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
@@ -39,19 +39,19 @@ class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
 
     topic: Annotated[str, checks.topic]
     type: Annotated[str, checks.message_type(*ODOMETRY_TYPES)] | None = None
-    """If not given, the bridge is asked."""
+    """If not given, the bridge is queried."""
     throttle: Annotated[int, checks.milliseconds] = 100
     """The least time between two messages, in milliseconds."""
     bridge: str = ""
 
 
 class TfConfig(Config, kw_only=True, frozen=True):
-    """The frames that the robot is drawn by."""
+    """The frames that place the robot."""
 
     quiet: bool = False
-    """Whether poses that stay in the odometry's frame are no problem to be shown."""
+    """Whether to show no problem when poses stay in the odometry's frame."""
     namespace: Annotated[str, checks.topic] = ""
-    """``/robot_0`` where the topics are ``/robot_0/tf`` and ``/robot_0/tf_static``."""
+    """``/robot_0`` if the topics are ``/robot_0/tf`` and ``/robot_0/tf_static``."""
     base_frame: Annotated[str, checks.text] | None = None
     """The robot's own frame; ``base_link`` of the robot if not given."""
     map_frame: Annotated[str, checks.text] = "map"
@@ -67,10 +67,10 @@ class TfConfig(Config, kw_only=True, frozen=True):
 
 
 class PictureConfig(Config, kw_only=True, frozen=True):
-    """A picture of the robot from above, its nose to the right unless it is turned."""
+    """A picture of the robot from above, its front to the right unless it is turned."""
 
     file: Annotated[str, checks.text]
-    """From the folder of the fleet file."""
+    """The path, relative to the folder of the fleet file."""
     width: Annotated[float, checks.above_zero("metres")]
     height: Annotated[float, checks.above_zero("metres")]
     x: Annotated[
@@ -84,7 +84,7 @@ class PictureConfig(Config, kw_only=True, frozen=True):
     angle: Annotated[float, checks.finite("a number of degrees, counter-clockwise")] = (
         0.0
     )
-    """How far it is turned about its middle."""
+    """The rotation about its centre."""
 
 
 def _address(value: Any) -> str:
@@ -96,17 +96,17 @@ def _address(value: Any) -> str:
 
 
 class CameraConfig(Config, kw_only=True, frozen=True):
-    """One camera: a topic, or an address on the web."""
+    """One camera: a topic, or a URL."""
 
     topic: Annotated[str, checks.topic] = ""
     url: Annotated[str, _address] = ""
     name: Annotated[str, checks.text] = ""
-    """Counted, if not given."""
+    """Numbered if not given."""
     throttle: Annotated[int, checks.milliseconds] | None = None
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any]:
-        """Return the table for a topic or an address alone."""
+        """Return the table for a topic or a URL alone."""
         either = f'a topic, or an address such as "{EXAMPLE}"'
         if not isinstance(value, str):
             raise ConfigError(f"{either}, or a table")
@@ -120,16 +120,16 @@ class CameraConfig(Config, kw_only=True, frozen=True):
         raise ConfigError(either)
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its fields together."""
+        """Add mistakes that concern several fields."""
         if bool(self.topic) == bool(self.url):
             mistakes.add(way, 'a camera has either a "topic" or a "url"')
 
 
 class ModuleConfig(Config, kw_only=True, frozen=True):
-    """A module by its name, with what ``add_module`` takes.
+    """A module by name, with the arguments of ``add_module``.
 
-    A bridge among the arguments is ``{"bridge": NAME}``, and ``None``, for which TOML
-    has no word, is ``{"none": True}``. The module itself says what it takes.
+    A bridge among the arguments is ``{"bridge": NAME}``, and ``None``, which TOML
+    lacks, is ``{"none": True}``. The module itself checks its arguments.
     """
 
     name: Annotated[str, checks.text]
@@ -138,7 +138,7 @@ class ModuleConfig(Config, kw_only=True, frozen=True):
 
 
 class Layer(NamedTuple):
-    """A module of a robot, and which key of the configuration says so."""
+    """A module of a robot, and the configuration key that adds it."""
 
     way: Way
     module: ModuleConfig
@@ -156,7 +156,8 @@ def _alignment(value: Any) -> tuple[float, ...]:
 
 
 Alignment = Annotated[tuple[float, float, float], _alignment]
-"""Where a map lies on the common one: metres, metres, and degrees counter-clockwise."""
+"""The pose of a map on the common one: metres, metres, and degrees
+counter-clockwise."""
 
 
 def _any_table(value: Any) -> dict[str, Any]:
@@ -175,7 +176,7 @@ def _buttons(value: Any, way: Way, mistakes: Mistakes) -> list[dict[str, Any]]:
 
 
 OWN_CLASSES = ("robot", "unplaced", "selected", "stale")
-"""Classes of CSS that WebMap gives to a robot by itself."""
+"""CSS classes that WebMap itself gives to a robot."""
 
 
 def _css_class(value: Any) -> str:
@@ -187,7 +188,7 @@ def _css_class(value: Any) -> str:
 
 
 class RobotConfig(Config, kw_only=True, frozen=True):
-    """A robot; what it does not have is left out.
+    """A robot; parts that it does not have are left out.
 
     In plain data the parts of ``motion`` are keys of the robot itself.
     """
@@ -195,40 +196,41 @@ class RobotConfig(Config, kw_only=True, frozen=True):
     inline: ClassVar[str] = "motion"
 
     name: Annotated[str, checks.any_text]
-    """What people call it."""
+    """The displayed name."""
     bridge: Annotated[str, checks.bridge] = ""
-    """The bridge of every part that names no other: its name, or its address."""
+    """The bridge of every part that names no other: its name, or its URL."""
     base_link: Annotated[str, checks.text] = "base_link"
-    """The frame that navigation calls the robot's own."""
+    """The robot's own frame in the navigation stack."""
     picture: PictureConfig | None = None
     odometry: OdometryConfig | None = None
     tf: TfConfig | None = None
     alignment: Alignment | None = None
-    """Where the robot's own map lies; that of its bridge if not given."""
+    """The pose of the robot's own map on the common one; that of its bridge if not
+    given."""
     scan: Annotated[list[Annotated[str, checks.topic]], ONE_OR_MORE] = []
-    """Topics of ``sensor_msgs/LaserScan``, drawn under the body of the robot."""
+    """Topics of type ``sensor_msgs/LaserScan``, drawn under the robot's body."""
     battery: Annotated[str, checks.topic] = ""
-    """A topic of ``sensor_msgs/BatteryState``."""
+    """A topic of type ``sensor_msgs/BatteryState``."""
     cameras: Annotated[list[CameraConfig], ONE_OR_MORE] = []
     motion: MotionConfig = MotionConfig()
     buttons: Annotated[list[dict[str, Any]], ReadBy(_buttons)] = []
-    """As the module ``Buttons`` takes them."""
+    """The arguments of the module ``Buttons``."""
     modules: list[ModuleConfig] = []
     classes: list[Annotated[str, _css_class]] = []
-    """Classes of CSS."""
+    """CSS classes."""
     model: Annotated[dict[str, Any], _any_table] | None = None
-    """How it looks: an element as plain data."""
+    """The drawing: an element as plain data."""
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "RobotConfig":
-        """Return the configuration that plain data has.
+        """Return the configuration in plain data.
 
         Args:
-            data: As :meth:`to_dict` returns it, or a table ``[[robots]]`` of a fleet
+            data: The result of :meth:`to_dict`, or a table ``[[robots]]`` of a fleet
                 file.
 
         Raises:
-            ConfigError: If something in it is wrong; every mistake is named.
+            ConfigError: If a value is wrong; the message lists every mistake.
 
         """
         if not isinstance(data, Mapping):
@@ -245,31 +247,31 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return config
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, which JSON and TOML can hold."""
+        """Return the configuration as plain data that fits JSON and TOML."""
         data: dict[str, Any] = {}
         for key, value in msgspec.to_builtins(self).items():
             data |= value if key == "motion" else {key: value}
         return data
 
     def check(self, way: Way, mistakes: Mistakes) -> None:
-        """Note what is wrong with its fields together."""
+        """Add mistakes that concern several fields."""
         if self.picture is not None and self.model is not None:
             words = 'a robot has a "picture" or a "model"; remove one of them'
             mistakes.add((*way, "picture"), words)
 
     def part(self, key: str) -> Any:
-        """Return a part by its key, of ``motion`` or not; None if it has none."""
+        """Return a part by its key, including those of ``motion``; None if absent."""
         return getattr(self.motion if key in MOTION else self, key)
 
     def with_part(self, key: str, part: Any) -> "RobotConfig":
-        """Return the robot with another part."""
+        """Return the robot with a part replaced."""
         if key in MOTION:
             motion = msgspec.structs.replace(self.motion, **{key: part})
             return msgspec.structs.replace(self, motion=motion)
         return msgspec.structs.replace(self, **{key: part})
 
     def resolved(self) -> "RobotConfig":
-        """Return the robot with a bridge in every part that goes over one."""
+        """Return the robot with a bridge in every part that uses one."""
         config = self
         for key in LINKED:
             part = self.part(key)
@@ -279,7 +281,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return config
 
     def bridges(self) -> Iterator[tuple[Way, str]]:
-        """Yield every bridge that is named, and where."""
+        """Yield every named bridge with its path."""
         if self.bridge:
             yield ("bridge",), self.bridge
         for key in LINKED:
@@ -320,12 +322,12 @@ class RobotConfig(Config, kw_only=True, frozen=True):
 
 
 def read_robot(value: Any, way: Way, mistakes: Mistakes) -> RobotConfig | None:
-    """Return the robot that plain data has; every mistake is noted.
+    """Return the robot in plain data; every mistake is added.
 
     Args:
         value: The plain data.
-        way: The way to it.
-        mistakes: Where every mistake goes. If there is one, the result is of no use.
+        way: Its path.
+        mistakes: The list for every mistake. If there is one, the result is unusable.
 
     """
     if not isinstance(value, Mapping):
@@ -344,7 +346,7 @@ def read_robot(value: Any, way: Way, mistakes: Mistakes) -> RobotConfig | None:
 
 
 def named_cameras(cameras: Sequence[CameraConfig]) -> list[CameraConfig]:
-    """Return cameras each of which has a name."""
+    """Return the cameras, with names for those without one."""
     many = len(cameras) > 1
     return [
         msgspec.structs.replace(each, name=f"Camera {number}" if many else "Camera")
@@ -355,12 +357,12 @@ def named_cameras(cameras: Sequence[CameraConfig]) -> list[CameraConfig]:
 
 
 def scan_name(number: int) -> str:
-    """Return the class that gives one of a robot's scans a colour of its own."""
+    """Return the CSS class that gives one of a robot's scans its own colour."""
     return f"scan-{number}" if number > 1 else ""
 
 
 def bridges_of(module: ModuleConfig) -> Iterator[tuple[Way, str]]:
-    """Yield every bridge among the arguments of a module, and the way to it."""
+    """Yield every bridge among the arguments of a module, with its path."""
     for index, each in enumerate(module.args):
         if is_link(each):
             yield ("args", index, "bridge"), each["bridge"]
@@ -370,5 +372,5 @@ def bridges_of(module: ModuleConfig) -> Iterator[tuple[Way, str]]:
 
 
 def is_link(value: Any) -> bool:
-    """Return whether an argument of a module stands for a bridge."""
+    """Return whether an argument of a module is a bridge."""
     return isinstance(value, Mapping) and set(value) == {"bridge"}

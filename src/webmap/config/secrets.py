@@ -1,4 +1,4 @@
-"""Passwords in a fleet file that other users of this computer can read."""
+"""Detection of passwords in a fleet file that other users of this computer can read."""
 
 import os
 import re
@@ -13,14 +13,14 @@ _SECRET = re.compile(
 
 
 def readable_secret(file: Path, data: Any) -> str | None:
-    """Return a warning if a file holds a password and others may read it.
+    """Return a warning if a file contains a password and others may read it.
 
     Args:
         file: The file.
-        data: What it says, as plain values.
+        data: Its content, as plain values.
 
     Raises:
-        OSError: If the file is gone.
+        OSError: If the file no longer exists.
 
     """
     mode = file.stat().st_mode & 0o777
@@ -33,7 +33,7 @@ def readable_secret(file: Path, data: Any) -> str | None:
 
 
 def _holds_secret(data: Any) -> bool:
-    """Return whether a text in it is a password, or an address with one."""
+    """Return whether a text in the data is a password, or a URL with one."""
     left = [data]
     while left:
         value = left.pop()

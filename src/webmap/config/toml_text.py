@@ -1,9 +1,9 @@
-"""The text of a fleet file: TOML, and on which line of it each value is.
+"""The text of a fleet file: TOML, and the line of each value.
 
-Python's reader of TOML gives values without their lines. :class:`Lines` goes through a
-text that was read already, so it may trust its form: it knows headers, keys, strings,
-arrays and inline tables, and skips what else values are made of. What would take the
-reader very long is found before, by going through the text once.
+Python's TOML reader returns values without their lines. :class:`Lines` parses a text
+that was already read, so it can trust its form: it recognises headers, keys, strings,
+arrays and inline tables, and skips other values. Text that would take the reader very
+long is found before that, in one pass.
 """
 
 import re
@@ -16,12 +16,12 @@ from webmap.base.plain_files import read_file
 from webmap.config.checks import Mistakes, Way, way_in_words
 
 LARGEST = 1 << 19
-"""Bytes that a file may have."""
+"""The greatest size of a file, in bytes."""
 
 EXPECTED = "expected TOML with a table [bridges] and a table [[robots]] for each robot"
 
 DEEPEST = 20
-"""Parts of a key, and brackets in one another."""
+"""The greatest number of parts of a key, and of nested brackets."""
 
 _STRING = (
     r'"""(?:\\.|[^\\])*?""""{0,2}'
@@ -43,7 +43,7 @@ _NUMBER = re.compile(r"\d[\d_]{999,}")
 _LONGEST = 60
 
 SEVERAL = ("robots", "map", "image", "modules", "labels", "buttons")
-"""Tables of which there may be more than one."""
+"""Tables that may occur more than once."""
 
 WORDS = {
     "Invalid value": "no value that TOML knows: a text stands in quotes, true and "
@@ -56,7 +56,7 @@ WORDS = {
     "Expected newline or end of document after a statement": "expected the end of the "
     "line after a value",
 }
-"""What the reader of TOML says, in the words of somebody who writes a file."""
+"""The errors of the TOML reader, reworded for authors of files."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _SPACE = re.compile(r"[ \t]*")
@@ -72,14 +72,14 @@ _TEXT = re.compile(
 
 
 class FleetText:
-    """A file that was read, and where in it something stands.
+    """The text of a file, with the lines of its values.
 
     Args:
-        name: The file's name, for people.
-        text: What is in it.
+        name: The file's name, for error messages.
+        text: The content of the file.
 
     Raises:
-        ConfigError: If it is not TOML; line and column are named.
+        ConfigError: If it is not TOML; the message has line and column.
 
     """
 
@@ -95,7 +95,7 @@ class FleetText:
             )
         try:
             self.data = tomllib.loads(text)
-        except ValueError as error:  # also whole numbers of thousands of digits
+        except ValueError as error:  # also integers of thousands of digits
             raise ConfigError(not_toml(name, text, error)) from None
         except RecursionError:
             raise ConfigError(
@@ -106,14 +106,14 @@ class FleetText:
     def complaint(self, way: Way, words: str) -> str:
         """Return a mistake with file, line and key."""
         said = f"{way_in_words(way) or 'the file'}: {words}"
-        # What a file holds must not steer the terminal that shows it.
+        # The content of a file must not control the terminal that shows it.
         return f"{self.name}:{self._lines.of(way)}: {one_line(said)}"
 
     def refuse(self, mistakes: Mistakes) -> None:
         """Raise all mistakes at once, if there are any.
 
         Raises:
-            ConfigError: If there are.
+            ConfigError: If there are mistakes.
 
         """
         if mistakes.found:
@@ -127,7 +127,7 @@ def read_text(file: Path) -> FleetText:
     """Read a file.
 
     Raises:
-        ConfigError: If it is no file, too large, not UTF-8, or not TOML.
+        ConfigError: If it is not a file, too large, not UTF-8, or not TOML.
         OSError: If it cannot be read.
 
     """
@@ -150,7 +150,7 @@ class Lines:
     """The line of each key and each element of an array.
 
     Args:
-        text: A text that is TOML.
+        text: A valid TOML text.
 
     """
 
@@ -163,7 +163,7 @@ class Lines:
         self._document()
 
     def of(self, path: Way) -> int:
-        """Return the line of a path, or of what is around it; 1 for the file."""
+        """Return the line of a path, or of its nearest parent; 1 for the file."""
         while path and path not in self._found:
             path = path[:-1]
         return self._found.get(path, 1)
@@ -269,7 +269,7 @@ class Lines:
 def _unquoted(key: str) -> str:
     if "\\" in key:
         return str(tomllib.loads(f"key = {key}")["key"])
-    return key[1:-1]  # keys are of one line, with one quote on each side
+    return key[1:-1]  # keys are on one line, with one quote on each side
 
 
 def too_deep(text: str) -> int | None:
@@ -277,7 +277,7 @@ def too_deep(text: str) -> int | None:
     brackets = parts = 0
     for token in _TOKEN.finditer(text):
         kind = token.lastgroup
-        if kind == "quote":  # a text without an end; the reader says so
+        if kind == "quote":  # a text without an end; the reader reports it
             return None
         if kind == "dot":
             parts += 1
@@ -293,12 +293,12 @@ def too_deep(text: str) -> int | None:
 
 
 def not_toml(name: str, text: str, error: ValueError) -> str:
-    """Return what is wrong with a text, with its line and what stands there.
+    """Return the error of a text that is not TOML, with its line and the text there.
 
     Args:
-        name: The file's name, for people.
-        text: What is in it.
-        error: What the reader of TOML says.
+        name: The file's name, for error messages.
+        text: The content of the file.
+        error: The error of the TOML reader.
 
     """
     lines = text.splitlines() or [""]
@@ -310,7 +310,7 @@ def not_toml(name: str, text: str, error: ValueError) -> str:
         line = text.count("\n", 0, number.start()) + 1
         return f"{name}:{line}: this is not TOML: a whole number of far too many digits"
     words = found["words"]
-    # The end of the file is told without a line.
+    # The reader gives no line for the end of the file.
     line = int(found["line"] or len(lines))
     table = _TABLE.fullmatch(words)
     if table is not None:

@@ -1,8 +1,8 @@
-"""Alignments that people saved on a page, kept over restarts.
+"""Alignments saved on a page, kept over restarts.
 
-They are in the state folder, one small file each. A file also says which alignment it
-was saved in place of, as a program or a fleet file had stated that. So what was saved
-on a page holds until somebody states another one: the newer word counts.
+Each is one small file in the state folder. The file also keeps the alignment that a
+program or a fleet file stated at the time of saving. A saved alignment is used until
+the stated one changes; then the stated one is used.
 """
 
 import contextlib
@@ -30,31 +30,32 @@ Numbers = tuple[float, float, float]
 
 
 class AlignmentStore:
-    """The files of one folder.
+    """The alignment files of one folder.
 
     Args:
-        folder: Where they are; the state folder if not given.
+        folder: The folder; the state folder if not given.
 
     """
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
         self._stated: dict[str, Numbers | None] = {}
-        """What was stated of each before what was saved took its place."""
+        """The alignment of each name that was stated before the saved one replaced
+        it."""
 
     def path(self, name: str) -> Path:
-        """Return the file of a bridge or a robot."""
+        """Return the path of the file of a bridge or a robot."""
         digest = hashlib.sha256(name.encode()).hexdigest()[:24]
         return (self._folder or state_folder()) / f"{digest}.alignment"
 
     def restore_bridge(self, bridge: Bridge) -> None:
-        """Align a bridge as it was saved, unless something else was stated since."""
+        """Apply a bridge's saved alignment unless another one was stated since."""
         saved = self._saved(name_of(bridge), alignments.stated(bridge))
         if saved is not None:
             alignments.set(bridge, saved)
 
     def restore(self, robot: "Robot") -> None:
-        """Align a robot and its bridge as they were saved; see above."""
+        """Apply the saved alignments of a robot and of its bridge."""
         bridge = robot.whereabouts.bridge
         if bridge is None:
             return
@@ -65,13 +66,13 @@ class AlignmentStore:
             robot.set_alignment(*numbers(saved))
 
     def save(self, name: str, before: Pose | None, now: Pose, by: str) -> str:
-        """Keep an alignment, and return the file's path.
+        """Save an alignment and return the file's path.
 
         Args:
-            name: Of the bridge or the robot: see :func:`name_of`.
-            before: What held until now; None if nothing was stated.
-            now: What holds from now on.
-            by: Who says so.
+            name: The name of the bridge or the robot; see :func:`name_of`.
+            before: The alignment until now; None if none was stated.
+            now: The alignment from now on.
+            by: The name of the operator who saves it.
 
         Raises:
             OSError: If the folder cannot be written to.
@@ -90,14 +91,14 @@ class AlignmentStore:
         return str(path)
 
     def forget(self, name: str) -> None:
-        """Forget what was saved: it goes by another alignment from now on."""
+        """Delete a saved alignment; another one is used from now on."""
         with contextlib.suppress(OSError):
             self.path(name).unlink()
 
     def _saved(self, name: str, stated: Pose | None) -> Pose | None:
-        """Return what was saved in place of what is stated, if anything was."""
+        """Return the alignment saved in place of the stated one, or None."""
         if name in self._stated:
-            return None  # it holds already, or was refused
+            return None  # already applied or refused
         path = self.path(name)
         try:
             content = json.loads(read_file(path, LARGEST_STATE))
@@ -129,7 +130,7 @@ class AlignmentStore:
 
 
 def name_of(bridge: Bridge, robot: str = "") -> str:
-    """Return what an alignment is kept under: no secrets of an address are in it."""
+    """Return the key of a saved alignment, without the secrets of the bridge's URL."""
     parts = urlsplit(bridge.url)
     host = parts.hostname or ""
     port = f":{parts.port}" if parts.port else ""
@@ -141,4 +142,4 @@ def _of(pose: Pose | None) -> Numbers | None:
 
 
 store = AlignmentStore()
-"""That of this process."""
+"""The alignment store of this process."""

@@ -1,4 +1,4 @@
-"""Methods whose arguments are one part of a robot's configuration."""
+"""Decorator for methods whose arguments set one part of a robot's configuration."""
 
 import functools
 import inspect
@@ -16,14 +16,14 @@ Method = Callable[Concatenate[D, P], None]
 
 
 def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
-    """Have a method set a part of the configuration; a decorator.
+    """Make a method set one part of the configuration (decorator).
 
-    The method has a signature and a docstring and no code: ``configure`` gets what it
-    is called with, by the names of its parameters. An argument that it does not have
-    and a bridge that is none are refused here, all else where the part is read.
+    The method has a signature and a docstring but no code. Its arguments are passed to
+    ``configure`` under the names of its parameters. Unknown arguments and a bridge that
+    is not a ``Bridge`` are refused here; ``configure`` checks the rest.
 
     Args:
-        key: The part.
+        key: The name of the part.
 
     """
 

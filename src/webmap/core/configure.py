@@ -1,4 +1,4 @@
-"""From a configuration to a robot and back, and from one configuration to another."""
+"""Conversion between configurations and robots, and changes of a configuration."""
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 NONE = {"none": True}
-"""What stands for ``None`` among the arguments of a module."""
+"""How ``None`` is written among the arguments of a module."""
 
 Link: TypeAlias = Callable[[str], Bridge]
-"""Returns the bridge of a name or an address."""
+"""Returns the bridge with a name or a URL."""
 
 Made: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
-"""Name and arguments of a module, as it was added."""
+"""Name, positional and keyword arguments of an added module."""
 
 R = TypeVar("R", bound="Robot")
 
@@ -48,7 +48,7 @@ def robot_of(
     bridges: Mapping[str, Bridge] | None,
     model: Element | None = None,
 ) -> R:
-    """Make a robot; see :meth:`Robot.from_config`."""
+    """Create a robot; see :meth:`Robot.from_config`."""
     mistakes = Mistakes()
     if config.picture is not None and model is None:
         words = "only the console shows a picture; give a model instead"
@@ -64,7 +64,7 @@ def robot_of(
         mistakes.take((), apply(robot, before, config, bridges))
         mistakes.refuse(f"robot {config.name!r}")
     except BaseException:
-        robot.destroy()  # else the gate would be told of it
+        robot.destroy()  # or the gate would get the robot
         raise
     return robot
 
@@ -75,21 +75,20 @@ def apply(
     new: RobotConfig,
     bridges: Mapping[str, Bridge] | None = None,
 ) -> Mistakes:
-    """Change a robot by what differs between two configurations.
+    """Apply the differences between two configurations to a robot.
 
-    What both have stays as it is, and so does everything that neither of them has:
-    modules that a program added, for example. Name, model and frame of the base are
-    those that the robot was made with. Bridges and modules that are made belong to the
-    scope that this is called in.
+    Parts that both have in common stay, and so does everything that neither has, such
+    as modules that a program added. Name, model and base frame are never changed. New
+    bridges and modules belong to the scope in which this is called.
 
     Args:
         robot: The robot.
-        old: What it was configured with.
-        new: What it is to be configured with.
-        bridges: Bridges by name or address; others are made.
+        old: The configuration until now.
+        new: The configuration to apply.
+        bridges: Bridges by name or URL; others are created.
 
     Returns:
-        What is wrong; each part that is not named there has been changed.
+        The mistakes found; each part without a mistake was changed.
 
     """
     links = dict(bridges or {})
@@ -108,7 +107,7 @@ def apply(
     for name in new.classes:
         robot.svg.classes.add(name)
     if _changes_bridge_of_goals(old.resolved(), new.resolved()):
-        robot.configure("initial_pose", None)  # both go to one bridge at any time
+        robot.configure("initial_pose", None)  # both must always use the same bridge
     for key in ("odometry", "tf", "alignment", *MOTION):
         before, after = old.resolved().part(key), new.resolved().part(key)
         if before == after:
@@ -122,14 +121,14 @@ def apply(
 
 
 def _changes_bridge_of_goals(old: RobotConfig, new: RobotConfig) -> bool:
-    """Return whether goals and the initial pose both go to another bridge now."""
+    """Return whether goals and the initial pose both change to another bridge."""
     parts = [(config.motion.move, config.motion.initial_pose) for config in (old, new)]
     bridges = [part.bridge for pair in parts for part in pair if part is not None]
     return len(bridges) == 4 and bridges[:2] != bridges[2:]
 
 
 def _set(robot: "Robot", key: str, part: Any, link: Link) -> None:
-    """Set or clear a part that is no module."""
+    """Set or clear a part that is not a module."""
     if key == "alignment":
         robot.unset_alignment() if part is None else robot.set_alignment(*part)
     elif part is None:
@@ -143,12 +142,12 @@ def _set(robot: "Robot", key: str, part: Any, link: Link) -> None:
 
 
 def _place(robot: "Robot", tf: TfConfig, bridge: Bridge) -> None:
-    """Draw a robot by frames, and move the layers of its map into the same frame."""
+    """Place a robot by TF, and move the layers of its map into the same frame."""
     before = robot.tf
     options = {**msgspec.structs.asdict(tf), "bridge": bridge}
     if before == {**options, **_names(robot, tf)}:
         return
-    # What was heard of the frames is kept meanwhile.
+    # Keep the received frames until the new subscription is made.
     held = frames_of(bridge, tf.namespace).join(lambda: None)
     try:
         robot.set_tf(**options)
@@ -164,7 +163,7 @@ def _place(robot: "Robot", tf: TfConfig, bridge: Bridge) -> None:
 
 
 def _names(robot: "Robot", tf: TfConfig) -> dict[str, str]:
-    """Return the whole names of the frames that a robot would be drawn by."""
+    """Return the full names of the frames that would place a robot."""
     base, name = tf.base_frame or robot.base_link, Buffer().name
     space = tf.namespace
     return {"map_frame": name(tf.map_frame, space), "base_frame": name(base, space)}
@@ -206,18 +205,18 @@ def _add(robot: "Robot", layer: Layer, link: Link, mistakes: Mistakes) -> None:
             place = wrong.way if inner else ()
             mistakes.add((*way, *place), wrong_argument(module, wrong))
     except WebMapError as error:
-        # What a module says of a value begins with the name of the argument.
+        # The error of a module begins with the name of the argument.
         key = str(error).partition(" ")[0].rstrip(":")
         place = ("options", key) if inner and key in module.options else ()
         said = f"{module.name}: {error}" if inner else str(error)
         mistakes.add((*way, *place), said)
-    except Exception as error:  # a module of somebody else's may raise anything
+    except Exception as error:  # a module from elsewhere may raise anything
         said = f"{type(error).__name__}: {error}"
         mistakes.add(way, f"{module.name} refused its arguments: {said}")
 
 
 def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
-    """Return what is wrong with an argument, and what was expected."""
+    """Return the error message for a wrong argument, with the expected value."""
     if not wrong.got:
         return f"{module.name}: {wrong.words}"
     expected = wrong.words
@@ -228,7 +227,7 @@ def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
 
 
 def _note(mistakes: Mistakes, way: Way, error: WebMapError, name: str) -> None:
-    """Note what a part refused, each mistake with the way to it."""
+    """Add the mistakes of a part, each with its path."""
     if isinstance(error, checks.WrongConfig):
         mistakes.take((), error.mistakes)
     else:
@@ -236,21 +235,21 @@ def _note(mistakes: Mistakes, way: Way, error: WebMapError, name: str) -> None:
 
 
 def module_call(module: ModuleConfig, link: Link) -> Made:
-    """Return a module with its arguments as ``add_module`` takes them."""
+    """Return a module's name and arguments for ``add_module``."""
     args = tuple(_argument(value, link) for value in module.args)
     options = {key: _argument(value, link) for key, value in module.options.items()}
     return module.name, args, options
 
 
 def _argument(value: Any, link: Link) -> Any:
-    """Return what an argument of a module stands for."""
+    """Return the value of a module's argument, with bridges resolved."""
     if is_link(value):
         return link(value["bridge"])
     return None if value == NONE else value
 
 
 def config_of(robot: "Robot") -> RobotConfig:
-    """Return what a robot is configured with; see :meth:`Robot.to_config`."""
+    """Return the configuration of a robot; see :meth:`Robot.to_config`."""
     feed, tf, own = robot.feed, robot.tf, robot.whereabouts.own_alignment
     odometry = frames = None
     if feed is not None:
@@ -286,7 +285,7 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
     """Return a robot as plain data; see :meth:`Robot.to_dict`."""
     try:
         return config_of(robot).to_dict()
-    except TypeError as error:  # a module was given what no file can hold
+    except TypeError as error:  # an argument of a module has no form in a file
         raise ConfigError(f"robot {robot.name!r} is no plain data: {error}") from error
 
 

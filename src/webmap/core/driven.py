@@ -1,4 +1,4 @@
-"""What a robot can be told to do: its verbs of motion, all of which the gate obeys."""
+"""The motion methods of a robot; all of them go through the gate."""
 
 import asyncio
 import time
@@ -21,14 +21,14 @@ from webmap.ros.bridge import Bridge
 
 
 class Driven(Extendable):
-    """An extendable that is moved, through the gate: what every robot is.
+    """An extendable object that moves through the gate; base class of every robot.
 
-    It says where velocity and goals go and hands them over; nothing here writes to a
-    robot, and nothing here knows where one is or how it looks.
+    It configures the topics for velocity and goals and passes commands to the gate. It
+    never writes to a robot, and has no pose and no drawing.
 
     Args:
-        name: What people call it.
-        namespace: Where its modules are looked up.
+        name: The displayed name.
+        namespace: The namespace of its modules.
 
     """
 
@@ -38,16 +38,16 @@ class Driven(Extendable):
         self.motion = MotionRoad(self.name, self.report_error)
         self.report: RobotReport | None = None
         self.goal_ended_at: float | None = None
-        """When the newest goal ended, in seconds of ``time.monotonic()``; None if none
-        has."""
+        """When the newest goal ended, in seconds of ``time.monotonic()``; None if there
+        is no goal or it has not ended."""
         self._report_is_old = False
 
     @property
     def id(self) -> str:
-        """What the gate and the page call this robot; unique in the process."""
+        """The robot's identifier for the gate and the page; unique in the process."""
         return self.motion.id
 
-    # Where velocity and goals go.
+    # Topics for velocity and goals.
 
     @sets_part("twist")
     def set_twist_topic(
@@ -66,39 +66,40 @@ class Driven(Extendable):
         rx_max: float | None = None,
         ry_max: float | None = None,
     ) -> None:
-        """Say where velocity goes, and what the base behind it does and can.
+        """Set the topic for velocity, with the limits and the behaviour of the base.
 
-        A robot that moves in the plane has no ``z_max``, ``rx_max`` and ``ry_max``.
-        State them for one that flies or dives: :meth:`twist` then takes ``z``, ``rx``
-        and ``ry``.
+        A robot that moves in the plane has no ``z_max``, ``rx_max`` and ``ry_max``. Set
+        them for a robot that flies or dives: :meth:`twist` then takes ``z``, ``rx`` and
+        ``ry``.
 
         Args:
-            bridge: The link to the robot's ROS system.
-            topic: The topic, of ``geometry_msgs`` Twist or TwistStamped.
-            type: The message type; asked of the bridge, or Twist, if not given.
-            stops_within: The time in seconds within which the base stops by itself
-                when velocity ceases. Without it nobody knows whether the robot stops
-                when WebMap cannot tell it to, and it is driven at no more than
+            bridge: The connection to the robot's ROS system.
+            topic: A topic of type ``geometry_msgs`` Twist or TwistStamped.
+            type: The message type; if not given, the type that the bridge reports, or
+                Twist.
+            stops_within: The command timeout of the base: the time in seconds within
+                which the base stops by itself when velocities end. Without it, the
+                robot may not stop when WebMap cannot reach it, and the speed limits are
                 0.3 m/s and 0.6 rad/s.
-            v_max: The highest speed, in metres per second, whatever the direction.
-            w_max: The highest rate of turn, in radians per second, whatever the axis.
-            a_max: The highest acceleration, in metres per second squared. Slowing
-                down is never delayed by it.
+            v_max: The greatest speed in metres per second, in any direction.
+            w_max: The greatest rate of turn in radians per second, about any axis.
+            a_max: The greatest acceleration in metres per second squared. It never
+                delays slowing down.
             holonomic: Whether the base can move sideways.
-            stop_hooks: What else ``bridge`` is told on STOP:
+            stop_hooks: What else is sent over ``bridge`` on STOP:
                 ``{"topic": "/lock", "type": "std_msgs/Bool"}`` publishes true, and
-                false on reset; ``{"service": "/e_stop", "type": "std_srvs/Trigger"}``
+                false on Reset; ``{"service": "/e_stop", "type": "std_srvs/Trigger"}``
                 calls the service.
-            z_max: The highest speed upward and downward, in metres per second. Without
-                it the robot takes no ``z``.
-            rx_max: The highest rate of turn about the forward axis, in radians per
-                second. Without it the robot takes no ``rx``.
-            ry_max: The highest rate of turn about the left axis, in radians per
-                second. Without it the robot takes no ``ry``.
+            z_max: The greatest speed upward and downward in metres per second. Without
+                it, the robot takes no ``z``.
+            rx_max: The greatest rate of turn about the forward axis in radians per
+                second. Without it, the robot takes no ``rx``.
+            ry_max: The greatest rate of turn about the left axis in radians per second.
+                Without it, the robot takes no ``ry``.
 
         Raises:
-            ConfigError: If ``type`` carries no velocity, or a number or a stop hook
-                cannot be meant.
+            ConfigError: If ``type`` carries no velocity, or a number or a stop hook is
+                not valid.
 
         """
 
@@ -111,12 +112,12 @@ class Driven(Extendable):
         """Set or clear one part of the robot's configuration.
 
         Args:
-            key: Its name in a fleet file, such as ``"twist"``.
-            values: What it says there; None clears it.
-            bridge: The link that it goes over, if it goes over one of its own.
+            key: The part's name in a fleet file, such as ``"twist"``.
+            values: The part's values, as in a fleet file; None clears the part.
+            bridge: The bridge of the part, if it has one of its own.
 
         Raises:
-            ConfigError: If something in it cannot be meant; every mistake is named.
+            ConfigError: If a value is not valid; the message lists every mistake.
 
         """
         what = f"robot {self.name!r}"
@@ -132,7 +133,7 @@ class Driven(Extendable):
         self._show_base(holonomic=twist is not None and twist.holonomic)
 
     def _show_base(self, *, holonomic: bool) -> None:
-        """Let pages know what the base can."""
+        """Show on pages what the base can do."""
 
     @sets_part("scan_assist")
     def set_scan_assist(
@@ -150,40 +151,42 @@ class Driven(Extendable):
         blind: Literal["stop", "creep"] = "stop",
         creep: float = 0.1,
     ) -> None:
-        """Have the robot slowed down, when driven, before what a laser scan sees.
+        """Slow the robot down before obstacles in a laser scan while it is driven.
 
-        It assists a driver and is no safety function: a planar scanner does not see
-        glass, stairs or a table's edge, and what it says comes over a network.
+        Scan assist is no safety function: a planar scanner does not see glass, stairs
+        or the edge of a table, and its data comes over a network.
 
         Args:
-            topic: Of ``sensor_msgs/LaserScan``, on the bridge of the twist topic.
-            footprint: The robot's corners in its own frame, in order, or its radius,
-                in metres.
-            x: Where the scanner is on the robot, in metres forward.
-            y: In metres to the left.
-            angle: Where it looks, in degrees from the robot's x, counter-clockwise as
-                seen from above.
-            upside_down: Whether it hangs head down, so that its rays go round the other
-                way; frames are not asked.
-            frame: The frame that its scans must name; the robot is blind by a scan of
-                another. Left out, any will do, but not two on one topic.
-            stop_distance: What stays free before the robot, in metres.
-            brake: How hard the robot slows down, in metres per second squared.
-            blind: Whether it stops or creeps while the scan is older than 0.3 s, is
-                empty or mostly unknown.
-            creep: How fast it creeps, in metres per second.
+            topic: A topic of type ``sensor_msgs/LaserScan``, on the bridge of the twist
+                topic.
+            footprint: The robot's corners in its own frame, in order, or its radius, in
+                metres.
+            x: The scanner's position on the robot, in metres forward.
+            y: The scanner's position, in metres to the left.
+            angle: The scanner's direction in degrees from the robot's x axis,
+                counter-clockwise as seen from above.
+            upside_down: Whether the scanner is mounted upside down, so that its rays
+                turn the other way; frames are not used.
+            frame: The frame that the scans must have; a scan with another frame is not
+                used, and the robot is then blind. If left out, any frame is accepted,
+                but not two on one topic.
+            stop_distance: The distance that stays free before the robot, in metres.
+            brake: The deceleration of the robot, in metres per second squared.
+            blind: Whether the robot stops or creeps while the scan is older than 0.3 s,
+                is empty or mostly unknown.
+            creep: The speed when creeping, in metres per second.
 
         Raises:
-            ConfigError: If something of that cannot be meant.
+            ConfigError: If a value is not valid.
 
         """
 
     def clear_scan_assist(self) -> None:
-        """Let the robot be driven as before; nothing happens if nothing was set."""
+        """Clear scan assist; does nothing if none was set."""
         self.configure("scan_assist", None)
 
     def unadvertise_twist_topic(self) -> None:
-        """Give up the twist topic; does nothing if there is none."""
+        """Clear the twist topic; does nothing if none was set."""
         self.configure("twist", None)
 
     @sets_part("move")
@@ -198,25 +201,26 @@ class Driven(Extendable):
         action: str | None = None,
         action_type: str = NAVIGATE_TO_POSE,
     ) -> None:
-        """Say where goals go.
+        """Set the topic or the action for goals.
 
-        They go to the action, if there is one: it says how they go and how they end.
+        If there is an action, goals go to the action, which reports their progress and
+        their end.
 
         Args:
-            bridge: The link to the ROS system of the robot's navigation.
-            topic: A topic of ``geometry_msgs/PoseStamped``; besides an action it is
-                for bridges that take no goals of actions.
+            bridge: The connection to the ROS system of the robot's navigation.
+            topic: A topic of type ``geometry_msgs/PoseStamped``; together with an
+                action it is for bridges that take no goals of actions.
             frame: The frame of the goals.
-            cancel_topic: actionlib's topic by which goals are called off.
-            on_operator_loss: ``"continue"`` if a goal goes on when its operator is
-                lost, ``"cancel"`` if it is called off.
+            cancel_topic: The topic of actionlib that cancels goals.
+            on_operator_loss: ``"continue"`` if a goal continues when its operator is
+                lost, ``"cancel"`` if it is cancelled.
             action: The name of the action, such as ``"/navigate_to_pose"``.
             action_type: ``"nav2_msgs/action/NavigateToPose"``, of ROS 2, or
                 ``"move_base_msgs/MoveBaseAction"``, of ROS 1.
 
         Raises:
-            ConfigError: If there is neither a topic nor an action, or something else
-                cannot be meant.
+            ConfigError: If there is neither a topic nor an action, or another value is
+                not valid.
 
         """
 
@@ -229,50 +233,51 @@ class Driven(Extendable):
         covariance: Sequence[float] = COVARIANCE,
         frame: str = "map",
     ) -> None:
-        """Say where the robot is told where it is.
+        """Set the topic for the robot's initial pose.
 
         Args:
-            bridge: The link to its localisation; the bridge of its goals.
-            topic: A topic of ``geometry_msgs/PoseWithCovarianceStamped``.
-            covariance: How sure one is: the variances of x and y in m², of yaw in
-                rad². RViz's are given if not said.
-            frame: The frame of the map that it is told in. A robot that takes goals is
-                told in the frame of those.
+            bridge: The connection to the robot's localisation; must be the bridge of
+                its goals.
+            topic: A topic of type ``geometry_msgs/PoseWithCovarianceStamped``.
+            covariance: The variances of x and y in m², and of yaw in rad². The default
+                is that of RViz.
+            frame: The map frame of the pose. For a robot that takes goals, it is the
+                frame of the goals.
 
         Raises:
-            ConfigError: If the covariance is not three numbers from 0 on, or goals go
-                to another bridge.
+            ConfigError: If the covariance is not three numbers of 0 or more, or goals
+                go to another bridge.
 
         """
 
     def unadvertise_move_topic(self) -> None:
-        """Give up the move topic; does nothing if there is none."""
+        """Clear the move topic; does nothing if none was set."""
         self.configure("move", None)
 
-    # What a program says.
+    # Commands of a program.
 
     async def acquire_lease(self, *, timeout: float = 5.0) -> int:
-        """Take the right to drive this robot, on behalf of this program.
+        """Take control of this robot for this program.
 
-        Any operator takes it away by driving.
+        Any operator takes control away by driving.
 
         Args:
-            timeout: Seconds to wait until the robot can be driven: the gate may have
-                been started a moment ago, the links over which the robot is driven
-                open now, and its odometry must be heard.
+            timeout: Seconds to wait until the robot can be driven: the gate may be
+                starting, the connections for commands may be opening, and odometry must
+                arrive first.
 
         Returns:
             The lease's epoch.
 
         Raises:
-            NoLease: If somebody else drives.
-            MotionError: If the robot cannot be driven, and why.
+            NoLease: If another operator or program has control.
+            MotionError: If the robot cannot be driven; the message has the reason.
 
         """
         deadline = time.monotonic() + timeout
         while self._may_be_had_soon():
             if time.monotonic() > deadline:
-                break  # the gate says why not
+                break  # the gate gives the reason
             await asyncio.sleep(0.02)
         epoch = await asyncio.wrap_future(self.motion.take())
         while (why := self._not_drivable(epoch)) is not None:
@@ -283,7 +288,7 @@ class Driven(Extendable):
         return epoch
 
     def _may_be_had_soon(self) -> bool:
-        """Tell whether it cannot be taken yet, and nobody's word is against it."""
+        """Return whether the robot cannot be taken yet but probably can be soon."""
         gate, report = self.motion.gate, self.report
         if gate is None or self.motion.spec() is None:
             return False
@@ -295,12 +300,12 @@ class Driven(Extendable):
         report = self.report
         if report is None or report.epoch != epoch:
             return "the gate has not said that it can"
-        if self.motion.config.twist is None:  # it takes goals alone
+        if self.motion.config.twist is None:  # takes goals only
             return None if report.armable else report.reason
         return report.reason
 
     def release_lease(self) -> None:
-        """Give the right to drive back; the robot is stopped if it moves."""
+        """Release control; a moving robot is stopped."""
         self.motion.release()
 
     def twist(
@@ -312,12 +317,12 @@ class Driven(Extendable):
         ry: float = 0.0,
         rz: float = 0.0,
     ) -> None:
-        """Give one velocity, which holds until it is old: 0.2 s at the most.
+        """Send one velocity command, which is valid for 0.2 s at most.
 
-        It goes through the gate like every other, so the program needs the lease, and
-        the speed in force bounds it. Whoever wants the robot to go on calls again, at
-        20 Hz, say. What comes less than 10 ms after the last velocity that went to the
-        gate is left out, but a zero after motion never is.
+        The command goes through the gate like every other, so the program needs
+        control, and the speed limit applies. To keep the robot moving, call this again,
+        for example at 20 Hz. A command less than 10 ms after the last one that went to
+        the gate is dropped, except a zero after motion.
 
         Args:
             x: Metres per second forward.
@@ -330,75 +335,75 @@ class Driven(Extendable):
             rz: Radians per second, counter-clockwise.
 
         Raises:
-            NoLease: If the program does not hold the lease.
-            MotionError: If ``z``, ``rx`` or ``ry`` is not 0 and the twist topic states
-                no limit for it, or a number is not finite.
+            NoLease: If the program does not have control.
+            MotionError: If ``z``, ``rx`` or ``ry`` is not 0 and the twist topic has no
+                limit for it, or a number is not finite.
 
         """
         self.motion.twist(Twist(x, y, rz, z, rx, ry))
 
     def move(self, position: Position, orientation: Orientation) -> None:
-        """Send the robot to a pose in the plane, by its own navigation.
+        """Send the robot to a goal in the plane, by its own navigation.
 
         Args:
-            position: Where the base link is to be, in metres on the common map; ``z``
-                is left out.
-            orientation: Its orientation there, of which the heading counts.
+            position: The goal of the base link, in metres on the common map; ``z`` is
+                ignored.
+            orientation: The orientation at the goal; only the heading is used.
 
         Raises:
-            NoLease: If the program does not hold the lease.
+            NoLease: If the program does not have control.
 
         """
         o = orientation
         self.motion.move(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
 
     def locate(self, position: Position, orientation: Orientation) -> None:
-        """Tell the robot where it is, while it neither moves nor follows a goal.
+        """Send the robot its own pose, while it neither moves nor follows a goal.
 
         Args:
-            position: Where the base link is, in metres on the common map.
-            orientation: Its orientation there.
+            position: The position of the base link, in metres on the common map.
+            orientation: The orientation of the base link.
 
         Raises:
-            NoLease: If the program does not hold the lease.
+            NoLease: If the program does not have control.
 
         """
         o = orientation
         self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
 
     def cancel(self) -> None:
-        """Call off the robot's goals."""
+        """Cancel the robot's goals."""
         self.motion.cancel()
 
     def stop(self) -> None:
-        """Stop the robot, whoever drives it, and call off its goals.
+        """Stop the robot, no matter who has control, and cancel its goals.
 
-        It stays stopped, for everybody and also after a restart, until
-        :meth:`reset_stop` or a person's reset.
+        The STOP stays active for everybody, also after a restart, until
+        :meth:`reset_stop` or Reset on a page.
         """
         self.motion.stop()
 
     def reset_stop(self) -> None:
-        """End the STOP that ``report`` tells of; moves nothing, gives nobody the robot.
+        """End the STOP in ``report``; nothing moves, and control does not change.
 
-        The gate refuses that if somebody pressed STOP since then: look at ``report``,
-        which tells of the newer STOP, and call this again.
+        The gate refuses this if STOP was pressed again since then. Read the newer STOP
+        from ``report`` and call this again.
 
         Raises:
-            MotionError: If ``report`` tells of no STOP. After :meth:`stop`, wait until
-                ``report.stop`` is there.
+            MotionError: If ``report`` has no STOP. After :meth:`stop`, wait until
+                ``report.stop`` is set.
 
         """
         self.motion.reset_stop(self.report)
 
-    # What the gate says.
+    # Reports of the gate.
 
     def on_gate_down(self) -> None:
-        """Wait for the next gate's word before a lease; pages show the last one."""
+        """Mark the report as old: taking control needs one of the next gate."""
         self._report_is_old = True
 
     def on_gate_report(self, report: RobotReport) -> None:
-        """Keep what the gate says of this robot and fire ``on_report``."""
+        """Store the gate's report on this robot and fire ``on_report``."""
         self.report, self._report_is_old = report, False
         if report.goal is None or report.goal.state not in OVER:
             self.goal_ended_at = None
@@ -408,15 +413,15 @@ class Driven(Extendable):
         self.notify_modules("on_report", report)
 
     def expect_jump(self) -> None:
-        """Expect that the robot is somewhere else from here on."""
+        """Accept that the robot's pose jumps from here on."""
 
     def on_written(self, kind: str, message: dict[str, Any]) -> None:
-        """Fire ``on_send_twist`` or ``on_send_move`` for what the gate wrote.
+        """Fire ``on_send_twist`` or ``on_send_move`` for a message that the gate wrote.
 
         Args:
             kind: ``"twist"`` or ``"move"``.
-            message: As :func:`webmap.core.runtime.twist_message` or
-                :func:`webmap.core.runtime.goal_message` has it.
+            message: The result of :func:`webmap.core.runtime.twist_message` or
+                :func:`webmap.core.runtime.goal_message`.
 
         """
         self.notify_modules(f"on_send_{kind}", message)

@@ -1,4 +1,4 @@
-"""What maps and robots both are: owners of modules."""
+"""Base class of maps and robots: owner of modules."""
 
 import inspect
 import logging
@@ -18,9 +18,9 @@ log = logging.getLogger("webmap.modules")
 class Extendable:
     """An object that modules extend and that fires triggers on them.
 
-    Any object can be a module. A module is constructed by :meth:`add_module` with its
-    owner as the first argument; a method of it that is named like a trigger is called
-    when the trigger fires. It may be a coroutine function: the others do not wait.
+    Any object can be a module. :meth:`add_module` constructs a module with its owner as
+    the first argument. A method named like a trigger is called when the trigger fires.
+    The method may be a coroutine function; the other modules do not wait for it.
     """
 
     def __init__(self, namespace: Namespace) -> None:
@@ -29,7 +29,7 @@ class Extendable:
         self._scopes: dict[int, Scope] = {}
         self._made: dict[int, tuple[str, tuple[Any, ...], dict[str, Any]]] = {}
         self._destroyed = False
-        """Whether it has ended, so that nobody would ever remove a module of it."""
+        """Whether it was destroyed; modules added later would never be removed."""
 
     def add_module(
         self, name: str | Callable[..., Any], /, *args: Any, **kwargs: Any
@@ -37,18 +37,17 @@ class Extendable:
         """Construct a module and add it.
 
         Args:
-            name: The module's name in the owner's namespace, or what makes it.
-            *args: What the module's constructor gets after its owner.
-            **kwargs: Its arguments by name.
+            name: The module's name in the owner's namespace, or its factory.
+            *args: Positional arguments for the module's constructor, after its owner.
+            **kwargs: Keyword arguments for the module's constructor.
 
         Returns:
             The module, to keep for :meth:`remove_module`.
 
         Raises:
-            ModuleNotFound: If there is no module of that name.
-            ConfigError: If an argument is not of the kind that the module's
-                annotations name; it is a ``TypeError``, too. Or if the owner was
-                destroyed.
+            ModuleNotFound: If the namespace has no module of that name.
+            ConfigError: If an argument has not the type of the module's annotation (the
+                error is also a ``TypeError``), or if the owner was destroyed.
 
         """
         if self._destroyed:
@@ -83,10 +82,10 @@ class Extendable:
         return self._made.get(id(module))
 
     def remove_module(self, module: Any) -> None:
-        """Remove a module: call its ``destroy()`` and release what it made.
+        """Remove a module: call its ``destroy()`` and release its resources.
 
         Raises:
-            ValueError: If the module is not one of this owner's.
+            ValueError: If the module does not belong to this owner.
 
         """
         for index, known in enumerate(self.modules):
@@ -110,20 +109,20 @@ class Extendable:
     def notify_modules(self, trigger: str, /, *args: Any) -> None:
         """Call the method ``trigger`` on every module that has it.
 
-        A module that raises is reported and does not keep the others from hearing.
+        An exception of one module is reported; the other modules are still called.
         """
         for module in tuple(self.modules):
             self._call(module, trigger, args)
 
     def report_error(self, text: str) -> None:
-        """Show people that something of this owner's failed; the log has it."""
+        """Show a failure of this owner to people; the log already has it."""
 
     def set_problem(self, about: object, text: str) -> None:
-        """Show people what goes on failing until :meth:`clear_problem`."""
+        """Show a failure until :meth:`clear_problem`."""
         self.report_error(text)
 
     def clear_problem(self, about: object) -> None:
-        """Note that what was said of ``about`` is true no more."""
+        """Remove the failure shown for ``about``."""
 
     def _failed(self, text: str, about: object) -> None:
         if about is None:

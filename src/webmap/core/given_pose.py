@@ -1,4 +1,4 @@
-"""Poses that a program or a page gives."""
+"""Poses given by a program or a page."""
 
 import sys
 from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
@@ -43,12 +43,12 @@ class Orientation(Protocol):
 def robot_and_pose(
     map: "Map", given: Any
 ) -> "tuple[Robot, float, float, float] | None":
-    """Return which robot of a map a page means, and x, y and yaw.
+    """Return the robot, x, y and yaw that a page sent.
 
     Args:
-        map: The map that the page shows.
+        map: The map of the page.
         given: A table with ``robot``, its id, ``x`` and ``y`` in metres and ``yaw`` in
-            radians; what comes from a page may be anything else.
+            radians. It comes from a page, so it may be anything.
 
     Returns:
         None if the map has no such robot, or a number is missing.
@@ -64,5 +64,5 @@ def robot_and_pose(
 
 
 def _finite(value: object) -> TypeGuard[float]:
-    # A whole number may have more digits than any float has.
+    # An integer may be too large for a float.
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max

@@ -1,4 +1,4 @@
-"""Layers: what is drawn from data once, however many maps show it."""
+"""Layers: drawings of data that all maps share."""
 
 import logging
 from collections.abc import Hashable
@@ -19,9 +19,9 @@ log = logging.getLogger("webmap.layer")
 class Layer:
     """A part of the scene that maps share, kept while at least one map shows it.
 
-    A subclass draws into :attr:`svg` from what it subscribes to in :meth:`start`.
-    Two maps that ask for a layer of the same class with the same arguments get the
-    same one, so what it draws is received, decoded and encoded once.
+    A subclass subscribes in :meth:`start` and draws into :attr:`svg`. Two maps that ask
+    for a layer of the same class with the same arguments share one layer, so its data
+    is received, decoded and encoded once.
     """
 
     _shared: ClassVar[dict[Hashable, "Layer"]] = {}
@@ -34,17 +34,17 @@ class Layer:
         self.scope = Scope(type(self).__name__, self._failed, self.clear_problem)
         self._told = Problems(log)
         self.maps = self._told.maps
-        """Those that hear what fails: see :meth:`show_on`."""
+        """The maps that show the layer's failures; see :meth:`show_on`."""
         self.problems: dict[object, str] = self._told.standing
-        """What fails for now, in sentences, by what they are about."""
+        """Current failures, as sentences, by subject."""
         self._key: Hashable = None
 
     @classmethod
     def shared(cls, *args: Any, **options: Any) -> Self:
-        """Return the layer of this class for these arguments, with one user more.
+        """Return the layer of this class for these arguments, and add a user to it.
 
         Args:
-            *args: Hashable; bridges count by identity.
+            *args: Hashable; bridges are compared by identity.
             **options: Hashable.
 
         """
@@ -69,17 +69,18 @@ class Layer:
         return cls(*args, **options)
 
     def start(self) -> None:
-        """Subscribe to what the layer shows; called once, in the layer's scope."""
+        """Subscribe to the layer's data; called once, in the layer's scope."""
 
     def show_on(self, map: "Map", *, order: float) -> Removal:
-        """Show the layer on a map, and tell the map's page what fails.
+        """Show the layer on a map, and its failures on the map's page.
 
         Args:
-            map: The map; one of the layer's users is its, and goes with it.
-            order: What lies over what: greater is nearer; robots have 100.
+            map: The map. It counts as one user of the layer until it is removed.
+            order: The drawing order: a greater one is drawn above; robots have 100.
 
         Returns:
-            What takes it off the map again; the end of the current scope does, too.
+            The removal that takes the layer off the map; the end of the current scope
+            does the same.
 
         """
         shown = map.add_layer(self, order=order)
@@ -92,21 +93,21 @@ class Layer:
         return keep(Removal(undo))
 
     def set_problem(self, about: object, text: str) -> None:
-        """Note what fails until :meth:`clear_problem`; later viewers see it too.
+        """Show a failure until :meth:`clear_problem`, also to pages opened later.
 
         Args:
-            about: What the sentence is about; a new one takes its place.
+            about: The subject of the failure; a new sentence replaces the old one.
             text: A sentence for people.
 
         """
         self._told.set(about, text)
 
     def clear_problem(self, about: object) -> None:
-        """Note that what was said of ``about`` is true no more."""
+        """Remove the failure shown for ``about``."""
         self._told.clear(about)
 
     def release(self) -> None:
-        """Have one user less; with none left the layer ends."""
+        """Remove one user; without users the layer ends."""
         self.users -= 1
         if self.users == 0:
             self._shared.pop(self._key, None)

@@ -1,4 +1,4 @@
-"""Maps: what one viewer sees, from above."""
+"""Maps: the drawing areas of pages, seen from above."""
 
 from webmap.base.scope import Removal, keep
 from webmap.core.layer import Layer
@@ -15,13 +15,13 @@ ROBOT_ORDER = 100.0
 
 
 class Map(WorldView):
-    """What one viewer sees on one page: a view of the world and the robots in it.
+    """The map on one page: a view of the world and the robots in it.
 
     Args:
         container: The page's element to draw in: ``page.element("webmap_container")``.
         canvas_width: The width in pixels; the container's if not given.
         canvas_height: The height in pixels; the container's if not given.
-        namespace: Where its modules are looked up.
+        namespace: The namespace of its modules.
 
     Raises:
         ConfigError: If the container is on no page, or its page was closed.
@@ -43,7 +43,7 @@ class Map(WorldView):
         self.mount(self._robots, order=ROBOT_ORDER)
         self.selected: Robot | None = None
         self.marked: list[Robot] = []
-        """What is selected besides, for what concerns several; never to be driven."""
+        """Robots selected in addition, for actions on several robots; never driven."""
         self.page.maps.append(self)
         self.page.listen(
             self._mount, self.root, "click", lambda event: self.set_selected(None)
@@ -52,14 +52,14 @@ class Map(WorldView):
     def __repr__(self) -> str:
         return f"<Map of {self.page.viewer.name} with {len(self.robots)} robots>"
 
-    # What it shows.
+    # Contents.
 
     def add_robot(self, robot: Robot) -> None:
         """Show a robot; does nothing if the map shows it already."""
         if robot in self.robots:
             return
         self.robots.append(robot)
-        # A group of their own, so that in CSS :nth-child counts robots.
+        # A group of its own, so that :nth-child in CSS counts robots.
         mount = self.mount(robot.fragment, order=0.0, into=self._robots)
         self.page.listen(
             mount, robot.svg, "click", lambda event: self.pick(robot, event), stop=True
@@ -68,7 +68,7 @@ class Map(WorldView):
         self.notify_modules("on_add_robot", robot)
 
     def remove_robot(self, robot: Robot) -> None:
-        """Show a robot no more; it keeps its topics and its other maps."""
+        """Remove a robot from this map; it keeps its topics and its other maps."""
         if robot not in self.robots:
             return
         if self.selected is robot:
@@ -80,23 +80,23 @@ class Map(WorldView):
         self.notify_modules("on_remove_robot", robot)
 
     def find_robot(self, id: object) -> Robot | None:
-        """Return the robot of this map that has an id, if there is one.
+        """Return the robot of this map with an id, or None.
 
         Args:
-            id: As a page says it, so it may be anything.
+            id: An id sent by a page, so it may be anything.
 
         """
         return next((robot for robot in self.robots if robot.id == id), None)
 
     def add_layer(self, layer: Layer, *, order: float = LAYER_ORDER) -> Removal:
-        """Show a shared layer until the removal that is returned, or the map's end.
+        """Show a shared layer until the returned removal is called or the map ends.
 
         Args:
-            layer: From :meth:`webmap.core.layer.Layer.shared`; given back at the end.
-            order: What lies over what: greater is nearer; robots have 100.
+            layer: From :meth:`webmap.core.layer.Layer.shared`; released at the end.
+            order: The drawing order: a greater one is drawn above; robots have 100.
 
         Raises:
-            WireError: If the map has ended; the layer is given back.
+            WireError: If the map has ended; the layer is released.
 
         """
         try:
@@ -112,7 +112,7 @@ class Map(WorldView):
         return keep(Removal(undo))
 
     def set_selected(self, robot: Robot | None) -> None:
-        """Select a robot of this map, in this viewer's page; None clears.
+        """Select a robot of this map, on this page; None clears the selection.
 
         Raises:
             ValueError: If the map does not show the robot.
@@ -134,9 +134,9 @@ class Map(WorldView):
         self.notify_modules("on_select")
 
     def set_marked(self, robot: Robot, on: bool) -> None:
-        """Select a robot besides the selected one, or no more; fires ``on_mark``.
+        """Mark or unmark a robot in addition to the selected one; fires ``on_mark``.
 
-        Selecting a robot by :meth:`set_selected` ends that for every other.
+        :meth:`set_selected` unmarks all robots.
 
         Raises:
             ValueError: If the map does not show the robot.
@@ -151,32 +151,32 @@ class Map(WorldView):
         self.notify_modules("on_mark")
 
     def toggle_marked(self, robot: Robot) -> None:
-        """Mark a robot or no more; the first one is selected."""
+        """Mark or unmark a robot; select it if no robot is selected."""
         if self.selected is None:
             self.set_selected(robot)
         else:
             self.set_marked(robot, robot not in self.marked)
 
     def pick(self, robot: Robot, event: Event) -> None:
-        """Select a robot that was clicked, or mark it if Shift was held."""
+        """Select a clicked robot, or toggle its mark if Shift was pressed."""
         if event.shift:
             self.toggle_marked(robot)
         else:
             self.set_selected(robot)
 
     def follow(self, robot: Robot | None) -> None:
-        """Keep a robot where it is on the screen, until the viewer moves the view.
+        """Keep a robot in place on the page until the viewer moves the view.
 
-        A robot that is out of sight is brought to the middle first.
+        A robot that is out of sight is first brought to the centre.
         """
         if robot is not None:
             self._bring_into_sight(robot)
         self._operate("follow", 0 if robot is None else robot.svg.id)
 
-    # Its end.
+    # Removal.
 
     def destroy(self) -> None:
-        """Remove modules in reverse order, the robots, and the map itself."""
+        """Remove modules in reverse order, then the robots, then the map."""
         if self._destroyed:
             return
         self._destroyed = True

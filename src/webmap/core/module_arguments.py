@@ -1,9 +1,9 @@
-"""Whether a module takes the arguments that it is given, by its own annotations.
+"""Check of a module's arguments against its annotations.
 
-Who adds a module from a file or from a program makes the same mistakes: a number in
-quotes, a topic where the bridge should be, a key with a typing error. They are found
-here, before the module is made, so that no module needs checks of kinds, and the way
-to each wrong argument is known to who reads a file.
+Modules added from a file and from a program get the same wrong arguments: a number in
+quotes, a topic in place of the bridge, a misspelt key. They are found here, before the
+module is created, so modules need no type checks of their own, and the path of each
+wrong argument is known to the reader of a file.
 """
 
 import inspect
@@ -30,13 +30,13 @@ from webmap.config.checks import did_you_mean
 from webmap.ros.names import normalise_topic
 
 Way: TypeAlias = tuple[str | int, ...]
-"""Keys and indices on the way to a value."""
+"""Keys and indices that lead to a value."""
 
 Misfit: TypeAlias = tuple[Way, Any, str]
-"""The way to a value that does not fit, the value, and what was expected."""
+"""The path of a value of the wrong type, the value, and the expected type."""
 
 _PLAIN = (str, bytes, int, float, list, tuple, dict, type(None))
-"""What files are made of; anything else its taker knows better than we do."""
+"""Types that files consist of; only values of these types are checked."""
 
 _NAMES = {
     bool: "true or false",
@@ -49,10 +49,10 @@ _NAMES = {
 
 
 def resolved(annotation: Any, owner: Callable[..., Any]) -> Any:
-    """Return an annotation that may be a text as what it means.
+    """Return the type of an annotation that may be a string.
 
-    A name that only a type checker knows stands for a class of its own: no plain value
-    is one.
+    A name that only a type checker knows becomes a class of its own, which no plain
+    value is an instance of.
     """
     if not isinstance(annotation, str):
         return annotation
@@ -65,17 +65,17 @@ def resolved(annotation: Any, owner: Callable[..., Any]) -> Any:
         except NameError as error:
             name = str(error.name)
             names[name] = type(name, (), {"__module__": "typing"})
-        except Exception:  # what somebody else wrote there may be no type at all
+        except Exception:  # an annotation may be no type at all
             return Any
     return Any
 
 
 def misfit(annotation: Any, value: Any) -> Misfit | None:
-    """Return what of a value is not of the kind that an annotation names, if any.
+    """Return the part of a value that does not match an annotation, or None.
 
     Args:
-        annotation: A type, as a signature has it once its texts are resolved.
-        value: Anything. An object of a class of its own passes for another class.
+        annotation: A type from a signature, with its strings resolved.
+        value: Any value. An instance of a custom class passes for another class.
 
     """
     origin, inner = get_origin(annotation), get_args(annotation)
@@ -107,11 +107,11 @@ def _is_one(annotation: Any, value: Any) -> bool:
     try:
         if isinstance(value, annotation):
             return True
-    except TypeError:  # a protocol that cannot be asked
+    except TypeError:  # a protocol without runtime checks
         return True
     if getattr(annotation, "_is_protocol", False):
         return True
-    if issubclass(annotation, Mapping):  # a table with types for its keys, too
+    if issubclass(annotation, Mapping):  # a table whose annotation names key types
         return isinstance(value, Mapping)
     if annotation is str or annotation is bytes:
         return False
@@ -119,9 +119,9 @@ def _is_one(annotation: Any, value: Any) -> bool:
 
 
 def _unusable(value: Any) -> bool:
-    """Tell whether it is a whole number of hundreds of digits, which is no float.
+    """Return whether a value is an integer too large for a float.
 
-    NaN and infinity are floats; what they would mean, their taker says better.
+    NaN and infinity are floats; the module that takes the value checks them.
     """
     try:
         math.isnan(value)
@@ -159,7 +159,7 @@ def _of_many(
         if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
             return wrong
         if not isinstance(value, list | tuple):
-            return None  # going through it might use it up
+            return None  # iterating might consume it
         return _first((at, misfit(inner[0], each)) for at, each in enumerate(value))
     if issubclass(origin, Callable):  # type: ignore[arg-type]
         return None if callable(value) else wrong
@@ -211,28 +211,28 @@ _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONL
 
 @dataclass(frozen=True, slots=True)
 class WrongArgument:
-    """An argument that a module does not take."""
+    """An argument that a module does not accept."""
 
     way: Way
-    """``("args", 1)`` or ``("options", "throttle")``, and on into a list or a table;
-    empty if it is about all of them."""
+    """``("args", 1)`` or ``("options", "throttle")``, followed by the path into a list
+    or a table; empty if it is about all arguments."""
 
     words: str
-    """What was expected, or what is wrong."""
+    """What was expected, or the error."""
 
     name: str = ""
-    """What the module calls it."""
+    """The name of the module's parameter."""
 
     got: tuple[Any, ...] = ()
-    """The value, if ``words`` say what was expected in its place."""
+    """The value, if ``words`` is what was expected."""
 
 
 class WrongArguments(ConfigError, TypeError):
-    """A module does not take its arguments.
+    """The arguments of a module are wrong.
 
     Args:
         module: The module's name.
-        wrong: All that is wrong.
+        wrong: All wrong arguments.
 
     """
 
@@ -249,23 +249,23 @@ def check_arguments(
     *,
     first: int = 0,
 ) -> None:
-    """Let arguments pass that are of the kinds that a module's annotations name.
+    """Check arguments against the annotations of a module.
 
     Args:
-        factory: What makes the module; its first parameter is the owner.
-        args: What it gets after its owner.
-        options: Its arguments by name.
-        first: The number of the first of ``args`` for people, where they were passed
-            on after others.
+        factory: The module's class or factory; its first parameter is the owner.
+        args: The positional arguments after the owner.
+        options: The keyword arguments.
+        first: The number of the first of ``args`` in error messages, if it is not the
+            caller's first argument.
 
     Raises:
-        WrongArguments: If one is not.
+        WrongArguments: If an argument does not match.
 
     """
     try:
         signature = inspect.signature(factory)
     except (TypeError, ValueError):
-        return  # written in C; it says itself what it takes
+        return  # written in C, checks its arguments itself
     found = list(_wrong(factory, signature, args, options, first))
     if not found:
         try:
@@ -295,7 +295,7 @@ def _wrong(
             yield from _one(factory, parameter, value, ("args", first + place))
     placed = {each.name for each in by_place[: len(args)]}
     every = signature.parameters.values()
-    # The owner comes by its place, and by its name nobody else can.
+    # The owner is passed by position; its name is not free for another argument.
     owner = {each.name for each in every if each.kind in _NAMED} - set(by_name)
     for name, value in options.items():
         parameter = by_name.get(name, None if name in owner else others)
@@ -324,8 +324,8 @@ def _one(
         name = str(way[1]) if many else parameter.name
         yield WrongArgument((*way, *deeper), expected, name, (got,))
     elif parameter.name == "topic" and isinstance(value, str):
-        # The name means the same in every module, and a bad one would be found only
-        # when the topic is subscribed to, which may be when the first page is opened.
+        # The parameter means the same in every module. A bad name would otherwise be
+        # found only on subscription, which may be when the first page opens.
         try:
             normalise_topic(value)
         except ConfigError:
@@ -342,7 +342,7 @@ def _after_owner(signature: inspect.Signature) -> list[inspect.Parameter]:
 
 
 def _names(signature: inspect.Signature) -> str:
-    # Without its annotation and default, a parameter shows its name and its stars.
+    # Without annotation and default, a parameter shows its name and its stars.
     empty = inspect.Parameter.empty
     listed = _after_owner(signature)
     names = [str(each.replace(annotation=empty, default=empty)) for each in listed]

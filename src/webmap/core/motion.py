@@ -1,4 +1,4 @@
-"""The road of one robot's commands to the gate, and the gate's word of it."""
+"""The commands of one robot to the gate, and the gate's reports on it."""
 
 import logging
 import math
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.robot")
 
 ASK_WRITERS = 10.0
-"""Seconds between two questions to a bridge who publishes velocities to a robot."""
+"""Seconds between two queries of a bridge for other publishers of velocities."""
 
 PARTS: dict[str, type[Config]] = {
     "twist": TwistConfig,
@@ -51,13 +51,13 @@ PARTS: dict[str, type[Config]] = {
 """The parts of a robot's motion."""
 
 WRITING = ("twist", "move", "initial_pose")
-"""Those for which the gate writes; the first that a robot has names its bridge."""
+"""The parts that the gate writes for; the first one of a robot sets its bridge."""
 
 OF_BASE = sorted(
     set(TwistConfig.__struct_fields__)
     & set(RobotSpec.__struct_fields__) - {"stop_hooks"}
 )
-"""What the gate knows of a base by the names that the configuration has."""
+"""The fields of a base that configuration and gate share."""
 
 Links: TypeAlias = dict[str, Bridge | None]
 """The bridge of each part."""
@@ -66,10 +66,10 @@ _used: Counter[str] = Counter()
 
 
 def _id_of(name: str) -> str:
-    """Return what pages and gate call a robot of that name.
+    """Return the identifier of a robot for pages and gate.
 
-    It is the same after a restart, in whatever order robots are made: a page may still
-    have to say a STOP that it could not get rid of before.
+    It is the same after a restart, in whatever order robots are created: a page may
+    still have to send a STOP that it could not deliver before.
     """
     id = f"r{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     _used[id] += 1
@@ -77,22 +77,23 @@ def _id_of(name: str) -> str:
 
 
 class MotionRoad:
-    """What the gate is told about one robot, kept true as topics come and go.
+    """The gate's description of one robot, updated as topics change.
 
-    Nothing here writes to a robot: everything is handed to the gate, which decides.
+    It also passes the robot's commands to the gate. Nothing here writes to a robot; the
+    gate decides.
     """
 
     gate: "GateClient | None" = None
-    """The one gate of this process, once it is started."""
+    """The gate of this process, once it is started."""
 
     def __init__(self, name: str, complain: Any) -> None:
         self.id = _id_of(name)
         self.base_frame = ""
-        """The robot's own frame; the gate hears of a change."""
+        """The robot's own frame; a change is sent to the gate."""
         self._name = name
         self._complain = complain
         self.config = MotionConfig()
-        """What moves the robot; :meth:`set` changes it."""
+        """The configuration of the robot's motion; changed by :meth:`set`."""
         self._bridges: Links = {}
         self._odometry: tuple[Bridge, str, str | None] | None = None
         self._own_map = Pose()
@@ -102,7 +103,7 @@ class MotionRoad:
 
     @property
     def axes(self) -> Axes:
-        """The axes out of the plane that the robot moves along, and how fast."""
+        """The axes out of the plane along which the robot moves, with their limits."""
         twist = self.config.twist
         if twist is None:
             return PLANE
@@ -115,12 +116,12 @@ class MotionRoad:
 
         Args:
             key: The part, a field of ``MotionConfig``.
-            values: What it says, as plain values; None clears it. What is empty where
-                that is the default counts as left out.
-            bridge: The bridge that it goes over, if it goes over one.
+            values: The part's plain values; None clears the part. An empty value counts
+                as left out where that is the default.
+            bridge: The bridge of the part, if it has one.
 
         Raises:
-            ConfigError: If something in it cannot be meant; every mistake is named.
+            ConfigError: If a value is not valid; the message lists every mistake.
 
         """
         part = None
@@ -147,16 +148,16 @@ class MotionRoad:
             self._asking = TypeAsking(bridge, twist.topic, self._take_type)
 
     def bridge(self, key: str) -> Bridge | None:
-        """Return the bridge that a part of the configuration goes over, if any."""
+        """Return the bridge of a part of the configuration, or None."""
         return self._bridges.get(key)
 
     def set_odometry(self, bridge: Bridge, topic: str, type: str | None) -> None:
-        """Tell where the gate can see for itself how the robot moves.
+        """Set the odometry in which the gate observes the robot's motion.
 
         Args:
-            bridge: The link to the ROS system that has the topic.
+            bridge: The connection to the ROS system that has the topic.
             topic: The topic.
-            type: Its type; None as long as nobody knows it.
+            type: Its type; None while it is unknown.
 
         """
         if self._odometry != (bridge, topic, type):
@@ -164,19 +165,19 @@ class MotionRoad:
             self.declare()
 
     def set_alignment(self, own_map: Pose) -> None:
-        """Tell where the robot's own map lies on the common one: goals need it."""
+        """Set the alignment of the robot's own map, which goals need."""
         if own_map != self._own_map:
             self._own_map = own_map
             self.declare()
 
     def clear_odometry(self) -> None:
-        """Tell that there is no such topic any more."""
+        """Clear the odometry topic."""
         if self._odometry is not None:
             self._odometry = None
             self.declare()
 
     def declare(self) -> None:
-        """Tell the gate what it needs to know of this robot, as it is now."""
+        """Send the gate its current description of this robot."""
         if self.gate is None:
             return
         spec = self.spec()
@@ -186,7 +187,7 @@ class MotionRoad:
             self.gate.declare(spec)
 
     def declare_or_complain(self) -> None:
-        """Tell the gate likewise; what it does not take is said of this robot alone."""
+        """Send the description; an error is shown for this robot only."""
         try:
             self.declare()
         except Exception as error:
@@ -194,11 +195,11 @@ class MotionRoad:
             self._complain(f"it cannot be moved: {error}")
 
     def spec(self) -> RobotSpec | None:
-        """Return what the gate needs to know, or None if nothing moves the robot."""
+        """Return the gate's description, or None if nothing moves the robot."""
         return self._spec(self.config, self._bridges)
 
     def _check(self, config: MotionConfig, bridges: "Links") -> None:
-        """Refuse what the gate would refuse, before any of it is kept.
+        """Raise what the gate would refuse, before any of it is stored.
 
         The error is raised where the part is set, not where the gate is started.
         """
@@ -258,10 +259,10 @@ class MotionRoad:
         )
 
     def writes(self, url: str) -> dict[str, str]:
-        """Return what the gate alone writes over a bridge: topics, and what they carry.
+        """Return the topics that only the gate writes over a bridge, with contents.
 
         Args:
-            url: The address of the bridge.
+            url: The URL of the bridge.
 
         """
         written: dict[str, str] = {}
@@ -272,25 +273,25 @@ class MotionRoad:
         return written
 
     def close(self) -> None:
-        """Let the gate forget the robot; it stops if it was driven."""
-        # All at once: without velocity it would be another machine, for its goals.
+        """Remove the robot from the gate; it stops if it was driven."""
+        # All at once: for its goals, a robot without velocity would be another one.
         self.config, self._odometry = MotionConfig(), None
         self.set("twist", None)
         roads.discard(self)
 
     def take(self) -> "Future[int]":
-        """Ask for the lease on behalf of this program."""
+        """Request control for this program."""
         return self._gate().take(self.id)
 
     def release(self) -> None:
-        """Give the program's lease back; the robot is stopped."""
+        """Release the program's control; the robot is stopped."""
         self._gate().release(self.id)
 
     def twist(self, twist: Twist) -> None:
-        """Hand one velocity to the gate, as this program.
+        """Send the gate one velocity command of this program.
 
         Raises:
-            MotionError: If the twist topic states no limit for an axis that it names.
+            MotionError: If the twist topic has no limit for an axis of the command.
 
         """
         gate = self._gate()
@@ -299,23 +300,23 @@ class MotionRoad:
         gate.twist(self.id, twist)
 
     def move(self, x: float, y: float, yaw: float) -> None:
-        """Hand one goal to the gate, as this program."""
+        """Send the gate one goal of this program."""
         self._gate().move(self.id, x, y, yaw)
 
     def locate(self, x: float, y: float, yaw: float) -> None:
-        """Hand to the gate where the robot is, as this program."""
+        """Send the gate the robot's pose, from this program."""
         self._gate().locate(self.id, x, y, yaw)
 
     def cancel(self) -> None:
-        """Have the gate call off the robot's goals."""
+        """Cancel the robot's goals through the gate."""
         self._gate().cancel(self.id)
 
     def stop(self) -> None:
-        """Have the gate stop the robot, whoever drives it."""
+        """Stop the robot through the gate, no matter who has control."""
         self._gate().stop_robot(self.id)
 
     def reset_stop(self, report: RobotReport | None) -> None:
-        """Have the gate end the STOP that a report tells of."""
+        """End the STOP in a report through the gate."""
         gate = self._gate()
         stop = None if report is None else report.stop
         if stop is None:
@@ -326,7 +327,7 @@ class MotionRoad:
         gate.reset(self.id, stop.id)
 
     def heed(self, report: RobotReport) -> None:
-        """Ask who else publishes velocities to the robot, while somebody does."""
+        """Query the names of other publishers while another program is driving."""
         twist, now = self.config.twist, time.monotonic()
         if report.other_writer is None or twist is None:
             self._ask_writers_at = now
@@ -368,7 +369,7 @@ class MotionRoad:
 
 
 def _written(part: object) -> dict[str, str]:
-    """Return what the gate alone writes for a part: topics, and what each carries."""
+    """Return the topics that only the gate writes for a part, with their contents."""
     match part:
         case TwistConfig():
             hooks = {hook.topic: STOP for hook in part.stop_hooks if hook.topic}
@@ -388,13 +389,13 @@ def _written(part: object) -> dict[str, str]:
 
 
 def _goal_type(move: MoveConfig | None, name: str) -> str:
-    """Return a type of ``geometry_msgs`` as the dialect of the action has it."""
+    """Return a type of ``geometry_msgs`` in the form of the action's ROS version."""
     ros2 = move is not None and move.action and "/action/" in move.action_type
     return f"geometry_msgs/msg/{name}" if ros2 else f"geometry_msgs/{name}"
 
 
 def _assist(config: ScanAssistConfig) -> AssistSpec:
-    """Return scan assist as the gate takes it: a radius becomes corners."""
+    """Return the gate's form of scan assist: a radius becomes corners."""
     size = config.footprint
     corners = polygon_around(size) if isinstance(size, float) else tuple(size)
     return AssistSpec(
@@ -411,4 +412,4 @@ def _assist(config: ScanAssistConfig) -> AssistSpec:
 
 
 roads: set[MotionRoad] = set()
-"""The roads of all robots there are; declared anew when the gate starts."""
+"""Those of all robots; declared again when the gate starts."""

@@ -1,4 +1,4 @@
-"""Pages: what a viewer opens, and what the rest of WebMap asks of one."""
+"""Pages: the open browser tabs, and their interface for the rest of WebMap."""
 
 import inspect
 import logging
@@ -29,7 +29,7 @@ log = logging.getLogger("webmap.page")
 
 
 class HandSpeeds:
-    """The most that each module of a page asks for, and the module the hands are at."""
+    """The greatest speeds of a page's modules, and the module with active input."""
 
     def __init__(self) -> None:
         self._most: dict[int, tuple[float, float]] = {}
@@ -37,10 +37,10 @@ class HandSpeeds:
 
     @property
     def in_force(self) -> tuple[float, float]:
-        """What holds now, in m/s and rad/s.
+        """The greatest speeds that the page asks for now, in m/s and rad/s.
 
-        That of the module that the hands are at; the least of all while they are at
-        none; zero if there is no module that drives.
+        They are those of the module with active input; without active input, the lowest
+        of all modules; zero without a module that drives.
         """
         if not self._most:
             return (0.0, 0.0)
@@ -50,18 +50,18 @@ class HandSpeeds:
         return (min(linear), min(angular))
 
     def set(self, module: object, speed: float, rotation_speed: float) -> None:
-        """Note that a module drives, and how fast at the most."""
+        """Set the greatest speeds of a module that drives."""
         self._most[id(module)] = (speed, rotation_speed)
 
     def drive(self, module: object, on: bool) -> None:
-        """Note that the hands are at a module, or left it."""
+        """Set whether a module has active input."""
         if on:
             self._driving = id(module)
         elif self._driving == id(module):
             self._driving = None
 
     def clear(self, module: object) -> None:
-        """Note that a module drives no more."""
+        """Remove a module that no longer drives."""
         self._most.pop(id(module), None)
         self.drive(module, False)
 
@@ -71,21 +71,21 @@ PageFunction = Callable[["Page"], Any]
 
 @dataclass(frozen=True, slots=True)
 class Viewer:
-    """One browser that has signed in; all its pages and tabs are one viewer."""
+    """One browser that has signed in; all its pages are one viewer."""
 
     id: str
-    """Opaque, the same for as long as the browser stays signed in."""
+    """Opaque; the same while the browser stays signed in."""
 
     name: str
-    """What other people read when this viewer drives."""
+    """The name shown to others when this viewer has control."""
 
     role: Role = "operator"
-    """What the viewer may do: look, drive, or administer."""
+    """What the viewer may do: watch, drive, or administer."""
 
 
 @dataclass(frozen=True, slots=True)
 class PageEntry:
-    """A URL, and the function that builds a page for each viewer that opens it."""
+    """A path, and the function that builds a page for each viewer that opens it."""
 
     path: str
     function: PageFunction
@@ -103,17 +103,17 @@ class Site:
     def page(
         self, path: str, *, html: str | Path | None = None, title: str = "WebMap"
     ) -> Callable[[PageFunction], PageFunction]:
-        """Build a page for each viewer that opens ``path``; a decorator.
+        """Build a page for each viewer that opens ``path`` (decorator).
 
         Args:
-            path: Where the page is, from the application's root: ``"/"``, ``"/lab"``.
-            html: The HTML file to serve, from the script's folder; a page with one
-                container, ``webmap_container``, is made if not given. Files beside
-                it can be loaded by the page.
-            title: The title of a page that is made.
+            path: The path of the page from the application's root: ``"/"``, ``"/lab"``.
+            html: The HTML file to serve, relative to the script's folder; if not given,
+                a page with one container, ``webmap_container``, is generated. The page
+                can load the files in the same folder.
+            title: The title of a generated page.
 
         Raises:
-            ConfigError: If the path is not one, or the HTML file does not exist.
+            ConfigError: If the path is not valid, or the HTML file does not exist.
 
         """
         if not re.fullmatch(r"/[A-Za-z0-9._~/-]*", path) or path.startswith("/_webmap"):
@@ -142,17 +142,17 @@ site = Site()
 
 
 MADE_PAGE_MODULES = ("MetreGrid", "MouseViewControl")
-"""Modules that maps have on a page that WebMap makes."""
+"""Modules that maps get on a generated page."""
 
 MADE_PAGE_SCALE = 20.0
 """Pixels per metre of such a map, unless the page function chooses a view."""
 
 Key = tuple[int, int, str]
-"""What is listened to: a mount, an element of it and an event."""
+"""The target of a listener: a mount, one of its elements and an event."""
 
 
 class Page:
-    """One page that one viewer has open; made for each, and gone with it."""
+    """One page of one viewer; created when it opens, and removed when it closes."""
 
     def __init__(
         self,
@@ -182,7 +182,8 @@ class Page:
         """Return the page's own element with this ``id``, to fill and to listen to.
 
         Args:
-            id: The ``id`` in the page's HTML. If the page has none, the page says so.
+            id: The ``id`` in the page's HTML. If the HTML has none, the page shows an
+                error.
 
         """
         return self._document.bind(id)
@@ -194,10 +195,10 @@ class Page:
         return (0.0, 0.0)
 
     def complete(self) -> None:
-        """Complete the maps of the page if WebMap makes the page's HTML.
+        """Complete the maps of a page whose HTML WebMap generates.
 
-        Each gets the modules of ``MADE_PAGE_MODULES`` that the page function did not
-        add, and a view if the page function chose none.
+        Each map gets the modules of ``MADE_PAGE_MODULES`` that the page function did
+        not add, and a view if the page function set none.
         """
         for map in self.maps if self.entry.html is None else ():
             if map.world.tf == initial_view(map.canvas_width, map.canvas_height):
@@ -220,10 +221,10 @@ class Page:
         return removal
 
     def image(self, href: str) -> str:
-        """Return the URL by which the page can load an image, until the page's end.
+        """Return a URL by which the page can load an image until the page closes.
 
         Args:
-            href: A file of the page's folder, or an absolute path.
+            href: A file in the page's folder, or an absolute path.
 
         Raises:
             ConfigError: If the file does not exist, lies outside the folder or is no
@@ -233,13 +234,13 @@ class Page:
         return self.publish_image(href)[0]
 
     def publish_image(self, href: str) -> tuple[str, Removal]:
-        """Return such a URL of an image, and what lets nobody load it any more.
+        """Return a URL of an image, and the removal that withdraws it.
 
         Args:
-            href: A file of the page's folder, or an absolute path.
+            href: A file in the page's folder, or an absolute path.
 
         Raises:
-            ConfigError: As :meth:`image` does.
+            ConfigError: Like :meth:`image`.
 
         """
         url = self.publisher.publish_image(self.image_file(href))
@@ -256,7 +257,7 @@ class Page:
         """Return the path of an image, which may not exist.
 
         Args:
-            href: A file of the page's folder, or an absolute path.
+            href: A file in the page's folder, or an absolute path.
 
         Raises:
             ConfigError: If it lies outside the folder.
@@ -275,25 +276,25 @@ class Page:
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """What this page's hands may ask for at most, in m/s and rad/s.
+        """The greatest speeds that the page asks for now, in m/s and rad/s.
 
-        Those of the module that the hands are at; the least of all while they are at
-        none; zero if there is no module that drives.
+        They are those of the module with active input; without active input, the lowest
+        of all modules; zero without a module that drives.
         """
         return self._speeds.in_force
 
     def set_speeds(self, module: object, speed: float, rotation_speed: float) -> None:
-        """Note that a module of this page drives, and how fast at the most."""
+        """Set the greatest speeds of a module of this page that drives."""
         self._speeds.set(module, speed, rotation_speed)
         self._tell_speeds()
 
     def set_driving(self, module: object, on: bool) -> None:
-        """Note that the page's hands are at a module that drives, or left it."""
+        """Set whether a module that drives has active input."""
         self._speeds.drive(module, on)
         self._tell_speeds()
 
     def clear_speeds(self, module: object) -> None:
-        """Note that a module drives no more."""
+        """Remove a module that no longer drives."""
         self._speeds.clear(module)
         self._tell_speeds()
 
@@ -313,7 +314,7 @@ class Page:
     ) -> Removal:
         """Call ``handler`` for an event of an element in this page only.
 
-        It ends with the removal that is returned, the current scope or the page.
+        It ends with the returned removal, the current scope or the page.
         """
         key = (mount, element.id, event)
         scope = current_scope()
@@ -332,7 +333,7 @@ class Page:
         return listener.removal
 
     def _set_listening(self, key: Key, listeners: tuple[Listener, ...]) -> None:
-        """Note who listens, and tell the browser if it is to do something else."""
+        """Set the listeners of an event, and update the browser if needed."""
         asked = _flags(listeners)
         if asked != _flags(self._listening.get(key, ())):
             if asked is None:
@@ -346,7 +347,7 @@ class Page:
             self._listening.pop(key, None)
 
     def forget_mount(self, mount: int) -> None:
-        """Let nobody hear of a mount that is taken away."""
+        """Remove all listeners of a mount."""
         for key in [key for key in self._listening if key[0] == mount]:
             for listener in self._listening.pop(key):
                 listener.forget()
@@ -355,14 +356,14 @@ class Page:
         """Return the URL of an ES module or a style sheet.
 
         Args:
-            file: The name of one that comes with WebMap, as
-                ``"features/drive/teleop.js"``, or the path of a file.
+            file: The name of a file of WebMap, such as ``"features/drive/teleop.js"``,
+                or a path.
 
         """
         return file if isinstance(file, str) else self.publisher.publish_file(file)
 
     def dispatch(self, mount: int, element: Element, event: Event) -> None:
-        """Call who listens: the element's owner, then this viewer's own listeners."""
+        """Call the listeners: the element's own, then those of this page."""
         element.dispatch(event, self._failed, self._begin)
         for listener in self._listening.get((mount, element.id, event.kind), ()):
             listener.call(event, self._failed, self._begin)
@@ -376,7 +377,7 @@ class Page:
             self.notice(f"A handler failed: {type(error).__name__}: {error}")
 
     def close(self) -> None:
-        """End the page: destroy its maps and release all that was made for it."""
+        """Close the page: destroy its maps and release its resources."""
         if self.closed:
             return
         self.closed = True
@@ -389,7 +390,7 @@ class Page:
 
 
 def _flags(listeners: Sequence[Listener]) -> tuple[bool, bool] | None:
-    """Return whether any of them prevents, and any stops; None if nobody listens."""
+    """Return whether any prevents and any stops; None without listeners."""
     if not listeners:
         return None
     return any(i.prevent for i in listeners), any(i.stop for i in listeners)

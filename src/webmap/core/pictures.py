@@ -1,4 +1,4 @@
-"""Images that are drawn in this process and shown by URL, without any file.
+"""Images that this process draws and serves by URL, without files.
 
 The model's thread publishes and the web thread serves, hence the lock.
 """
@@ -15,20 +15,20 @@ from webmap.base.scope import Removal, keep
 from webmap.scene import svg
 
 KEPT_FOR = 3.0
-"""Seconds for which a picture is served after another took its place."""
+"""Seconds for which a picture is still served after it was replaced."""
 
 MOST_KEPT = 64
-"""How many of them, so that what changes often does not pile up."""
+"""The greatest number of such pictures, a bound for pictures that change often."""
 
 RETIRED_BYTES = 8 << 20
-"""The most bytes of retired pictures that pages may still load."""
+"""The greatest total size of retired pictures that pages may still load, in bytes."""
 
 PREFIX = "/_webmap/images/"
-"""How the URL of every image begins that has no name of its own."""
+"""The start of the URL of every image without a name."""
 
 
 def pixels_across(file: Path) -> int | None:
-    """Return how many pixels wide an image is; None if its file does not tell."""
+    """Return the width of an image in pixels; None if its file cannot be read."""
     from PIL import Image
 
     try:
@@ -39,13 +39,13 @@ def pixels_across(file: Path) -> int | None:
 
 
 class Publisher(Protocol):
-    """Gives files URLs that a page can load; the server implements it."""
+    """Gives files a URL that pages can load; implemented by the server."""
 
     def publish_file(self, path: Path) -> str:
-        """Let pages load an ES module or a style sheet; return its URL."""
+        """Publish an ES module or a style sheet and return its URL."""
 
     def publish_image(self, image: Path) -> str:
-        """Let pages load an image; return the URL of this version of it."""
+        """Publish an image and return the URL of this version of it."""
 
     def withdraw_image(self, url: str) -> None:
         """Undo one :meth:`publish_image`."""
@@ -57,18 +57,18 @@ class Published(NamedTuple):
     data: bytes
     media_type: str
     fleeting: bool = False
-    """Whether another takes its place at once, so that no browser need keep it."""
+    """Whether it is replaced at once, so that browsers need not cache it."""
 
 
 class Pictures:
-    """Images by what is in them: the same content has the same URL."""
+    """Images by content: the same content has the same URL."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._images: dict[str, Published] = {}
         self._uses: dict[str, int] = {}
         self._retired: dict[str, tuple[Published, float]] = {}
-        """For each tag the image and when it was retired, the oldest first."""
+        """The image and the time of retirement for each tag, the oldest first."""
 
     def __len__(self) -> int:
         return len(self._images)
@@ -76,8 +76,8 @@ class Pictures:
     def publish(
         self, data: bytes, media_type: str = "image/png", *, fleeting: bool = False
     ) -> str:
-        """Let pages load an image until it was withdrawn as often; return its URL."""
-        # The quickest that cannot be forged; the data may be a large map.
+        """Publish an image until it was withdrawn as often; return its URL."""
+        # The fastest hash that cannot be forged; the data may be a large map.
         found = hashlib.blake2b(media_type.encode() + b"\0", digest_size=16)
         found.update(data)
         tag = found.hexdigest()
@@ -87,7 +87,7 @@ class Pictures:
         return PREFIX + tag
 
     def withdraw(self, url: str) -> None:
-        """Undo one :meth:`publish`; an unknown URL does nothing."""
+        """Undo one :meth:`publish`; does nothing for an unknown URL."""
         tag = url.removeprefix(PREFIX)
         with self._lock:
             uses = self._uses.pop(tag, 0) - 1
@@ -97,9 +97,9 @@ class Pictures:
                 self._images.pop(tag, None)
 
     def retire(self, url: str) -> None:
-        """Withdraw an image, but let pages load it for ``KEPT_FOR`` seconds more.
+        """Withdraw an image, but serve it for ``KEPT_FOR`` seconds more.
 
-        A page that is a little behind still asks for what is no longer shown.
+        A page with a slow connection may still request it.
         """
         now, tag = time.monotonic(), url.removeprefix(PREFIX)
         image = self.get(tag)
@@ -117,7 +117,7 @@ class Pictures:
                 size -= len(old.data)
 
     def get(self, tag: str) -> Published | None:
-        """Return the image whose URL ends in ``tag``, if pages may load it."""
+        """Return the image whose URL ends in ``tag``; None if pages may not load it."""
         with self._lock:
             if tag in self._images:
                 return self._images[tag]
@@ -126,13 +126,13 @@ class Pictures:
 
 
 pictures = Pictures()
-"""What the layers of this process have drawn."""
+"""The pictures that the layers of this process drew."""
 
 
 class Picture:
-    """An ``<image>`` in the world whose content is drawn here, again and again.
+    """An ``<image>`` in the world whose content this process draws repeatedly.
 
-    It ends with the scope that it was made in.
+    It ends with the scope in which it was created.
     """
 
     def __init__(self) -> None:
@@ -143,15 +143,15 @@ class Picture:
     def show(
         self, data: bytes, matrix: Affine, width: float, height: float, cell: float
     ) -> None:
-        """Show a PNG in place of the one before.
+        """Replace the picture by a PNG.
 
         Args:
             data: The PNG.
-            matrix: From the image, in metres with x right and y down from its top
-                left corner, to what the element is in.
+            matrix: The transform from the image, in metres with x right and y down from
+                its top left corner, to the parent of the element.
             width: In metres.
             height: In metres.
-            cell: How wide one of its pixels is, in metres.
+            cell: The width of one of its pixels, in metres.
 
         """
         now = time.monotonic()
@@ -159,7 +159,7 @@ class Picture:
         self.element.set(href=self._urls[-1][0], width=width, height=height)
         self.element.set("data-cell", cell)
         self.element.set_matrix(matrix)
-        # A page that is a little behind still asks for those before.
+        # A page with a slow connection may still request earlier pictures.
         while len(self._urls) > 2 and (
             now - self._urls[0][1] > KEPT_FOR or len(self._urls) > MOST_KEPT
         ):

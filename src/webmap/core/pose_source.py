@@ -1,7 +1,7 @@
-"""Hears where a robot is, by a topic and by frames, and has its poses shown.
+"""Receives a robot's poses from a topic and from TF.
 
-What follows from a message is decided in :mod:`webmap.poses.pipeline`; here are the
-subscriptions, the clock and the alignment.
+:mod:`webmap.poses.pipeline` processes the messages; here are the subscriptions, the
+clock and the alignment.
 """
 
 import time
@@ -24,31 +24,31 @@ if TYPE_CHECKING:
 
 
 class PoseSource:
-    """Brings a robot's poses from where they come to the common map.
+    """Receives a robot's poses and puts them on the common map.
 
     Args:
-        robot: The robot, which shows its poses and what is wrong with them.
+        robot: The robot, which shows its poses and their problems.
 
     """
 
     def __init__(self, robot: "Robot") -> None:
         self.pipeline = PosePipeline()
         self.feed: OdometryFeed | None = None
-        """The topic, if there is one."""
+        """The odometry topic, if there is one."""
         self.frames: Frames | None = None
-        """What poses are placed by; None to take them as they come."""
+        """The frames that place the poses; None to use poses without a transform."""
         self.bridge: Bridge | None = None
-        """The link that poses come over."""
+        """The bridge of the poses."""
         self.own_alignment: Pose | None = None
-        """The robot's own alignment; None if it goes with its bridge."""
+        """The robot's own alignment; None to use that of its bridge."""
         self.alignment = HERE
-        """Where the robot's own map lies on the common one."""
+        """The position and rotation of the robot's own map on the common one."""
         self.common_from_own = Affine()
-        """What takes points of the robot's own map to the common one."""
+        """The transform from the robot's own map to the common one."""
         self.heard_at: float | None = None
-        """When the newest pose came in, in seconds of :func:`time.monotonic`."""
+        """When the newest pose arrived, in seconds of :func:`time.monotonic`."""
         self.expected_at: float | None = None
-        """When the newest pose came that would also come from a robot at rest."""
+        """When the newest pose arrived from a source that also sends at rest."""
         self._robot = robot
         self._silence = SilenceWatch(lambda: robot.name)
         self._problems: Mapping[str, Problem] = {}
@@ -56,16 +56,16 @@ class PoseSource:
         self._hears_alignment = Removal(lambda: None)
         self._listeners: dict[int, Callable[[], object]] = {}
 
-    # Where poses come from.
+    # Sources of poses.
 
     def follow(
         self, bridge: Bridge, topic: str, throttle: int, type: str | None
     ) -> None:
-        """Take poses from a topic; see :meth:`Robot.set_odometry_topic`."""
+        """Receive poses from a topic; see :meth:`Robot.set_odometry_topic`."""
         self.unfollow()
         typed = partial(self._on_type, bridge, topic)
         if type is None:
-            typed(None)  # else the feed calls it at once
+            typed(None)  # otherwise the feed calls it at once
         try:
             with no_scope():
                 self.feed = OdometryFeed(
@@ -84,7 +84,7 @@ class PoseSource:
         self._restart()
 
     def unfollow(self) -> None:
-        """Stop taking poses from a topic; does nothing if there is none."""
+        """Stop receiving poses from a topic; does nothing if there is none."""
         if self.feed is not None:
             self.feed.remove()
             self.feed = None
@@ -100,7 +100,7 @@ class PoseSource:
         namespace: str,
         quiet: bool,
     ) -> None:
-        """Take poses to the frame of the map; see :meth:`Robot.set_tf`."""
+        """Transform poses to the frame of the map; see :meth:`Robot.set_tf`."""
         self.unplace()
         frames = self.frames = frames_of(bridge, namespace)
         placing = Placing(frames, map_frame, base_frame, quiet=quiet)
@@ -110,14 +110,14 @@ class PoseSource:
         self._restart()
 
     def unplace(self) -> None:
-        """Stop placing poses by frames; does nothing if there are none."""
+        """Stop placing poses by TF; does nothing if TF is not set."""
         self._hears_frames.remove()
         self.frames = self.pipeline.placing = None
         self._restart()
 
     @property
     def tf(self) -> Mapping[str, Any] | None:
-        """The arguments of :meth:`Robot.set_tf`, None if it is not set."""
+        """The arguments of :meth:`Robot.set_tf`; None if it is not set."""
         frames, placing = self.frames, self.pipeline.placing
         if frames is None or placing is None:
             return None
@@ -130,11 +130,11 @@ class PoseSource:
         }
 
     def end(self) -> None:
-        """Hear of no pose any more."""
+        """Stop receiving poses."""
         self.unfollow()
         self.unplace()
 
-    # Where the robot's own map lies.
+    # Alignment of the robot's own map.
 
     @property
     def newest(self) -> PoseReading | None:
@@ -142,22 +142,19 @@ class PoseSource:
         return self.pipeline.newest
 
     def come(self, *, within: float) -> bool:
-        """Return whether a pose came in the last seconds, however old it was then."""
+        """Return whether a pose of any age arrived in the last ``within`` seconds."""
         heard = self.heard_at
         return heard is not None and time.monotonic() - heard <= within
 
     def align(self, pose: Pose | None) -> None:
-        """Lay the robot's own map somewhere; with None it goes with its bridge."""
+        """Set the robot's own alignment; None uses that of its bridge."""
         self.own_alignment = pose
         self._on_alignment()
 
-    # Who draws by it.
+    # Listeners.
 
     def join(self, listener: Callable[[], object]) -> Removal:
-        """Call ``listener`` whenever there is news, until the removal.
-
-        That is of the pose, of the frames or of the alignment.
-        """
+        """Call ``listener`` when pose, frames or alignment change, until removed."""
         key = id(listener)
         self._listeners[key] = listener
         return Removal(lambda: self._listeners.pop(key, None))
@@ -166,13 +163,13 @@ class PoseSource:
         for listener in tuple(self._listeners.values()):
             listener()
 
-    # What comes.
+    # Received data.
 
     def _on_type(self, bridge: Bridge, topic: str, type: str | None) -> None:
-        """Let the gate look at the odometry itself, unless it has no velocity.
+        """Give the odometry to the gate, unless it has no velocity.
 
-        The gate looks also while the type is not known: whoever drives a robot whose
-        odometry never came drives blind.
+        The gate also watches the odometry while the type is unknown: a robot whose
+        odometry never arrived would be driven blind.
         """
         if type in (None, ODOMETRY):
             self._robot.motion.set_odometry(bridge, topic, type)
@@ -186,26 +183,26 @@ class PoseSource:
             self._robot.set_problem("odometry", text)
 
     def _on_reading(self, reading: PoseReading) -> None:
-        """Take a pose from the topic."""
+        """Process a pose from the topic."""
         feed = self.feed
         if feed is None:
             return
         self.heard_at = now = time.monotonic()
-        if feed.type == ODOMETRY:  # other poses may come only while the robot moves
+        if feed.type == ODOMETRY:  # other poses may arrive only while the robot moves
             self.expected_at = now
             self._silence.hear(now)
         self._show(self.pipeline.step(reading, self.frames, now), now - feed.bridge.lag)
 
     def _on_frames(self) -> None:
-        """Take the pose of the base from the frames, if there is no topic."""
+        """Process the pose of the base from TF, if there is no topic."""
         frames, now = self.frames, time.monotonic()
         if frames is None:
             return
         step = self.pipeline.step(None, frames, now)
         if step.pose is not None:
-            # It may have waited for the next call of listeners.
+            # The pose may have waited for the next call of listeners.
             self.heard_at = came = frames.heard_at
-            if step.pose.stamp:  # else it is fixed to the map, and comes once
+            if step.pose.stamp:  # otherwise it is fixed to the map, and arrives once
                 self.expected_at = came
                 self._silence.hear(now)
             self._show(step, came - frames.bridge.lag)
@@ -224,7 +221,7 @@ class PoseSource:
         self._robot.motion.set_alignment(self.alignment)
         self._tell()
 
-    # What is shown.
+    # Display.
 
     def _show(self, step: Step, stamp: float) -> None:
         assert step.pose is not None  # callers have one
@@ -249,7 +246,7 @@ class PoseSource:
                 self._robot.set_problem(about, new.text)
 
     def _restart(self) -> None:
-        """Forget the poses so far: those to come are from another source."""
+        """Discard the poses so far; the next ones come from another source."""
         feed, frames = self.feed, self.frames
         bridge, topic, period = None, "", None
         if feed is not None:

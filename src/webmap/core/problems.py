@@ -1,4 +1,4 @@
-"""What is wrong with a robot or a layer: kept meanwhile, and shown on its maps."""
+"""Problems of a robot or a layer: stored while they last, and shown on its maps."""
 
 import itertools
 import logging
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.modules")
 
 LONGEST = 1000
-"""Characters of a sentence that is shown."""
+"""The greatest length of a shown sentence, in characters."""
 
 AGAIN = 60.0
-"""Seconds in which the same words about one thing go to the log once, and for which
-it is the same trouble when it fails anew after it was mended."""
+"""Seconds in which the log gets the same text about one subject once. A problem that
+returns within this time after it ended is the same problem."""
 
 WORDINGS = 10
-"""How many different words about one thing the log takes in that time."""
+"""The number of different texts about one subject that the log gets in that time."""
 
 _NUMBER = re.compile(
     r"0x[0-9a-f]+|[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?\b(?:nan|inf(?:inity)?)\b",
@@ -34,47 +34,47 @@ _NUMBER = re.compile(
 )
 _ROW = re.compile(r"#(?:[\s,;:]+#)+")
 
-# A page that was open before WebMap was started anew knows other numbers.
+# A page opened before a restart of WebMap has other numbers.
 _numbers = itertools.count(secrets.randbits(31))
 
 
 def cut(text: str) -> str:
-    """Return a text that people may read; robots may put anything into one."""
+    """Return a text shortened for people; robots may send any text."""
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
 def wording(text: str) -> str:
-    """Return a sentence without its numbers, of which a row is as good as one."""
+    """Return a sentence with each number or row of numbers replaced by ``#``."""
     return _ROW.sub("#", _NUMBER.sub("#", text))
 
 
 class Recurring:
-    """What is remembered of one thing that fails, until it was good for a minute."""
+    """The history of one problem, until it has been absent for a minute."""
 
     def __init__(self) -> None:
         self.number = next(_numbers)
-        """What pages know it by."""
+        """The number by which pages identify it."""
         self._wording: str | None = None
         self._mended = 0.0
         self._logged: dict[str, float] = {}
 
     def fails(self, text: str) -> bool:
-        """Take the sentence of now; return whether it is new, numbers aside."""
+        """Set the current sentence; return whether more than its numbers changed."""
         words = wording(text)
         news = words != self._wording
         self._wording = words
         return news
 
     def mend(self, now: float) -> None:
-        """Note that it is good again, at ``now`` of any clock that goes forward."""
+        """Set that the problem ended, at ``now`` of any monotonic clock."""
         self._wording, self._mended = None, now
 
     def is_over(self, now: float) -> bool:
-        """Return whether it has been good for so long that the next time is another."""
+        """Return whether it ended so long ago that the next one is a new problem."""
         return self._wording is None and now - self._mended >= AGAIN
 
     def is_worth_a_line(self, now: float) -> bool:
-        """Return whether the log is to have the words of now, and note that it has."""
+        """Return whether the current text is to be logged, and record that it is."""
         for words in [w for w, at in self._logged.items() if now - at >= AGAIN]:
             del self._logged[words]
         if self._wording is None or self._wording in self._logged:
@@ -86,12 +86,12 @@ class Recurring:
 
 
 class Problems:
-    """The sentences of one thing that maps share, and the maps that show them.
+    """The problems of a robot or a layer, and the maps that show them.
 
     Args:
-        log: Where each sentence goes besides.
-        worded: Makes the sentence that is shown, for example with a name in front.
-        clock: Seconds that only go forward.
+        log: The log for each sentence.
+        worded: Builds the shown sentence, for example with a name in front.
+        clock: A monotonic clock, in seconds.
 
     """
 
@@ -103,24 +103,24 @@ class Problems:
     ) -> None:
         self.maps: list[Map] = []
         self.standing: dict[object, str] = {}
-        """What fails for now, by what it is about."""
+        """The current problems, by subject."""
         self._log = log
         self._worded = worded
         self._clock = clock
         self._recurring: dict[object, Recurring] = {}
 
     def report(self, text: str) -> None:
-        """Log a failure and show it on every map there is now."""
+        """Log a failure and show it on every current map."""
         sentence = self._worded(cut(text))
         self._log.warning("%s", sentence)
         for map in self.maps:
             map.show_error(sentence)
 
     def set(self, about: object, text: str) -> None:
-        """Show what fails until :meth:`clear`, once; a new text takes its place.
+        """Show a problem once, until :meth:`clear`; a new text replaces it.
 
-        A text that differs in its numbers alone is kept and not shown. The same words
-        go to the log once a minute at most, whether it was good in between or not.
+        A text that differs only in its numbers is stored but not shown. The log gets
+        the same text once a minute at most, even if the problem ended in between.
         """
         text = cut(text)
         before = self.standing.get(about)
@@ -139,7 +139,7 @@ class Problems:
             page.channel.problem(recurring.number, self._worded(text))
 
     def clear(self, about: object) -> None:
-        """Take back the problem of ``about``; does nothing if there is none."""
+        """Remove the problem of ``about``; does nothing if there is none."""
         if self.standing.pop(about, None) is None:
             return
         recurring = self._recurring[about]
@@ -148,7 +148,7 @@ class Problems:
             page.channel.mended(recurring.number)
 
     def join(self, map: "Map") -> None:
-        """Show a map what fails now, and from now on."""
+        """Show a map the current and future problems."""
         self.maps.append(map)
         if map.page.closed:
             return
@@ -156,7 +156,7 @@ class Problems:
             map.page.channel.problem(self._recurring[about].number, self._worded(text))
 
     def leave(self, map: "Map") -> None:
-        """Show a map nothing more, and take back what it shows."""
+        """Stop showing problems on a map, and remove those that it shows."""
         self.maps.remove(map)
         if map.page.closed or map.page in self._pages():
             return
@@ -164,12 +164,12 @@ class Problems:
             map.page.channel.mended(self._recurring[about].number)
 
     def _pages(self) -> "list[Page]":
-        """Return the pages that the maps are on, each of them once."""
+        """Return the open pages of the maps, each of them once."""
         pages = dict.fromkeys(map.page for map in self.maps)
         return [page for page in pages if not page.closed]
 
     def _forget(self, now: float) -> None:
-        """Forget what was mended so long ago that its next time is another."""
+        """Remove problems that ended so long ago that the next one is a new problem."""
         for about in [a for a, r in self._recurring.items() if r.is_over(now)]:
             del self._recurring[about]
 
@@ -178,24 +178,23 @@ M = TypeVar("M")
 
 
 class Owner(Protocol):
-    """Who shows people what goes on failing: a robot, a map or a layer."""
+    """An object that shows problems: a robot, a map or a layer."""
 
     def set_problem(self, about: object, text: str) -> None:
-        """Note what fails until :meth:`clear_problem`."""
+        """Show a problem until :meth:`clear_problem`."""
 
     def clear_problem(self, about: object) -> None:
-        """Note that the problem of ``about`` is over."""
+        """Remove the problem of ``about``."""
 
 
 class Refusing:
-    """Shows people what is wrong with the messages of a topic.
+    """Shows people the errors in the messages of a topic.
 
-    The sentence about a message stands until one comes that is right, or until the
-    current scope ends.
+    An error is shown until a valid message arrives or the current scope ends.
 
     Args:
-        owner: Shows the sentence.
-        topic: Where the messages come from.
+        owner: Shows the error.
+        topic: The topic of the messages.
 
     """
 
@@ -207,14 +206,14 @@ class Refusing:
         keep(Removal(lambda: owner.clear_problem(self)))
 
     def complain(self, words: str) -> None:
-        """Note what is wrong with the message that is drawn at present."""
+        """Set an error of the message that is drawn at present."""
         self._complaint = words
 
     def take(self, draw: Callable[[M], object], message: M) -> None:
-        """Have a message drawn; one for which ``draw`` raises is left out.
+        """Draw a message; a message for which ``draw`` raises is skipped.
 
-        What was drawn before then stays and ages. An error that is not one of WebMap's
-        is a mistake in ``draw``, and is logged when it differs from the last one.
+        The earlier drawing stays and ages. An exception that is not a ``WebMapError``
+        is a bug in ``draw``; it is logged when it differs from the last one.
         """
         self._complaint = ""
         try:
@@ -235,12 +234,13 @@ class Refusing:
 def refusing(
     owner: Owner, topic: str, draw: Callable[[M], None]
 ) -> Callable[[M], None]:
-    """Return ``draw`` for a subscription: what it refuses, the owner shows.
+    """Wrap ``draw`` for a subscription: the owner shows the messages that it refuses.
 
     Args:
-        owner: Shows what is wrong with messages.
-        topic: Where the messages come from.
-        draw: Takes a message, and changes nothing before it has looked at all of it.
+        owner: Shows the errors in messages.
+        topic: The topic of the messages.
+        draw: Draws a message; it must check the whole message before it changes
+            anything.
 
     """
     return partial(Refusing(owner, topic).take, draw)

@@ -1,7 +1,7 @@
-"""What pages sent and nobody took, counted for whoever looks after WebMap.
+"""Counts of the refused messages of pages, for administrators.
 
-A message that is refused does nothing. That there are many is worth knowing all the
-same: a page that is broken, a link that delivers late, somebody who tries things.
+A refused message does nothing. A large number still points to a problem: a broken page,
+a slow connection, or a person who probes WebMap.
 """
 
 from collections import OrderedDict
@@ -10,41 +10,41 @@ from dataclasses import dataclass
 from datetime import datetime
 
 MOST = 50
-"""How many people are remembered; who was refused longest ago is forgotten first."""
+"""How many people are kept; the one whose last refusal is oldest is removed first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """What one person's pages sent in vain."""
+    """The refused messages of one person's pages."""
 
     by: str
-    """Who."""
+    """The person's name."""
 
     count: int
-    """How many messages, since WebMap started."""
+    """The number of messages since WebMap started."""
 
     last: str
-    """What the last one was, and why it was not taken."""
+    """The last message, and why it was refused."""
 
     at: datetime
-    """When that was counted, with its time zone."""
+    """When that message was counted, with a time zone."""
 
 
 class Refusals:
-    """Counts refused messages by who sent them. Lives in the model's thread."""
+    """Counts refused messages by sender; used in the model's thread only."""
 
     def __init__(self) -> None:
         self.total = 0
-        """How many messages were refused since WebMap started."""
+        """The number of messages refused since WebMap started."""
         self._rows: OrderedDict[str, Refused] = OrderedDict()
 
     @property
     def rows(self) -> Sequence[Refused]:
-        """One for each person, who was refused last first."""
+        """One entry for each person, the latest refusal first."""
         return tuple(reversed(self._rows.values()))
 
     def note(self, by: str, count: int, last: str, at: datetime) -> None:
-        """Count ``count`` more messages of ``by``, of which ``last`` is the last."""
+        """Add ``count`` messages of ``by``; ``last`` describes the last one."""
         self.total += count
         before = self._rows.pop(by, None)
         if before is not None:
@@ -55,4 +55,4 @@ class Refusals:
 
 
 refusals = Refusals()
-"""What was refused in this process."""
+"""The refusals of this process."""

@@ -1,4 +1,4 @@
-"""Namespaces of modules: the class for a module's name."""
+"""Namespaces of modules: each name of a module and its class."""
 
 import difflib
 import importlib
@@ -18,21 +18,21 @@ Factory = Callable[..., Any]
 T = TypeVar("T", bound=Factory)
 
 BUILT_IN = "webmap.features"
-"""The package of the built-in modules; each folder of it is a room."""
+"""The package of the built-in modules; each of its folders is a subpackage."""
 
 
 class Namespace:
     """The modules that one kind of owner can add, by name.
 
-    Each module is registered by :meth:`register`. A built-in module is a class of
-    ``webmap.features`` in the file of its name: ``LaserScanner`` is in
-    ``laser_scanner.py``, which is imported when the name is first used. Another
-    package has an entry point for each of its modules.
+    A module is registered by :meth:`register`. A built-in module is a class of
+    ``webmap.features`` in a file of the same name: ``LaserScanner`` is in
+    ``laser_scanner.py``, which is imported when the name is first used. Another package
+    has an entry point for each of its modules.
 
     Args:
         kind: The kind of the owner, for error messages.
-        group: The group of the entry points; without it there are none, and no
-            built-in modules.
+        group: The group of the entry points; without it there are no entry points and
+            no built-in modules.
 
     """
 
@@ -44,15 +44,15 @@ class Namespace:
         self._broken: set[str] = set()
 
     def register(self, factory: T, /, *, name: str | None = None) -> T:
-        """Add a module under its class's name, or under ``name``; a decorator.
+        """Register a module under its class's name, or under ``name`` (decorator).
 
         Args:
-            factory: Called with the owner and the arguments of ``add_module``; what
-                it returns is the module. A class, as a rule.
-            name: The module's name, where it differs from the class's.
+            factory: Called with the owner and the arguments of ``add_module``; returns
+                the module. Usually a class.
+            name: The module's name, if it differs from the class's.
 
         Raises:
-            ValueError: If the name is taken by something else.
+            ValueError: If the name is already used.
 
         """
         name = name or factory.__name__
@@ -74,16 +74,16 @@ class Namespace:
         return factory
 
     def names(self) -> list[str]:
-        """Return the names of all modules there are, sorted."""
+        """Return the names of all modules, sorted."""
         for name in _built_in_files():
             self._look_for(name)
         return sorted({*self._registered, *self._other_packages()})
 
     def __getitem__(self, name: str) -> Factory:
-        """Return what makes the module ``name``.
+        """Return the factory of the module ``name``.
 
         Raises:
-            ModuleNotFound: If there is none; the message lists what there is.
+            ModuleNotFound: If there is none; the message lists all modules.
 
         """
         if name in self:
@@ -97,13 +97,13 @@ class Namespace:
         return name in self._registered or name in self._other_packages()
 
     def __iter__(self) -> Iterator[Factory]:
-        """Yield what makes each module; one that cannot be loaded is logged once."""
+        """Yield each module's factory; one that cannot be loaded is logged once."""
         for name in self.names():
             if name in self._broken:
                 continue
             try:
                 yield self[name]
-            except Exception:  # a package of somebody else's may raise anything
+            except Exception:  # another package may raise anything
                 self._broken.add(name)
                 log.exception("the %s module %r cannot be loaded", self.kind, name)
 
@@ -135,9 +135,9 @@ class Namespace:
 
 @cache
 def _built_in_files() -> dict[object, str]:
-    """Return the files of all rooms of the built-in modules, by the names of classes.
+    """Return the files of the built-in modules in all folders, by class name.
 
-    Not every file has a class of its name: a room has other files too.
+    Some files have no class of that name: a folder has other files too.
     """
     files: dict[object, str] = {}
     rooms = find_spec(BUILT_IN)
@@ -152,13 +152,13 @@ def _built_in_files() -> dict[object, str]:
 
 
 def _provides(found: EntryPoint, factory: Factory) -> bool:
-    """Return whether an entry point loads what makes a module."""
+    """Return whether an entry point loads the factory of a module."""
     inside = f"{factory.__module__}.".startswith(f"{found.module}.")
     return inside and found.attr == factory.__qualname__
 
 
 def _same_source(one: Factory, other: Factory) -> bool:
-    """Tell whether a name was only defined again, as when a script is reloaded."""
+    """Return whether a name was only defined again, as when a script is reloaded."""
     return (one.__module__, one.__qualname__) == (other.__module__, other.__qualname__)
 
 

@@ -1,4 +1,4 @@
-"""Robots: who they are, where they are and how they are moved."""
+"""Robots: identity, pose and motion."""
 
 import asyncio
 import logging
@@ -36,27 +36,27 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.robot")
 
 POSE_LIMIT = 1.0
-"""Seconds after which a pose is drawn as old."""
+"""Seconds after which a pose is drawn as stale."""
 
 STATE_EVERY = 0.5
-"""Seconds between two looks at the state."""
+"""Seconds between two checks of the state."""
 
 robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary()
-"""All robots that were made and not destroyed, by their id."""
+"""All robots that were created and not destroyed, by their id."""
 
 
 class Robot(Driven):
-    """One robot: its name, its pose, how it looks and how it is moved.
+    """One robot: its name, its pose, its drawing and its motion.
 
     A robot may be shown on any number of maps, and used without any.
 
     Args:
-        name: What people call it. A label: it need not be unique.
-        model: How it looks from above, in metres, x forward; a plain arrow if not
-            given. It becomes part of the robot's own group, :attr:`svg`. An image in
-            it may name a file of the page's folder.
-        base_link: The frame that the navigation stack calls the robot's own.
-        namespace: Where its modules are looked up.
+        name: The displayed name. It need not be unique.
+        model: The drawing from above, in metres, x forward; a plain arrow if not given.
+            It becomes part of the robot's own group, :attr:`svg`. An image in it may
+            name a file in the page's folder.
+        base_link: The robot's own frame in the navigation stack.
+        namespace: The namespace of its modules.
 
     Raises:
         ConfigError: If the model is no element, or another robot's.
@@ -78,7 +78,7 @@ class Robot(Driven):
         self._told = Problems(log, lambda text: f"{self.name}: {text}")
         self.maps = self._told.maps
         self.problems: dict[object, str] = self._told.standing
-        """What fails for now, in sentences, by what they are about."""
+        """Current problems, as sentences, by subject."""
         self.selected = False
         self.position = Vector3()
         self.orientation = Quaternion()
@@ -88,9 +88,9 @@ class Robot(Driven):
         self._state_timer: asyncio.TimerHandle | None = None
         self.pose_stamp: float | None = None
         """When the newest pose was sent, in seconds of ``time.monotonic()``; None
-        before there was one."""
+        before the first one."""
         self.whereabouts = PoseSource(self)
-        """Where it is and was, on its own map and on the common one."""
+        """The source of its poses, on its own map and on the common one."""
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
         self.svg.set("data-name", self.name)
         self.svg.set("data-robot", self.motion.id)
@@ -107,7 +107,7 @@ class Robot(Driven):
 
     @property
     def state(self) -> RobotState:
-        """What the robot is doing, in words.
+        """What the robot is doing.
 
         Its element in the scene has the state's name as ``data-state``.
         """
@@ -126,7 +126,7 @@ class Robot(Driven):
 
     @property
     def feed(self) -> OdometryFeed | None:
-        """Where the poses come from, if that is set."""
+        """The feed of the odometry topic; None if none is set."""
         return self.whereabouts.feed
 
     @property
@@ -147,15 +147,15 @@ class Robot(Driven):
 
     @property
     def silent_for(self) -> float | None:
-        """Seconds since the newest pose that would also come from a robot at rest.
+        """Seconds since the newest pose from a source that also sends at rest.
 
-        None if none has come: a pose of AMCL, for example, comes only after motion.
+        None if there was none: AMCL, for example, sends a pose only after motion.
         """
         heard = self.whereabouts.expected_at
         return None if heard is None else time.monotonic() - heard
 
     def hears_poses(self, within: float) -> bool:
-        """Return whether a pose came in the last seconds, however old it was then."""
+        """Return whether a pose of any age arrived in the last ``within`` seconds."""
         return self.whereabouts.come(within=within)
 
     def destroy(self) -> None:
@@ -172,7 +172,7 @@ class Robot(Driven):
         self.motion.close()
         robots.pop(self.id, None)
 
-    # Where it is.
+    # Pose.
 
     @sets_part("odometry")
     def set_odometry_topic(
@@ -183,26 +183,26 @@ class Robot(Driven):
         *,
         type: str | None = None,
     ) -> None:
-        """Follow the poses on a topic, in place of the one before.
+        """Receive poses from a topic, in place of the one before.
 
-        The topic may carry ``geometry_msgs`` Pose, PoseStamped,
+        The topic may have type ``geometry_msgs`` Pose, PoseStamped,
         PoseWithCovarianceStamped or Pose2D, or ``nav_msgs/Odometry``. If ``type`` is
-        not given, the bridge is asked, and where it does not know, the shape of the
-        first message tells. The bridge need not be open yet.
+        not given, the bridge is queried; if the bridge does not know the type, the
+        first message determines it. The connection need not be open yet.
 
         Args:
-            bridge: The link to the ROS system that has the topic.
+            bridge: The connection to the ROS system that has the topic.
             topic: The topic.
             throttle: The least time between two messages, in milliseconds.
             type: The message type.
 
         Raises:
-            ConfigError: If ``type`` has no pose, or something else cannot be meant.
+            ConfigError: If ``type`` has no pose, or another value is not valid.
 
         """
 
     def unsubscribe_odometry_topic(self) -> None:
-        """Stop following poses; does nothing if there is no topic."""
+        """Stop receiving poses; does nothing if there is no topic."""
         self.whereabouts.unfollow()
 
     @sets_part("tf")
@@ -215,24 +215,24 @@ class Robot(Driven):
         namespace: str = "",
         quiet: bool = False,
     ) -> None:
-        """Draw the robot in the frame of the map, by the frames of ``/tf``.
+        """Draw the robot in the frame of the map, using ``/tf``.
 
-        A pose of the odometry topic is taken from its own frame to ``map_frame`` as
-        the frames were at its stamp. Without an odometry topic the robot is drawn
-        where the frames have its base. Robots of one bridge share what they hear.
+        A pose of the odometry topic is transformed from its own frame to ``map_frame``
+        with the transforms at its stamp. Without an odometry topic the robot is drawn
+        at the pose of its base in TF. Robots of one bridge share the subscription.
 
         Args:
-            bridge: The link to the ROS system that has the frames.
+            bridge: The connection to the ROS system that has the frames.
             map_frame: The frame that robots are drawn in.
             base_frame: The robot's own frame; ``base_link`` of the robot if not given.
-            namespace: ``/robot_0`` where the topics are ``/robot_0/tf`` and
-                ``/robot_0/tf_static``; the names of frames get it in front, but for
-                ``map``, ``world`` and ``earth``, which are everybody's.
-            quiet: Whether poses that stay in the odometry's frame, because nobody
-                tells of ``map_frame``, are no problem to be shown.
+            namespace: ``/robot_0`` if the topics are ``/robot_0/tf`` and
+                ``/robot_0/tf_static``. It is put before the names of frames, except
+                ``map``, ``world`` and ``earth``, which all robots share.
+            quiet: Whether to show no problem when poses stay in the odometry's frame
+                because ``map_frame`` is missing in TF.
 
         Raises:
-            ConfigError: If something of that cannot be meant.
+            ConfigError: If a value is not valid.
 
         """
 
@@ -264,30 +264,30 @@ class Robot(Driven):
                 super().configure(key, values, bridge)
 
     def unset_tf(self) -> None:
-        """Stop drawing the robot by frames; does nothing if it has none."""
+        """Stop drawing the robot by TF; does nothing if TF is not set."""
         self.whereabouts.unplace()
 
     @property
     def tf(self) -> Mapping[str, Any] | None:
-        """The arguments of :meth:`set_tf`, None if it is not set."""
+        """The arguments of :meth:`set_tf`; None if it is not set."""
         return self.whereabouts.tf
 
     def set_alignment(self, x: float, y: float, angle: float) -> None:
-        """Lay the robot's own map onto the common one: its poses, data and goals.
+        """Align the robot's own map, its poses, data and goals, on the common map.
 
         Args:
-            x: Where its map's origin is, in metres along the common map's x.
-            y: In metres along its y.
-            angle: How its map is turned, in degrees, counter-clockwise.
+            x: The position of its map's origin on the common map, in metres along x.
+            y: The position, in metres along y.
+            angle: The rotation of its map in degrees, counter-clockwise.
 
         Raises:
-            ConfigError: If a number makes no sense.
+            ConfigError: If a number is not valid.
 
         """
         self.whereabouts.align(alignment(x, y, angle))
 
     def unset_alignment(self) -> None:
-        """Let the robot lie where its bridge's alignment has it."""
+        """Use the alignment of the robot's bridge."""
         self.whereabouts.align(None)
 
     # Plain data.
@@ -300,15 +300,15 @@ class Robot(Driven):
         *,
         model: Element | None = None,
     ) -> Self:
-        """Make a robot with its topics and modules.
+        """Create a robot with its topics and modules.
 
         Args:
-            config: What it is and has.
-            bridges: Bridges by name or address, to be shared; others are made.
-            model: How it looks, if not as the configuration says.
+            config: The robot's configuration.
+            bridges: Bridges by name or URL, to be shared; others are created.
+            model: The drawing, in place of the configured one.
 
         Raises:
-            ConfigError: If something cannot be meant; every mistake is named.
+            ConfigError: If a value is not valid; the message lists every mistake.
 
         """
         from webmap.core.configure import robot_of
@@ -319,20 +319,21 @@ class Robot(Driven):
     def from_dict(
         cls, data: Mapping[str, Any], bridges: Mapping[str, Bridge] | None = None
     ) -> Self:
-        """Make a robot with its topics and modules from plain data.
+        """Create a robot with its topics and modules from plain data.
 
         Args:
-            data: As :meth:`to_dict` returns it, or a table of a TOML file.
-            bridges: Bridges by name or URL, to be shared; others are made.
+            data: The result of :meth:`to_dict`, or a table of a TOML file.
+            bridges: Bridges by name or URL, to be shared; others are created.
 
         Raises:
-            ConfigError: If a key or a value is not understood; every mistake is named.
+            ConfigError: If a key or a value is not valid; the message lists every
+                mistake.
 
         """
         return cls.from_config(RobotConfig.from_dict(data), bridges)
 
     def to_config(self) -> RobotConfig:
-        """Return what the robot is and has: its topics and its named modules."""
+        """Return the configuration of the robot, its topics and its named modules."""
         from webmap.core.configure import config_of
 
         return config_of(self)
@@ -340,39 +341,39 @@ class Robot(Driven):
     def to_dict(self) -> dict[str, Any]:
         """Return the robot, its topics and its named modules as plain data.
 
-        JSON and TOML can hold it: ``None`` among a module's arguments is
-        ``{"none": True}`` there, and a bridge ``{"bridge": URL}``.
+        The data fits JSON and TOML: ``None`` among a module's arguments is
+        ``{"none": True}``, and a bridge is ``{"bridge": URL}``.
 
         Raises:
-            ConfigError: If a module was given what no such file can hold.
+            ConfigError: If an argument of a module has no form in such a file.
 
         """
         from webmap.core.configure import robot_to_dict
 
         return robot_to_dict(self)
 
-    # What is shown of it.
+    # Display.
 
     def report_error(self, text: str) -> None:
         """Log a failure and show it on every page that has the robot."""
         self._told.report(text)
 
     def set_problem(self, about: object, text: str) -> None:
-        """Note what fails until :meth:`clear_problem`; later viewers see it too.
+        """Show a problem until :meth:`clear_problem`, also to pages opened later.
 
         Args:
-            about: What the sentence is about; a new one takes its place.
+            about: The subject of the problem; a new sentence replaces the old one.
             text: A sentence for people.
 
         """
         self._told.set(about, text)
 
     def clear_problem(self, about: object) -> None:
-        """Take back the problem of ``about``; does nothing if there is none."""
+        """Remove the problem of ``about``; does nothing if there is none."""
         self._told.clear(about)
 
     def on_map(self, map: "Map", shown: bool) -> None:
-        """Note that a map shows this robot, or does so no more; fire ``on_map``."""
+        """Set whether a map shows this robot, and fire ``on_map``."""
         if shown:
             self.model_images.show(map.page)
             self._told.join(map)
@@ -384,26 +385,26 @@ class Robot(Driven):
         self.notify_modules("on_map", map, shown)
 
     def update_selected(self) -> None:
-        """Look whether any map has the robot selected and fire ``on_select``."""
+        """Update whether any map has the robot selected, and fire ``on_select``."""
         selected = any(map.selected is self for map in self.maps)
         if selected != self.selected:
             self.selected = selected
             self.notify_modules("on_select", selected)
 
     def on_gate_report(self, report: RobotReport) -> None:
-        """Keep the gate's report of this robot and fire ``on_report``."""
+        """Store the gate's report on this robot and fire ``on_report``."""
         super().on_gate_report(report)
         self._show_state()
 
     def expect_jump(self) -> None:
-        """Expect that the robot is somewhere else: somebody set its pose.
+        """Accept that the robot's pose jumps: an operator or a program set it.
 
         A jump of its poses within the next seconds is then no problem.
         """
         self.whereabouts.pipeline.jumps.expect(time.monotonic())
 
     def _watch_state(self) -> None:
-        """Show the state now and then: no message comes when a robot is gone."""
+        """Update the shown state periodically: a lost robot sends no message."""
         self._show_state()
         with suppress(RuntimeError):  # outside of an event loop
             loop = asyncio.get_running_loop()
@@ -423,7 +424,7 @@ class Robot(Driven):
         Args:
             pose: The pose; nothing fires if it is the same as before.
             stamp: When it was sent, in seconds of :func:`time.monotonic`; None if the
-                robot's map was moved and the robot was not heard.
+                robot's map was moved and no pose arrived.
 
         """
         if stamp is not None:

@@ -1,4 +1,4 @@
-"""How a robot looks: its model, also as plain data, and the image files in it."""
+"""The drawing of a robot: its model, also as plain data, and its image files."""
 
 import contextlib
 from collections.abc import Container, Iterator, Mapping
@@ -21,16 +21,16 @@ def default_model() -> Element:
 
 
 def checked_model(name: str, model: Any, robots: Container[str]) -> Element:
-    """Return the model that the robot called ``name`` is given, or the default one.
+    """Return the given model of the robot called ``name``, or the default one.
 
     Args:
-        name: The robot, for people.
-        model: What it is given.
-        robots: The ids of all robots that there are.
+        name: The robot's name, for error messages.
+        model: The given model; None for the default one.
+        robots: The ids of all robots.
 
     Raises:
-        ConfigError: If it is no element, or that of another robot: an element has one
-            place, so that the other would lose it.
+        ConfigError: If it is no element, or the model of another robot: an element has
+            one place, so the other robot would lose it.
 
     """
     if model is None:
@@ -54,19 +54,19 @@ class _Shown(NamedTuple):
     """An image whose file pages can load."""
 
     name: str
-    """The file, as the program has it."""
+    """The file name that the program gave."""
 
     file: Path
     url: str
-    """The ``href`` that the element has meanwhile."""
+    """The current ``href`` of the element."""
 
 
 class ModelImages:
-    """Lets pages load the image files that a robot's elements name.
+    """Publishes the image files that a robot's elements name.
 
-    A file is looked for in the folder of the page that shows the robot first, as
-    :meth:`webmap.Map.add_image` does. The robot is everybody's, so its images can be
-    loaded for as long as any map shows it, and not for the time of one page.
+    A file is first looked for in the folder of the page that shows the robot, as by
+    :meth:`webmap.Map.add_image`. A robot is not bound to one page, so its images can be
+    loaded while any map shows it.
 
     Args:
         root: The robot's own group.
@@ -80,7 +80,7 @@ class ModelImages:
 
     @property
     def names(self) -> Mapping[Element, str]:
-        """What the program wrote as the ``href`` of those that have another now."""
+        """The original ``href`` of each image whose ``href`` was replaced."""
         return {
             image: shown.name
             for image, shown in self._shown.items()
@@ -88,11 +88,11 @@ class ModelImages:
         }
 
     def show(self, page: "Page") -> None:
-        """Let a page load them; one that is no file of its folder stays as it is."""
+        """Publish the images for a page; names that are no file of its folder stay."""
         for image in self._images():
             shown = self._shown.get(image)
             if shown is not None and image.get("href") == shown.url:
-                with contextlib.suppress(ConfigError):  # the file is gone since
+                with contextlib.suppress(ConfigError):  # the file was deleted meanwhile
                     self._publish(page, shown.file)
                 continue
             name = image.get("href")
@@ -102,12 +102,12 @@ class ModelImages:
                 file = page.image_file(name)
                 url = self._publish(page, file)
             except ConfigError:
-                continue  # it may be served by others; if not, the page says so
+                continue  # another server may have it; if not, the page shows an error
             self._shown[image] = _Shown(name, file, url)
             image.set("href", url)
 
     def end(self) -> None:
-        """Let nobody load them, and have the elements name their files again."""
+        """Withdraw the images and restore the file names of the elements."""
         for image, name in self.names.items():
             image.set("href", name)
         for (publisher, _), url in self._published.items():
@@ -134,7 +134,7 @@ def element_to_dict(
 
     Args:
         element: The element.
-        names: What to write as the ``href`` of some, in place of what it is now.
+        names: The ``href`` to write for some elements, in place of the current one.
 
     """
     names = names or {}
@@ -155,10 +155,10 @@ def element_to_dict(
 
 
 def element_from_dict(data: Mapping[str, Any]) -> Element:
-    """Make an element with its children from plain data.
+    """Create an element with its children from plain data.
 
     Raises:
-        ConfigError: If it is not an element's data.
+        ConfigError: If the data is not that of an element.
         SceneError: If a tag or an attribute is not allowed.
 
     """

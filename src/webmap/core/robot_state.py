@@ -1,4 +1,4 @@
-"""What a robot is doing, in the words that every page has for it."""
+"""What a robot is doing, with the texts that every page shows."""
 
 from datetime import datetime, timedelta
 from typing import NamedTuple
@@ -37,43 +37,43 @@ WORDS = {
     "held_by_you": "You have control",
     "free": "Free",
 }
-"""The words of each state. The page has the same table, made from this one."""
+"""The text of each state. The page has the same table, generated from this one."""
 
 GONE = 30.0
-"""Seconds without a pose, over a link that is open, after which a robot is gone."""
+"""Seconds without a pose, over an open connection, after which a robot is gone."""
 
 FRESH = 1.0
-"""Seconds for which the velocity of a pose counts."""
+"""Seconds for which the velocity of a pose is used."""
 
 QUIET = ("free", "barred", "down")
-"""States of the gate that the display may replace by what it knows. The page has the
-same rule (``doingOf`` of web/motion/report.js)."""
+"""States of the gate that the display may replace by its own. The page has the same
+rule (``doingOf`` of web/motion/report.js)."""
 
 
 class RobotState(NamedTuple):
     """What a robot is doing."""
 
     name: str
-    """Which state it is: a key of ``WORDS``."""
+    """The state: a key of ``WORDS``."""
 
     text: str
-    """The state in words."""
+    """The text of the state."""
 
     mine: str
-    """The words for the page that holds the robot."""
+    """The text for the page that has control of the robot."""
 
 
 class Facts(NamedTuple):
-    """What the state of a robot follows from."""
+    """The facts that determine the state of a robot."""
 
     report: RobotReport | None
     """The newest report of the gate; None if the gate does not know the robot."""
 
     bridge: Bridge | None
-    """The link of the topic with poses; None if there is no such topic."""
+    """The bridge of the topic with poses; None if there is no such topic."""
 
     period: float
-    """The least seconds between two poses of that topic."""
+    """The least time between two poses of that topic, in seconds."""
 
     silent_for: float | None
     """Seconds since the newest pose from a source that also sends while the robot is at
@@ -86,16 +86,16 @@ class Facts(NamedTuple):
     """The velocity of that pose, in the axes that the robot moves along."""
 
     goal_over_for: float | None
-    """Seconds since the newest goal ended; None if none has."""
+    """Seconds since the newest goal ended; None if there is no goal or it has not
+    ended."""
 
 
 def state_of(facts: Facts) -> RobotState:
     """Return what a robot is doing.
 
-    The gate decides what it knows. The display adds what only the display knows: the
-    bridge and the poses of a robot that the gate does not listen to. Whether data is
-    old is left out: the page sees that by itself, also when it cannot reach this
-    process.
+    The gate's report decides. The display adds what the gate does not know: the bridge
+    and the poses of a robot whose odometry the gate does not receive. Stale data is
+    left out: the page detects it by itself, even when it cannot reach this process.
     """
     if facts.report is None:
         return _state(_seen(facts) or "watched", facts)
@@ -106,7 +106,7 @@ def state_of(facts: Facts) -> RobotState:
 
 
 def since_when(silent_for: float | None) -> str:
-    """Return when a robot fell silent, by the clock of this computer.
+    """Return when the poses of a robot ended, by the clock of this computer.
 
     Args:
         silent_for: Seconds since then; None for now.
@@ -116,14 +116,14 @@ def since_when(silent_for: float | None) -> str:
 
 
 def _seen(facts: Facts, *, may_move: bool = False) -> str | None:
-    """Return what the display knows of a robot that nobody drives."""
+    """Return the state that the display sees for a robot without an operator."""
     bridge, report = facts.bridge, facts.report
     if bridge is not None and bridge.state != "open":
         return "no_bridge" if bridge.lost else "connecting"
     if _is_gone(facts):
         return "gone"
     if not may_move or report is None or report.measured is not None:
-        return None  # the gate looks at the same odometry
+        return None  # the gate receives the same odometry
     if not _moves(facts):
         return None
     if report.goal is not None and report.goal.state not in OVER:
@@ -140,7 +140,7 @@ def _state(name: str, facts: Facts) -> RobotState:
 
 
 def _is_gone(facts: Facts) -> bool:
-    """Return whether poses that should come have not come for long."""
+    """Return whether expected poses have been missing for a long time."""
     silent = facts.silent_for
     if silent is None or silent <= GONE:
         return False

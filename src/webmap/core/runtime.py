@@ -1,7 +1,8 @@
-"""The model's thread: one event loop with everything that a user touches.
+"""The model's thread: one event loop with all objects that user code touches.
 
-User code, callbacks and the robots' data live in this one thread, so nothing in it
-needs a lock. The web thread hands over what came from pages and takes finished bytes.
+User code, callbacks and the robots' data live in this one thread, so they need no
+locks. The web thread passes the messages of pages to this thread and takes finished
+bytes from it.
 """
 
 import asyncio
@@ -37,8 +38,8 @@ log = logging.getLogger("webmap")
 SWITCH = 0.0001
 """Seconds after which a running thread gives way to a waiting one.
 
-While the model's thread is busy, the web thread waits so long several times for each
-message to a page. With 1 ms, the ticks of drivers came up to 0.3 s late.
+While the model's thread is busy, the web thread waits this long several times for each
+message to a page. With 1 ms, the ticks to operators came up to 0.3 s late.
 """
 
 TICK = 0.05
@@ -46,13 +47,13 @@ TICK = 0.05
 
 
 class Watcher(Protocol):
-    """Somebody who looks: a page, as a rule."""
+    """An observer of the model, usually a page."""
 
     def tick(self, now: float) -> None:
-        """Take what changed, at the loop's monotonic time ``now``."""
+        """Take the changes, at the loop's monotonic time ``now``."""
 
     def notice(self, text: str) -> None:
-        """Take a sentence that everybody should read."""
+        """Show a sentence that everybody should read."""
 
 
 class Runtime:
@@ -73,14 +74,14 @@ class Runtime:
         return self._thread is not None
 
     def start(self) -> None:
-        """Start the model's thread and the gate; return when the first is up.
+        """Start the model's thread and the gate; return when the thread is up.
 
-        The gate's process hears a moment later. The second call does nothing.
+        The gate's process is ready a moment later. A second call does nothing.
         """
         if self._thread is not None:
             return
-        # A busy model's thread holds the interpreter for this long at a time, while
-        # the web thread has the ticks of drivers to hand on.
+        # A busy model's thread keeps the interpreter for this long at a time, while the
+        # web thread must pass on the ticks to operators.
         sys.setswitchinterval(min(SWITCH, sys.getswitchinterval()))
         self._looked_at, self._ending = asyncio.Event(), asyncio.Event()
         ready = threading.Event()
@@ -96,7 +97,7 @@ class Runtime:
             raise failure[0]
 
     def stop(self) -> None:
-        """Stop driven robots, close every link and end the thread."""
+        """Stop driven robots, close all connections and end the thread."""
         thread, self._thread = self._thread, None
         if thread is None or self._loop is None:
             return
@@ -104,7 +105,7 @@ class Runtime:
         thread.join(10.0)
 
     def call(self, fn: Callable[..., object], /, *args: Any) -> None:
-        """Call ``fn`` in the model's thread, soon.
+        """Schedule a call of ``fn`` in the model's thread.
 
         Raises:
             RuntimeError: If WebMap has not been started.
@@ -116,7 +117,7 @@ class Runtime:
         loop.call_soon_threadsafe(fn, *args)
 
     def on_stop(self, fn: Callable[[], None]) -> None:
-        """Call ``fn`` in the model's thread whenever it is about to end."""
+        """Call ``fn`` in the model's thread whenever the thread is about to end."""
         self._on_stop.append(fn)
 
     def watch(self, watcher: Watcher) -> Removal:
@@ -211,20 +212,20 @@ class Runtime:
 
 
 def twist_message(sent: SentTwist) -> dict[str, Any]:
-    """Return a velocity that was written as ``geometry_msgs/Twist`` has it.
+    """Return a velocity that the gate wrote as a ``geometry_msgs/Twist``.
 
-    It is in the robot's own frame, in metres and radians per second, and a Twist also
-    where the topic takes TwistStamped.
+    It is in the robot's own frame, in metres and radians per second. It is a Twist also
+    if the topic has type TwistStamped.
     """
     twist = Twist(sent.vx, sent.vy, sent.wz, sent.vz, sent.wx, sent.wy)
     return twist.to_message()
 
 
 def goal_message(sent: SentGoal) -> dict[str, Any]:
-    """Return where a robot was sent as ``geometry_msgs/Pose`` has it.
+    """Return a goal that the gate sent as a ``geometry_msgs/Pose``.
 
-    It is on the common map, in metres, and has no header. What the robot heard is the
-    same place in its own map, in the frame of its move topic.
+    It is on the common map, in metres, and has no header. The robot received the same
+    pose in its own map, in the frame of its move topic.
     """
     q = Quaternion.from_yaw(sent.yaw)
     return {
@@ -242,4 +243,4 @@ def _new_loop() -> asyncio.AbstractEventLoop:
 
 
 runtime = Runtime()
-"""The one model of this process."""
+"""The model's thread of this process."""

@@ -1,4 +1,4 @@
-"""The view of one map: what carries world coordinates to pixels."""
+"""The view of one map: the transform from world coordinates to pixels."""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Rect:
 
 
 def initial_view(width: float, height: float) -> Affine:
-    """Return the view with the world's origin in the middle, a pixel to the metre.
+    """Return the view with the world's origin in the centre, one pixel per metre.
 
     World y points up and screen y down (REP 103), so the view mirrors.
     """
@@ -37,10 +37,10 @@ def initial_view(width: float, height: float) -> Affine:
 def apply_operation(
     view: Affine, rect: Rect, operation: str, args: tuple[float, ...]
 ) -> Affine:
-    """Return the view after an operation that the browser is told to apply.
+    """Return the view after an operation that is sent to the browser.
 
-    The browser owns the view; this keeps Python's copy right until it reports.
-    ``follow`` changes nothing here, since only the browser moves the view then.
+    The browser owns the view; this keeps Python's copy correct until the browser
+    reports. ``follow`` changes nothing here, as only the browser then moves the view.
     """
     if operation == "translate":
         return Affine.translation(*args) @ view
@@ -57,7 +57,7 @@ def apply_operation(
 
 
 def fit_view(rect: Rect, x0: float, y0: float, x1: float, y1: float) -> Affine:
-    """Return the unrotated view that shows the world's rectangle as large as it can."""
+    """Return the unrotated view in which a rectangle of the world fills the canvas."""
     across, up = max(abs(x1 - x0), 1e-6), max(abs(y1 - y0), 1e-6)
     factor = min(max(rect.width, 1) / across, max(rect.height, 1) / up)
     x, y = (x0 + x1) / 2, (y0 + y1) / 2

@@ -1,4 +1,4 @@
-"""A view of the world on a page: what a map is before there is a robot on it."""
+"""A view of the world on a page: the base class of maps, without robots."""
 
 import itertools
 import logging
@@ -25,7 +25,7 @@ _numbers = itertools.count(1)
 
 
 class BrowserHalf:
-    """An ES module in one viewer's page that belongs to one module of one map."""
+    """An ES module in one page that belongs to one module of one map."""
 
     def __init__(
         self,
@@ -50,12 +50,12 @@ class BrowserHalf:
         )
 
     def send(self, message: dict[str, Any]) -> None:
-        """Send a message to the half; nothing happens once it has ended."""
+        """Send a message to the ES module; does nothing once it has ended."""
         if self._ended is not None:
             self._channel.send(self.instance, message)
 
     def remove(self) -> None:
-        """End the half; the second call does nothing."""
+        """End the ES module; a second call does nothing."""
         ended, self._ended = self._ended, None
         if ended is not None:
             ended(self.instance)
@@ -68,20 +68,20 @@ class World(Element):
     def __init__(self) -> None:
         super().__init__("g", class_="world")
         self.tf = Affine()
-        """What carries world coordinates to pixels from the canvas's top left."""
+        """The transform from world coordinates to pixels from the canvas's top left."""
 
 
 class WorldView(Extendable):
-    """An extendable that shows one viewer the world from above: what every map is.
+    """An extendable that shows the world from above on one page; base class of maps.
 
     It has the canvas, the view, images, mounted fragments, listeners and the browser
-    halves of modules, and it knows no robot.
+    halves of modules, but no robots.
 
     Args:
         container: The page's element to draw in.
         canvas_width: The width in pixels; the container's if not given.
         canvas_height: The height in pixels; the container's if not given.
-        namespace: Where its modules are looked up.
+        namespace: The namespace of its modules.
 
     Raises:
         ConfigError: If the container is on no page, or its page was closed.
@@ -97,7 +97,7 @@ class WorldView(Extendable):
     ) -> None:
         super().__init__(namespace)
         self.page: Page = page_of(container)
-        if self.page.closed:  # nobody would ever destroy it
+        if self.page.closed:  # the map would never be destroyed
             raise ConfigError(
                 f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
                 "so no map can be made on it: what goes on beside a page function may "
@@ -133,23 +133,23 @@ class WorldView(Extendable):
         return self._rect.height
 
     def get_bounding_rect(self) -> Rect:
-        """Return where the canvas is in the browser's viewport, in pixels."""
+        """Return the rectangle of the canvas in the browser's viewport, in pixels."""
         return self._rect
 
-    # What it shows.
+    # Contents.
 
     def add_image(
         self, iri: str, x: float, y: float, width: float, height: float
     ) -> Element:
         """Place an image in the world, under everything else.
 
-        It is drawn with sharp pixels, and smoothly where it is seen from far away; a
-        rule of CSS for ``.images > image`` may say otherwise.
+        It is drawn with sharp pixels, and smoothly when zoomed out; a CSS rule for
+        ``.images > image`` can change that.
 
-        A file that does not exist is said on the page, and the rest goes on.
+        If the file does not exist, the page shows an error and the program continues.
 
         Args:
-            iri: A file of the page's folder, or an absolute path of a file.
+            iri: A file in the page's folder, or the absolute path of a file.
             x: The left edge, in metres.
             y: The lower edge, in metres.
             width: In metres.
@@ -175,7 +175,7 @@ class WorldView(Extendable):
         return image
 
     def remove_image(self, img: Element) -> None:
-        """Remove an image that :meth:`add_image` returned; nobody can load it then."""
+        """Remove and withdraw an image that :meth:`add_image` returned."""
         img.remove()
         published = self._published.pop(img, None)
         if published is not None:
@@ -187,10 +187,11 @@ class WorldView(Extendable):
         """Show a fragment in the world.
 
         Args:
-            fragment: What to show.
-            order: Of two fragments in one place the one with the greater order lies
-                over the other; of two with the same order, the newer one.
-            into: The mounted fragment whose root takes it; the world if not given.
+            fragment: The fragment.
+            order: Of two fragments in one place, the one with the greater order is
+                drawn above; with the same order, the newer one.
+            into: The mounted fragment in whose root it is placed; the world if not
+                given.
 
         """
         under = self.world if into is None else into.root
@@ -202,17 +203,17 @@ class WorldView(Extendable):
         return mount
 
     def unmount(self, fragment: Fragment) -> None:
-        """Show a fragment no more."""
+        """Remove a fragment from the map."""
         mount = self._mounts.pop(fragment.id, None)
         if mount is not None:
             self.page.forget_mount(mount)
             self.page.channel.unmount(mount)
 
     def shows(self, mount: int) -> bool:
-        """Tell whether a mount is one of this map's."""
+        """Return whether a mount belongs to this map."""
         return mount in self._mounts.values()
 
-    # What the viewer does.
+    # Events of the viewer.
 
     def on(
         self,
@@ -223,14 +224,14 @@ class WorldView(Extendable):
         prevent: bool = False,
         stop: bool = False,
     ) -> Removal:
-        """Call ``handler`` when this viewer does something to an element.
+        """Call ``handler`` for an event of an element on this page.
 
         Args:
             element: An element that this map shows.
             event: The DOM's name: ``"click"``, ``"pointerdown"``, ``"keydown"``.
             handler: Called with the event, in the model's thread.
             prevent: Whether the browser's own reaction is prevented.
-            stop: Whether elements further out do not hear of it.
+            stop: Whether the event does not propagate to outer elements.
 
         Raises:
             ValueError: If this map does not show the element.
@@ -251,20 +252,21 @@ class WorldView(Extendable):
         options: dict[str, Any] | None = None,
         style: str | Path | None = None,
     ) -> BrowserHalf:
-        """Give a module a half that lives in the browser.
+        """Give a module an ES module in the browser, its browser half.
 
         Args:
-            module: The module. Its ``on_message(message)`` gets what the half sends;
-                its ``on_ready()`` is called whenever the half was loaded.
+            module: The module. Its ``on_message(message)`` gets the messages of the
+                browser half; its ``on_ready()`` is called whenever the browser half was
+                loaded.
             script: An ES module: the name of a built-in one, or a file's path. Its
-                default export is called with the map, the options and a function
-                that sends a message, and returns an object with ``destroy()`` and,
-                if it wants messages, ``receive(message)``.
-            options: Plain data for the half.
-            style: A style sheet to load with it, likewise.
+                default export is called with the map, the options and a function that
+                sends a message, and returns an object with ``destroy()`` and, to
+                receive messages, ``receive(message)``.
+            options: Plain data for the browser half.
+            style: A style sheet to load with it: a built-in name or a path.
 
         Returns:
-            The half, to send messages to; it ends with the module.
+            The browser half, for sending messages; it ends with the module.
 
         """
         half = BrowserHalf(
@@ -279,7 +281,7 @@ class WorldView(Extendable):
         self._halves[half.instance] = half
         return keep(half)
 
-    # How it is seen.
+    # View.
 
     def translate(self, x: float, y: float) -> None:
         """Move the view by an amount of pixels, right and down."""
@@ -288,12 +290,12 @@ class WorldView(Extendable):
     def scale(
         self, factor: float, x: float | None = None, y: float | None = None
     ) -> None:
-        """Make everything larger by a factor, about a point that stays where it is.
+        """Zoom by a factor about a fixed point.
 
         Args:
             factor: Above 1 zooms in.
-            x: Pixels from the canvas's left edge; its middle if not given.
-            y: Pixels from the canvas's top edge; its middle if not given.
+            x: Pixels from the canvas's left edge; its centre if not given.
+            y: Pixels from the canvas's top edge; its centre if not given.
 
         """
         self._operate("scale", factor, *self._point(x, y))
@@ -301,22 +303,22 @@ class WorldView(Extendable):
     def rotate(
         self, angle: float, x: float | None = None, y: float | None = None
     ) -> None:
-        """Turn the world about a point that stays where it is.
+        """Turn the world about a fixed point.
 
         Args:
-            angle: Degrees, counter-clockwise as it is seen.
-            x: Pixels from the canvas's left edge; its middle if not given.
-            y: Pixels from the canvas's top edge; its middle if not given.
+            angle: Degrees, counter-clockwise on the page.
+            x: Pixels from the canvas's left edge; its centre if not given.
+            y: Pixels from the canvas's top edge; its centre if not given.
 
         """
         self._operate("rotate", angle, *self._point(x, y))
 
     def fit(self, x: float, y: float, width: float, height: float) -> None:
-        """Show a rectangle of the world, in metres, as large as it can be."""
+        """Show a rectangle of the world, in metres, as large as possible."""
         self._operate("fit", x, y, x + width, y + height)
 
     def on_view_report(self, tf: Affine, rect: Rect) -> None:
-        """Take what the browser says of its view and its size."""
+        """Store the view and the size that the browser reports."""
         changed = (rect.width, rect.height) != (self._rect.width, self._rect.height)
         self.world.tf, self._rect = tf, rect
         if changed:
@@ -324,7 +326,7 @@ class WorldView(Extendable):
         self.notify_modules("on_view")
 
     def on_module_message(self, instance: int, message: Any) -> bool:
-        """Hand a message of a browser half to its module; tell whether it is ours."""
+        """Pass a message to its module; return whether the module is of this map."""
         half = self._halves.get(instance)
         if half is None:
             return False
@@ -332,7 +334,7 @@ class WorldView(Extendable):
         return True
 
     def on_module_ready(self, instance: int) -> None:
-        """Tell a module that its browser half is there, maybe after a reload."""
+        """Notify a module that its browser half was loaded, possibly after a reload."""
         half = self._halves.get(instance)
         if half is not None:
             self._call(half.module, "on_ready", ())
@@ -343,12 +345,12 @@ class WorldView(Extendable):
         self.show_error(text)
 
     def show_error(self, text: str) -> None:
-        """Show on this map's page what the log has already."""
+        """Show an error that is already in the log on this map's page."""
         if not self.page.closed:
             self.page.notice(text)
 
     def leave_page(self) -> None:
-        """Be on the page no more, with its images and all that is mounted in it."""
+        """Remove the map, its images and its mounts from the page."""
         for published in self._published.values():
             published.remove()
         self._published.clear()

@@ -1,6 +1,6 @@
-"""What a layer declares about itself: its topics, its switch and its class in CSS.
+"""The declaration of a layer: its topics, its switch and its CSS class.
 
-Discovery, the limit of layers for each robot, the list of layers on the page,
+Discovery, the limit of layers per robot, the list of layers on the page,
 ``webmap view --show`` and the reference are derived from it.
 """
 
@@ -27,7 +27,7 @@ View = type[msgspec.Struct]
 BY_TYPE = {"": "its type alone"}
 
 LAST = 1000.0
-"""The rank of a layer that names none: it comes after the built-in ones."""
+"""The rank of a layer without a rank: after the built-in ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,18 +35,18 @@ class TopicKind:
     """Topics that a layer draws in the same way."""
 
     name: str
-    """What discovery calls such a topic, such as ``"scan"``. Kinds of a layer that have
-    the same name share their limit, and only differ in their types and names."""
+    """The name of the kind in discovery, such as ``"scan"``. Kinds of a layer with the
+    same name share their limit, and differ only in types and names."""
 
     names: Mapping[str, str] = field(default_factory=lambda: BY_TYPE)
     """Regular expressions that are searched in the topic's name, the best first, each
-    with the reason that people are shown."""
+    with the reason that is shown to people."""
 
     most: int = 3
-    """How many topics of this kind a robot gets."""
+    """The greatest number of topics of this kind for one robot."""
 
     types: tuple[str, ...] = ()
-    """The types of such topics, without a dialect; all of the layer's if empty."""
+    """The types of such topics, without a ROS version; all of the layer's if empty."""
 
     options: Mapping[str, Any] = field(default_factory=dict)
     """The layer's options for such a topic."""
@@ -68,28 +68,28 @@ class FoundTopic:
     """As the bridge spells it."""
 
     own: bool = True
-    """Whether the topic is in the robot's own namespace, and not shared by robots."""
+    """Whether the topic is in the robot's own namespace and not shared by robots."""
 
     namespace: str = ""
-    """The robot's: ``/robot_0``, or empty."""
+    """The namespace of the robot: ``/robot_0``, or empty."""
 
     frames: Mapping[str, Any] | None = None
-    """``map_frame`` and ``namespace`` of the robot's frames; None if it has none."""
+    """``map_frame`` and ``namespace`` of the robot's TF; None if it has none."""
 
     number: int = 1
-    """Which of the robot's layers of this class it is, from 1."""
+    """The number of this layer among the robot's layers of this class, from 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
-    """What :func:`layer` was told about a layer."""
+    """The arguments of :func:`layer` for one class."""
 
     layer: type
     types: tuple[str, ...]
     kinds: tuple[TopicKind, ...]
     view: View | Mapping[str, View] | None
     switches: Mapping[str, str]
-    """CSS selectors by the names of switches."""
+    """CSS selectors by switch name."""
 
     css: str
     rank: float
@@ -106,11 +106,11 @@ class Declaration:
 
     @property
     def of_maps(self) -> bool:
-        """Whether it is a layer of maps, and not of robots."""
+        """Whether it is a layer of maps and not of robots."""
         return getattr(self.layer, "registry", robot_modules) is map_modules
 
     def options_for(self, found: FoundTopic) -> dict[str, Any]:
-        """Return the options of the layer that draw a topic."""
+        """Return the options with which the layer draws a topic."""
         chosen = getattr(self.layer, "options_for", None)
         options: dict[str, Any] = (
             usual_options(self.layer, found) if chosen is None else chosen(found)
@@ -118,7 +118,7 @@ class Declaration:
         return options
 
     def view_of(self, type: str) -> View | None:
-        """Return what messages of a type are decoded as; None for plain messages.
+        """Return the class for decoding messages of a type; None for plain messages.
 
         Raises:
             ConfigError: If the layer does not draw messages of that type.
@@ -131,10 +131,10 @@ class Declaration:
 
 
 def usual_options(layer: type, found: FoundTopic) -> dict[str, Any]:
-    """Return the options of a topic's kind, and those that say what the topic is.
+    """Return the options of a topic's kind, and those that depend on the topic.
 
-    A layer that has an option ``type`` gets the type of the topic, if it is not the
-    usual one, and one that has an option ``map_frame`` the frames of the robot.
+    An option ``type`` gets the topic's type if it is not the default one. An option
+    ``map_frame`` gets the frames of the robot.
 
     Args:
         layer: The class of the layer.
@@ -162,26 +162,27 @@ def layer(
     css: str = "",
     rank: float = LAST,
 ) -> Callable[[T], T]:
-    """Declare what a layer draws, so that discovery finds topics for it; a decorator.
+    """Declare what a layer draws, so that discovery finds its topics (decorator).
 
     A subclass of :class:`webmap.RobotLayer` or :class:`webmap.MapLayer` is registered
-    as a module under its own name; any other class has to be registered besides.
+    as a module under its own name; any other class must be registered separately.
 
     Args:
-        *types: Message types that the layer draws, without a dialect, such as
-            ``"sensor_msgs/Temperature"``; the first is its usual one.
+        *types: Message types that the layer draws, without a ROS version, such as
+            ``"sensor_msgs/Temperature"``; the first is the default one.
         kinds: The kinds of topics that discovery draws with it, the best first.
-        kind: The name of the only kind; without it and ``kinds`` the layer is added by
-            programs alone.
+        kind: The name of the only kind. Without it and ``kinds``, only programs add the
+            layer.
         names: A regular expression that is searched in the names of topics of the only
             kind; all topics of the types if empty.
-        most: How many topics of the only kind a robot gets.
-        view: A class that messages are decoded as, or one for each type. Without it
-            a message is decoded to an object that has all fields as attributes.
-        switch: The name of its switch in the list of layers, or CSS selectors by names.
-        css: The class of what it draws; the name of the layer in lower case if empty.
-        rank: Layers are found and drawn in this order; the built-in ones have 10 to
-            140.
+        most: The greatest number of topics of the only kind for one robot.
+        view: A class for decoding messages, or one for each type. Without it, a message
+            is decoded to an object with all fields as attributes.
+        switch: The name of its switch in the list of layers, or CSS selectors by switch
+            name.
+        css: The CSS class of the drawing; the name of the layer in lower case if empty.
+        rank: The order in which layers are found and drawn; the built-in ones have 10
+            to 140.
 
     Raises:
         ConfigError: If there is no type or one is no name of a type, if both ``kind``
@@ -224,7 +225,7 @@ def layer(
 
 
 def _check_kinds(declared: Declaration) -> None:
-    """Let kinds pass that discovery can use."""
+    """Check that discovery can use all kinds."""
     takes = list(inspect.signature(declared.layer).parameters)
     first: dict[str, TopicKind] = {}
     for kind in declared.kinds:
@@ -250,9 +251,9 @@ def _check_kinds(declared: Declaration) -> None:
 
 
 def declarations() -> list[Declaration]:
-    """Return the declarations of all layers there are, in the order of their ranks.
+    """Return the declarations of all layers, ordered by rank.
 
-    A kind whose name another layer before has is left out, and logged once.
+    A kind whose name an earlier layer already has is left out, and logged once.
     """
     made = [*robot_modules, *map_modules]
     found = (vars(each).get("declared") for each in made if isinstance(each, type))

@@ -1,4 +1,4 @@
-"""Points, outlines and numbers for what layers draw; public as ``webmap.drawing``.
+"""Points, outlines and numbers for layers; public as ``webmap.drawing``.
 
 Lengths are in metres and angles in radians.
 """
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 RIM = 24
-"""Points of the outline of something round."""
+"""Points of the outline of a round shape."""
 
 UNIT = 0.001
-"""Metres per unit of dots, as long as all points fit in 16 bits."""
+"""Metres per unit of dots, while all points fit in 16 bits."""
 
 MOST = 32767
-"""Units that a number of 16 bits holds."""
+"""The greatest number of units in 16 bits."""
 
 
 def in_space(points: Iterable[Vector3 | PointMsg]) -> list[Vector3]:
-    """Return points with a height; one whose height is no number lies in the plane.
+    """Return points with heights; a height that is not a finite number becomes 0.
 
     Raises:
-        ProtocolError: If one is higher or lower than anything can be.
+        ProtocolError: If a height is beyond the limit.
 
     """
     found = [Vector3(p.x, p.y, p.z if math.isfinite(p.z) else 0.0) for p in points]
@@ -46,11 +46,11 @@ def in_space(points: Iterable[Vector3 | PointMsg]) -> list[Vector3]:
 
 
 def flat(points: Iterable[Vector3], tilt: Transform) -> list[Point]:
-    """Return where points are in the plane.
+    """Return points in the plane.
 
     Args:
         points: In metres, in the coordinates that ``tilt`` takes.
-        tilt: What takes them to coordinates whose z points up.
+        tilt: The transform to coordinates whose z points up.
 
     """
     if tilt.upright and tilt.rotation.z == 0.0:
@@ -71,7 +71,7 @@ def levelled(
     Args:
         points: Of shape (N, 2) in the plane of ``tilt``'s own coordinates, or (N, 3),
             in metres.
-        tilt: What takes them to coordinates whose z points up.
+        tilt: The transform to coordinates whose z points up.
 
     Returns:
         Points of shape (N, 2) and heights of shape (N,), in metres.
@@ -89,9 +89,9 @@ def levelled(
 
 
 def hull(points: Iterable[Point]) -> list[Point]:
-    """Return the corners of the least convex outline around points.
+    """Return the corners of the convex hull of points.
 
-    They go counter-clockwise, and none lies on a side.
+    They are in counter-clockwise order, and none lies on a side.
     """
     found = sorted(set(points))
     if len(found) < 3:
@@ -112,9 +112,9 @@ def cone(reach: float, half: float, tilt: Transform) -> list[Point]:
     """Return the outline of a cone about x with a round end.
 
     Args:
-        reach: From its tip to its end, in metres.
+        reach: The distance from its tip to its end, in metres.
         half: Half the angle at its tip, in radians.
-        tilt: What takes its coordinates to those whose z points up.
+        tilt: The transform from its coordinates to those whose z points up.
 
     """
     rings = (half * share / 4 for share in range(5))
@@ -131,7 +131,7 @@ def cone(reach: float, half: float, tilt: Transform) -> list[Point]:
 
 
 def box(size: Sequence[float], tilt: Transform) -> list[Point]:
-    """Return the outline of a box about the origin, by its three sides in metres."""
+    """Return the outline of a box about the origin, from its three sides in metres."""
     x, y, z = (side / 2 for side in size)
     corners = [
         Vector3(i * x, j * y, k * z) for i in _BOTH for j in _BOTH for k in _BOTH
@@ -140,7 +140,7 @@ def box(size: Sequence[float], tilt: Transform) -> list[Point]:
 
 
 def cylinder(size: Sequence[float], tilt: Transform) -> list[Point]:
-    """Return the outline of a cylinder about z, by its three sizes in metres."""
+    """Return the outline of a cylinder about z, from its three sizes in metres."""
     x, y, z = (side / 2 for side in size)
     rims = [
         Vector3(x * math.cos(turn), y * math.sin(turn), k * z)
@@ -155,10 +155,10 @@ def ellipsoid(size: Sequence[float], tilt: Transform) -> tuple[float, float, flo
 
     Args:
         size: Its three sizes, in metres.
-        tilt: What takes its coordinates to those whose z points up.
+        tilt: The transform from its coordinates to those whose z points up.
 
     Returns:
-        Both half axes in metres, and how far the first is turned from x in radians.
+        Both half axes in metres, and the angle from x to the first one in radians.
 
     """
     one, other, _ = tilt.rows
@@ -172,14 +172,14 @@ def ellipsoid(size: Sequence[float], tilt: Transform) -> tuple[float, float, flo
 
 
 def in_units(points: "NDArray[np.float64]") -> "tuple[NDArray[np.int16], float]":
-    """Return points in whole units, and how many metres a unit is.
+    """Return points in whole units, and the size of a unit in metres.
 
     Args:
         points: Of shape (N, 2), in metres.
 
     Returns:
-        Little-endian numbers of the same shape; their bytes and the unit are what
-        :meth:`webmap.Element.set_dots` takes.
+        Little-endian numbers of the same shape, whose bytes are for
+        :meth:`webmap.Element.set_dots`, and the unit.
 
     """
     farthest = float(abs(points).max()) if len(points) else 0.0
@@ -188,16 +188,16 @@ def in_units(points: "NDArray[np.float64]") -> "tuple[NDArray[np.int16], float]"
 
 
 def rounded(value: float) -> float:
-    """Return metres to the millimetre, which is short on the wire."""
+    """Return metres rounded to the millimetre, to shorten messages."""
     return round(value, 3) + 0.0
 
 
 def check_finite(points: list[tuple[float, float]], what: str) -> None:
-    """Let points pass that can be drawn.
+    """Check that points can be drawn.
 
     Raises:
-        ProtocolError: If one is not finite, or farther away than anything can be; it
-            is named by its number.
+        ProtocolError: If a point is not finite or too far away; the message has its
+            number.
 
     """
     for number, (x, y) in enumerate(points):
@@ -214,7 +214,7 @@ def check_finite(points: list[tuple[float, float]], what: str) -> None:
 
 
 def thinned(count: int, most: int) -> range | list[int]:
-    """Return which of ``count`` things to keep: evenly chosen, and the last one."""
+    """Return which of ``count`` items to keep: evenly chosen, and the last one."""
     if count <= most:
         return range(count)
     step = count / most
@@ -225,8 +225,8 @@ def sector(radius: float, half: float) -> str | None:
     """Return the path of a sector about x; None if it has no size.
 
     Args:
-        radius: Metres.
-        half: Half its angle, in radians; all round from pi on.
+        radius: In metres.
+        half: Half its angle, in radians; a full circle from pi on.
 
     """
     if radius <= 0 or half < 1e-4:

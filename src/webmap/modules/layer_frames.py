@@ -1,4 +1,4 @@
-"""Where a layer lies, and where the frames are that its data is in."""
+"""The alignment of a layer, and the frames of its data."""
 
 from typing import TYPE_CHECKING
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
 
 
 class LayerFrames:
-    """Lays a layer onto the common map, and knows the frames of its data.
+    """Puts a layer on the common map, and receives the frames of its data.
 
-    It lies there as its robot is aligned, or as its bridge is if it is nobody's own.
-    Frames are only heard once data names one that is not the map's. All of it ends with
-    the layer.
+    The layer has the alignment of its robot, or of its bridge if the robot has none. TF
+    is only subscribed to once data names a frame other than the map's. All of it ends
+    with the layer.
 
     Args:
-        layer: What is drawn.
-        bridge: The link to the ROS system that has the data and the frames.
-        map_frame: The map's own frame; None if data is drawn as it comes.
-        namespace: ``/robot_0`` where the topics are ``/robot_0/tf`` and
+        layer: The layer.
+        bridge: The connection to the ROS system that has the data and the frames.
+        map_frame: The map's own frame; None to draw data without a transform.
+        namespace: ``/robot_0`` if the topics are ``/robot_0/tf`` and
             ``/robot_0/tf_static``.
-        robot: Whose layer it is.
+        robot: The robot of the layer, if it has one.
 
     """
 
@@ -62,12 +62,12 @@ class LayerFrames:
 
     @property
     def alignment(self) -> Pose:
-        """Where the map of the data lies on the common one."""
+        """The position and rotation of the data's map on the common one."""
         own = None if self._robot is None else self._robot.whereabouts.own_alignment
         return alignments.of(self._bridge) if own is None else own
 
     def _source(self, frame_id: str) -> str | None:
-        """Return the whole name of a frame; None if data of it is drawn as it comes."""
+        """Return the full name of a frame; None to draw data without a transform."""
         if self._map_frame is None or not frame_id:
             return None
         if self._frames is None:
@@ -79,10 +79,10 @@ class LayerFrames:
         return self._frames.buffer.name(frame_id, self._namespace)
 
     def _look(self, source: str, stamp: float) -> tuple[Transform, bool]:
-        """Return what takes a frame to the map, and whether news would not change it.
+        """Return the transform from a frame to the map, and whether it is final.
 
         Raises:
-            TransformError: If that is not known.
+            TransformError: If the transform is unknown.
 
         """
         if self._frames is None or self._map_frame is None:
@@ -92,7 +92,7 @@ class LayerFrames:
         return newest_or_at(buffer, target, source, stamp)
 
     def _say(self, words: str) -> None:
-        """Show what is wrong with the frames once it has lasted, or clear it."""
+        """Show a problem of the frames once it has lasted, or clear it."""
         if lasting(self._lasting, "lost" if words else "", self._frames):
             self._layer.set_problem(self, words)
         elif not words:
@@ -105,37 +105,37 @@ class LayerFrames:
             self._align(aligned)
 
     def _begin(self) -> None:
-        """Make ready, before the layer is laid anywhere."""
+        """Set attributes before the layer is first placed."""
 
     def _align(self, aligned: Pose) -> None:
-        """Lay the layer where its map is now."""
+        """Place the layer at the current alignment of its map."""
         raise NotImplementedError
 
     def _news(self) -> None:
-        """Look again where frames are."""
+        """Process changed frames."""
         raise NotImplementedError
 
 
 def not_known(frame: str, why: object) -> str:
-    """Return a sentence on a frame that is somewhere and nobody tells where."""
+    """Return the sentence for a frame whose pose is unknown."""
     return f"the pose of {frame!r} on the map is unknown: {why}"
 
 
 class Anchored(LayerFrames):
-    """Keeps a whole layer where the frames of a ROS system have its data."""
+    """Keeps a whole layer at the frame of its data."""
 
     def _begin(self) -> None:
         self._frame: str | None = None
         self._offset = Affine()
 
     def stand_in(self, frame_id: str, stamp: float) -> None:
-        """Take the layer's coordinates to be in a frame, as it was at a time.
+        """Set the frame of the layer's coordinates, as it was at a time.
 
-        Afterwards the layer moves as the frame does.
+        Afterwards the layer moves with the frame.
 
         Args:
-            frame_id: The frame of a message; empty if it does not say.
-            stamp: In seconds of the robot's clock; 0 if not said.
+            frame_id: The frame of a message; empty if it has none.
+            stamp: In seconds of the robot's clock; 0 if there is none.
 
         """
         source = self._source(frame_id)

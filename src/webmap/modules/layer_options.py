@@ -1,7 +1,7 @@
 """The options of a layer: declared once, as annotated attributes of its class.
 
-From the declaration comes the signature, by which arguments are checked and named in
-error messages; values are checked by what the annotation says.
+The declaration gives the signature, with which arguments are checked and named in error
+messages. Values are checked by the annotations.
 """
 
 import inspect
@@ -27,7 +27,7 @@ from webmap.ros.bridge import Bridge
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Which values an option may have: ``Annotated[float, Limit(words, fits)]``."""
+    """The values that an option may have: ``Annotated[float, Limit(words, fits)]``."""
 
     words: str
     """The values in words, as in "must be WORDS"."""
@@ -47,15 +47,15 @@ Frame: TypeAlias = Literal["map", "robot"]
 
 
 class LayerOptions:
-    """Takes arguments after an owner, and keeps each as an attribute.
+    """Takes arguments after an owner, and stores each as an attribute.
 
     Every annotated attribute of the class that has a value is an option, and its value
-    the default. Options are given by name; those above ``_: KW_ONLY`` may be given by
-    place too, after the bridge and the topic.
+    is the default. Options are keyword arguments; those above ``_: KW_ONLY`` may also
+    be given by position, after the bridge and the topic.
     """
 
     owner: ClassVar[str] = "owner"
-    """What the first argument is called."""
+    """The name of the first argument."""
 
     __signature__: ClassVar[inspect.Signature]
 
@@ -64,7 +64,7 @@ class LayerOptions:
         cls.__signature__ = _signature(cls)
 
     def _take_arguments(self, *args: Any, **options: Any) -> None:
-        """Keep arguments, of which the owner is the first, as attributes.
+        """Store the arguments after the owner as attributes.
 
         Raises:
             ConfigError: If a value is outside of its limits.
@@ -94,7 +94,7 @@ def _signature(cls: type[LayerOptions]) -> inspect.Signature:
 
 
 def _limits(annotation: Any, value: Any) -> Iterator[Limit]:
-    """Yield the limits that an annotation has for a value."""
+    """Yield the limits of an annotation for a value."""
     origin = get_origin(annotation)
     if origin is Annotated:
         found = annotation.__metadata__
@@ -105,11 +105,11 @@ def _limits(annotation: Any, value: Any) -> Iterator[Limit]:
 
 
 def _options(cls: type) -> Iterator[inspect.Parameter]:
-    """Yield the options of a class, its own before those of the classes above it."""
+    """Yield the options of a class, its own before those of its base classes."""
     seen = {"topic"}
     for each in cls.__mro__:
         own = inspect.get_annotations(each)
-        # Texts, if the file begins with ``from __future__ import annotations``.
+        # Strings, if the file begins with ``from __future__ import annotations``.
         own = {name: resolved(text, each) for name, text in own.items()}
         by_place = list(own).index("_") if "_" in own else 0
         for place, (name, annotation) in enumerate(own.items()):

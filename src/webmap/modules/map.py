@@ -1,8 +1,8 @@
 """Modules of maps, by name: ``webmap.modules.map.Teleop``.
 
-A built-in module is the class that its file is named after. ``register`` is a
-decorator that adds one of your own, and a package adds its modules by an entry point
-in the group ``webmap.modules.map``.
+A built-in module is the class after which its file is named. The decorator ``register``
+adds your own module. A package adds its modules by an entry point in the group
+``webmap.modules.map``.
 """
 
 from typing import Any

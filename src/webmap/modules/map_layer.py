@@ -1,4 +1,4 @@
-"""The base of what is drawn on maps from the messages of one topic."""
+"""Base class of layers that draw the messages of one topic on maps."""
 
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 NEVER = 1e9
-"""Seconds after which a layer without an age limit is drawn as old."""
+"""Age limit in seconds of a layer without one, so that it is never stale."""
 
 
 class MapLayer(TopicLayer, Layer):
-    """Something drawn on maps from the messages of one topic.
+    """A drawing on maps of the messages of one topic.
 
     A subclass is declared with :func:`webmap.layer`. It makes its elements in
-    :meth:`build` and changes them in :meth:`draw`; everything else is done here. The
-    messages of the topic are decoded, and one that makes no sense is left out and
-    shown as a problem on the maps. The layer lies as a whole where the frame of the
-    message was at its stamp, as the map is aligned, looks old when it is, and has a
-    name in the list of layers. Maps that ask for the same layer with the same options
-    share one, which ends with the last of them.
+    :meth:`build` and changes them in :meth:`draw`; this class does the rest. It decodes
+    the messages of the topic; an invalid message is skipped and shown as a problem on
+    the maps. The whole layer is placed at the frame of the message at its stamp, with
+    the alignment of the map. It is shown as stale when it is, and has a name in the
+    list of layers. Maps that ask for the same layer with the same options share one,
+    which ends with the last of them.
 
     Annotated attributes of the class that have a value are options of the module. A
     call of the class shows the layer on a map, and returns a :class:`ShownLayer`.
@@ -35,28 +35,29 @@ class MapLayer(TopicLayer, Layer):
     registry: ClassVar = map_modules
 
     age_limit: Seconds | None = None
-    """Seconds after which it is drawn as old; None for data that is sent only once."""
+    """Seconds after which it is drawn as stale; None for data that is sent only
+    once."""
 
     map_frame: str | None = "map"
-    """The map's own frame, to which the ``/tf`` of the bridge leads; None to draw data
-    as it comes."""
+    """The map's own frame in the ``/tf`` of the bridge; None to draw data without a
+    transform."""
 
     namespace: str = ""
-    """``/robot_0`` where the frames are on ``/robot_0/tf``."""
+    """``/robot_0`` if the frames are on ``/robot_0/tf``."""
 
     robot: "Robot | None" = None
-    """Whose layer it is: it lies as that robot is aligned, and as its bridge is if it
-    is nobody's own."""
+    """The robot of the layer: it has the alignment of that robot, or of the bridge
+    without a robot."""
 
     order: float | None = None
-    """What lies over what: greater is nearer; robots have 100, and the layer 50 if not
-    given."""
+    """The drawing order: a greater one is drawn above; robots have 100, and the layer
+    50 if not given."""
 
     usual_order = 50.0
     """The order if none is given."""
 
     def __new__(cls, map: "Map", *args: Any, **options: Any) -> Any:
-        """Return what shows the layer on a map."""
+        """Return the module that shows the layer on a map."""
         return ShownLayer(map, cls, args, options)
 
     @classmethod
@@ -67,7 +68,7 @@ class MapLayer(TopicLayer, Layer):
         return layer
 
     def start(self) -> None:
-        """Make the drawing, and subscribe; called once, in the layer's scope."""
+        """Make the drawing and subscribe; called once, in the layer's scope."""
         self.svg.classes.add(self.declared.css)
         self.svg.set(pointer_events="none")
         owner = "" if self.robot is None else self.robot.name
@@ -77,13 +78,13 @@ class MapLayer(TopicLayer, Layer):
         self._subscribe(self)
 
     def lay(self) -> None:
-        """Lay the layer onto the common map, to move with the frames of its data."""
+        """Put the layer on the common map; it moves with the frames of its data."""
         self.anchor = Anchored(
             self, self.bridge, self.map_frame, self.namespace, self.robot
         )
 
     def take(self, message: Any) -> None:
-        """Draw a message where its frame was at its stamp.
+        """Draw a message at the pose of its frame at its stamp.
 
         Raises:
             ProtocolError: If it cannot be drawn.
@@ -95,7 +96,7 @@ class MapLayer(TopicLayer, Layer):
         self.be_new()
 
     def be_new(self) -> None:
-        """Note that the drawing is as new as the messages of the bridge."""
+        """Set the age of the drawing to that of the bridge's messages."""
         limit = NEVER if self.age_limit is None else self.age_limit
         self.svg.set_age(self.bridge.lag, limit=limit)
 
@@ -106,8 +107,8 @@ class ShownLayer:
     Args:
         map: The map.
         layer: The class of the layer.
-        args: What it takes after the map.
-        options: Its arguments by name.
+        args: The positional arguments after the map.
+        options: The keyword arguments.
 
     """
 
@@ -124,6 +125,6 @@ class ShownLayer:
         order = named.pop("order")
         self.map = map
         self.layer = layer.shared(**named)
-        """The layer, which other maps may show too."""
+        """The layer; other maps may show it too."""
         usual = self.layer.usual_order
         self.layer.show_on(map, order=usual if order is None else order)

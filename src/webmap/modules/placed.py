@@ -1,4 +1,4 @@
-"""Where a robot's module draws: on the robot, or in the world under it."""
+"""Groups in which a robot's modules draw: on the robot, or in the world under it."""
 
 import logging
 import math
@@ -25,32 +25,32 @@ log = logging.getLogger("webmap.modules")
 FRAMES = ("map", "robot")
 
 Draw = Callable[[Transform], object]
-"""Draws data in the plane, given what takes its coordinates to those of a level frame:
-z points up there, and heights begin at the robot's base, or at the map's plane."""
+"""Draws data in the plane, given the transform from its coordinates to those of a level
+frame. There z points up, and heights are above the robot's base, or above the map's
+plane."""
 
 SEEN_TILT, SEEN_LIFT = 0.002, 0.005
-"""Radians and metres by which data has to tilt and rise to be drawn anew."""
+"""The least tilt in radians and rise in metres by which data is drawn again."""
 
 
 class Placed:
-    """A group of a robot's whose data stays where it was measured.
+    """A group of a robot whose data stays where it was measured.
 
-    It is part of the robot's fragment, so that all maps share it and CSS finds it below
-    ``.robot``; it ends with the scope that it was made in.
+    It is part of the robot's fragment, so all maps share it, and CSS selects it below
+    ``.robot``. It ends with the scope in which it was created.
 
-    Data of the robot's own frame goes with the robot until a message says when it was
-    measured: see :meth:`stand_in`. From then on it stays on the map where the robot was
-    at that time, so that a wall does not turn along with who looks at it.
-
-    A group in the map's frame lies under the robot's model.
+    Data in the robot's own frame moves with the robot until a message has a stamp: see
+    :meth:`stand_in`. From then on the data stays on the map at the robot's pose at that
+    stamp, so that a wall does not turn with the robot that sees it. A group in the
+    map's frame is drawn under the robot's model.
 
     The group itself only turns in the plane. For data that is tilted, upside down or on
     its side, pass a function to :meth:`stand_in` that draws it as seen from above.
 
     Args:
         robot: The robot.
-        *children: What is in the group.
-        class_: Its class.
+        *children: The children of the group.
+        class_: Its CSS class.
         frame: ``"map"`` if its coordinates are the map's, ``"robot"`` if they are the
             robot's.
         x: Metres along x of the frame.
@@ -87,8 +87,8 @@ class Placed:
         self._draw: Draw | None = None
         self._drawn: Transform | None = None
         self._offset = Affine.of_pose(mount)
-        """What takes the group's coordinates to those of the robot's own map, or to the
-        robot's; or to the common map if no message was ever taken."""
+        """The transform from the group's coordinates to the robot's own map, or to the
+        robot; or to the common map before the first message."""
         self._on_robot = frame == "robot"
         self._settled = True
         self._upright: dict[Element, tuple[float, float]] = {}
@@ -104,23 +104,23 @@ class Placed:
         keep(Removal(self._end))
 
     def stand_in(self, frame_id: str, stamp: float, draw: Draw | None = None) -> None:
-        """Take coordinates to be in the frame that a message names, as it was then.
+        """Set the frame of the coordinates, as it was at the stamp of a message.
 
-        The frames that the robot was given with ``set_tf`` say where that frame was at
-        the stamp, or the robot's poses if there are none. If the newest of them is
-        older than the stamp, the motion is extrapolated, and corrected when newer ones
-        come.
+        The frames of ``set_tf`` give the pose of that frame at the stamp, or the
+        robot's poses if there are no frames. If the newest of them is older than the
+        stamp, the motion is extrapolated, and corrected when newer ones arrive.
 
-        Without frames, a sensor is where the options of its module place it, or at the
-        robot's origin. If a frame is unknown, its last place is used, or the robot's
+        Without frames, a sensor is placed by the options of its module, or at the
+        robot's origin. If a frame is unknown, its last pose is used, or the robot's
         frame or the map's, and the robot shows a problem.
 
         Args:
-            frame_id: The frame of the message; empty if it does not say.
-            stamp: When it was measured, in seconds of the robot's clock; 0 if not said.
-            draw: Draws the data as it looks from above. It is called at once, and again
-                when it turns out that the frame is tilted otherwise. Without it the
-                group has to lie in the plane of the frame.
+            frame_id: The frame of the message; empty if it has none.
+            stamp: The time of measurement in seconds of the robot's clock; 0 if there
+                is none.
+            draw: Draws the data as seen from above. It is called at once, and again if
+                the tilt of the frame changes. Without it the group must lie in the
+                plane of the frame.
 
         """
         before = (self._seen, self._draw, self._drawn)
@@ -133,12 +133,12 @@ class Placed:
             raise
 
     def moved_within(self, frame_id: str, stamp: float, seconds: float) -> Pose:
-        """Return where a sensor gets in a time, in its own plane as it was before.
+        """Return how a sensor moves in a time, in its own plane at the beginning.
 
         Args:
             frame_id: The sensor's frame.
-            stamp: When the time begins, in seconds of the robot's clock; 0 if not said.
-            seconds: How long; 0.5 s at the most are looked ahead.
+            stamp: The beginning, in seconds of the robot's clock; 0 if there is none.
+            seconds: The duration; at most 0.5 s are extrapolated.
 
         """
         if not stamp:
@@ -154,9 +154,9 @@ class Placed:
         """Keep an element of the group from turning with it.
 
         Args:
-            element: Its y then points down and its units are centimetres.
-            x: Where it is from the group's origin, in metres along the map's x.
-            y: In metres along the map's y.
+            element: The element; its y then points down and its units are centimetres.
+            x: Its distance from the group's origin, in metres along the map's x.
+            y: Its distance, in metres along the map's y.
 
         """
         self._upright[element] = (x, y)
@@ -169,15 +169,15 @@ class Placed:
             return
         try:
             self._settle()
-        except Exception as error:  # others hear of the news too
+        except Exception as error:  # the other listeners must run too
             self._settled = True
-            self._trouble = "failed"  # so that the next drawing that works clears it
+            self._trouble = "failed"  # so that the next successful drawing clears it
             log.exception("%s: drawing failed", self._class)
             words = f"drawing failed: {type(error).__name__}: {error}"
             self.robot.set_problem(self, f"{self._class}: {words}")
 
     def _settle(self) -> None:
-        """Find out where the group is, as well as it can be known by now."""
+        """Determine the current pose of the group as well as possible."""
         if self._seen is None:
             return
         found = self._sightings.look(*self._seen)
@@ -188,14 +188,14 @@ class Placed:
             lift = Vector3(0.0, 0.0, tilt.translation.z - found.ground)
             self._tilt(self._draw, replace(tilt, translation=lift))
             offset = Affine.of_pose(pose)
-        # Only now, since drawing may fail: what was drawn before then stays in place.
+        # Only now, since drawing may fail: the earlier drawing then stays in place.
         self._offset, self._on_robot = offset, found.on_robot
         self._settled = found.settled
         self._say(found)
         self._put()
 
     def _tilt(self, draw: Draw, tilt: Transform) -> None:
-        """Draw again what looks otherwise now."""
+        """Draw again if the tilt changed visibly."""
         if self._drawn is None or not alike(self._drawn, tilt, SEEN_LIFT, SEEN_TILT):
             self._drawn = tilt
             draw(tilt)
@@ -214,7 +214,7 @@ class Placed:
             element.set_matrix(turn @ Affine(0.01, 0, 0, -0.01, x, y))
 
     def _say(self, found: Sighting) -> None:
-        """Show what is wrong with the place once; clear it when that is over."""
+        """Show a problem of the pose once; clear it when it ends."""
         trouble = lasting(self._lasting, found.trouble, self.robot.whereabouts.frames)
         if trouble == self._trouble:
             return
@@ -231,7 +231,7 @@ class Placed:
 
 
 def put(element: Element, place: Affine) -> None:
-    """Place an element: by a pose, which is short on the wire, if it is one."""
+    """Place an element: by a pose, which is a shorter message, if possible."""
     if abs(place.a - place.d) < 1e-9 and abs(place.b + place.c) < 1e-9:
         element.set_pose(place.e, place.f, math.atan2(place.b, place.a))
     else:

@@ -1,4 +1,4 @@
-"""The base of what is drawn of a robot from the messages of one topic."""
+"""Base class of layers that draw the messages of one topic of a robot."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -13,24 +13,24 @@ if TYPE_CHECKING:
 
 
 class RobotLayer(TopicLayer):
-    """Something drawn of a robot from the messages of one topic.
+    """A drawing of the messages of one topic of a robot.
 
     A subclass is declared with :func:`webmap.layer`. It makes its elements in
-    :meth:`build` and changes them in :meth:`draw`; everything else is done here. The
-    messages of the topic are decoded, and one that makes no sense is left out and
-    shown as a problem of the robot. What is drawn stays on the map where the frame of
-    the message was at its stamp, looks old when it is, has a name in the list of
-    layers, and goes with the module.
+    :meth:`build` and changes them in :meth:`draw`; this class does the rest. It decodes
+    the messages of the topic; an invalid message is skipped and shown as a problem of
+    the robot. The drawing stays on the map at the frame of the message at its stamp, is
+    shown as stale when it is, has a name in the list of layers, and ends with the
+    module.
 
     Annotated attributes of the class that have a value are options of the module. A
-    layer whose messages are in the robot's frame, unless they name another, sets
-    ``frame = "robot"``; ``x``, ``y`` and ``angle`` are then where its sensor is on the
-    robot, in metres and degrees. Annotated, these are options too.
+    layer whose messages are in the robot's frame unless they name another sets
+    ``frame = "robot"``; ``x``, ``y`` and ``angle`` are then the pose of its sensor on
+    the robot, in metres and degrees. Annotated, these are options too.
 
-    What :meth:`draw` gets as ``at`` takes coordinates of the message to those of the
-    drawing, which is level: x and y are seen, and z is metres above the robot's base,
-    or above the map's plane with ``frame = "map"``. It is called for each message, and
-    again if the frame turns out to be tilted otherwise.
+    The argument ``at`` of :meth:`draw` is the transform from coordinates of the message
+    to those of the drawing, which is level: x and y are drawn, and z is metres above
+    the robot's base, or above the map's plane with ``frame = "map"``. :meth:`draw` is
+    called for each message, and again if the tilt of the frame changes.
     """
 
     owner: ClassVar = "robot"
@@ -38,7 +38,7 @@ class RobotLayer(TopicLayer):
 
     in_plane: ClassVar[bool] = False
     """Whether the drawing lies in the plane of its frame and tilts with it as a whole,
-    so that :meth:`draw` need not turn points in space."""
+    so that :meth:`draw` need not transform points in space."""
 
     robot: "Robot"
 
@@ -46,10 +46,10 @@ class RobotLayer(TopicLayer):
     """The least time between two messages, in milliseconds."""
 
     age_limit: Seconds = 60.0
-    """Seconds after which it is drawn as old."""
+    """Seconds after which it is drawn as stale."""
 
     name: str = ""
-    """A further class, by which style sheets tell one of several."""
+    """A further CSS class, to tell several layers apart."""
 
     frame = "map"
     x = y = angle = 0.0
@@ -65,7 +65,7 @@ class RobotLayer(TopicLayer):
             y=self.y,
             angle=self.angle,
         )
-        """Where the drawing is."""
+        """The group of the drawing."""
         self.svg = self.placed.svg
         label(self.svg, self.topic, robot)
         self.build()
@@ -79,15 +79,15 @@ class RobotLayer(TopicLayer):
 
         Args:
             element: The element.
-            x: Where it is from the origin of the frame, in metres along the map's x.
-            y: In metres along the map's y.
+            x: Its distance from the origin of the frame, in metres along the map's x.
+            y: Its distance, in metres along the map's y.
 
         """
         self.placed.keep_upright(self.add(element), x, y)
         return element
 
     def take(self, message: Any) -> None:
-        """Draw a message where its frame was at its stamp.
+        """Draw a message at the pose of its frame at its stamp.
 
         Raises:
             ProtocolError: If it cannot be drawn.

@@ -1,4 +1,4 @@
-"""Where the frame of a message was when the message was measured."""
+"""The pose of a message's frame at the time of measurement."""
 
 from dataclasses import dataclass, replace
 
@@ -11,44 +11,44 @@ AHEAD = 0.2
 """Seconds for which a motion is extrapolated."""
 
 SOON = 0.5
-"""Seconds within which frames and poses catch up with a stamp, as a rule."""
+"""Seconds within which frames and poses usually reach a stamp."""
 
 FLOWING = 1.0
-"""Seconds since the newest pose within which poses count as coming."""
+"""Greatest age of the newest pose while poses count as arriving, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """Where data is, as far as that is known now."""
+    """The pose of data, as far as it is known now."""
 
     offset: Transform
-    """What takes its coordinates to those of the robot's own map; or to the robot's."""
+    """The transform from its coordinates to the robot's own map, or to the robot."""
 
     ground: float = 0.0
-    """Where heights begin: how high the robot's base is there, in metres."""
+    """Height of the robot's base, from which heights are measured, in metres."""
 
     on_robot: bool = False
-    """Whether :attr:`offset` is on the robot, and goes with it."""
+    """Whether :attr:`offset` is on the robot and moves with it."""
 
     settled: bool = True
-    """Whether later poses and frames would not change it."""
+    """Whether the result is final: later poses and frames would not change it."""
 
     trouble: str = ""
-    """The kind of trouble, if there is any; the sentences of one kind may differ."""
+    """The kind of trouble, or empty; the sentences of one kind may differ."""
 
     words: str = ""
-    """What is wrong, in a sentence."""
+    """The trouble in a sentence."""
 
 
 class Sightings:
-    """Looks where a robot's sensors were.
+    """Finds the poses of a robot's sensors at a stamp.
 
     Args:
-        poses: The poses of the robot, and the frames that it is placed by.
+        poses: The poses of the robot, and the frames that place it.
         frame: ``"map"`` if data without a frame is in the map's, ``"robot"`` if it is
             in the robot's.
-        mount: Where the sensor is on the robot, if that is configured; its frame is
-            then ignored.
+        mount: The configured pose of the sensor on the robot, if any; the sensor's
+            frame is then ignored.
 
     """
 
@@ -60,10 +60,10 @@ class Sightings:
         self._known: dict[str, Transform] = {}
 
     def look(self, frame_id: str, stamp: float) -> Sighting:
-        """Return where data of a frame was at a stamp.
+        """Return the pose of data of a frame at a stamp.
 
         Args:
-            frame_id: As the message names it; empty if it names none.
+            frame_id: The frame of the message; empty if it has none.
             stamp: In seconds of the robot's clock; 0 if there is none.
 
         """
@@ -80,7 +80,7 @@ class Sightings:
         return self._carried(placing, source, stamp)
 
     def _on_map(self, placing: Placing, source: str, stamp: float) -> Sighting:
-        """Return where data of the map is that came in another frame."""
+        """Return the pose of map data that arrived in another frame."""
         try:
             found, settled = newest_or_at(
                 placing.buffer, placing.map_frame, source, stamp
@@ -92,7 +92,7 @@ class Sightings:
         return Sighting(found, settled=settled)
 
     def _carried(self, placing: Placing, source: str, stamp: float) -> Sighting:
-        """Return where a sensor was that the robot carries."""
+        """Return the pose of a sensor on the robot."""
         buffer, base, world = placing.buffer, placing.base_frame, placing.map_frame
         mount = self._mount
         if stamp:
@@ -101,7 +101,7 @@ class Sightings:
                 ground = _height(buffer, world, base, stamp)
                 return Sighting(found @ mount, ground)
             except TransformError:
-                pass  # The poses may know what the frames do not.
+                pass  # The poses may be known when the frames are not.
         if source != base:
             try:
                 self._known[source], _ = newest_or_at(buffer, base, source, stamp)
@@ -118,7 +118,7 @@ class Sightings:
         return Sighting(ahead @ mount, ahead.translation.z, settled=False)
 
     def _by_poses(self, mount: Transform, stamp: float) -> Sighting:
-        """Return where the robot's poses have a sensor."""
+        """Return the pose of a sensor from the robot's poses."""
         on_robot = Sighting(mount, on_robot=True)
         pipeline = self._poses.pipeline
         newest = pipeline.newest_stamp
@@ -151,7 +151,7 @@ class Sightings:
 def _lost(
     placing: Placing, source: str, error: TransformError, otherwise: Sighting
 ) -> Sighting:
-    """Return what is known of data whose frame is not, with the trouble."""
+    """Return the fallback pose of data whose frame is unknown, with the trouble."""
     if placing.quiet:
         return otherwise
     return replace(
@@ -165,9 +165,9 @@ def _lost(
 def newest_or_at(
     buffer: Buffer, target: str, source: str, stamp: float
 ) -> tuple[Transform, bool]:
-    """Return a frame in another, and whether more news would not change it.
+    """Return a frame in another, and whether the result is final.
 
-    It is as it was at the stamp if that is known, and else as it is now.
+    It is the transform at the stamp if that is known, and otherwise the newest one.
     """
     if source == target:
         return Transform(), True
@@ -178,7 +178,7 @@ def newest_or_at(
 
 
 def _height(buffer: Buffer, target: str, base: str, stamp: float) -> float:
-    """Return how high the base is, in metres; 0 if that is not known."""
+    """Return the height of the base, in metres; 0 if it is unknown."""
     try:
         return newest_or_at(buffer, target, base, stamp)[0].translation.z
     except TransformError:
@@ -186,7 +186,7 @@ def _height(buffer: Buffer, target: str, base: str, stamp: float) -> float:
 
 
 def _ahead(buffer: Buffer, target: str, source: str, stamp: float) -> Transform | None:
-    """Return where a frame is by extrapolation; None if its news is too old."""
+    """Return an extrapolated frame; None if its newest transform is too old."""
     try:
         newest = buffer.newest(target, source)
         if newest is None or not newest < stamp <= newest + SOON:

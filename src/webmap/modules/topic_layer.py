@@ -1,4 +1,4 @@
-"""The common base of layers of robots and of maps: draws the messages of a topic."""
+"""Common base class of layers of robots and maps: draws the messages of a topic."""
 
 import math
 from array import array
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 
 def label(drawn: "Element", topic: str, robot: "Robot") -> None:
-    """Name the topic of a drawing, so that viewers can switch it on and off.
+    """Name the topic of a drawing, so that viewers can switch the drawing on and off.
 
-    Robots that are alike are switched together, so the robot's own namespace is left
-    out: ``/bob/front/scan`` of Bob is ``front/scan``.
+    Similar robots are switched together, so the robot's own namespace is left out:
+    ``/bob/front/scan`` of Bob is ``front/scan``.
 
     Args:
         drawn: The element that has the class of its layer.
-        topic: What it draws.
-        robot: Whose it is.
+        topic: The topic of the drawing.
+        robot: The robot of the drawing.
 
     """
     drawn.set("data-layer", short(topic, robot.name))
@@ -48,14 +48,14 @@ def short(topic: str, name: str) -> str:
 
 
 class MissingField(ProtocolError, AttributeError):
-    """A message has no field of a name."""
+    """A message lacks a field."""
 
 
 class Message:
-    """A message whose fields are attributes; those that cannot be drawn are refused.
+    """A message whose fields are attributes; fields that cannot be drawn are refused.
 
     Args:
-        fields: The fields, as they were decoded.
+        fields: The decoded fields.
 
     """
 
@@ -66,17 +66,17 @@ class Message:
 
     @property
     def frame_id(self) -> str:
-        """The frame that the numbers are in; empty if the message does not say."""
+        """The frame of the numbers; empty if the message has none."""
         return self._header.frame_id
 
     @property
     def stamp(self) -> float:
-        """When it was measured, in seconds of the robot's clock; 0 if not said."""
+        """The time of measurement by the robot's clock, in seconds; 0 if unknown."""
         return self._header.stamp.seconds
 
     @property
     def _header(self) -> Header:
-        """The header of the message; of a header, or without one, its own fields."""
+        """The header; for a header, or without one, the message's own fields."""
         found = self._fields.get("header")
         if found is None:
             kinds = {"frame_id": str, "stamp": dict}
@@ -93,7 +93,7 @@ class Message:
 
 
 def _usable(value: Any, name: str) -> Any:
-    """Return a field, whose own fields are attributes, if it can be drawn."""
+    """Return a field that can be drawn; its own fields are attributes."""
     if isinstance(value, dict):
         return Message(value)
     if isinstance(value, list):
@@ -103,20 +103,20 @@ def _usable(value: Any, name: str) -> Any:
 
 
 def origin(message: Any) -> tuple[str, float]:
-    """Return the frame and the stamp of a message, empty and 0 without a header."""
+    """Return the frame and the stamp of a message; empty and 0 without a header."""
     return getattr(message, "frame_id", ""), getattr(message, "stamp", 0.0)
 
 
 def check_numbers(value: Any, name: str = "a number") -> None:
-    """Let a message pass whose numbers can be drawn.
+    """Check that the numbers of a message can be drawn.
 
     Args:
         value: A view of a message, or a part of one.
-        name: What the part is called.
+        name: The name of the part.
 
     Raises:
-        ProtocolError: If a number is NaN, infinite or null, or a coordinate is farther
-            away than anything can be.
+        ProtocolError: If a number is NaN, infinite or null, or a coordinate is too far
+            away.
 
     """
     if isinstance(value, msgspec.Struct):
@@ -126,7 +126,7 @@ def check_numbers(value: Any, name: str = "a number") -> None:
     elif isinstance(value, list | tuple):
         for item in value:
             check_numbers(item, name)
-    elif isinstance(value, array):  # how numbers come in a binary encoding
+    elif isinstance(value, array):  # numbers of a binary encoding
         if not all(map(math.isfinite, value)):
             raise ProtocolError(f"{name} must be finite numbers")
     elif value is None or (isinstance(value, float) and not math.isfinite(value)):
@@ -148,23 +148,23 @@ E = TypeVar("E", bound=Element)
 
 
 class TopicLayer(LayerOptions):
-    """Draws the messages of one topic, and refuses those that make no sense."""
+    """Draws the messages of one topic, and refuses invalid ones."""
 
     registry: ClassVar[Namespace]
     declared: ClassVar[Declaration]
 
     encoding: ClassVar[Encoding | None] = None
-    """How messages come, as :meth:`webmap.Bridge.subscribe` takes it."""
+    """The encoding of messages, as in :meth:`webmap.Bridge.subscribe`."""
 
     queue_length: ClassVar[int] = 1
-    """How many messages the bridge may hold back."""
+    """The number of messages that the bridge may queue."""
 
     bridge: Bridge
     topic: str
     svg: Element
     """The group of the drawing."""
 
-    # Layers that offer these as options annotate them.
+    # Layers with these options annotate them.
     type = ""
     throttle = 0
 
@@ -179,32 +179,33 @@ class TopicLayer(LayerOptions):
 
     @classmethod
     def options_for(cls, found: FoundTopic) -> dict[str, Any]:
-        """Return the options that draw a topic that discovery found."""
+        """Return the options for a topic that discovery found."""
         return usual_options(cls, found)
 
     def build(self) -> None:
-        """Make the elements of the drawing; called once, when the options are set.
+        """Make the elements of the drawing; called once, after the options are set.
 
         Raises:
-            ConfigError: If an option makes no sense.
+            ConfigError: If an option is not valid.
 
         """
 
     def add(self, element: E) -> E:
-        """Put an element into the drawing, over those before, and return it."""
+        """Append an element to the drawing, above the earlier ones, and return it."""
         self.svg.append(element)
         return element
 
     def read(self, message: Any) -> Any:
-        """Return what is to be drawn of a message; called once for each.
+        """Return the data to draw of a message; called once for each message.
 
         Unless this is overridden, a message of a layer with a view is refused if a
-        number in it is NaN or infinite, or a place is farther away than anything can
-        be. A message of a layer without a view is refused when such a number is used.
-        A place is what fields named x, y and z say.
+        number in it is NaN or infinite, or a position is too far away. A message of a
+        layer without a view is refused when such a number is used. A position is the
+        fields x, y and z.
 
         Args:
-            message: As the layer's view decodes it; nothing is changed by it as yet.
+            message: The message as decoded by the layer's view; nothing has been
+                changed yet.
 
         Raises:
             ProtocolError: If the message cannot be drawn.
@@ -214,16 +215,16 @@ class TopicLayer(LayerOptions):
         return message
 
     def draw(self, found: Any, at: Transform) -> None:
-        """Draw in place of what was drawn before.
+        """Replace the drawing.
 
         Args:
-            found: What :meth:`read` returned.
-            at: What takes coordinates of the message to those of the drawing.
+            found: The result of :meth:`read`.
+            at: The transform from coordinates of the message to those of the drawing.
 
         """
 
     def take(self, message: Any) -> None:
-        """Draw a message where its frame was at its stamp.
+        """Draw a message at the pose of its frame at its stamp.
 
         Raises:
             ProtocolError: If it cannot be drawn.
@@ -232,11 +233,11 @@ class TopicLayer(LayerOptions):
         raise NotImplementedError
 
     def complain(self, words: str) -> None:
-        """Show people what is wrong with the message, which is drawn all the same."""
+        """Show an error in a message that is drawn nevertheless."""
         self._refusing.complain(words)
 
     def _subscribe(self, owner: Owner) -> None:
-        """Draw what comes on the topic; ``owner`` shows what is wrong with it."""
+        """Draw the messages of the topic; ``owner`` shows their errors."""
         self._refusing = Refusing(owner, self.topic)
         type = self.type or self.declared.types[0]
         view = self.declared.view_of(type)

@@ -1,4 +1,4 @@
-"""Where the map of a robot, or of a whole ROS system, lies on the common map."""
+"""Alignments of the maps of a robot or a whole ROS system on the common map."""
 
 import itertools
 import math
@@ -13,10 +13,10 @@ from webmap.ros.bridge import Bridge
 _numbers = itertools.count(1)
 
 FARTHEST = 1e6
-"""Metres; no map lies farther off."""
+"""The greatest distance of a map, in metres."""
 
 HERE = Pose()
-"""The alignment of everything on the common map."""
+"""The alignment of a map that coincides with the common one."""
 
 
 def alignment(x: float, y: float, angle: float) -> Pose:
@@ -28,7 +28,7 @@ def alignment(x: float, y: float, angle: float) -> Pose:
         angle: Degrees, counter-clockwise.
 
     Raises:
-        ConfigError: If one of them is no number, or farther than any map.
+        ConfigError: If a value is not a number, or beyond the limit.
 
     """
     for name, value in (("x", x), ("y", y), ("angle", angle)):
@@ -42,19 +42,19 @@ def alignment(x: float, y: float, angle: float) -> Pose:
 
 
 def numbers(pose: Pose) -> tuple[float, float, float]:
-    """Return x and y in metres and the angle in degrees, rounded to what one sees."""
+    """Return x and y in metres and the angle in degrees, rounded for display."""
     angle = round(math.degrees(pose.yaw), 2) + 0.0
     return (round(pose.x, 3) + 0.0, round(pose.y, 3) + 0.0, angle)
 
 
 def toml_line(pose: Pose) -> str:
-    """Return the line of a fleet file that keeps an alignment."""
+    """Return the line of a fleet file that sets an alignment."""
     x, y, angle = numbers(pose)
     return f"alignment = [{x}, {y}, {angle}] # metres, metres, degrees"
 
 
 class Alignments:
-    """What whole ROS systems are aligned by, and who hears of a change."""
+    """The alignments of bridges, and the listeners for changes."""
 
     def __init__(self) -> None:
         self._poses: weakref.WeakKeyDictionary[Bridge, Pose] = (
@@ -68,27 +68,27 @@ class Alignments:
         ] = weakref.WeakKeyDictionary()
 
     def of(self, bridge: Bridge | None) -> Pose:
-        """Return where the map of the robots behind a bridge lies."""
+        """Return the alignment of a bridge; the identity if none is set."""
         return HERE if bridge is None else self._poses.get(bridge, HERE)
 
     def stated(self, bridge: Bridge) -> Pose | None:
-        """Return where it lies, None if nobody ever said."""
+        """Return the alignment of a bridge; None if none was ever set."""
         return self._poses.get(bridge)
 
     def mark(self, bridge: Bridge) -> str:
-        """Return what the page knows the layers of a bridge by."""
+        """Return the page's identifier for the layers of a bridge."""
         if bridge not in self._marks:
             self._marks[bridge] = f"b{next(_numbers)}"
         return self._marks[bridge]
 
     def set(self, bridge: Bridge, pose: Pose) -> None:
-        """Say where the map of the robots behind a bridge lies."""
+        """Set the alignment of a bridge."""
         self._poses[bridge] = pose
         for listener in tuple(self._listeners.get(bridge, {}).values()):
             listener()
 
     def on_change(self, bridge: Bridge, listener: Callable[[], object]) -> Removal:
-        """Call ``listener`` whenever that changes, until the removal."""
+        """Call ``listener`` when the alignment changes, until the removal."""
         listeners = self._listeners.setdefault(bridge, {})
         key = id(listener)
         listeners[key] = listener
@@ -96,23 +96,23 @@ class Alignments:
 
 
 alignments = Alignments()
-"""Those of all bridges of this process."""
+"""The alignments of all bridges of this process."""
 
 
 def align_bridge(bridge: Bridge, x: float, y: float, angle: float) -> None:
-    """Lay the map of everything behind a bridge onto the common map.
+    """Put the map of a bridge on the common map.
 
-    Robots, grids and markers of that bridge move there; a robot with an alignment of
-    its own keeps that.
+    Robots, grids and markers of that bridge move with it; a robot with its own
+    alignment keeps that.
 
     Args:
-        bridge: The link to the ROS system.
-        x: Where its map's origin is, in metres along the common map's x.
-        y: In metres along its y.
-        angle: How its map is turned, in degrees, counter-clockwise.
+        bridge: The connection to the ROS system.
+        x: The position of its map's origin on the common map, in metres along x.
+        y: The position, in metres along y.
+        angle: The rotation of its map in degrees, counter-clockwise.
 
     Raises:
-        ConfigError: If a number makes no sense.
+        ConfigError: If a number is not valid.
 
     """
     alignments.set(bridge, alignment(x, y, angle))

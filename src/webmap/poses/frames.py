@@ -1,4 +1,4 @@
-"""The frames of a ROS system, heard once for all robots that need them."""
+"""The frames of a ROS system, received once for all robots that need them."""
 
 import asyncio
 import logging
@@ -23,21 +23,21 @@ log = logging.getLogger("webmap.ros.tf")
 TYPE = "tf2_msgs/TFMessage"
 
 QUEUE = 100
-"""Messages that a bridge may hold back: many nodes share the topic, and each counts."""
+"""The bridge's queue length: many nodes share the topic, and each message counts."""
 
 GRACE = 3.0
-"""Seconds since the link first opened in which no frame is called missing: publishers
-are still being discovered, and static frames come late."""
+"""Seconds after the connection first opened in which no frame is reported missing:
+publishers are still being discovered, and static frames arrive late."""
 
 PERIOD = 0.05
-"""Least seconds between two calls of the listeners: what comes meanwhile is one call,
-however many nodes share the topic."""
+"""The least time between two calls of the listeners in seconds: transforms that arrive
+meanwhile share one call, however many nodes share the topic."""
 
 STANDS = 10.0
-"""Seconds for which a fault is shown, after it was seen last."""
+"""Seconds for which a fault is shown after it last occurred."""
 
 MOST = 50
-"""Frames whose faults are kept."""
+"""The greatest number of frames whose faults are kept."""
 
 _heard: dict[tuple[Bridge, str], "Frames"] = {}
 
@@ -50,7 +50,7 @@ class _Fault:
 
 
 class FrameFaults:
-    """The faults of transforms, until they have not been seen for a while.
+    """The faults of transforms, kept for a while after they last occurred.
 
     Args:
         buffer: The frames; a fault concerns the robots whose frames descend from it.
@@ -63,17 +63,17 @@ class FrameFaults:
 
     @property
     def any(self) -> bool:
-        """Whether there is one."""
+        """Whether there is a fault."""
         return bool(self._faults)
 
     def note(self, parent: str, child: str, words: str, now: float) -> bool:
-        """Note that a transform had a fault.
+        """Add a fault of a transform.
 
         Args:
-            parent: The frame that its numbers are in.
+            parent: The frame of the transform's numbers.
             child: The frame that is placed.
-            words: What was wrong, in a sentence.
-            now: The time, in seconds of any clock that only goes forward.
+            words: The fault, in a sentence.
+            now: The time of any monotonic clock, in seconds.
 
         Returns:
             Whether it is new; a fault of every message is new once.
@@ -89,11 +89,11 @@ class FrameFaults:
         return True
 
     def of(self, base: str, now: float) -> str | None:
-        """Return what is wrong with the frames that a robot is placed by, if anything.
+        """Return a fault of the frames that place a robot, or None.
 
         Args:
-            base: The robot's own frame. Its ancestors concern it, and frames with the
-                same prefix.
+            base: The robot's own frame. Its ancestors concern the robot, and so do
+                frames with the same prefix.
             now: As in :meth:`note`.
 
         """
@@ -113,11 +113,11 @@ class FrameFaults:
 
 
 class Frames:
-    """A buffer that ``/tf`` and ``/tf_static`` of one namespace fill, while needed.
+    """A buffer filled by ``/tf`` and ``/tf_static`` of one namespace, while needed.
 
     Args:
-        bridge: The link to the ROS system.
-        namespace: Of both topics: ``/robot_0`` for ``/robot_0/tf``.
+        bridge: The connection to the ROS system.
+        namespace: The namespace of both topics: ``/robot_0`` for ``/robot_0/tf``.
 
     """
 
@@ -126,9 +126,9 @@ class Frames:
         self.namespace = namespace
         self.buffer = Buffer()
         self.faults = FrameFaults(self.buffer)
-        """What was wrong with transforms of late."""
+        """The recent faults of transforms."""
         self.heard_at = time.monotonic()
-        """When the first transform came for which the listeners are called now, in
+        """When the first transform of the current call of the listeners arrived, in
         seconds of :func:`time.monotonic`."""
         self._untold_since: float | None = None
         self._told_at = -math.inf
@@ -154,7 +154,7 @@ class Frames:
     def join(self, listener: Callable[[], object]) -> Removal:
         """Call ``listener`` when frames have moved, until the removal.
 
-        That is at once, or :data:`PERIOD` after the last call.
+        The call is immediate, or :data:`PERIOD` after the last call.
         """
         key = id(listener)
         self._listeners[key] = listener
@@ -169,14 +169,14 @@ class Frames:
 
     @property
     def complete_from(self) -> float:
-        """From when on a frame that is not there is missing, on the monotonic clock."""
+        """When absent frames start to count as missing, by the monotonic clock."""
         return self._since + GRACE
 
     def wake(self, after: float) -> None:
-        """Call all listeners once more, also if nothing is heard until then.
+        """Call all listeners once more, even if no transform arrives until then.
 
         Args:
-            after: Seconds from now; of several wishes the earliest counts.
+            after: Seconds from now; the earliest of several requests counts.
 
         """
         if self._loop is None:
@@ -199,9 +199,9 @@ class Frames:
         self._tell()
 
     def _tell_in_time(self) -> None:
-        """Call all listeners; later if they have only just been called."""
+        """Call all listeners; later if they were only just called."""
         loop = self._loop
-        # Before the link is up there is no time to go by, and nothing to spare.
+        # Before the connection opens there is no loop, and no need to limit calls.
         if loop is None or loop.time() >= self._told_at + PERIOD:
             self._tell()
         elif self._soon is None:
@@ -216,13 +216,13 @@ class Frames:
         for key, listener in list(self._listeners.items()):
             try:
                 listener()
-            except Exception as error:  # The others are to hear of it all the same.
+            except Exception as error:  # The other listeners must run too.
                 self._say_raised(key, error)
-        if self._loop is not None:  # What takes long leaves time for the rest.
+        if self._loop is not None:  # A slow call leaves time for the rest.
             self._told_at = self._loop.time()
 
     def _say_raised(self, key: int, error: Exception) -> None:
-        """Log what a listener raised, once: it may do so whenever it is called."""
+        """Log an exception of a listener once: it may occur at every call."""
         raised = (key, type(error))
         if raised not in self._raised:
             self._raised.add(raised)
@@ -259,7 +259,7 @@ class Frames:
             except TransformError as error:
                 note = f"a transform was left out: {error}"
                 parent, child = parent[:LONGEST_NAME], child[:LONGEST_NAME]
-            except ProtocolError as error:  # Of its stamp, which names no frames.
+            except ProtocolError as error:  # An error of the stamp; it names no frames.
                 note = f"a transform was left out: {parent!r} -> {child!r}: {error}"
             if note and self.faults.note(parent, child, note, now):
                 log.warning("%s: %s", self.bridge.name, note)
@@ -270,7 +270,7 @@ class Frames:
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
-    """Return the frames of a ROS system; they are shared by all callers."""
+    """Return the frames of a ROS system; all callers share them."""
     space = "/" + namespace.strip("/") if namespace.strip("/") else ""
     key = (bridge, space)
     if key not in _heard:
@@ -279,13 +279,13 @@ def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
 
 
 def lasting(waits: Lasting, trouble: str, frames: Frames | None = None) -> str:
-    """Return trouble once it has lasted, and nothing before.
+    """Return a trouble once it has lasted, and the empty string before.
 
     Args:
-        waits: What is known of it so far.
-        trouble: Which kind there is now; empty if there is none.
-        frames: Those it is about, if it is about frames. Nothing is returned while they
-            may still be coming, and their listeners are called when it is due.
+        waits: The history of the trouble.
+        trouble: The current kind; empty if there is none.
+        frames: The frames of the trouble, if any. Nothing is returned while they may
+            still arrive, and their listeners are called when the trouble is due.
 
     """
     now = time.monotonic()

@@ -1,4 +1,4 @@
-"""The topic with a robot's poses, whose type is found out if it is not given."""
+"""The topic with a robot's poses, whose type is determined if it is not given."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +18,7 @@ from webmap.ros.views import (
 )
 
 ODOMETRY = "nav_msgs/Odometry"
-"""The type of poses that has a velocity too."""
+"""The pose type that also has a velocity."""
 
 _NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
 
@@ -27,20 +27,20 @@ class OdometryFeed:
     """A subscription to a topic with poses.
 
     Args:
-        bridge: The link to the ROS system that has the topic.
+        bridge: The connection to the ROS system that has the topic.
         topic: The topic.
         throttle: The least time between two messages, in milliseconds.
-        type: The message type; if not given, the bridge is asked, and the shape of the
-            first message is looked at.
+        type: The message type; if not given, the bridge is queried, and the fields of
+            the first message are examined.
         listener: Called with each pose, in the model's thread.
-        typed: Called with the type when it is known, which may be at once; "" for one
-            that has no pose.
-        complain: Called with a sentence for people when the topic cannot be used,
-            and with None when it can be used again.
-        report: Called with a sentence about what failed and is over.
+        typed: Called with the type when it is known, possibly at once; "" for a type
+            without a pose.
+        complain: Called with a sentence for people when the topic cannot be used, and
+            with None when it can be used again.
+        report: Called with a sentence about a failure that does not last.
 
     Raises:
-        ConfigError: If ``type`` is given and has no pose in it.
+        ConfigError: If ``type`` is given and has no pose.
 
     """
 
@@ -76,16 +76,16 @@ class OdometryFeed:
             self._subscribe(odometry_view(type))
 
     def remove(self) -> None:
-        """Unsubscribe; the second call does nothing."""
+        """Unsubscribe; a second call does nothing."""
         for thing in (self._subscription, self._asking):
             if thing is not None:
                 thing.remove()
         self._subscription = self._asking = None
 
     def _listen_untyped(self) -> None:
-        """Find the type by the shape of the first message: the bridge may not know it.
+        """Determine the type from the first message: the bridge may not know the type.
 
-        The bridge is asked all the same, since the first message may come only when the
+        The bridge is still queried, since the first message may arrive only when the
         robot moves.
         """
         if self._subscription is None:
@@ -95,7 +95,7 @@ class OdometryFeed:
                 )
 
     def _told(self, type: str) -> None:
-        """Take the type that the bridge returns."""
+        """Use the type that the bridge returned."""
         if self.type is not None:
             return
         try:
@@ -107,7 +107,7 @@ class OdometryFeed:
             self._use(view)
 
     def _use(self, view: type[OdometryView]) -> None:
-        """Listen with the type that is known now."""
+        """Subscribe with the type that is now known."""
         untyped, asking = self._subscription, self._asking
         self._subscribe(view)
         for thing in (untyped, asking):
@@ -148,11 +148,11 @@ class OdometryFeed:
             return
         if self._complaint is not None:
             self._complain(None)
-        with no_scope():  # what others make of it is not this topic's
+        with no_scope():  # the listener's resources are not this topic's
             self._listener(reading)
 
     def _failed(self, text: str, about: object) -> None:
-        """Pass on what the bridge reports; what is about nothing is over."""
+        """Pass on a failure of the bridge; one without a subject does not last."""
         if about is None:
             self._report(text)
         else:

@@ -1,7 +1,7 @@
-"""The poses of one robot: from readings, frames and the time to what is drawn.
+"""The poses of one robot: from readings, frames and time to the drawn pose.
 
 This is the pure part: no I/O, no clock, no event loop. :mod:`webmap.core.pose_source`
-brings it what comes from the robot and shows what it returns.
+passes in the robot's data and shows the results.
 """
 
 import math
@@ -21,73 +21,75 @@ HISTORY = 10.0
 """Seconds of poses that are kept."""
 
 GAP = 1.0
-"""Seconds between two poses beyond which nothing is known of the time in between."""
+"""The longest time between two poses for which poses are interpolated, in seconds."""
 
 FASTEST = 5.0
-"""Metres per second; no robot of WebMap's is faster."""
+"""The greatest assumed speed of a robot, in metres per second."""
 
 SMALLEST = 0.5
-"""Metres; less is no jump but a correction, which all localisation makes."""
+"""The least distance of a jump, in metres; less is a correction, which every
+localisation makes."""
 
 LONGEST = 5.0
 """Seconds between two poses after which the robot may be anywhere."""
 
 BACK = 1.0
-"""Seconds by which a stamp may be older than the one before; more is a jump of time."""
+"""Seconds by which a stamp may be older than the previous one; more is a jump of the
+clock."""
 
 AHEAD = 10.0
-"""Seconds by which stamps may go ahead of the time that passes here; links that
-stalled deliver late, and may leave out what is between."""
+"""Seconds by which stamps may advance more than the time here; a stalled connection
+delivers late, and may drop messages."""
 
 JUMP_SHOWN = 10.0
-"""Seconds for which a jump is shown, after the last one."""
+"""Seconds for which a jump is shown after the last one."""
 
 EXPECTED = 5.0
-"""Seconds after somebody set the pose within which a jump is what they asked for."""
+"""Seconds after an operator or a program set the pose in which a jump is expected."""
 
 OFTEN = 4
 """Jumps within a short time after which they are no localisation."""
 
 
 class Problem(NamedTuple):
-    """What is wrong now."""
+    """A current problem."""
 
     kind: str
-    """The sentences of one kind may differ, for example in their numbers."""
+    """The kind; sentences of one kind may differ, for example in their numbers."""
 
     text: str
     """A sentence for people."""
 
 
 class Step(NamedTuple):
-    """What follows from a reading, from frames that moved, or from time that passed."""
+    """The result of a reading, of moved frames, or of passed time."""
 
     pose: PoseReading | None
-    """The new pose, on the common map; None if there is no news of it."""
+    """The new pose, on the common map; None if it did not change."""
 
     problems: Mapping[str, Problem]
-    """All that is wrong now, by what it is about: ``"tf"``, ``"frames"``, ``"jumps"``.
-    The same object as before if nothing of it changed."""
+    """All current problems, by subject: ``"tf"``, ``"frames"``, ``"jumps"``. The same
+    object as before if nothing changed."""
 
     look_again: float | None
     """When to make a step without a reading, to show a problem that has lasted."""
 
 
 class PosePipeline:
-    """Where one robot is and was, and what is wrong with that.
+    """The poses of one robot, now and before, and their problems.
 
-    Readings come in any frame. Frames take them to the robot's own map, and the
-    alignment takes that to the common map, which all robots are drawn on.
+    Readings arrive in any frame. TF transforms them to the robot's own map, and the
+    alignment transforms that to the common map, on which all robots are drawn.
 
-    All times but stamps are in seconds of one clock that only goes forward.
+    All times except stamps are in seconds of one monotonic clock.
     """
 
     def __init__(self) -> None:
         self.alignment = Pose()
-        """Where the robot's own map lies on the common one."""
+        """The position and rotation of the robot's own map on the common one."""
         self.placing: Placing | None = None
-        """What takes poses to the robot's own map by frames; None to take them as they
-        come."""
+        """The transform of poses to the robot's own map by TF; None to use poses
+        without a transform."""
         self.jumps = Jumps()
         self.newest: PoseReading | None = None
         """The newest pose, in the robot's own map."""
@@ -97,14 +99,14 @@ class PosePipeline:
         self._lasting = Lasting()
         self._found: tuple[str, str | None, str | None] = ("", None, None)
         self.problems: Mapping[str, Problem] = {}
-        """All that is wrong now; see :class:`Step`."""
+        """All current problems; see :class:`Step`."""
 
     def restart(self, period: float | None) -> None:
-        """Forget all poses and problems: those to come are from another source.
+        """Discard all poses and problems: the next ones come from another source.
 
         Args:
-            period: The least seconds between two readings of a topic; None if the
-                robot is placed by frames alone.
+            period: The least time between two readings of a topic in seconds; None if
+                the robot is placed by TF alone.
 
         """
         self._by_topic = period is not None
@@ -118,11 +120,11 @@ class PosePipeline:
     def step(
         self, reading: PoseReading | None, frames: "Frames | None", now: float
     ) -> Step:
-        """Take what there is to know now, and return what is to be shown.
+        """Process the current data, and return what to show.
 
         Args:
             reading: The pose of a message; None if frames moved or time passed.
-            frames: The frames, if the robot is placed by them.
+            frames: The frames, if they place the robot.
             now: The time.
 
         """
@@ -133,7 +135,7 @@ class PosePipeline:
             elif not self._by_topic:
                 reading = placing.of_base(now)
         if reading is not None:
-            # Of poses by frames alone the frames show it themselves when time leaps.
+            # For poses by TF alone, the frames show a jump of the clock themselves.
             self.jumps.look(reading, now, timed=self._by_topic)
             self._keep(reading)
         problems, look_again = self._look_for_problems(frames, now)
@@ -141,20 +143,20 @@ class PosePipeline:
         return Step(pose, problems, look_again)
 
     def on_map(self, reading: PoseReading) -> PoseReading:
-        """Return a pose of the robot's own map on the common one."""
+        """Transform a pose from the robot's own map to the common one."""
         if self.alignment == Pose():
             return reading
         return reading.moved(Transform.from_pose(self.alignment), reading.frame_id)
 
     def at(self, stamp: float, ahead: float = 0.0) -> Transform:
-        """Return where the robot was, in its own map.
+        """Return the robot's pose at a stamp, in its own map.
 
         Args:
-            stamp: When, in seconds of the robot's clock.
+            stamp: In seconds of the robot's clock.
             ahead: Seconds after the newest pose for which the motion is extrapolated.
 
         Raises:
-            NotKnownThen: If the poses around that time are not known.
+            NotKnownThen: If the poses around that time are unknown.
 
         """
         return self._track.at(stamp, self._gap, ahead)
@@ -166,7 +168,7 @@ class PosePipeline:
 
     def _keep(self, reading: PoseReading) -> None:
         if self.newest is not None and self.newest.frame_id != reading.frame_id:
-            self._track.clear()  # Its numbers are of another frame.
+            self._track.clear()  # the earlier poses are in another frame
         self.newest = reading
         if reading.stamp:
             newest = self._track.newest
@@ -177,7 +179,7 @@ class PosePipeline:
     def _look_for_problems(
         self, frames: "Frames | None", now: float
     ) -> tuple[Mapping[str, Problem], float | None]:
-        """Return all problems, and when to look again if one has not lasted yet."""
+        """Return all problems, and when to check again if one has not lasted yet."""
         placing = self.placing
         kind, fault = "", None
         if placing is not None and frames is not None:
@@ -209,28 +211,28 @@ class PosePipeline:
 
 
 class Jumps:
-    """Notices when a robot is somewhere else than it can have driven to."""
+    """Detects when a robot is where it cannot have driven to."""
 
     def __init__(self) -> None:
         self.problem: str | None = None
-        """What happened, in a sentence, as long as it is worth showing."""
+        """The last jump in a sentence, while it is shown."""
         self._last: PoseReading | None = None
         self._came = -math.inf
         self._jumped = self._asked_for = -math.inf
         self._count = 0
 
     def expect(self, now: float) -> None:
-        """Note that somebody set the pose: the next jumps are what they asked for."""
+        """Accept the next jumps: an operator or a program set the pose."""
         self._asked_for = now
 
     def look(self, reading: PoseReading, now: float, *, timed: bool = True) -> None:
-        """Take the next pose, in the frame that all of them are in.
+        """Process the next pose, in the frame of all poses.
 
         Args:
             reading: The pose.
-            now: When it came, in seconds of any clock that only goes forward.
-            timed: Whether a leap of its clock is a problem; not if the source of the
-                pose shows that already.
+            now: When it arrived, in seconds of any monotonic clock.
+            timed: Whether a jump of its clock is a problem; not if the source of the
+                pose already shows that.
 
         """
         if self.problem is not None and now - self._jumped > JUMP_SHOWN:
@@ -239,7 +241,7 @@ class Jumps:
         passed, self._came = now - self._came, now
         if before is None or before.frame_id != reading.frame_id:
             return
-        # By the robot's own clock: after a stall of the link poses come all at once.
+        # By the robot's own clock: a stalled connection delivers many poses at once.
         took = reading.stamp - before.stamp
         known = timed and before.stamp and reading.stamp
         if known and not -BACK <= took <= passed + AHEAD:
@@ -270,5 +272,5 @@ class Jumps:
             )
 
     def forget(self) -> None:
-        """Forget where it was: poses to come are from somewhere else."""
+        """Forget the last pose: the next ones come from another source."""
         self._last, self.problem, self._count = None, None, 0

@@ -1,4 +1,4 @@
-"""Readings of a robot's pose, and how frames take them to the robot's map."""
+"""Readings of a robot's pose, and their transform to the robot's map."""
 
 import math
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from webmap.ros.views import OdometryView
 
 OTHER_CLOCK = 60.0
-"""Seconds between two stamps of one moment beyond which they are by different clocks;
-what is less may be a recording that was put together."""
+"""Seconds between two stamps of one moment beyond which they are from different clocks;
+less may be a recording put together from several."""
 
 LATE = 2.0
-"""Seconds without news of a frame after which that is a problem."""
+"""Seconds without a new transform of a frame after which that is a problem."""
 
 CLOCKS = "clocks"
 """The kind of problem that poses and frames have different clocks."""
@@ -32,11 +32,11 @@ class PoseReading(NamedTuple):
     """The frame of the pose; empty if the message names none."""
 
     stamp: float = 0.0
-    """When it was measured, in seconds of the robot's clock; 0 if not known."""
+    """The time of measurement in seconds of the robot's clock; 0 if unknown."""
 
     @classmethod
     def of(cls, message: "OdometryView") -> "PoseReading":
-        """Take the pose out of a decoded message."""
+        """Return the pose of a decoded message."""
         place = message.place
         p, q = place.position, place.orientation
         return cls(
@@ -49,7 +49,7 @@ class PoseReading(NamedTuple):
 
     @property
     def is_usable(self) -> bool:
-        """Whether it is somewhere that can be drawn, and the orientation is one."""
+        """Whether position and orientation are valid and can be drawn."""
         p, q = self.position, self.orientation
         # Comparisons with NaN are false.
         return (
@@ -62,11 +62,11 @@ class PoseReading(NamedTuple):
 
     @property
     def transform(self) -> Transform:
-        """The pose as what takes coordinates of the robot to those of its frame."""
+        """The transform from coordinates of the robot to those of the pose's frame."""
         return Transform(self.position, self.orientation)
 
     def moved(self, by: Transform, frame_id: str) -> "PoseReading":
-        """Return the pose in another frame, where ``by`` has the frame of the pose."""
+        """Return the pose in another frame, to which ``by`` transforms it."""
         placed = by @ self.transform
         return PoseReading(
             placed.translation, placed.rotation, self.twist, frame_id, self.stamp
@@ -74,13 +74,13 @@ class PoseReading(NamedTuple):
 
 
 class Placing:
-    """Takes poses of a robot to the frame of its map.
+    """Transforms a robot's poses to the frame of its map.
 
     Args:
-        frames: What is known of the frames.
+        frames: The received frames.
         map_frame: The frame that the robot is drawn in.
         base_frame: The robot's own frame.
-        quiet: Whether poses that cannot be taken there are no problem to be shown.
+        quiet: Whether poses that cannot be transformed are no problem.
 
     """
 
@@ -93,27 +93,27 @@ class Placing:
         self.base_frame = self.name(base_frame)
         self.quiet = quiet
         self.kind = ""
-        """The kind of problem that there is with the frames; empty if there is none."""
+        """The kind of the current problem with the frames; empty if there is none."""
         self.problem = ""
-        """The problem, in a sentence."""
+        """The problem in a sentence."""
         self._known: dict[str, Transform] = {}
         self._newest = -math.inf
         self._news: dict[str, tuple[float, float]] = {}
 
     def name(self, frame: str) -> str:
-        """Return the whole name of a frame as the robot names it."""
+        """Return the full name of a frame that the robot names."""
         return self.buffer.name(frame, self._namespace)
 
     def of_reading(self, reading: PoseReading, now: float) -> PoseReading:
         """Return a pose in the frame of the map.
 
-        It is taken there as the frames were at its stamp, so that it does not lag
-        behind while the robot turns. A pose that is newer than the frames is taken
-        there by the newest; one whose frame was never seen stays as it came.
+        It is transformed with the frames at its stamp, so that it does not lag while
+        the robot turns. A pose that is newer than the frames is transformed with the
+        newest; a pose whose frame was never seen is not transformed.
 
         Args:
             reading: The pose.
-            now: When it came, in seconds of any clock that only goes forward.
+            now: When it arrived, in seconds of any monotonic clock.
 
         """
         frame = self.name(reading.frame_id)
@@ -135,10 +135,10 @@ class Placing:
         return reading.moved(self._known[frame], self.map_frame)
 
     def of_base(self, now: float) -> PoseReading | None:
-        """Return where the frames have the base; None if there is no news of it.
+        """Return the pose of the base in TF; None if it has not changed.
 
         Args:
-            now: The time, in seconds of any clock that only goes forward.
+            now: The time of any monotonic clock, in seconds.
 
         """
         base = self.base_frame
@@ -160,7 +160,7 @@ class Placing:
     def _look_whether_it_stopped(
         self, frame: str, newest: float | None, now: float
     ) -> None:
-        """Note a problem if there is no news of a frame; what is static needs none."""
+        """Set a problem if a frame gets no new transforms; static frames need none."""
         before, heard = self._news.get(frame, (None, now))
         if newest is None or newest != before:
             heard = now
@@ -175,7 +175,7 @@ class Placing:
             )
 
     def _look_at_clocks(self, frame: str, newest: float | None, stamp: float) -> None:
-        """Note a problem if a pose and the frames cannot be by one clock."""
+        """Set a problem if a pose and the frames cannot have the same clock."""
         if self.kind or not stamp or newest is None:
             return
         apart = stamp - newest

@@ -1,4 +1,4 @@
-"""Lines in the log when poses stop while the link is up, and when they go on."""
+"""Log lines for when poses stop over an open connection, and when they resume."""
 
 import asyncio
 import logging
@@ -11,28 +11,29 @@ from webmap.ros.bridge import Bridge
 log = logging.getLogger("webmap.robot")
 
 LIMIT = 3.0
-"""Seconds without a pose after which the log has a line."""
+"""Seconds without a pose after which the log gets a line."""
 
 PERIODS = 2.5
-"""As many times the least time between two poses, where that is longer."""
+"""The same limit in multiples of the least time between two poses; the longer one is
+used."""
 
 LATE = 0.5
-"""Seconds of delay of a timer beyond which it is set again for as many seconds: this
-process stood still, and not the robot."""
+"""Delay of a timer in seconds beyond which it is set again for as long: then this
+process was stopped, and not the robot."""
 
 AGAIN = 60.0
-"""Least seconds between two such lines about one robot."""
+"""The least time between two such lines about one robot, in seconds."""
 
 
 class Silence:
-    """Decides when a robot has been silent for so long that the log has a line.
+    """Decides when a robot has sent no pose for so long that the log gets a line.
 
-    All times are in seconds of one clock that only goes forward.
+    All times are in seconds of one monotonic clock.
     """
 
     def __init__(self) -> None:
         self.limit = LIMIT
-        """Seconds without a pose after which the log has a line."""
+        """Seconds without a pose after which the log gets a line."""
         self._heard = 0.0
         self._counted_from = 0.0
         self._said_at = -math.inf
@@ -40,23 +41,23 @@ class Silence:
 
     @property
     def due(self) -> float:
-        """When the line is due, if no pose comes until then."""
+        """When the line is due if no pose arrives until then."""
         return max(self._counted_from + self.limit, self._said_at + AGAIN)
 
     def hear(self, now: float) -> float | None:
-        """Note a pose; return for how long there was none, if the log has a line."""
+        """Record a pose; return the time without poses, if it was logged."""
         took = now - self._heard if self._is_said else None
         self._heard = self._counted_from = now
         self._is_said = False
         return took
 
     def look(self, now: float, *, linked: bool) -> float | None:
-        """Return for how long there was no pose, if the line is due now.
+        """Return the time without poses, if the line is due now.
 
         Args:
             now: The time.
-            linked: Whether the link was open since the last look. Where it was not,
-                the log has a line about the link.
+            linked: Whether the connection has been open since the last check. If not,
+                the log has a line about the connection.
 
         """
         if not linked:
@@ -67,14 +68,14 @@ class Silence:
         return now - self._heard
 
     def forget(self) -> None:
-        """Forget the silence: poses come from another source."""
+        """Forget the silence: the next poses come from another source."""
         self._is_said = False
 
 
 class SilenceWatch:
-    """Writes to the log when a robot falls silent, and when its poses go on.
+    """Logs when a robot's poses stop, and when they resume.
 
-    It has one timer, from the first pose on. Without an event loop it writes nothing.
+    It has one timer, from the first pose on. Without an event loop it logs nothing.
 
     Args:
         name: Returns the name of the robot for a line of the log.
@@ -95,7 +96,7 @@ class SilenceWatch:
         """Watch another source, from its first pose on.
 
         Args:
-            bridge: The link that poses come over; None if there is no source.
+            bridge: The bridge of the poses; None if there is no source.
             topic: The topic.
             period: The least time between two of its messages, in seconds.
 
@@ -108,7 +109,7 @@ class SilenceWatch:
         self._silence.limit = max(LIMIT, PERIODS * period)
 
     def hear(self, now: float) -> None:
-        """Note a pose, of a topic that goes on also while the robot stands.
+        """Record a pose of a topic that also sends while the robot is at rest.
 
         Args:
             now: The time, in seconds of :func:`time.monotonic`.
@@ -134,14 +135,14 @@ class SilenceWatch:
         if bridge is None:
             return
         now = time.monotonic()
-        if now - self._due_at > LATE:  # what came meanwhile may not be taken in yet
+        if now - self._due_at > LATE:  # received poses may not be processed yet
             self._look_at(loop, now + LATE)
             return
         before, self._links = self._links, bridge.stats.links
         linked = bridge.state == "open" and before in (None, self._links)
         silent = self._silence.look(now, linked=linked)
         if silent is None:
-            # A loop's clock may be a moment ahead of the one that is counted by.
+            # A loop's clock may be slightly ahead of the clock used here.
             self._look_at(loop, max(now + 0.01, self._silence.due))
             return
         log.warning(

@@ -1,4 +1,4 @@
-"""Asking a bridge for the type of a topic until it is known."""
+"""Queries of a bridge for the type of a topic until it is known."""
 
 import asyncio
 import time
@@ -9,27 +9,27 @@ from webmap.base.tasks import spawn
 from webmap.ros.bridge import Bridge
 
 SOON, LATER = 2.0, 5.0
-"""Seconds between two questions: the first few, and from then on."""
+"""Seconds between two queries: for the first few, and after them."""
 
 FEW = 5
-"""How many questions follow one another soon."""
+"""How many queries use the shorter pause."""
 
 SHARE = 10
-"""By what the time that an answer took is multiplied to the shortest pause after it,
-so that a bridge that hangs is asked rarely."""
+"""The least pause after a query in multiples of its duration, so that a slow bridge is
+queried rarely."""
 
 
 class TypeAsking:
-    """Asks for the type of a topic whenever the link opens, and on while it is unknown.
+    """Queries the type of a topic whenever the connection opens, until it is known.
 
-    The node that has the topic may start after the link is open, and so may the one
-    that answers the question.
+    The node that has the topic may start after the connection opened, and so may the
+    node that answers the query.
 
     Args:
-        bridge: The link.
+        bridge: The bridge to query.
         topic: The topic.
-        found: Called with each type that was told, in the bridge's dialect.
-        unknown: Called each time that nobody knows it, if given.
+        found: Called with each type returned, as the bridge spells it.
+        unknown: Called each time that the bridge does not know the type, if given.
 
     """
 
@@ -51,7 +51,7 @@ class TypeAsking:
         self._opening: Removable = bridge.on_open(self._begin)
 
     def remove(self) -> None:
-        """Ask no more; the second call does nothing."""
+        """Stop the queries; a second call does nothing."""
         self._over = True
         self._opening.remove()
         self._drop()
@@ -62,7 +62,7 @@ class TypeAsking:
             spawn(self._ask(self._turn, 1))
 
     def _drop(self) -> None:
-        """Let an answer that is under way count no more, nor a question follow it."""
+        """Ignore a pending answer, and cancel the next query."""
         self._turn += 1
         if self._timer is not None:
             self._timer.cancel()
@@ -79,10 +79,10 @@ class TypeAsking:
             return
         if self._unknown is not None:
             self._unknown()
-        if not self._known:  # what was told before the link was lost still holds
+        if not self._known:  # a type from before the connection was lost stays valid
             took = time.monotonic() - began
             pause = max(SOON if number <= FEW else LATER, SHARE * took)
-            # No task waits meanwhile: nothing is left over when the process ends.
+            # No task waits meanwhile, so none is left when the process ends.
             loop = asyncio.get_running_loop()
             self._timer = loop.call_later(pause, self._again, turn, number + 1)
 

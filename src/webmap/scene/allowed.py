@@ -1,8 +1,7 @@
-"""What a scene may hold: the one allow-list of tags, attributes, events and URLs.
+"""The allow-list of the scene: tags, attributes, events and URLs.
 
-The tables here are also what the browser knows: the wire sends positions in them,
-and a page cannot make an element that has no position. Values of attributes become
-text here, too.
+The browser has the same tables: messages contain positions in them, and a page cannot
+make an element that has no position. Attribute values are also converted to text here.
 """
 
 import difflib
@@ -26,7 +25,7 @@ SVG_TAGS = _words(
     tspan use
     """
 )
-"""The SVG tags; nothing that runs, animates attributes or embeds markup."""
+"""The SVG tags; none that runs scripts, animates attributes or embeds markup."""
 
 HTML_TAGS = _words(
     """
@@ -68,7 +67,7 @@ _HTML_ATTRIBUTES = _words(
 )
 
 ATTRIBUTES = tuple(sorted({*_COMMON, *_SVG_ATTRIBUTES, *_HTML_ATTRIBUTES}))
-"""Every attribute with a name of its own; ``data-*`` and ``aria-*`` come besides."""
+"""Every attribute with a fixed name; ``data-*`` and ``aria-*`` are allowed too."""
 
 BOOLEAN_ATTRIBUTES = frozenset(
     _words(
@@ -77,7 +76,7 @@ BOOLEAN_ATTRIBUTES = frozenset(
         """
     )
 )
-"""Attributes that are there or not there, whatever their value."""
+"""Attributes that are present or absent, without a value."""
 
 EVENTS = _words(
     """
@@ -103,7 +102,7 @@ _INPUT_TYPES = _words("checkbox color number radio range search text")
 
 
 def _unknown(what: str, name: object, known: Iterable[str]) -> SceneError:
-    """Return an error that names what is allowed nearest to ``name``."""
+    """Return an error that names the allowed names nearest to ``name``."""
     near = difflib.get_close_matches(str(name), list(known), n=3, cutoff=0.5)
     hint = f"; nearest are {', '.join(map(repr, near))}" if near else ""
     return SceneError(f"{what} {name!r} is not allowed in a scene{hint}")
@@ -113,7 +112,7 @@ def check_tag(namespace: str, tag: str) -> None:
     """Refuse a tag outside the allow-list.
 
     Raises:
-        SceneError: If ``tag`` is not allowed, with what is allowed nearest.
+        SceneError: If ``tag`` is not allowed, with the nearest allowed tags.
 
     """
     if namespace not in _TAGS_OF:
@@ -124,12 +123,12 @@ def check_tag(namespace: str, tag: str) -> None:
 
 @lru_cache(maxsize=4096)
 def attribute_name(namespace: str, key: str) -> str:
-    """Return the attribute that a Python keyword stands for.
+    """Return the attribute name of a Python keyword argument.
 
     ``class_`` is ``class`` and ``stroke_width`` is ``stroke-width``.
 
     Raises:
-        SceneError: If there is no such attribute, with what is allowed nearest.
+        SceneError: If there is no such attribute, with the nearest allowed names.
 
     """
     name = key.removesuffix("_").replace("_", "-")
@@ -148,7 +147,7 @@ def check_event(kind: str) -> None:
     """Refuse an event that an element cannot listen to.
 
     Raises:
-        SceneError: If ``kind`` is not allowed, with what is allowed nearest.
+        SceneError: If ``kind`` is not allowed, with the nearest allowed events.
 
     """
     if kind not in EVENTS:
@@ -170,11 +169,11 @@ def check_property(name: str) -> None:
 
 
 def check_value(tag: str, name: str, value: str) -> None:
-    """Refuse a value that reaches out of the page.
+    """Refuse a value that refers to another origin or document.
 
     Raises:
-        SceneError: If ``value`` is a URL of another origin, or a reference that is
-            not to this document, or a type of input that a scene cannot have.
+        SceneError: If ``value`` is a URL of another origin, a reference outside this
+            document, or an input type that is not allowed.
 
     """
     if name in ("href", "src"):
@@ -189,7 +188,7 @@ def check_references(name: str, value: str) -> None:
     """Refuse ``url()`` unless it points to an element of the same document.
 
     Raises:
-        SceneError: If anything else than ``url(#id)`` is in ``value``.
+        SceneError: If ``value`` has a ``url()`` other than ``url(#id)``.
 
     """
     if "url(" in _LOCAL_URL.sub("", value).lower():
@@ -208,7 +207,7 @@ def _check_url(tag: str, value: str) -> None:
 
 
 def format_number(value: float) -> str:
-    """Return ``value`` as short as SVG allows, to nine significant digits.
+    """Return ``value`` in the shortest form of SVG, to nine significant digits.
 
     Raises:
         SceneError: If ``value`` is NaN or infinite.
@@ -222,12 +221,12 @@ def format_number(value: float) -> str:
 def format_value(name: str, value: Any) -> str | None:
     """Return the text of an attribute, or None if it is to be absent.
 
-    Numbers become short text, True an attribute without a value (``"true"`` for
-    ``aria-*`` and ``data-*``), None and False no attribute, and sequences what
-    ``points`` and ``viewBox`` want: items apart by spaces, pairs by commas.
+    Numbers become short text. True becomes an attribute without a value (``"true"`` for
+    ``aria-*`` and ``data-*``), None and False become no attribute. Sequences become the
+    form of ``points`` and ``viewBox``: items separated by spaces, pairs by commas.
 
     Raises:
-        SceneError: If ``value`` has a number that is not finite, or no text.
+        SceneError: If ``value`` has a number that is not finite, or has no text form.
 
     """
     if isinstance(value, str):

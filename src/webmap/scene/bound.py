@@ -8,10 +8,10 @@ from webmap.scene.element import Child, Element
 
 
 class BoundElement(Element):
-    """Stands for the element with that id in the user's own HTML.
+    """The element with an id in the user's own HTML.
 
-    What Python appends comes after what the page has in it. Setting the text, or
-    :meth:`clear`, first drops what the page had.
+    Children that Python appends follow the page's own content. Setting the text, or
+    :meth:`clear`, first removes the page's own content.
     """
 
     __slots__ = ("dropped", "emptied", "html_id")
@@ -24,19 +24,19 @@ class BoundElement(Element):
         self.html_id = html_id
         self.emptied = False
         self.dropped: dict[str, None] = {}
-        """Attributes that were unset: the page's own HTML may have them."""
+        """Attributes that were unset; the page's own HTML may have them."""
 
     def __repr__(self) -> str:
         return f"<element #{self.html_id}>"
 
     def clear(self) -> Self:
-        """Remove everything in the element, also what the page had in it."""
+        """Remove everything in the element, including the page's own content."""
         self._empty()
         return super().clear()
 
     @property
     def text(self) -> str:
-        """The text that Python put there; setting it replaces all there is."""
+        """The text that Python set; setting it replaces the whole content."""
         return Element.text.fget(self)  # type: ignore[attr-defined,no-any-return]
 
     @text.setter
@@ -60,7 +60,7 @@ class BoundElement(Element):
 
 
 class Document(Element):
-    """The root of a fragment that holds the bound elements of a page."""
+    """The root of a fragment with the bound elements of a page."""
 
     __slots__ = ()
 
@@ -78,7 +78,7 @@ class Document(Element):
         return element
 
     def insert(self, index: int, child: Child) -> Self:
-        """Take bound elements only: nothing else has a place in a user's page.
+        """Insert a bound element; other elements have no place in a user's page.
 
         Raises:
             SceneError: If ``child`` is not a bound element.

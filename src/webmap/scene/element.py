@@ -20,10 +20,10 @@ from webmap.scene.node import Node, Text
 
 
 class Classes:
-    """The classes that Python gave to an element, in the order of giving.
+    """The classes that Python gave to an element, in the order of addition.
 
-    What a page adds by itself (``selected`` on one viewer's map, ``stale``) is not
-    among them.
+    Classes that a page adds by itself (``selected`` on one viewer's map, ``stale``) are
+    not included.
     """
 
     __slots__ = ("_element",)
@@ -44,16 +44,16 @@ class Classes:
         return " ".join(self._element._classes)
 
     def add(self, *names: str) -> None:
-        """Give the element these classes, if it has not got them yet."""
+        """Add classes that the element does not have yet."""
         self._replace({**self._element._classes, **split_classes(*names)})
 
     def remove(self, *names: str) -> None:
-        """Take these classes from the element, if it has them."""
+        """Remove classes that the element has."""
         gone = split_classes(*names)
         self._replace({n: None for n in self._element._classes if n not in gone})
 
     def toggle(self, name: str, on: bool | None = None) -> bool:
-        """Give or take a class: as ``on`` says, else the other way than it is.
+        """Set a class by ``on``, or toggle it without ``on``.
 
         Returns:
             Whether the element has the class now.
@@ -71,7 +71,7 @@ class Classes:
 
 
 def split_classes(*names: str) -> dict[str, None]:
-    """Return the single classes in ``names``, without doubles, in their order.
+    """Return the single classes in ``names``, without duplicates, in order.
 
     Raises:
         SceneError: If a name is empty or not text.
@@ -86,14 +86,14 @@ def split_classes(*names: str) -> dict[str, None]:
 
 
 Child = Node | str
-"""What an element takes as a child; a string becomes a text."""
+"""A child of an element; a string becomes a text."""
 
-# A hand may have changed these on a page since, so that they are always sent.
+# A person may have changed these on a page since, so they are always sent.
 _CHANGED_BY_HANDS = frozenset({"value", "checked", "open", "selected"})
 
 
 class Element(Live):
-    """One element; every change of it reaches the pages that show it.
+    """One element; every change is sent to the pages that show it.
 
     Keywords are attributes: ``class_`` is ``class`` and ``stroke_width`` is
     ``stroke-width``. Tags and attributes outside the allow-list raise.
@@ -143,7 +143,7 @@ class Element(Live):
 
     @property
     def attributes(self) -> dict[str, str]:
-        """The texts of all attributes that are set, as a copy."""
+        """The texts of all set attributes, as a copy."""
         names = ("class", "transform", *self._attributes)
         return {name: text for name in names if (text := self.get(name)) is not None}
 
@@ -172,7 +172,7 @@ class Element(Live):
         return self
 
     def unset(self, *names: str) -> Self:
-        """Unset attributes; those that are not set stay so."""
+        """Unset attributes; does nothing for those that are not set."""
         for name in names:
             self._set(attribute_name(self.namespace, name), None)
         return self
@@ -193,8 +193,8 @@ class Element(Live):
         """Set a custom style property such as ``"--dot-size"``; None unsets it.
 
         Raises:
-            SceneError: If ``name`` is not that of a custom property, or the value
-                refers to something outside the document.
+            SceneError: If ``name`` is not a custom property, or the value refers to
+                something outside the document.
 
         """
         check_property(name)
@@ -216,9 +216,10 @@ class Element(Live):
         """Make the element, an ``<svg>``, a map whose view each page moves by itself.
 
         Args:
-            world: The group in it whose matrix is the view; leave its place alone.
-            width: Pixels, or 0 to be as wide as what the map is in.
-            height: Pixels, or 0 to be as high as what the map is in.
+            world: The group in it whose matrix is the view; do not set its matrix
+                otherwise.
+            width: Pixels, or 0 for the width of its container.
+            height: Pixels, or 0 for the height of its container.
 
         Raises:
             SceneError: If this is no ``<svg>``, ``world`` is not in it, or a size is
@@ -242,18 +243,18 @@ class Element(Live):
 
     @property
     def children(self) -> tuple[Node, ...]:
-        """The elements and texts in this one, in order."""
+        """The child elements and texts, in order."""
         return tuple(self._children)
 
     def walk(self) -> Iterator[Node]:
-        """Yield this element and everything in it, parents first."""
+        """Yield this element and all its descendants, parents first."""
         yield self
         for child in self._children:
             yield from child.walk()
 
     @property
     def text(self) -> str:
-        """All text in the element; setting it replaces what was in the element."""
+        """All text in the element; setting it replaces the content."""
         return "".join(node.data for node in self.walk() if isinstance(node, Text))
 
     @text.setter
@@ -266,10 +267,10 @@ class Element(Live):
             self.append(text)
 
     def append(self, *children: Child) -> Self:
-        """Put children at the end; one that has another parent leaves it.
+        """Append children; a child of another parent is moved.
 
         Raises:
-            SceneError: If a child cannot be put there.
+            SceneError: If a child is not allowed here.
 
         """
         for child in children:
@@ -277,17 +278,17 @@ class Element(Live):
         return self
 
     def prepend(self, *children: Child) -> Self:
-        """Put children at the beginning, in their order."""
+        """Insert children at the beginning, in their order."""
         for index, child in enumerate(children):
             self.insert(index, child)
         return self
 
     def insert(self, index: int, child: Child) -> Self:
-        """Put ``child`` before the child that is at ``index`` now.
+        """Insert ``child`` before the child that is at ``index`` now.
 
         Raises:
-            SceneError: If ``child`` is the root of a fragment, which is mounted and
-                not appended, or has this element in it.
+            SceneError: If ``child`` is the root of a fragment, which is mounted and not
+                appended, or contains this element.
 
         """
         node = self._check_child(child)
@@ -346,24 +347,23 @@ class Element(Live):
         prevent: bool = False,
         stop: bool = False,
     ) -> Removal:
-        """Call ``handler`` with every such event, of every viewer.
+        """Call ``handler`` for every event of this kind, of every viewer.
 
-        The handler joins the current scope and is called within it; it goes with
-        the element, too. What a coroutine function goes on with is cancelled when
-        that scope closes.
+        The handler joins the current scope and is called within it; it also ends with
+        the element. A running coroutine of the handler is cancelled when that scope
+        closes.
 
         Args:
             event: The browser's name of the event, such as ``"click"``.
-            handler: A function, or a coroutine function, that takes an
-                :class:`Event`.
-            prevent: Whether the browser leaves out what it would do by itself.
-            stop: Whether elements further out do not hear of it.
+            handler: A function, or a coroutine function, that takes an :class:`Event`.
+            prevent: Whether the browser's default action is prevented.
+            stop: Whether the event does not propagate to outer elements.
 
         Returns:
-            What takes the handler away again.
+            The removal of the handler.
 
         Raises:
-            SceneError: If the event is not one that a scene knows.
+            SceneError: If the event is not allowed in a scene.
 
         """
         check_event(event)
@@ -389,14 +389,14 @@ class Element(Live):
     def dispatch(
         self, event: Event, report: Report, spawn: Spawn | None = None
     ) -> None:
-        """Call every handler of ``event.kind``, each in the scope it was added in.
+        """Call every handler of ``event.kind``, each in the scope of its addition.
 
         Args:
-            event: What happened.
-            report: Called with each exception that a handler lets out; the other
-                handlers are called all the same.
-            spawn: Called with what a coroutine function returned, in the context
-                in which it is to run.
+            event: The event.
+            report: Called with each exception that a handler raises; the other handlers
+                are still called.
+            spawn: Called with the coroutine that a handler returned, in the context in
+                which it is to run.
 
         """
         for listener in tuple(self._listeners.get(event.kind, ())):
@@ -404,7 +404,7 @@ class Element(Live):
 
     @property
     def listening(self) -> dict[str, tuple[bool, bool]]:
-        """The events that are listened to: whether prevented, whether stopped."""
+        """The events with listeners: whether prevented, whether stopped."""
         return {
             kind: (any(i.prevent for i in items), any(i.stop for i in items))
             for kind, items in self._listeners.items()

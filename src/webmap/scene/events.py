@@ -1,4 +1,4 @@
-"""What a hand did on a page, and who listens to it."""
+"""Events of a page, and their listeners."""
 
 import inspect
 from collections.abc import Awaitable, Callable
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from webmap.scene.element import Element
 
 Handler = Callable[["Event"], Any]
-"""What is called with an event; it may be a coroutine function."""
+"""Called with an event; may be a coroutine function."""
 
 Report = Callable[[Exception], object]
-"""What is told of an exception that a handler let out."""
+"""Called with an exception that a handler raised."""
 
 Spawn = Callable[[Awaitable[Any]], object]
-"""What runs the coroutine that a handler returned, in the context of the call."""
+"""Runs the coroutine that a handler returned, in the context of the call."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,10 +25,11 @@ class Event:
     """One event of one viewer, at one element."""
 
     kind: str
-    """The name, as the browser has it: ``"click"``, ``"keydown"``, ..."""
+    """The browser's name of the event: ``"click"``, ``"keydown"``, ..."""
 
     element: "Element | None" = None
-    """The element that listens, which is not always the one under the pointer."""
+    """The element with the listener, which may differ from the one under the
+    pointer."""
 
     x: float = 0.0
     """Pixels from the left of the map, or of the window if not on a map."""
@@ -43,13 +44,13 @@ class Event:
     """Metres in the world of the map, or None if not on a map."""
 
     key: str = ""
-    """The key of a key event, as the browser names it: ``"a"``, ``"ArrowUp"``."""
+    """The browser's name of the key of a key event: ``"a"``, ``"ArrowUp"``."""
 
     button: int = 0
     """The button of a pointer event: 0 is the main one."""
 
     delta: float = 0.0
-    """How far a wheel turned, in pixels; away from the hand is negative."""
+    """How far a wheel turned, in pixels; away from the viewer is negative."""
 
     shift: bool = False
     ctrl: bool = False
@@ -57,16 +58,16 @@ class Event:
     meta: bool = False
 
     value: str | None = None
-    """What an input holds after the event."""
+    """The value of an input after the event."""
 
     checked: bool | None = None
-    """Whether a checkbox is ticked after the event."""
+    """Whether a checkbox is checked after the event."""
 
     viewer: Any = None
-    """The viewer on whose page it happened."""
+    """The viewer of the page."""
 
     map: Any = None
-    """The map on which it happened, or None."""
+    """The map of the event, or None."""
 
 
 class Listener:
@@ -94,6 +95,6 @@ class Listener:
                 report(error)
 
     def forget(self) -> None:
-        """Let the scope forget this listener, so that it does not outgrow it."""
+        """Remove this listener from its scope, so that the scope does not grow."""
         if self.scope is not None and self.removal is not None:
             self.scope.discard(self.removal)

@@ -1,4 +1,4 @@
-"""Fragments: pieces of the scene that are mounted whole and know what changed."""
+"""Fragments: parts of the scene that are mounted whole and record their changes."""
 
 import itertools
 from collections import deque
@@ -12,13 +12,13 @@ _ids = itertools.count(1)
 
 
 class Removed(NamedTuple):
-    """A node went, with everything in it."""
+    """A node was removed, with its descendants."""
 
     node_id: int
 
 
 class Added(NamedTuple):
-    """A node came, with everything that is in it now."""
+    """A node was added, with its current descendants."""
 
     node: Node
     after: Node | None
@@ -26,11 +26,11 @@ class Added(NamedTuple):
 
 
 class Changed(NamedTuple):
-    """A value of a node that was there already is another now."""
+    """A value of an existing node changed."""
 
     node: Node
     slot: str
-    """Which value: the name of an attribute or of something else that is sent."""
+    """The value: the name of an attribute or of another item that is sent."""
 
 
 Change = Removed | Added | Changed
@@ -39,9 +39,9 @@ Change = Removed | Added | Changed
 class Fragment:
     """A tree with a log of its changes.
 
-    The log is kept as revisions: of each node when it came, and of each value when
-    it changed last. So what changed since any revision is told by newest values,
-    and only removals make it longer; it forgets the oldest of them.
+    The log stores revisions: of each node when it was added, and of each value when it
+    last changed. The changes since any revision are thus described by newest values.
+    Only removals make the log longer; the oldest of them are discarded.
     """
 
     REMOVALS_KEPT = 2000
@@ -53,7 +53,7 @@ class Fragment:
         self.root = root
         self.revision = 0
         self.memo: Any = None
-        """Whatever the encoder wants to find again; no part of the scene."""
+        """A cache of the encoder; no part of the scene."""
         self._nodes: dict[int, Node] = {}
         self._touched: dict[int, Node] = {}
         self._added: dict[int, Node] = {}
@@ -66,17 +66,17 @@ class Fragment:
         return f"<Fragment {self.id} of {self.root!r} at {self.revision}>"
 
     def __len__(self) -> int:
-        """How many nodes the fragment holds."""
+        """Return the number of nodes in the fragment."""
         return len(self._nodes)
 
     def find(self, node_id: int) -> Node | None:
-        """Return the node of that id, or None if it is not in this fragment."""
+        """Return the node with an id, or None if it is not in this fragment."""
         return self._nodes.get(node_id)
 
-    # What nodes tell ------------------------------------------------------------
+    # Changes of nodes -----------------------------------------------------------
 
     def touch(self, node: Node, slot: str) -> None:
-        """Note that a value of ``node`` changed."""
+        """Record that a value of ``node`` changed."""
         self.revision = revision = self.revision + 1
         node._slots[slot] = node._changed = revision
         touched = self._touched
@@ -84,15 +84,15 @@ class Fragment:
         touched[node.id] = node
 
     def put_in(self, node: Node) -> None:
-        """Note that ``node`` came into the tree."""
+        """Record that ``node`` was added to the tree."""
         self.revision += 1
         self._added[node.id] = node
         self._adopt(node)
 
     def take_out(self, node: Node) -> None:
-        """Note that ``node`` goes out of the tree."""
+        """Record that ``node`` is removed from the tree."""
         self.revision += 1
-        # What nobody was told of needs no removal.
+        # A node that was never sent needs no removal.
         if node._attached <= self._told:
             self._removed.append((self.revision, node.id))
             if len(self._removed) > self.REMOVALS_KEPT:
@@ -110,24 +110,24 @@ class Fragment:
             new._attached = self.revision
             self._nodes[new.id] = new
 
-    # What viewers ask -----------------------------------------------------------
+    # Requests of viewers --------------------------------------------------------
 
     def mark_told(self) -> None:
-        """Note that somebody was given the state as it is now."""
+        """Record that the current state was sent to a page."""
         self._told = self.revision
 
     def changes_since(self, revision: int) -> list[Change] | None:
-        """Return what to do to come from ``revision`` to the state as it is now.
+        """Return the changes from ``revision`` to the current state.
 
-        Removals come first, then what was added, in an order in which the sibling
-        before each is there already, then newest values.
+        Removals come first, then additions, in an order in which the preceding sibling
+        always exists, then newest values.
 
         Args:
-            revision: The revision that was seen last.
+            revision: The revision that was last sent.
 
         Returns:
-            The changes, or None if too much was removed since then, so that only
-            the whole tree will do.
+            The changes, or None if too much was removed since then, so that the whole
+            tree must be sent.
 
         """
         if revision < self._forgotten:
@@ -155,7 +155,7 @@ class Fragment:
             if node._attached <= revision:
                 break
             parent = node.parent
-            # A parent that is new itself brings its children along.
+            # A new parent brings its children along.
             if parent is not None and parent._attached <= revision:
                 new.setdefault(parent, set()).add(node)
         return [
@@ -167,7 +167,7 @@ def _in_order(parent: Element, new: set[Node]) -> list[Added]:
     """Return the new children of ``parent`` from left to right."""
     found: list[Added] = []
     children = parent._children
-    # From the end, because that is where children come as a rule.
+    # From the end, because children are usually added there.
     for index in range(len(children) - 1, -1, -1):
         if len(found) == len(new):
             break

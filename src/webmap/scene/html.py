@@ -1,7 +1,7 @@
 """Makers of HTML elements: ``html.button("Stop", class_="stop")``.
 
-There is one for each HTML tag that a scene may hold. Children come first, then
-``text`` and attributes by keyword.
+There is one for each HTML tag that a scene allows. Children are positional arguments,
+``text`` and attributes are keyword arguments.
 """
 
 from webmap.scene.element import TagMaker

@@ -28,27 +28,27 @@ class Age(NamedTuple):
     """Seconds of :func:`time.monotonic`; -inf if there was never any data."""
 
     limit: float
-    """Seconds after which the data counts as old."""
+    """Seconds after which the data is stale."""
 
     shown: bool
-    """Whether the age is the element's text."""
+    """Whether the age is shown as the element's text."""
 
 
 class MapPlace(NamedTuple):
-    """What makes an ``<svg>`` a map."""
+    """The map properties of an ``<svg>``."""
 
     world_id: int
     """The group in it whose matrix is the view."""
 
     width: float
-    """Pixels, or 0 to be as wide as what it is in."""
+    """Pixels, or 0 for the width of its container."""
 
     height: float
-    """Pixels, or 0 to be as high as what it is in."""
+    """Pixels, or 0 for the height of its container."""
 
 
 class Live(Node):
-    """A node whose place, dots and age can be set at every tick, cheaply."""
+    """A node whose pose, dots and age can be set cheaply at every tick."""
 
     __slots__ = ("_age", "_dots", "_map", "_transform")
 
@@ -63,7 +63,7 @@ class Live(Node):
         self._map: MapPlace | None = None
 
     def set_pose(self, x: float, y: float, yaw: float) -> None:
-        """Place the element in its parent, newest wins.
+        """Place the element in its parent; replaces the previous placement.
 
         Args:
             x: Metres.
@@ -81,7 +81,7 @@ class Live(Node):
             self._place(pose)
 
     def set_matrix(self, matrix: Affine) -> None:
-        """Place the element in its parent by any affine map, newest wins.
+        """Place the element in its parent by an affine map; replaces the previous one.
 
         Raises:
             SceneError: If a component is not finite.
@@ -101,8 +101,7 @@ class Live(Node):
     def set_dots(self, points: bytes | bytearray | memoryview, unit: float) -> None:
         """Draw the element, a ``path``, as a small square at each point.
 
-        The squares are as wide as the CSS custom property ``--dot-size`` says, in
-        metres.
+        The width of the squares is the CSS custom property ``--dot-size``, in metres.
 
         Args:
             points: Pairs of 16-bit integers, little-endian: x and y of each point.
@@ -132,17 +131,17 @@ class Live(Node):
         limit: float | None = None,
         age_text: bool | None = None,
     ) -> None:
-        """Say how old the data is that the element shows.
+        """Set the age of the data that the element shows.
 
-        From then on every page counts the age by itself, keeps it in ``data-age``
-        and gives the element the class ``stale`` beyond the limit, also while this
-        process is out of reach.
+        From then on every page counts the age by itself, shows it in ``data-age`` and
+        gives the element the class ``stale`` beyond the limit, even when it cannot
+        reach this process.
 
         Args:
-            seconds_old: Seconds since the data was measured; infinity if there was
-                none yet.
-            limit: Seconds after which the data counts as old; at first 1.
-            age_text: Whether the page shows the age as the element's text; at first
+            seconds_old: Seconds since the data was measured; infinity if there was none
+                yet.
+            limit: Seconds after which the data is stale; initially 1.
+            age_text: Whether the page shows the age as the element's text; initially
                 not.
 
         Raises:

@@ -1,4 +1,4 @@
-"""What elements and texts have in common: an identity and a place in a tree."""
+"""Base class of elements and texts: an identity and a place in a tree."""
 
 import itertools
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ _ids = itertools.count(1)
 
 
 class Node:
-    """One thing in the tree, with an id that is unique in this process."""
+    """A node of the tree, with an id that is unique in this process."""
 
     __slots__ = (
         "__weakref__",
@@ -30,24 +30,24 @@ class Node:
         self.id = next(_ids)
         self.parent: Element | None = None
         self.fragment: Fragment | None = None
-        # Kept for the fragment: when this node came into it, when it last changed,
-        # and when each of its values did.
+        # Used by the fragment: the revisions at which this node was added, last
+        # changed, and at which each of its values changed.
         self._attached = 0
         self._changed = 0
         self._slots: dict[str, int] = {}
 
     def walk(self) -> Iterator["Node"]:
-        """Yield this node and everything in it, parents first."""
+        """Yield this node and all its descendants, parents first."""
         yield self
 
     def remove(self) -> None:
-        """Take this node out of its tree, for good: its listeners are released."""
+        """Remove this node from its tree and release its listeners."""
         if self.parent is not None:
             self.parent._take_out(self)
         self._release()
 
     def _release(self) -> None:
-        """Let go of what would keep others alive."""
+        """Release references that would keep other objects alive."""
 
     def _touch(self, slot: str) -> None:
         if self.fragment is not None:
@@ -55,7 +55,7 @@ class Node:
 
 
 class Text(Node):
-    """A piece of text; only ever text, whatever is in it."""
+    """A piece of text; its content is never parsed as markup."""
 
     __slots__ = ("_data",)
 

@@ -1,8 +1,8 @@
-"""The web application: pages, files, sign-in, the two sockets, and what runs it.
+"""The web application: pages, files, sign-in, the two sockets, and the server.
 
-The only room that knows the web stack, which is loaded when a program starts to serve:
-``import webmap`` loads none of it. What a page shows and does is decided below, in
-:mod:`webmap.core` and :mod:`webmap.scene.wire`; what moves a robot, in the gate.
+The only package that imports the web stack, which is loaded when a program starts to
+serve: ``import webmap`` loads none of it. What a page shows and does is decided below,
+in :mod:`webmap.core` and :mod:`webmap.scene.wire`; what moves a robot, in the gate.
 
 Begin with ``app``, which routes requests: ``security`` and ``access`` let them in,
 ``scene_socket`` and ``drive_socket`` serve a page's sockets, ``open_pages`` has the

@@ -1,4 +1,4 @@
-"""Who may come in: the decisions on one request, without I/O."""
+"""Access control: the decisions on one request, without I/O."""
 
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping
 from dataclasses import dataclass, field
@@ -18,11 +18,11 @@ CODE = "webmap_code"
 """The fields of a query that sign in: the token, and a one-time code."""
 
 KEY = "webmap-key"
-"""The element of a page and the header of a request that carry the page's key."""
+"""The element of a page and the header of a request with the page's key."""
 
 PROTOCOL = "webmap"
-"""The subprotocol of both sockets. A page offers it together with its key, as a browser
-lets a page set no other header of a WebSocket."""
+"""The subprotocol of both sockets. A page offers it together with its key, as browsers
+let a page set no other header of a WebSocket."""
 
 _SECRET = {TOKEN, CODE}
 
@@ -34,7 +34,7 @@ NOT_SIGNED_IN = (
 Authenticate = Callable[
     [MutableMapping[str, Any]], Viewer | Awaitable[Viewer | None] | None
 ]
-"""Takes the ASGI scope of a request; gives who makes it, or None to refuse it."""
+"""Takes the ASGI scope of a request; returns its viewer, or None to refuse it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,25 +42,25 @@ class Settings:
     """Who may use the application, from where, and how many at once."""
 
     token: str = field(default_factory=new_token, repr=False)
-    """The secret that signs viewers in, of 256 bits or more; made if not given."""
+    """The secret that signs viewers in, of 256 bits or more; generated if not given."""
 
     authenticate: Authenticate | None = None
-    """How a host application tells who somebody is, in place of the token."""
+    """The host application's authentication, in place of the token."""
 
     hosts: Hosts = field(default_factory=Hosts)
-    """The names by which the server may be called."""
+    """The accepted names of the server."""
 
     origins: frozenset[str] = frozenset()
-    """Origins besides the server's own that may open sockets: that of a proxy which
-    ends TLS in front of it. Made with :func:`webmap.server.origins.checked_origin`."""
+    """Origins that may open sockets in addition to the server's own, such as that of a
+    proxy that ends TLS. Made with :func:`webmap.server.origins.checked_origin`."""
 
     max_pages: int = 100
-    """How many pages may be open at once."""
+    """The greatest number of open pages."""
 
 
 @dataclass(frozen=True, slots=True)
 class RequestHead:
-    """What access depends on in a request, or in one that opens a socket."""
+    """The parts of a request, or of a socket's opening, that decide on access."""
 
     path: str
     """Decoded, with the prefix under which the application is mounted."""
@@ -80,16 +80,16 @@ class RequestHead:
     cookies: tuple[str, ...]
     query: tuple[tuple[str, str], ...]
     keys: tuple[str, ...]
-    """What it offers as the key of a page."""
+    """The values offered as the key of a page."""
 
     address: str
-    """Where it came from, as the server says."""
+    """The address of the client, as the server reports it."""
 
     wants_html: bool
 
     @classmethod
     def of(cls, scope: Scope) -> "RequestHead":
-        """Read an ``http`` or ``websocket`` scope."""
+        """Return the request of an ``http`` or ``websocket`` scope."""
         method = scope.get("method", "")
         is_socket = scope["type"] == "websocket"
         return cls(
@@ -117,12 +117,12 @@ class RequestHead:
 
     @property
     def host(self) -> str:
-        """The one Host header, empty if there is none or more than one."""
+        """The only Host header; empty if there is none or more than one."""
         return self.hosts[0] if len(self.hosts) == 1 else ""
 
     @property
     def origin(self) -> str | None:
-        """The one Origin header, if there is exactly one."""
+        """The only Origin header; None if there is none or more than one."""
         return self.origins[0] if len(self.origins) == 1 else None
 
     @property
@@ -132,15 +132,15 @@ class RequestHead:
         return port if port.isdecimal() else ("443" if self.secure else "80")
 
     def tokens(self) -> list[str]:
-        """Return every ``?token=`` of the query."""
+        """Return the values of ``?token=`` in the query."""
         return [value for name, value in self.query if name == TOKEN]
 
     def codes(self) -> list[str]:
-        """Return every one-time code of the query."""
+        """Return the one-time codes of the query."""
         return [value for name, value in self.query if name == CODE]
 
     def cookie(self, name: str) -> list[str]:
-        """Return every value of a cookie; nested paths may each have one."""
+        """Return all values of a cookie; nested paths may each have one."""
         pairs = (
             pair.strip().partition("=")
             for header in self.cookies
@@ -149,13 +149,13 @@ class RequestHead:
         return [value for key, _, value in pairs if key == name]
 
     def clean_url(self, code: str | None = None) -> str:
-        """Return this URL without what signs in, as a path on the same origin.
+        """Return this URL without tokens and codes, as a path on the same origin.
 
         Args:
-            code: A one-time code that the URL carries in place of the token.
+            code: A one-time code to add in place of the token.
 
         """
-        # Two slashes at the start would be another host.
+        # Two slashes at the start would name another host.
         path = "/" + quote(self.path.lstrip("/\\"), safe="/~!$&'()*+,;=:@-._")
         kept = [(name, value) for name, value in self.query if name not in _SECRET]
         if code is not None:
@@ -164,7 +164,7 @@ class RequestHead:
 
 
 def redact(scope: Scope) -> None:
-    """Take what signs in out of a scope, from which servers write access logs."""
+    """Remove tokens and codes from a scope, from which servers write access logs."""
     query = scope.get("query_string", b"").decode("latin-1")
     if any(name in query for name in _SECRET):
         kept = [pair for pair in parse_qsl(query, keep_blank_values=True)]
@@ -182,11 +182,11 @@ def _headers(scope: Scope, name: bytes) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A request that is turned away."""
+    """A refused request."""
 
     status: int
     text: str
-    """What a person reads; never anything that the request said."""
+    """The text for people; it never repeats the request."""
 
     retry_after: int = 0
     """Seconds, for status 429."""
@@ -194,25 +194,25 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Redirect:
-    """A request whose URL holds what must not stay there: the browser goes on."""
+    """A redirect to a URL without the token or the code."""
 
     location: str
 
 
 @dataclass(frozen=True, slots=True)
 class SignedIn:
-    """A request that used a one-time code up: it is answered, with the new secrets."""
+    """A request with a valid one-time code: it is answered, with the new secrets."""
 
     viewer: Viewer
     key: str
-    """What the page that is answered keeps, and opens its sockets with."""
+    """The key that the answered page keeps to open its sockets."""
 
     cookie: str | None
-    """The whole Set-Cookie header, None if the browser has its cookie already."""
+    """The whole Set-Cookie header; None if the browser already has its cookie."""
 
 
 class AccessControl:
-    """Decides on every request before anything else sees it."""
+    """Decides on every request before any other code processes it."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -221,7 +221,7 @@ class AccessControl:
         self.codes = Codes()
 
     def check_address(self, request: RequestHead) -> Refusal | None:
-        """Refuse what names another host, or comes from a page of another origin."""
+        """Refuse a request for another host, or from a page of another origin."""
         if not self._settings.hosts.allow(request.host):
             return Refusal(
                 421,
@@ -239,13 +239,13 @@ class AccessControl:
     def identify(
         self, request: RequestHead, now: float
     ) -> Viewer | Redirect | SignedIn | Refusal:
-        """Tell by cookie, key, token or code who makes a request.
+        """Return who makes a request, by cookie, key, token or code.
 
         Sockets, and requests that may change something, need a page's key. For all
         others the cookie is enough.
 
         Args:
-            request: One that :meth:`check_address` let pass.
+            request: A request that :meth:`check_address` accepted.
             now: Seconds, monotonic.
 
         """
@@ -260,7 +260,7 @@ class AccessControl:
         if any(self._token.matches(token) for token in tokens):
             return Redirect(request.clean_url(self.codes.issue(now)))
         if viewer is not None:
-            # An old link in a browser that has signed in is not an attempt.
+            # An old URL in a browser that has signed in is not an attempt.
             return (
                 Redirect(request.clean_url()) if tokens or request.codes() else viewer
             )
@@ -320,7 +320,7 @@ def _viewer(session: str) -> Viewer:
 
 
 def _name(request: RequestHead) -> str:
-    # Cookies know no ports: two servers on one machine would share a name.
+    # Cookies ignore ports: two servers on one machine would share a name.
     return f"webmap_{request.port}"
 
 

@@ -1,4 +1,4 @@
-"""The web application: which request goes where."""
+"""The web application: routes of requests."""
 
 import asyncio
 import logging
@@ -30,7 +30,7 @@ Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 PACKAGE = Path(__file__).parents[1]
 
 FOLDERS = ("console/", "features/", "web/")
-"""Folders of the package with files for the browser, whose URLs are their paths."""
+"""Folders of the package with files for the browser; their URLs are their paths."""
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -40,12 +40,12 @@ class WebApp:
 
     Args:
         site: The pages that can be opened.
-        pages: The pages that are open.
+        pages: The open pages.
         connect_to_gate: Opens a connection of a page to the gate.
-        settings: Who may use it; a new token and this machine alone if not given.
-        published: What the program publishes, if it has published already.
-        lifespan: What to do when a server starts and stops the application, as
-            Starlette has it; a host that mounts the application does it itself.
+        settings: Who may use it; by default a new token and this machine only.
+        published: The files of the program, if it has published some already.
+        lifespan: What to do when a server starts and stops the application, as in
+            Starlette; a host that mounts the application does this itself.
 
     Raises:
         ConfigError: If the settings' token is too short.
@@ -86,11 +86,11 @@ class WebApp:
         )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, one socket, or the life of the application."""
+        """Serve one request, one socket, or the lifespan of the application."""
         await self._security(scope, receive, send)
 
     def new_code(self) -> str:
-        """Return a one-time code: an address with ``?webmap_code=`` signs in once."""
+        """Return a one-time code; a URL with ``?webmap_code=`` signs in once."""
         return self._security.new_code()
 
     async def _static(self, request: Request) -> Response:
@@ -109,7 +109,7 @@ class WebApp:
 
 
 async def _key_fits(request: Request) -> Response:
-    """Answer a page that asks why its socket was refused: this request was not."""
+    """Answer a page whose socket was refused: its key is valid."""
     del request
     return Response(status_code=204)
 
@@ -139,12 +139,12 @@ async def _answer_error(request: Request, error: Exception) -> Response:
 async def answer_file(
     request: Request, read: Callable[[], File], *, unchanging: bool = False
 ) -> Response:
-    """Answer with a file, or with nothing but "unchanged" if the browser has it.
+    """Answer with a file, or with status 304 if the browser has it.
 
     Args:
-        request: What is answered.
+        request: The request.
         read: Called in another thread; may raise :class:`NoSuchFile`.
-        unchanging: Whether this URL always means the same content.
+        unchanging: Whether this URL always has the same content.
 
     Raises:
         HTTPException: With status 404, if there is no such file.
@@ -171,7 +171,7 @@ async def answer_file(
 
 
 class PageAnswers:
-    """Answers for every path that is not WebMap's own: pages, and files beside them."""
+    """Serves all paths that are not WebMap's own: pages, and files in their folders."""
 
     def __init__(self, site: Site) -> None:
         self._site = site
@@ -211,7 +211,7 @@ class PageAnswers:
         return HTMLResponse(page.text, headers=headers)
 
     def _beside_page(self, path: str) -> File:
-        # Longest first: the nearest page knows its own files best.
+        # Longest first: the files of the nearest page come first.
         for entry in sorted(self._site.pages.values(), key=_depth, reverse=True):
             name = name_in_folder(entry, path)
             if name is None or entry.folder is None:
@@ -234,15 +234,15 @@ def _depth(entry: PageEntry) -> int:
 
 
 def other_spelling(path: str) -> str:
-    """Return a path with the slash at its end taken away, or added."""
+    """Return a path with the slash at its end removed, or added."""
     return path[:-1] if path.endswith("/") else path + "/"
 
 
 def name_in_folder(page: PageEntry, path: str) -> str | None:
-    """Return a path relative to a page, as the page's HTML would write it.
+    """Return a path relative to a page, as in the page's HTML.
 
     Returns:
-        None if the page has no files beside it, or the path does not lie there.
+        None if the page has no folder of files, or the path is not in it.
 
     """
     if page.html is None:

@@ -20,31 +20,31 @@ log = logging.getLogger("webmap")
 page = site.page
 
 command_line: dict[str, Any] = {}
-"""What the command line says of :func:`run`; it comes before a script's own word."""
+"""The options of the command line for :func:`run`; they override a script's own."""
 
 has_run = False
 """Whether :func:`run` was called in this process."""
 
 
 def start() -> None:
-    """Begin: connect the bridges, start the gate, follow the topics.
+    """Start WebMap: connect the bridges, start the gate, subscribe to the topics.
 
-    :func:`run` does it by itself, as does the application of :func:`asgi_app` where
-    the host runs its lifespan; a host application that mounts it may call this. The
-    second call does nothing.
+    :func:`run` calls it, and so does the application of :func:`asgi_app` if the host
+    runs its lifespan; a host application that mounts it may call it. A second call does
+    nothing.
     """
     runtime.start()
 
 
 def stop() -> None:
-    """End what :func:`start` began: driven robots are stopped, links are closed."""
+    """Stop WebMap: stop driven robots and close all connections."""
     runtime.stop()
 
 
 def call(fn: Callable[..., object], /, *args: Any) -> None:
-    """Call ``fn`` in the model's thread, where robots and maps live, soon.
+    """Schedule a call of ``fn`` in the model's thread, where robots and maps live.
 
-    Everything that a script touches after :func:`start` belongs to that thread.
+    Everything that a script uses after :func:`start` belongs to that thread.
 
     Raises:
         RuntimeError: If WebMap has not been started.
@@ -62,21 +62,21 @@ def asgi_app(
 ) -> "WebApp":
     """Return the web interface as an ASGI application.
 
-    A server that runs it by itself starts and stops WebMap with it. An application
-    that mounts it under a prefix calls :func:`start` and :func:`stop`, because what
-    is mounted is not told when the server starts.
+    A server that runs it by itself starts and stops WebMap with it. An application that
+    mounts it under a prefix calls :func:`start` and :func:`stop`, because a mounted
+    application gets no lifespan events.
 
     Args:
-        token: The secret that signs viewers in by ``?token=``; made if not given, and
-            then found in the application's ``settings.token``.
-        authenticate: Takes the ASGI scope of a request and returns the viewer who
-            makes it, or None to refuse it; in place of the token.
-        hosts: Names besides loopback's by which the server may be called.
-        origins: Origins besides the server's own that may open sockets, as
-            ``"https://robots.example.org"`` where a proxy ends TLS.
+        token: The secret that signs viewers in by ``?token=``; generated if not given,
+            and then available as the application's ``settings.token``.
+        authenticate: Takes the ASGI scope of a request and returns its viewer, or None
+            to refuse it; in place of the token.
+        hosts: Accepted names of the server in addition to those of loopback.
+        origins: Origins that may open sockets in addition to the server's own, such as
+            ``"https://robots.example.org"`` if a proxy ends TLS.
 
     Raises:
-        ConfigError: If the token is too short, or a host or an origin is none.
+        ConfigError: If the token is too short, or a host or an origin is not valid.
 
     """
     from webmap.server.access import Settings
@@ -108,10 +108,10 @@ def run(
         host: The address to listen on.
         port: The port; 0 lets the system choose.
         open_browser: Whether to open the page in a browser.
-        token: The secret in the printed URL; made for each start if not given. The
-            browser that is opened gets a one-time code instead.
-        insecure_lan: Whether other machines may be served without TLS, where
-            everybody on the way can read the token.
+        token: The secret in the printed URL; generated for each start if not given. The
+            opened browser gets a one-time code instead.
+        insecure_lan: Whether other machines may be served without TLS, so that
+            everybody on the network in between can read the token.
 
     Raises:
         ConfigError: If it cannot listen there.
@@ -133,7 +133,7 @@ def _serve(
     from webmap.server.origins import Hosts
     from webmap.server.runner import announce, check_exposure, listen, serve
 
-    # All that can be refused is refused before anything starts.
+    # Check everything that can be refused before anything starts.
     check_exposure(host, insecure_lan=insecure_lan)
     settings: dict[str, Any] = {"hosts": Hosts.of_binding(host)}
     if token is not None:

@@ -1,13 +1,13 @@
 """Sign-in by one token per start: the decisions, without I/O.
 
 The token is in the URL that WebMap prints. The server answers it with a one-time code,
-and the browser exchanges the code for two secrets of a new session. The cookie is sent
-by the browser with each request and opens what can only be read. The key is kept by the
-pages themselves and opens their sockets: a browser sends a cookie to every port of a
-host, and only pages of the very origin can read the key. Both are the session with a
-signature, made with a secret that is derived from the token. So neither shows the
-token, neither shows the other, and a server that starts again with the same token still
-knows its viewers.
+and the browser exchanges the code for two secrets of a new session. The browser sends
+the cookie with each request; it allows reading only. The pages keep the key themselves
+and open their sockets with it: a browser sends a cookie to every port of a host, but
+only pages of the exact origin can read the key. Both secrets are the session with a
+signature, made with a secret that is derived from the token. So neither reveals the
+token, neither reveals the other, and a server that starts again with the same token
+still knows its viewers.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ _SESSION = re.compile(r"([A-Za-z0-9_-]{22})\.([0-9a-f]{64})")
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{43,256}")
 
 CODE_LIFE_S = 120.0
-"""For how long a one-time code is good: a browser may take its time to start."""
+"""Validity of a one-time code in seconds; it includes the start of a browser."""
 
 
 def new_token() -> str:
@@ -36,7 +36,7 @@ class Token:
     """The secret of one server.
 
     Args:
-        secret: At least 43 characters of base64url, as :func:`new_token` makes them.
+        secret: At least 43 characters of base64url, as from :func:`new_token`.
 
     Raises:
         ConfigError: If the secret is too short, or not safe in a URL.
@@ -47,7 +47,7 @@ class Token:
 
     def __init__(self, secret: str) -> None:
         if not _TOKEN.fullmatch(secret):
-            # What was got is a secret, so that it is not repeated here.
+            # The value is a secret, so it is not repeated here.
             raise ConfigError(
                 "the token must be 43 to 256 letters, digits, '-' or '_' (256 random "
                 f"bits), got {len(secret)} characters; make one with: "
@@ -58,7 +58,7 @@ class Token:
         self._key_secret = _derive(secret, b"webmap page key v1")
 
     def matches(self, offered: str) -> bool:
-        """Tell in constant time whether ``offered`` is the token."""
+        """Return in constant time whether ``offered`` is the token."""
         digest = hashlib.sha256(offered.encode(errors="replace")).digest()
         return hmac.compare_digest(digest, self._digest)
 
@@ -67,7 +67,7 @@ class Token:
         return _signed(self._cookie_secret, secrets.token_urlsafe(16))
 
     def session(self, cookie: str) -> str | None:
-        """Return the session that a cookie value proves, None if it proves none."""
+        """Return the session of a valid cookie value, or None."""
         return _proved(self._cookie_secret, cookie)
 
     def key(self, session: str) -> str:
@@ -75,7 +75,7 @@ class Token:
         return _signed(self._key_secret, session)
 
     def session_of_key(self, key: str) -> str | None:
-        """Return the session that a page's key proves, None if it proves none."""
+        """Return the session of a valid page key, or None."""
         return _proved(self._key_secret, key)
 
 
@@ -98,8 +98,8 @@ class Codes:
     """One-time codes: each signs in one browser, once, soon after it was made.
 
     Args:
-        life: For how long a code is good, in seconds.
-        limit: How many codes are remembered; the oldest is forgotten first.
+        life: How long a code is valid, in seconds.
+        limit: How many codes are kept; the oldest is removed first.
 
     """
 
@@ -117,20 +117,20 @@ class Codes:
         return code
 
     def use(self, code: str, now: float) -> bool:
-        """Use a code up; False if it was used before, is too old, or never was one."""
+        """Use up a code; return False if it was used before, too old, or unknown."""
         return now < self._ends.pop(code, now)
 
 
 class Attempts:
-    """How often each address gave a wrong token in the last minute.
+    """Counts each address's wrong tokens of the last minute.
 
-    The right token is never kept waiting: one address may be everybody's, as that of a
-    reverse proxy or of the machine itself.
+    The right token never has to wait: many people may share one address, such as that
+    of a reverse proxy or of the machine itself.
 
     Args:
         limit: How many failures an address has before its wrong tokens must wait.
         window: How long a failure counts, in seconds.
-        addresses: How many addresses are remembered; the oldest is forgotten first.
+        addresses: How many addresses are kept; the oldest is removed first.
 
     """
 
@@ -143,7 +143,7 @@ class Attempts:
         self._failures: OrderedDict[str, deque[float]] = OrderedDict()
 
     def wait(self, address: str, now: float) -> int:
-        """Return for how many whole seconds the address must wait; 0 is not at all."""
+        """Return how many whole seconds the address must wait; 0 for no wait."""
         failures = self._failures.get(address)
         if failures is None:
             return 0
@@ -156,7 +156,7 @@ class Attempts:
         return math.ceil(failures[0] + self._window - now)
 
     def failed(self, address: str, now: float) -> None:
-        """Note that the address gave a wrong token."""
+        """Count a wrong token of an address."""
         self._failures.setdefault(address, deque(maxlen=self._limit)).append(now)
         self._failures.move_to_end(address)
         if len(self._failures) > self._addresses:

@@ -1,8 +1,8 @@
-"""The connections that the server has accepted, and for how long they may stay.
+"""The accepted connections of the server, and how long they may stay open.
 
-uvicorn has no time limit for the headers of a request, and counts every connection
-alike. Here each connection waits in a bounded crowd until a request on it comes from
-somebody who has signed in, and again when that request is answered.
+uvicorn has no time limit for the headers of a request, and counts all connections
+alike. Here each connection waits in a bounded group until a request on it comes from a
+person who has signed in, and again after that request was answered.
 """
 
 import asyncio
@@ -21,13 +21,14 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import (
 log = logging.getLogger("webmap.server")
 
 WAITING_S = 10.0
-"""How long a connection may go without a request from somebody who has signed in."""
+"""How long a connection may go without a request from a person who has signed in, in
+seconds."""
 
 STRANGERS = 256
 STRANGERS_PER_ADDRESS = 64
 SIGNED_IN = 256
-"""How many connections wait at most: those on which nobody has signed in yet, and those
-on which somebody has, between two requests. Others push neither of these out."""
+"""The greatest numbers of waiting connections: those without a sign-in yet, and those
+between two requests of people who have signed in. Neither can displace the other."""
 
 _LOG_EVERY_S = 60.0
 _FLUSH_S = 1.0
@@ -37,23 +38,23 @@ T = TypeVar("T")
 
 
 class Waiting(Generic[T]):
-    """Connections that serve nobody who has signed in: so many, the newest stay.
+    """Waiting connections up to a limit, of which the newest stay.
 
-    A newcomer is never refused: whether it has signed in is known only when its request
-    has come. So the oldest one goes, of the address that has the most, and one address
-    cannot push those of another out.
+    A new connection is never refused: whether it has signed in is known only when its
+    request arrives. Instead, the oldest connection of the address with the most is
+    closed, so that one address cannot displace the connections of another.
 
     Args:
-        limit: How many wait at most.
-        per_address: How many of one address wait at most. This does not apply to this
-            machine's own: a reverse proxy or a tunnel here brings everybody.
+        limit: The greatest number of waiting connections.
+        per_address: The greatest number for one address. It does not apply to this
+            machine's own: a reverse proxy or a tunnel here brings many people.
 
     """
 
     def __init__(self, limit: int, per_address: int) -> None:
         self._limit = limit
         self._per_address = per_address
-        # The oldest first; a dict, as it keeps its order and finds each at once.
+        # The oldest first; a dict keeps the order and finds each one quickly.
         self._by_address: dict[str, dict[T, None]] = {}
         self._count = 0
 
@@ -61,14 +62,14 @@ class Waiting(Generic[T]):
         return self._count
 
     def add(self, connection: T, address: str) -> T | None:
-        """Let a connection wait.
+        """Add a waiting connection.
 
         Args:
-            connection: One that does not wait.
-            address: Where it comes from, as :func:`origin_of` gives it.
+            connection: A connection that is not waiting yet.
+            address: Its origin, from :func:`origin_of`.
 
         Returns:
-            One that must go for it, and that does not wait any more.
+            A connection that was removed for it and must be closed, or None.
 
         """
         mine = self._by_address.setdefault(address, {})
@@ -82,7 +83,7 @@ class Waiting(Generic[T]):
         return gone
 
     def remove(self, connection: T, address: str) -> None:
-        """Note that a connection waits no more."""
+        """Remove a waiting connection."""
         mine = self._by_address[address]
         del mine[connection]
         self._count -= 1
@@ -99,11 +100,11 @@ class Waiting(Generic[T]):
 
 
 def origin_of(address: str) -> str:
-    """Return what counts as one address: of IPv6, a whole network of 64 bits.
+    """Return the part of an address that is counted: for IPv6 a network of 64 bits.
 
     Returns:
-        Nothing for this machine itself, and for what is no IP address, such as the
-        path of a Unix socket.
+        Empty for this machine itself, and if it is no IP address, such as the path of a
+        Unix socket.
 
     """
     try:
@@ -120,7 +121,7 @@ def origin_of(address: str) -> str:
 
 
 class Crowds:
-    """All connections of one server that serve nobody now."""
+    """All waiting connections of one server."""
 
     def __init__(self) -> None:
         self.strangers: Waiting[Connection] = Waiting(STRANGERS, STRANGERS_PER_ADDRESS)
@@ -128,7 +129,7 @@ class Crowds:
         self._logged = float("-inf")
 
     def log_full(self, now: float) -> None:
-        """Log that there are too many strangers, once a minute at most."""
+        """Log that too many connections have not signed in, once a minute at most."""
         if now - self._logged >= _LOG_EVERY_S:
             self._logged = now
             log.warning(
@@ -138,11 +139,11 @@ class Crowds:
 
 
 class Connection:
-    """One connection, from when it is accepted until it ends.
+    """One connection, from its acceptance to its end.
 
     Args:
-        transport: What it is made of.
-        crowds: Where it waits.
+        transport: The transport of the connection.
+        crowds: The groups in which it waits.
 
     """
 
@@ -158,7 +159,7 @@ class Connection:
 
     @contextlib.contextmanager
     def serving(self) -> Iterator[None]:
-        """Wait no more while somebody who has signed in is served."""
+        """Stop waiting while a request of a person who has signed in is served."""
         self._leave()
         try:
             yield
@@ -166,7 +167,7 @@ class Connection:
             self._rest()
 
     def ended(self) -> None:
-        """Note that the connection has ended."""
+        """Set that the connection has ended."""
         self._ended = True
         self._leave()
 
@@ -174,7 +175,7 @@ class Connection:
         if self._ended or self._transport.is_closing():
             return
         if self._transport.get_write_buffer_size() > 0:
-            # A large answer over a slow link is still on its way.
+            # A large answer over a slow connection is still being sent.
             self._timer = _loop().call_later(_FLUSH_S, self._rest)
         else:
             self._wait_in(self._crowds.signed_in)
@@ -201,20 +202,20 @@ class Connection:
         if crowd is self._crowds.strangers:
             self._transport.abort()
         else:
-            # The system may still hold the end of an answer for a slow link.
+            # The system may still have to send the end of an answer.
             self._transport.close()
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
-    """Hands a text that is not UTF-8 to the application as bytes.
+    """Passes a text that is not UTF-8 to the application as bytes.
 
-    uvicorn ends the connection of such a text without telling the application of it,
-    and logs a traceback. The application refuses it as it refuses every binary message,
-    and can see before that whether it is a STOP (S10).
+    uvicorn ends the connection of such a text without informing the application, and
+    logs a traceback. The application refuses it like every binary message, and can
+    first check whether it is a STOP (S10).
     """
 
     def send_receive_event_to_app(self) -> None:
-        """Pass on a message that is whole."""
+        """Pass on a complete message."""
         if self.curr_msg_data_type == "text":
             try:
                 b"".join(self.frames).decode()
@@ -224,12 +225,12 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
 
 def connection_of(scope: Scope) -> Connection | None:
-    """Return the connection of a request; None if another server made it."""
+    """Return the connection of a request; None if another server accepted it."""
     return cast(Connection | None, scope.get("state", {}).get(_KEY))
 
 
 def protocols() -> tuple[type[H11Protocol], type[WebSocketProtocol]]:
-    """Return what speaks HTTP and WebSocket for one server."""
+    """Return the HTTP and WebSocket protocols for one server."""
     crowds = Crowds()
 
     class Http(H11Protocol):
@@ -244,7 +245,7 @@ def protocols() -> tuple[type[H11Protocol], type[WebSocketProtocol]]:
             super().connection_lost(exc)
 
     class Socket(WebSocketProtocol):
-        """A WebSocket on the connection that asked for it."""
+        """A WebSocket on the connection that requested it."""
 
         def connection_lost(self, exc: Exception | None) -> None:
             self.app_state[_KEY].ended()
@@ -253,7 +254,7 @@ def protocols() -> tuple[type[H11Protocol], type[WebSocketProtocol]]:
         async def send(self, message: Any) -> None:
             await super().send(message)
             if message["type"] == "websocket.http.response.body":
-                # Else uvicorn logs that the refused socket was forgotten.
+                # Otherwise uvicorn logs that the refused socket was never completed.
                 self.handshake_complete = True
 
     return Http, Socket

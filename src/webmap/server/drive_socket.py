@@ -1,7 +1,7 @@
-"""The shell of ``/_webmap/drive``: commands to the gate, its word back.
+"""The ``/_webmap/drive`` sockets: commands to the gate, its messages to the page.
 
-A socket of its own, so that nothing large is ever in a command's way. What the page
-sends goes to the gate unread; the gate alone decides.
+It is a socket of its own, so that no large message delays a command. The page's
+messages go to the gate unread; only the gate decides.
 """
 
 import logging
@@ -37,7 +37,8 @@ to the page and close its socket; they may be called from any thread."""
 log = logging.getLogger("webmap.server")
 
 MOST_LAST_STOPS = 60
-"""So many STOPs are served of a page that is disconnected: a second's worth."""
+"""The greatest number of STOPs that are served for a disconnected page: those of one
+second."""
 
 
 class DriveSockets:
@@ -58,7 +59,7 @@ class DriveSockets:
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
         viewer: Viewer = socket.scope[VIEWER]
-        # Without an id it drives all the same, as a page of its own.
+        # Without an id it can still drive, as a page of its own.
         named = "id" in socket.query_params
         page_id = page_id_of(socket.query_params) if named else secrets.token_hex(8)
         await accept(socket)
@@ -81,7 +82,7 @@ class DriveSockets:
         try:
             connection = self._connect(page_socket, viewer)
             if limited:
-                # Until the model, which may be busy, has said what the page allows.
+                # Until the model, which may be busy, has set the page's speeds.
                 connection.set_speeds(0.0, 0.0)
         except Exception:
             log.exception("%s cannot reach the gate", viewer.name)
@@ -95,7 +96,7 @@ class DriveSockets:
             last_stops = iter(range(MOST_LAST_STOPS))
 
             def rest(message: str | bytes) -> None:
-                # A page that is disconnected has its STOP served first (S10).
+                # A STOP of a disconnected page is still served (S10).
                 if isinstance(message, str):
                     data = message.encode(errors="replace")
                 else:
@@ -107,7 +108,7 @@ class DriveSockets:
                 connection.receive, lambda why: self._pages.refused(viewer, why), rest
             )
         finally:
-            # The gate first: with the connection its leases end and robots stop.
+            # The gate first: the connection's leases end with it, and robots stop.
             connection.close()
             self._pages.drive_closed(page_id, viewer, connection)
 

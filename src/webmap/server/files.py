@@ -1,8 +1,8 @@
-"""The files that a browser may load: those below a folder, and those published.
+"""The files that a browser may load: those below a folder, and published ones.
 
-The name of a file below a folder is checked before the file system is asked: only plain
-parts, only suffixes that are listed. Then links are resolved, and the result must be a
-regular file inside the folder. What the program publishes is found by its URL alone.
+The name of a file below a folder is checked before the file system is used: only plain
+parts and listed suffixes are accepted. Then links are resolved, and the result must be
+a regular file inside the folder. Published files are found by their URL only.
 """
 
 import hashlib
@@ -33,7 +33,7 @@ MEDIA_TYPES: Mapping[str, str] = {
     ".svg": "image/svg+xml; charset=utf-8",
     ".webp": "image/webp",
 }
-"""What may be served, by suffix; a table of our own, for the machine's may differ."""
+"""The served file types by suffix; a fixed table, since the machine's may differ."""
 
 FILES = "/_webmap/files/"
 IMAGES = drawn.PREFIX
@@ -56,13 +56,13 @@ class File:
     data: bytes
     media_type: str
     tag: str
-    """Changes when the file does; without quotes."""
+    """Changes with the file; without quotes."""
     fleeting: bool = False
-    """Whether it is worth no room in a browser's store."""
+    """Whether browsers should not cache it."""
 
 
 def media_type_of(path: Path) -> str | None:
-    """Return the media type of a file that may be served, None of any other."""
+    """Return the media type of a file that may be served, None for any other."""
     return MEDIA_TYPES.get(path.suffix.lower())
 
 
@@ -70,7 +70,7 @@ def read_below(folder: Path, name: str) -> File:
     """Read a file below a folder.
 
     Args:
-        folder: The only place where files are looked for.
+        folder: The folder.
         name: The rest of a URL's path, decoded, with ``/`` between its parts.
 
     Raises:
@@ -92,18 +92,18 @@ def read_below(folder: Path, name: str) -> File:
 
 
 def read_file(path: Path) -> File:
-    """Read a file whose path is already known to be right.
+    """Read a file whose path was already checked.
 
     Raises:
-        NoSuchFile: If its suffix is not one of :data:`MEDIA_TYPES`, it is not a
-            regular file, or it has more than 64 MiB.
+        NoSuchFile: If its suffix is not one of :data:`MEDIA_TYPES`, it is not a regular
+            file, or it has more than 64 MiB.
 
     """
     media_type = media_type_of(path)
     if media_type is None:
         raise NoSuchFile
-    # A link put there since the path was resolved is not followed, and a FIFO does
-    # not block.
+    # A link created after the path was resolved is not followed, and a FIFO does not
+    # block.
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     flags |= getattr(os, "O_BINARY", 0)
     try:
@@ -118,17 +118,17 @@ def read_file(path: Path) -> File:
 
 
 def _is_plain(part: str) -> bool:
-    # A dot at the start is a hidden file, ".." or "."; a colon is a drive or a stream.
+    # A dot at the start means a hidden file, ".." or "."; a colon a drive or a stream.
     return bool(part) and not part.startswith(".") and not set(part) & set("\\:\0")
 
 
 class Published:
-    """Files and images that the program has published, each by a URL of its own.
+    """Files and images that the program has published, each with its own URL.
 
     The program publishes in its own thread while the web thread serves, hence the lock.
 
-    Every URL begins with ``/_webmap/``; the browser puts the prefix before it under
-    which the application is mounted.
+    Every URL begins with ``/_webmap/``; the browser adds the prefix under which the
+    application is mounted.
     """
 
     def __init__(self) -> None:
@@ -139,15 +139,15 @@ class Published:
     def publish_file(self, path: Path) -> str:
         """Let browsers load a file, and return its URL.
 
-        Files of one folder have one folder in their URLs, so that a published module
-        can import a published neighbour by its relative name. The file is read at
-        each request.
+        Files of one folder have the same folder in their URLs, so that a published
+        module can import another one by its relative name. The file is read at each
+        request.
 
         Args:
             path: An ES module, a style sheet or an image.
 
         Raises:
-            ConfigError: If there is no such file, or it is of another kind.
+            ConfigError: If there is no such file, or it has another type.
 
         """
         path = _checked_path(path)
@@ -158,18 +158,19 @@ class Published:
         return FILES + quote(name)
 
     def publish_image(self, image: Path | bytes, media_type: str | None = None) -> str:
-        """Let browsers load an image, and return a URL of this very version of it.
+        """Let browsers load an image, and return a URL of this exact version of it.
 
-        The same content has the same URL, and a browser asks for it once; what was
-        published twice is served until it was withdrawn twice.
+        The same content has the same URL, and a browser requests it once. An image that
+        was published twice is served until it was withdrawn twice.
 
         Args:
             image: A file, which is read now, or the bytes themselves.
-            media_type: As ``"image/png"``; told by a file's suffix if not given.
+            media_type: Such as ``"image/png"``; taken from a file's suffix if not
+                given.
 
         Raises:
-            ConfigError: If there is no such file, or it is not of a kind of image
-                that browsers know.
+            ConfigError: If there is no such file, or it is not an image type that
+                browsers support.
 
         """
         if isinstance(image, Path):
@@ -186,14 +187,14 @@ class Published:
         return self._images.publish(data, known)
 
     def withdraw_image(self, url: str) -> None:
-        """Undo one :meth:`publish_image`; an unknown URL does nothing."""
+        """Undo one :meth:`publish_image`; does nothing for an unknown URL."""
         self._images.withdraw(url)
 
     def file(self, name: str) -> File:
         """Read a published file by its folder and name.
 
         Raises:
-            NoSuchFile: If it was not published, or is gone.
+            NoSuchFile: If it was not published, or was deleted.
 
         """
         path = self._files.get(name)
@@ -202,7 +203,7 @@ class Published:
         return read_file(path)
 
     def image(self, tag: str) -> File:
-        """Return a published image, or one that a layer of this process has drawn.
+        """Return a published image, or one that a layer of this process drew.
 
         Raises:
             NoSuchFile: If it was not published, or was withdrawn.

@@ -1,7 +1,7 @@
-"""The HTML of pages: the user's own, with what WebMap needs put in, or one made.
+"""The HTML of pages: the user's own with additions, or a generated page.
 
-The user's file is changed in two places only: the base style sheet goes first into
-the head, so that the user's own rules win, and the script goes last.
+The user's file is changed in two places only: the base style sheet is inserted first in
+the head, so that the user's own rules override it, and the script last.
 """
 
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from urllib.parse import quote
 from webmap.server.access import KEY
 
 FOLDER = "/_webmap/"
-"""Where pages find WebMap's own files and sockets, under the application's root."""
+"""The path of WebMap's own files and sockets, under the application's root."""
 
 _MADE = """<!doctype html>
 <html lang="en">
@@ -39,7 +39,7 @@ _LOADS = {"script": "src", "img": "src", "link": "href", "iframe": "src"}
 
 
 def base_of(root_path: str) -> str:
-    """Return the URL below which WebMap's own files are, ending in a slash."""
+    """Return the URL of WebMap's own files, ending in a slash."""
     return quote(root_path.rstrip("/")) + FOLDER
 
 
@@ -48,8 +48,8 @@ def make_page(title: str, base: str, key: str | None = None) -> str:
 
     Args:
         title: The page's title.
-        base: Where WebMap's own files are, as :func:`base_of` gives it.
-        key: The key that is handed to the page, if it has just signed in.
+        base: The URL of WebMap's own files, from :func:`base_of`.
+        key: The page's key, if it has just signed in.
 
     """
     return _MADE.format(title=escape(title), base=escape(base), key=_key_element(key))
@@ -61,7 +61,7 @@ def _key_element(key: str | None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class OwnPage:
-    """A user's HTML with what WebMap needs in it."""
+    """A user's HTML with WebMap's additions."""
 
     text: str
     blocked: list[str] = field(default_factory=list)
@@ -69,12 +69,12 @@ class OwnPage:
 
 
 def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
-    """Put the base style sheet and the page's script into a user's HTML.
+    """Insert the base style sheet and the page's script into a user's HTML.
 
     Args:
-        text: The user's HTML, whole.
-        base: Where WebMap's own files are, as :func:`base_of` gives it.
-        key: The key that is handed to the page, if it has just signed in.
+        text: The user's whole HTML.
+        base: The URL of WebMap's own files, from :func:`base_of`.
+        key: The page's key, if it has just signed in.
 
     """
     seen = _Reader(text)
@@ -91,7 +91,7 @@ def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
 
 
 class _Reader(HTMLParser):
-    """Finds the head of a page, what it loads, and what will be blocked."""
+    """Finds the head of a page, the files it loads, and what will be blocked."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -109,14 +109,14 @@ class _Reader(HTMLParser):
         self.close()
 
     def head(self) -> tuple[int, int]:
-        """Return where the head starts and ends; without one, where it would be."""
+        """Return the start and the end of the head; without one, where it would be."""
         content = self._length if self._content is None else self._content
         start = content if self._head_start is None else self._head_start
         end = start if self._head_end is None else max(start, self._head_end)
         return start, end
 
     def has(self, name: str) -> bool:
-        """Tell whether the page loads one of WebMap's own files by itself."""
+        """Return whether the page itself loads one of WebMap's own files."""
         return any(url.endswith(f"_webmap/{name}") for url in self._loaded)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -128,7 +128,7 @@ class _Reader(HTMLParser):
         if tag not in {"html", "head"} and self._content is None:
             self._content = self._here()
         if tag in {"title", "textarea"}:
-            self.set_cdata_mode(tag)  # Older Pythons look for tags in these, too.
+            self.set_cdata_mode(tag)  # Older Pythons find tags in these too.
 
     def handle_endtag(self, tag: str) -> None:
         if tag == "head" and self._head_end is None:

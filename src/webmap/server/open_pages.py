@@ -1,7 +1,7 @@
-"""The open pages: where a socket, a viewer and a page function meet.
+"""The open pages: they connect a socket, a viewer and a page function.
 
-The web thread calls :class:`SceneHandle`, and those methods of :class:`OpenPages` that
-only hand over. All else runs in the model's thread.
+The web thread calls :class:`SceneHandle` and a few methods of :class:`OpenPages`, which
+only pass data to the model's thread. Everything else runs in the model's thread.
 """
 
 import asyncio
@@ -53,17 +53,17 @@ SAME = (
     "value",
     "checked",
 )
-"""What an event of the scene has by the same names as a page's message."""
+"""The attributes that an event of the scene shares with a page's message."""
 
 PageKey = tuple[str, str, str]
-"""The path of a page, what the page calls itself, and its viewer."""
+"""The path of a page, the page's own identifier, and its viewer's."""
 
 KEPT_FOR = 30.0
-"""Seconds for which a page waits for its viewer to come back."""
+"""Seconds for which a page is kept for its viewer after its socket was lost."""
 
 
 class PageHost:
-    """One page of one viewer, through losses of its socket and reloads."""
+    """One page of one viewer, kept when its socket is lost or the page is reloaded."""
 
     def __init__(
         self,
@@ -91,7 +91,7 @@ class PageHost:
     # From the socket.
 
     def connected(self, socket: PageSocket) -> None:
-        """Speak to this socket from now on, once it has said hello."""
+        """Use this socket from now on, once it has sent its hello."""
         if self._socket is not None:
             self._socket.end(FAILED, "this page was opened again in another tab")
         self._socket = socket
@@ -99,7 +99,7 @@ class PageHost:
         self._stay()
 
     def receive(self, socket: PageSocket, text: str) -> None:
-        """Take one message of the page."""
+        """Process one message of the page."""
         if socket is not self._socket:
             return
         try:
@@ -127,7 +127,7 @@ class PageHost:
                 log.warning("%r: the page says: %s", self, text)
 
     def lost(self, socket: PageSocket) -> None:
-        """Note that the socket is gone; the page is kept for a while."""
+        """Set that the socket was lost; the page is kept for a while."""
         if socket is not self._socket:
             return
         self._socket = None
@@ -136,7 +136,7 @@ class PageHost:
         self._giving_up = asyncio.get_running_loop().call_later(KEPT_FOR, self.close)
 
     def tick(self, now: float) -> None:
-        """Send what changed, if the page keeps up."""
+        """Send the changes, if the page keeps up."""
         if self._socket is not None:
             data = self._session.frame(time.monotonic())
             if data is not None:
@@ -184,7 +184,7 @@ class PageHost:
         page.dispatch(said.mount, element, event)
 
     def close(self) -> None:
-        """End the page for good."""
+        """Close the page permanently."""
         self._stop_watching()
         self._stay()
         self._pages.forget(self._key, self)
@@ -196,7 +196,7 @@ class PageHost:
             self._socket = None
 
     def tell_speeds(self) -> None:
-        """Tell the gate how fast this page's hands may drive."""
+        """Send the gate the greatest speeds that this page may ask for."""
         if self.drive is not None and self._page is not None:
             self.drive.set_speeds(*self._page.speeds)
 
@@ -217,7 +217,7 @@ class PageHost:
         self.tell_speeds()
 
     def _failed(self, error: Exception) -> None:
-        if self._page is None:  # nobody looks any more, and it may well be for that
+        if self._page is None:  # the viewer is gone, which may be the cause
             log.info("%r was closed before it was built: %s", self, error)
             return
         log.error("%r: the page function failed", self, exc_info=error)
@@ -226,7 +226,7 @@ class PageHost:
         )
 
     def _stay(self) -> None:
-        """Give up no more; a timer would hold what has ended for as long as it runs."""
+        """Keep the page; a running timer would keep a closed one in memory."""
         self.lost_at = None
         if self._giving_up is not None:
             self._giving_up.cancel()
@@ -244,7 +244,7 @@ async def _then_complete(building: Awaitable[Any], page: Page) -> None:
 
 
 class SceneHandle:
-    """The web thread's end of one scene socket; it only hands over."""
+    """The web thread's end of one scene socket; it only passes messages on."""
 
     def __init__(
         self, pages: "OpenPages", key: PageKey, viewer: Viewer, socket: PageSocket
@@ -255,11 +255,11 @@ class SceneHandle:
         pages.runtime.call(self._open, key, viewer)
 
     def receive(self, text: str) -> None:
-        """Hand one message over."""
+        """Pass one message to the model's thread."""
         self._pages.runtime.call(self._received, text)
 
     def closed(self) -> None:
-        """Hand over that the socket is gone."""
+        """Report to the model's thread that the socket was lost."""
         if self._pages.runtime.running:
             self._pages.runtime.call(self._lost)
 
@@ -281,10 +281,10 @@ class OpenPages:
 
     Args:
         runtime: The model's thread.
-        pages: What is behind each path.
-        publisher: Where the pages' files get URLs.
-        max_pages: How many pages there are at most; of those that are kept for a
-            viewer who may come back, the one that was lost first gives way.
+        pages: The page entry of each path.
+        publisher: Gives the pages' files URLs.
+        max_pages: The greatest number of pages. Of those that are kept for a viewer who
+            may return, the one that was lost first is closed for a new page.
 
     """
 
@@ -308,35 +308,35 @@ class OpenPages:
     def open_scene(
         self, entry_path: str, page_id: str, viewer: Viewer, socket: PageSocket
     ) -> SceneHandle:
-        """Take up a page whose socket has opened; return without waiting."""
+        """Open a page whose socket was accepted; return without waiting."""
         return SceneHandle(self, (entry_path, page_id, viewer.id), viewer, socket)
 
     def drive_opened(
         self, page_id: str, viewer: Viewer, connection: DriveConnection
     ) -> None:
-        """Note by which connection a page drives, to set its speeds."""
+        """Set the connection by which a page drives, to set its speeds."""
         self.runtime.call(self._drive_opened, (page_id, viewer.id), connection)
 
     def drive_closed(
         self, page_id: str, viewer: Viewer, connection: DriveConnection
     ) -> None:
-        """Note that this connection is gone; another may have replaced it before."""
+        """Remove a connection that has ended, unless another has replaced it."""
         if self.runtime.running:
             self.runtime.call(self._drive_closed, (page_id, viewer.id), connection)
 
     def refused(self, viewer: Viewer, why: str) -> None:
-        """Count a message whose socket is ended for it."""
+        """Count a refused message that ended its socket."""
         if self.runtime.running:
             self.runtime.call(self.count_refused, viewer, f"socket: {why}")
 
     # In the model's thread.
 
     def count_refused(self, viewer: Viewer, last: str) -> None:
-        """Count a message of a page that was not taken."""
+        """Count a refused message of a page."""
         refusals.note(viewer.name, 1, last, datetime.now(UTC))
 
     def host(self, key: PageKey, viewer: Viewer) -> PageHost:
-        """Return the page of that key: the one that was kept, or a new one."""
+        """Return the page of that key: the kept one, or a new one."""
         if key not in self._hosts:
             self._make_room()
             self._hosts[key] = host = PageHost(self, self.pages[key[0]], key, viewer)
@@ -344,19 +344,19 @@ class OpenPages:
         return self._hosts[key]
 
     def forget(self, key: PageKey, host: PageHost) -> None:
-        """Note that a page has ended for good."""
+        """Remove a page that was closed."""
         if self._hosts.get(key) is host:
             del self._hosts[key]
 
     def _make_room(self) -> None:
-        """End those that were lost longest ago, if there are too many for one more."""
+        """Close the pages that were lost first, if there are too many for one more."""
         lost = [host for host in self._hosts.values() if host.lost_at is not None]
         lost.sort(key=lambda host: host.lost_at or 0.0)
         for host in lost[: max(0, len(self._hosts) + 1 - self._max_pages)]:
             host.close()
 
     def close(self) -> None:
-        """End every page."""
+        """Close every page."""
         for host in tuple(self._hosts.values()):
             host.close()
 

@@ -1,7 +1,7 @@
-"""Opens a page in a browser without showing other users how to sign in.
+"""Opens a page in a browser without revealing the code to other users.
 
-Every user of a machine can read the command line of every process. So the browser is
-given the name of a file that only its owner can read, and the file leads to the page.
+Every user of a machine can read the command line of every process. So the browser gets
+the name of a file that only its owner can read, and the file redirects to the page.
 """
 
 import contextlib
@@ -34,10 +34,10 @@ _HTML = """<!doctype html>
 def opened(url: str, code: str) -> Iterator[None]:
     """Open a page in a browser, and keep the file for it while the block runs.
 
-    The file is removed at the end of the block, or when its code is too old.
+    The file is removed at the end of the block, or when its code has expired.
 
     Args:
-        url: The page, without a query.
+        url: The URL of the page, without a query.
         code: A one-time code that signs in.
 
     """
@@ -66,8 +66,8 @@ def opened(url: str, code: str) -> Iterator[None]:
 
 
 def _write(html: str) -> Path | None:
-    # Browsers that come as snaps can read neither hidden folders nor the folder for
-    # temporary files.
+    # Browsers installed as snaps cannot read hidden folders or the folder for temporary
+    # files.
     for folder in (Path.home(), Path(tempfile.gettempdir())):
         with contextlib.suppress(OSError):
             number, name = tempfile.mkstemp(".html", "webmap-sign-in-", folder)

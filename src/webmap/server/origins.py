@@ -1,9 +1,9 @@
-"""Which hosts this server answers to, and which origins may talk to it: without I/O.
+"""The accepted hosts and origins of this server, without I/O.
 
-A page of another site can make a browser send requests here, and a name that its
-owner points to 127.0.0.1 (DNS rebinding) makes them look like the server's own. So
-every request must name a host that is known, and a socket or a request that changes
-something must come from the very origin it is sent to.
+A page of another site can make a browser send requests here, and a name that its owner
+points to 127.0.0.1 (DNS rebinding) makes them look like the server's own. So every
+request must name a known host, and a socket or a request that changes something must
+come from the exact origin that it is sent to.
 """
 
 import ipaddress
@@ -23,16 +23,16 @@ _ORIGIN = re.compile(r"https?://[^/?#@\s]+")
 
 @dataclass(frozen=True, slots=True)
 class Hosts:
-    """The names by which a server may be called."""
+    """The accepted names of a server."""
 
     names: frozenset[str] = LOOPBACK
     """Host names and addresses, lower-case, IPv6 in brackets, without a port."""
 
     addresses: bool = False
-    """Whether any IP address will do; no name can be rebound to one."""
+    """Whether any IP address is accepted; no name can be rebound to one."""
 
     def allow(self, header: str) -> bool:
-        """Tell whether a Host header names this server, with whatever port."""
+        """Return whether a Host header names this server, with any port."""
         match = _HOST.fullmatch(header)
         if match is None:
             return False
@@ -44,8 +44,9 @@ class Hosts:
         """Return the names of a server that listens on ``host``.
 
         Args:
-            host: What it listens on; ``"0.0.0.0"`` and ``"::"`` are all addresses.
-            extra: More names by which it may be called.
+            host: The address to listen on; ``"0.0.0.0"`` and ``"::"`` mean all
+                addresses.
+            extra: More accepted names.
 
         Raises:
             ConfigError: If an extra name is not a host name or an address.
@@ -63,7 +64,7 @@ class Hosts:
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether only this machine can reach what listens on ``host``."""
+    """Return whether only this machine can reach a server that listens on ``host``."""
     if host.lower() == "localhost":
         return True
     try:
@@ -73,25 +74,26 @@ def is_loopback(host: str) -> bool:
 
 
 def same_origin(origin: str | None, *, secure: bool, host: str) -> bool:
-    """Tell whether an Origin header is the very origin that a request was sent to.
+    """Return whether an Origin header is the exact origin that a request was sent to.
 
     Args:
-        origin: The header; None if there is none, and ``"null"`` is none.
+        origin: The header; None if there is none, and ``"null"`` never matches.
         secure: Whether the request came over TLS.
         host: The request's Host header, with its port if it has one.
 
     """
     scheme = "https" if secure else "http"
     default = ":443" if secure else ":80"
-    # A browser leaves the scheme's own port out of both headers; others may not.
+    # Browsers leave the scheme's default port out of both headers; other clients may
+    # not.
     return origin == f"{scheme}://{host.lower().removesuffix(default)}"
 
 
 def checked_origin(text: str) -> str:
-    """Return an origin that the configuration names, as a browser writes it.
+    """Return an origin of the configuration in the form that browsers use.
 
     Raises:
-        ConfigError: If it is not a scheme, a host and perhaps a port.
+        ConfigError: If it is not a scheme, a host and an optional port.
 
     """
     if not _ORIGIN.fullmatch(text):

@@ -1,6 +1,6 @@
-"""What waits to be sent to a page, and how other threads hand it over.
+"""Queues of messages to a page, and how other threads fill them.
 
-Nothing here does I/O but to wake the event loop of the sockets.
+The only I/O here is to wake the event loop of the sockets.
 """
 
 import asyncio
@@ -23,9 +23,8 @@ _TICK = '{"op":"tick"'
 class FrameQueue:
     """Frames of the scene, in order: up to 8, and together up to 1 MiB.
 
-    The page acknowledges frames, so that a queue that fills belongs to one that does
-    not behave. A frame that waits alone may have any size: the first one holds the
-    whole scene.
+    The page acknowledges frames, so a full queue means that the page misbehaves. A
+    single waiting frame may have any size: the first one holds the whole scene.
     """
 
     def __init__(self) -> None:
@@ -33,7 +32,7 @@ class FrameQueue:
         self._size = 0
 
     def put(self, item: bytes | str) -> bool:
-        """Take a frame; False if there is no room."""
+        """Add a frame; return False if the queue is full."""
         size = self._size + len(item)
         if self._waiting and (len(self._waiting) >= FRAMES or size > FRAME_BYTES):
             return False
@@ -42,7 +41,7 @@ class FrameQueue:
         return True
 
     def pop(self) -> bytes | str | None:
-        """Return the oldest frame; None if nothing waits."""
+        """Return the oldest frame; None if the queue is empty."""
         if not self._waiting:
             return None
         item = self._waiting.popleft()
@@ -51,10 +50,10 @@ class FrameQueue:
 
 
 class DriveQueue:
-    """Messages of the gate: the newest tick before all, the others in order.
+    """Messages of the gate: the newest tick before all others, which are in order.
 
-    A tick that waits is worth nothing once there is a newer one; what the gate says
-    of a robot, or refuses, is never left out.
+    A newer tick replaces a waiting one. The gate's reports and refusals are never left
+    out.
     """
 
     def __init__(self) -> None:
@@ -63,7 +62,7 @@ class DriveQueue:
         self._size = 0
 
     def put(self, item: bytes | str) -> bool:
-        """Take a message; False if there is no room."""
+        """Add a message; return False if the queue is full."""
         if isinstance(item, str) and item.startswith(_TICK):
             self._tick = item
             return True
@@ -75,7 +74,7 @@ class DriveQueue:
         return True
 
     def pop(self) -> bytes | str | None:
-        """Return the tick that waits, else the oldest message, else None."""
+        """Return the waiting tick, otherwise the oldest message, otherwise None."""
         if self._tick is not None:
             item, self._tick = self._tick, None
             return item
@@ -99,7 +98,7 @@ class BatchedCalls:
         self._woken = False
 
     def call(self, fn: Callable[..., object], /, *args: object) -> None:
-        """Call ``fn`` soon; callable from any thread, nothing if the loop has ended."""
+        """Schedule a call from any thread; does nothing if the loop has ended."""
         self._calls.append(partial(fn, *args))
         # Set after appending and cleared before draining, so no call is left behind.
         if self._woken:
@@ -132,7 +131,7 @@ class BatchedCallsByLoop:
         ] = weakref.WeakKeyDictionary()
 
     def of_this_loop(self) -> BatchedCalls:
-        """Return the one whose functions are called in the running loop."""
+        """Return the object for the running loop."""
         loop = asyncio.get_running_loop()
         if loop not in self._by_loop:
             self._by_loop[loop] = BatchedCalls(loop)

@@ -1,7 +1,7 @@
-"""The WebSockets of pages: bounded both ways, and always ended with a reason.
+"""The WebSockets of pages: bounded in both directions, and always closed with a reason.
 
-Which pages have a socket, how much each may send, and how one is read and written. The
-two sockets of a page are in ``scene_socket`` and ``drive_socket``.
+Here are the open sockets, the limits of each, and how one is read and written. The two
+sockets of a page are in ``scene_socket`` and ``drive_socket``.
 """
 
 import asyncio
@@ -25,18 +25,19 @@ FAILED = 1011
 COME_BACK = 1013
 
 STALLED_S = 5.0
-"""How long a page may leave one message unread before it is given up."""
+"""How long a page may leave one message unread before its socket is closed, in
+seconds."""
 
 _GOODBYE_S = 0.5
 
 _REST_S = 0.05
-"""How long messages that had come before the socket was ended are read."""
+"""How long messages that arrived before the end of the socket are read, in seconds."""
 
 _REST_PAUSE_S = 0.01
-"""How long the next of them is waited for."""
+"""How long to wait for the next of them, in seconds."""
 
-# What sending to a page that has gone raises. The last is for one that the server gave
-# up itself, as its pings were not answered.
+# The exceptions of sending to a page that is gone. The last one is raised if the server
+# itself closed the connection because its pings were not answered.
 _GONE = (WebSocketDisconnect, OSError, RuntimeError)
 
 _PAGE_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
@@ -45,30 +46,30 @@ Key = tuple[str, str]
 """A viewer and one of its pages."""
 
 REPLACED = 4001
-"""The close code of a socket whose page has opened another."""
+"""The close code of a socket whose page has opened another one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What one socket may send."""
+    """The limits of one socket."""
 
     max_bytes: int
-    """The largest message, in bytes of UTF-8."""
+    """The greatest message size, in bytes of UTF-8."""
 
     rate: float
-    """Messages a second, over any long time."""
+    """Messages per second, on average."""
 
     burst: float
-    """Messages at once. A link that stalled delivers what it held back in one go."""
+    """Messages at once. A connection that stalled delivers its queue at once."""
 
 
 SCENE = Bounds(max_bytes=16 * 1024, rate=120.0, burst=240.0)
-# 20 commands a second for the 6 s after which a silent link is given up.
+# 20 commands a second for the 6 s after which a silent connection is given up.
 DRIVE = Bounds(max_bytes=1024, rate=60.0, burst=120.0)
 
 
 class Allowance:
-    """What one socket has left of its bounds: a bucket that fills at a rate."""
+    """The remaining allowance of one socket: a bucket that fills at a rate."""
 
     __slots__ = ("_bounds", "_left", "_then")
 
@@ -78,7 +79,7 @@ class Allowance:
         self._then = now
 
     def spend(self, text: str, now: float) -> str | None:
-        """Count one message; return why the socket must end, None if it need not.
+        """Count one message; return why the socket must end, or None.
 
         Args:
             text: The message.
@@ -97,27 +98,27 @@ class Allowance:
 
 
 async def accept(socket: WebSocket) -> None:
-    """Accept a socket, with our subprotocol if the page offers it."""
+    """Accept a socket, with WebMap's subprotocol if the page offers it."""
     offered = socket.scope.get("subprotocols", ())
     await socket.accept(PROTOCOL if PROTOCOL in offered else None)
 
 
 async def close(socket: WebSocket, code: int, reason: str) -> None:
-    """Close a socket and say why, unless the page has gone or reads nothing."""
+    """Close a socket with a reason, unless the page is gone or reads nothing."""
     with contextlib.suppress(TimeoutError, *_GONE):
         async with asyncio.timeout(_GOODBYE_S):
             await socket.close(code, short(reason))
 
 
 class PageSocket:
-    """A socket that has been accepted.
+    """An accepted socket.
 
     Args:
         socket: The socket, accepted.
-        name: What it is called in the log.
+        name: The name in the log.
         calls: Calls functions in the socket's event loop.
-        bounds: What the page may send.
-        queue: Where messages for the page wait.
+        bounds: The limits of the page's messages.
+        queue: The queue of messages for the page.
 
     """
 
@@ -144,16 +145,16 @@ class PageSocket:
         self._calls.call(self._put, item)
 
     def end(self, code: int, reason: str) -> None:
-        """End the socket and say why; callable from any thread."""
+        """Close the socket with a reason; callable from any thread."""
         self._calls.call(self._end, code, reason)
 
     async def refuse(self, code: int, reason: str) -> None:
-        """End the socket before anything was carried, and say why."""
+        """Close the socket with a reason before any message was passed."""
         self._end(code, reason)
         await self._say_goodbye()
 
     async def refuse_full(self) -> None:
-        """End the socket because too many pages are open."""
+        """Close the socket because too many pages are open."""
         await self.refuse(
             COME_BACK, "too many open pages: close one, or try again later"
         )
@@ -164,16 +165,17 @@ class PageSocket:
         on_broken: Callable[[str], None],
         on_rest: Callable[[str | bytes], None] | None = None,
     ) -> None:
-        """Carry messages both ways until either side ends the socket.
+        """Pass messages in both directions until either side ends the socket.
 
         Args:
-            on_text: Called with each text message that is within the bounds.
-            on_broken: Called with what is wrong with one that is not; it is the last.
-            on_rest: Called with the message that was not within the bounds, and with
-                those that had come behind it when this side ends the socket.
+            on_text: Called with each text message within the limits.
+            on_broken: Called with the error of a message beyond the limits; it is the
+                last.
+            on_rest: Called with the message beyond the limits, and with those that had
+                arrived after it when this side ends the socket.
 
         """
-        # The third waits for an end that comes while the other two are stuck.
+        # The third one detects an end while the other two are blocked.
         tasks = [
             asyncio.create_task(self._read(on_text, on_broken, on_rest)),
             asyncio.create_task(self._write()),
@@ -230,7 +232,7 @@ class PageSocket:
             on_text(text or "")
 
     async def _read_rest(self, on_rest: Callable[[str | bytes], None]) -> None:
-        """Read what has come already; a page that goes on sending is not waited for."""
+        """Read messages that have already arrived, for a limited time."""
         until = time.monotonic() + _REST_S
         while time.monotonic() < until:
             try:
@@ -275,21 +277,21 @@ class PageSocket:
 
 
 def page_id_of(query: Mapping[str, str]) -> str | None:
-    """Return what a page calls itself; None if it is not an identifier."""
+    """Return a page's identifier; None if it is not valid."""
     page_id = query.get("id", "")
     return page_id if _PAGE_ID.fullmatch(page_id) else None
 
 
 def short(reason: str) -> str:
-    """Return a reason that fits into a close frame, which has room for 123 bytes."""
+    """Return a reason cut to the 123 bytes of a close frame."""
     return reason.encode()[:123].decode(errors="ignore")
 
 
 class OpenSockets:
-    """The sockets of one kind that are open now: one for each page.
+    """The open sockets of one kind: one for each page.
 
     Args:
-        limit: How many pages may have one at once.
+        limit: The greatest number of pages with a socket.
 
     """
 
@@ -301,10 +303,10 @@ class OpenSockets:
         return len(self._sockets)
 
     def add(self, key: Key, socket: PageSocket) -> bool:
-        """Add a page's socket; False if too many other pages have one.
+        """Add a page's socket; return False if too many other pages have one.
 
-        It replaces the socket that this page had before, which may be one that the
-        network has lost while nobody has noticed yet.
+        It replaces the previous socket of this page, whose connection may be lost
+        without either side having detected it.
         """
         before = self._sockets.get(key)
         if before is None and len(self._sockets) >= self._limit:
@@ -315,7 +317,7 @@ class OpenSockets:
         return True
 
     def remove(self, key: Key, socket: PageSocket) -> None:
-        """Remove a page's socket, unless another has replaced it."""
+        """Remove a page's socket, unless another one has replaced it."""
         if self._sockets.get(key) is socket:
             del self._sockets[key]
 
@@ -323,7 +325,9 @@ class OpenSockets:
     async def holding(self, key: Key, socket: PageSocket) -> AsyncIterator[bool]:
         """Count a socket as open within an ``async with`` block.
 
-        Gives False if too many other pages have one.
+        Yields:
+            False if too many other pages have one.
+
         """
         added = self.add(key, socket)
         try:

@@ -1,4 +1,4 @@
-"""Listens and runs the web application: uvicorn, set up for small messages."""
+"""The web server: uvicorn, configured for small messages."""
 
 import logging
 import os
@@ -20,22 +20,23 @@ log = logging.getLogger("webmap.server")
 PING_EVERY_S = 2.0
 PONG_WITHIN_S = 4.0
 _MAX_MESSAGE = 64 * 1024
-# How many connections are accepted between two looks at those that are open, so that a
-# rush of new ones delays no STOP. uvicorn has one number for this and for how many wait
-# in the kernel, so the latter is set afterwards.
+# How many connections are accepted before those that are open are served again, so that
+# many new ones delay no STOP. uvicorn has one number for this and for the queue in the
+# kernel, so the latter is set afterwards.
 _ACCEPTED_AT_ONCE = 4
 _BACKLOG = 1024
 
-# A peer that acknowledges nothing for so long is gone, in milliseconds. Without it a
-# stalled viewer's socket lingers for a quarter of an hour.
+# A peer that acknowledges nothing for this long is gone, in milliseconds. Without it a
+# stalled viewer's socket stays open for a quarter of an hour.
 _USER_TIMEOUT_MS = 10_000
 
 
 def check_exposure(host: str, *, insecure_lan: bool) -> None:
-    """Refuse to be reached from other machines unless that was asked for.
+    """Refuse to be reachable from other machines unless that was requested.
 
     Raises:
-        ConfigError: If ``host`` is not this machine alone and nobody said so.
+        ConfigError: If ``host`` is not this machine alone and ``insecure_lan`` is
+            false.
 
     """
     if not is_loopback(host) and not insecure_lan:
@@ -48,14 +49,14 @@ def check_exposure(host: str, *, insecure_lan: bool) -> None:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens.
+    """Return a listening socket.
 
     Args:
         host: A name or an address of this machine.
         port: From 0 to 65535; 0 lets the kernel choose.
 
     Raises:
-        ConfigError: If that is not possible, with what would be.
+        ConfigError: If that is not possible; the message has the reason.
 
     """
     if not 0 <= port <= 65535:
@@ -84,14 +85,14 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def url_of(listener: socket.socket, host: str) -> str:
-    """Return the URL at which a browser on this machine finds a listening socket."""
+    """Return the URL of a listening socket for a browser on this machine."""
     name = "127.0.0.1" if host in WILDCARD else host
     bracketed = f"[{name}]" if ":" in name else name
     return f"http://{bracketed}:{listener.getsockname()[1]}/"
 
 
 def announce(url: str) -> None:
-    """Print the one line that says where the page is, at once."""
+    """Print the line with the page's URL, without buffering."""
     print(f"WebMap is ready at {url}", flush=True)
 
 
@@ -108,16 +109,16 @@ def serve(
 
     Args:
         app: The web application.
-        host: What to listen on.
+        host: The address to listen on.
         port: The port; 0 lets the kernel choose.
-        insecure_lan: The explicit word without which only this machine is served.
-        listener: A socket of :func:`listen` that was opened
-            before, so that nothing starts if the port is in use; closed here.
+        insecure_lan: Without it only this machine is served.
+        listener: A socket from :func:`listen` that was opened before, so that nothing
+            starts if the port is in use; closed here.
         on_ready: Called once with the URL when the page can be opened.
 
     Raises:
         ConfigError: If it cannot listen there.
-        WebMapError: If the application's own start failed; the log says why.
+        WebMapError: If the application's own start failed; the log has the reason.
 
     """
     check_exposure(host, insecure_lan=insecure_lan)
@@ -138,7 +139,7 @@ def serve(
 
 
 def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
-    """Return what :func:`serve` runs, for those who start and stop it themselves."""
+    """Return the server of :func:`serve`, for callers that run it themselves."""
     http, ws = protocols()
     config = uvicorn.Config(
         app,
@@ -150,10 +151,10 @@ def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
         ws_ping_timeout=PONG_WITHIN_S,
         # Compression costs 27 to 90 times the send, for a tenth of the bytes.
         ws_per_message_deflate=False,
-        # Whoever can connect could otherwise say which address it comes from.
+        # Otherwise any client could claim another address.
         proxy_headers=False,
         server_header=False,
-        # At INFO uvicorn writes the URL of each socket, with its query.
+        # At INFO, uvicorn logs the URL of each socket with its query.
         access_log=False,
         log_config=None,
         log_level=logging.WARNING,
@@ -164,7 +165,7 @@ def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
 
 
 class Server(uvicorn.Server):
-    """A server that says when it is ready, and takes a signal as a wish to end."""
+    """A server with a callback when it is ready, which a signal ends."""
 
     def __init__(self, config: uvicorn.Config, on_ready: Callable[[], object]) -> None:
         super().__init__(config)
@@ -172,19 +173,19 @@ class Server(uvicorn.Server):
         self.failure: Exception | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start to listen, then say so."""
+        """Start to listen, then call the callback."""
         await super().startup(sockets)
         for listener in sockets or ():
             listener.listen(_BACKLOG)
         try:
             self._on_ready()
         except Exception as error:
-            # Not out of here: what has started would be left as it is.
+            # Not raised here: the parts already started would not be stopped.
             self.failure, self.should_exit = error, True
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Take a signal as a wish to end; the second one does not wait."""
-        # uvicorn's own remembers the signal and raises it again at the end, and the
+        """End the server on a signal; the second one does not wait."""
+        # uvicorn's own method stores the signal and raises it again at the end, and the
         # process would not exit with 0.
         del sig, frame
         self.force_exit = self.should_exit

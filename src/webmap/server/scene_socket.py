@@ -1,4 +1,4 @@
-"""The shell of ``/_webmap/scene``: the picture out, what hands do back in."""
+"""The ``/_webmap/scene`` sockets: the scene to the page, its events back."""
 
 import logging
 

@@ -36,21 +36,21 @@ HEADERS = (
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
     (b"cross-origin-opener-policy", b"same-origin"),
-    # Another port of this machine is the same site: SameSite does not keep it out.
+    # Another port of this machine is the same site, so SameSite does not exclude it.
     (b"cross-origin-resource-policy", b"same-origin"),
 )
 
-# An image that is opened by itself is a document; it gets no script, whatever it is.
+# An image opened by itself is a document; it must never run scripts.
 SANDBOX = CONTENT_SECURITY_POLICY + "; sandbox"
 
 _STARTS = {"http.response.start", "websocket.http.response.start"}
 
 
 def with_headers(send: Send, cookie: str | None = None) -> Send:
-    """Return ``send`` with the headers added that an answer does not have yet.
+    """Return ``send`` with the headers added that an answer lacks.
 
     Args:
-        send: What answers.
+        send: Sends the answer.
         cookie: A whole Set-Cookie header, which is added too.
 
     """
@@ -101,7 +101,7 @@ def plain(status: int, text: str) -> Response:
 
 
 def refuse(refusal: Refusal, *, wants_html: bool) -> Response:
-    """Return what a refused request is answered with."""
+    """Return the answer to a refused request."""
     if refusal.status == HTTPStatus.UNAUTHORIZED and wants_html:
         return HTMLResponse(_SIGN_IN.format(text=escape(refusal.text)), refusal.status)
     response = plain(refusal.status, refusal.text)
@@ -111,17 +111,17 @@ def refuse(refusal: Refusal, *, wants_html: bool) -> Response:
 
 
 def redirect(to: Redirect) -> Response:
-    """Return the redirect to an address without the token."""
+    """Return the redirect to a URL without the token."""
     response = Response(status_code=HTTPStatus.SEE_OTHER)
     response.headers["location"] = to.location
     return response
 
 
 VIEWER = "webmap.viewer"
-"""The key of the scope under which the routes find who makes a request."""
+"""The key of the scope with the viewer who makes a request."""
 
 PAGE_KEY = "webmap.page_key"
-"""The key of the scope under which a page finds the key to hand out, if it signs in."""
+"""The key of the scope with the page's key, if the request signs in."""
 
 
 class Security:
@@ -139,7 +139,7 @@ class Security:
         self._now = now
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let one request in, or answer it."""
+        """Pass on one request, or answer it."""
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
@@ -164,13 +164,13 @@ class Security:
             _log_refusal(who, request, scope)
             answer = refuse(who, wants_html=request.wants_html)
             if connection_of(scope):
-                # One request for each connection, so that strangers cannot have the
-                # server busy with all of theirs at once.
+                # One request per connection, so that clients who have not signed in
+                # cannot keep the server busy with all of theirs at once.
                 answer.headers["connection"] = "close"
             await _deny(answer, scope, receive, send)
 
     def new_code(self) -> str:
-        """Return a one-time code that signs one browser in, soon."""
+        """Return a one-time code that signs one browser in."""
         return self._access.codes.issue(self._now())
 
     async def _who(
@@ -193,14 +193,14 @@ async def _deny(answer: Response, scope: Scope, receive: Receive, send: Send) ->
     ):
         await answer(scope, receive, send)
     else:
-        # Servers without the extension turn this into 403, before the upgrade too.
+        # Servers without the extension turn this into 403, also before the upgrade.
         await send({"type": "websocket.close", "code": 1008, "reason": ""})
 
 
 def _log_refusal(refusal: Refusal, request: RequestHead, scope: Scope) -> None:
     if refusal.status == 401 and not request.tokens():
         return
-    # Repr: what a stranger sends must not write lines of its own into the log.
+    # With repr, so that a request cannot write its own lines into the log.
     log.warning(
         "refused %s %r from %s: status %d (host %r, origin %r)",
         scope["type"],

@@ -1,4 +1,4 @@
-"""Fragments as records, encoded once for all who watch them."""
+"""Fragments as records, encoded once for all pages that show them."""
 
 import math
 import struct
@@ -18,17 +18,17 @@ _TAG = {tag: index for index, tag in reversed(list(enumerate(TAGS)))}
 _HTML_TAG = {tag: index for index, tag in enumerate(TAGS)}
 _ATTRIBUTE = {name: index for index, name in enumerate(ATTRIBUTES)}
 EVENT_NUMBER = {kind: index for index, kind in enumerate(EVENTS)}
-"""The events by their numbers on the wire."""
+"""The number of each event in messages."""
 
 _POSE = struct.Struct("<fff").pack
 _FAR_POSE = struct.Struct("<ddf").pack
 _MATRIX = struct.Struct("<6d").pack
 _FLOAT = struct.Struct("<f").pack
 _FAR = 4096.0
-"""Metres beyond which single precision is worse than half a millimetre."""
+"""Metres beyond which the error of single precision exceeds half a millimetre."""
 
 
-@lru_cache(maxsize=1 << 12)  # for ids and lengths: ages never come twice
+@lru_cache(maxsize=1 << 12)  # for ids and lengths; ages never repeat
 def varint(number: int) -> bytes:
     """Return ``number``, which is not negative, with seven bits in each byte."""
     out = bytearray()
@@ -40,13 +40,13 @@ def varint(number: int) -> bytes:
 
 
 def string(text: str) -> bytes:
-    """Return ``text`` in UTF-8 after its length; half characters become marks."""
+    """Return the length of ``text`` and its UTF-8; lone surrogates become ``?``."""
     data = text.encode("utf-8", "replace")
     return varint(len(data)) + data
 
 
 class _Memo:
-    """What was encoded of a fragment at one revision."""
+    """The encoded records of a fragment at one revision."""
 
     __slots__ = ("changes", "revision", "snapshot")
 
@@ -64,15 +64,15 @@ def _memo(fragment: Fragment) -> _Memo:
 
 
 def encode_changes(fragment: Fragment, since: int) -> bytes | None:
-    """Return the records that bring a page from ``since`` to now.
+    """Return the records that bring a page from revision ``since`` to the current one.
 
     Args:
-        fragment: What the page shows.
+        fragment: The fragment.
         since: The revision that the page has.
 
     Returns:
-        The section of the fragment, empty if nothing changed after all, or None if
-        only a snapshot will do.
+        The section of the fragment, empty if nothing changed, or None if a snapshot is
+        needed.
 
     """
     memo = _memo(fragment)
@@ -84,7 +84,7 @@ def encode_changes(fragment: Fragment, since: int) -> bytes | None:
 
 
 def encode_snapshot(fragment: Fragment) -> bytes:
-    """Return the records that build the whole fragment as it is now."""
+    """Return the records that build the whole current fragment."""
     memo = _memo(fragment)
     if memo.snapshot is None:
         fragment.mark_told()
@@ -138,7 +138,7 @@ def _put_node(out: bytearray, node: Node, parent: int, place: int) -> None:
 
 
 def _slots_of(element: Element) -> list[str]:
-    """Return the slots whose values a new element needs to be told."""
+    """Return the slots whose values must be sent for a new element."""
     slots = [*element._attributes, *element._styles]
     if isinstance(element, BoundElement):
         slots += element.dropped
@@ -210,7 +210,7 @@ def _put_transform(out: bytearray, element: Element) -> None:
 
 
 def _put_pose(out: bytearray, element: Element, x: float, y: float, yaw: float) -> None:
-    # An angle of any size means what it means within one turn.
+    # The angle within one turn is equivalent and keeps its precision.
     yaw = math.remainder(yaw, math.tau)
     if -_FAR < x < _FAR and -_FAR < y < _FAR:
         _head(out, Op.POSE, element)
@@ -286,4 +286,4 @@ _SLOTS = cast(
         "emptied": _put_emptied,
     },
 )
-"""How each slot that is no plain attribute is written."""
+"""The encoder of each slot that is not a plain attribute."""

@@ -1,4 +1,4 @@
-"""What a page says: typed, bounded, and refused when it is anything else."""
+"""Messages of a page: typed, bounded, and refused if they are invalid."""
 
 from typing import Annotated, Any, Literal
 
@@ -10,10 +10,11 @@ from webmap.base.nesting import MAX_DEPTH, is_too_deep
 from webmap.scene.allowed import EVENTS
 
 LONGEST = 16 * 1024
-"""Bytes that a message from a page may have."""
+"""The greatest length of a message from a page, in bytes."""
 
 LONGEST_TEXTS = {"name": 64, "value": 8192, "url": 2048, "trouble": 2000}
-"""Characters that texts in these messages may have; the browser cuts longer ones."""
+"""The greatest lengths of texts in these messages, in characters; the browser cuts
+longer ones."""
 
 PAGE_ID = "^[A-Za-z0-9_-]{8,64}$"
 """The pattern of the name that a page chooses for itself."""
@@ -29,11 +30,11 @@ class Message(
     tag_field="op",
     forbid_unknown_fields=True,
 ):
-    """The base of what a page says."""
+    """Base class of the messages of a page."""
 
 
 class Hello(Message, frozen=True, tag="hello"):
-    """The first message on a socket: which page this is, and how large."""
+    """The first message on a socket: the page's identity and size."""
 
     page: Annotated[str, Meta(pattern=PAGE_ID)]
     """Chosen by the page and kept through a reload, to find its maps again."""
@@ -42,23 +43,23 @@ class Hello(Message, frozen=True, tag="hello"):
     """Path and query of the page."""
 
     width: float
-    """Pixels of the window, from left to right."""
+    """The width of the window, in pixels."""
 
     height: float
-    """Pixels of the window, from top to bottom."""
+    """The height of the window, in pixels."""
 
     dpr: float = 1.0
-    """Pixels of the screen in one pixel of the page."""
+    """Device pixels per pixel of the page."""
 
     theme: Literal["light", "dark"] = "light"
-    """What the viewer's system prefers."""
+    """The preference of the viewer's system."""
 
     containers: dict[_Name, tuple[float, float]] = {}
-    """Pixels across and down of each element with an id in the page."""
+    """The width and height of each element with an id in the page, in pixels."""
 
 
 class ElementEvent(Message, frozen=True, tag="event"):
-    """Something happened at an element that is listened to."""
+    """An event of an element with a listener."""
 
     mount: _Id
     element: _Id
@@ -79,7 +80,7 @@ class ElementEvent(Message, frozen=True, tag="event"):
 
 
 class ViewReport(Message, frozen=True, tag="view"):
-    """How a map is seen now: the matrix from the world to its pixels, and its place."""
+    """The current view of a map: the matrix from the world to pixels, and its size."""
 
     map_element: _Id
     a: float
@@ -100,24 +101,24 @@ class ViewReport(Message, frozen=True, tag="view"):
     """The element that the view follows, or 0."""
 
     applied: _Id = 0
-    """The number of the newest operation that the view has in it."""
+    """The number of the newest operation that the view contains."""
 
 
 class ModuleReady(Message, frozen=True, tag="ready"):
-    """The browser's half of a module was attached, maybe again after a reload."""
+    """A module's browser half was attached, possibly again after a reload."""
 
     instance: _Id
 
 
 class ModuleMessage(Message, frozen=True, tag="module"):
-    """The browser's half of a module says something to the other."""
+    """A message of a module's browser half to the module."""
 
     instance: _Id
     data: dict[str, Any]
 
 
 class Trouble(Message, frozen=True, tag="trouble"):
-    """The page could not do something that somebody should know of."""
+    """A failure of the page that is logged."""
 
     text: Annotated[str, Meta(max_length=LONGEST_TEXTS["trouble"])]
 
@@ -129,11 +130,11 @@ class Seen(Message, frozen=True, tag="seen"):
 
 
 class Resync(Message, frozen=True, tag="resync"):
-    """The page did not understand a frame and wants to be told everything."""
+    """The page could not read a frame and requests the whole state."""
 
 
 PageEvent = Hello | ElementEvent | ViewReport | ModuleReady | ModuleMessage | Trouble
-"""What concerns more than the session itself."""
+"""Messages that concern more than the session itself."""
 
 _decoder: msgspec.json.Decoder[PageEvent | Seen | Resync] = msgspec.json.Decoder(
     PageEvent | Seen | Resync
@@ -141,10 +142,10 @@ _decoder: msgspec.json.Decoder[PageEvent | Seen | Resync] = msgspec.json.Decoder
 
 
 def read_message(text: str | bytes) -> PageEvent | Seen | Resync:
-    """Return what a page said.
+    """Return the decoded message of a page.
 
     Raises:
-        WireError: If it is too long or no message that a page may send.
+        WireError: If it is too long or not a message that a page may send.
 
     """
     size = len(text)

@@ -1,14 +1,14 @@
-"""The one table of what is on the wire between the display and a page.
+"""The table of the messages between the display and a page.
 
-``tools/make_javascript.py`` writes the same table for the browser. Everything is
-little-endian. In the layouts below, ``v`` is a variable-length integer of seven bits
-a byte, lowest first, ``s`` is text in UTF-8 after its length as ``v``, and ``u8``,
-``u16``, ``u32``, ``i16``, ``f32`` and ``f64`` are what they say.
+``tools/make_javascript.py`` writes the same table for the browser. All numbers are
+little-endian. In the layouts below, ``v`` is a variable-length integer with seven bits
+in each byte, lowest first, and ``s`` is UTF-8 text after its length as ``v``. ``u8``,
+``u16``, ``u32``, ``i16``, ``f32`` and ``f64`` are unsigned integers, signed integers
+and floats with that many bits.
 
-A frame is a header and then records until its end. The header is ``u16 version``,
-``u8 flags``, ``u32 frame`` and ``f64 now``: the version of this table, :data:`RESET`
-or 0, the number that the page acknowledges, and the display's monotonic clock in
-seconds.
+A frame is a header followed by records. The header is ``u16 version``, ``u8 flags``,
+``u32 frame`` and ``f64 now``: the version of this table, :data:`RESET` or 0, the number
+that the page acknowledges, and the display's monotonic clock in seconds.
 """
 
 import zlib
@@ -23,23 +23,23 @@ from webmap.scene.allowed import (
 )
 
 RESET = 1
-"""Flag of a frame that tells everything: the page drops what it had."""
+"""Flag of a frame with the whole state: the page drops its earlier state."""
 
 PREVENT, STOP = 1, 2
-"""Flags of an event that is listened to."""
+"""Flags of an event with a listener."""
 
 LAST, FIRST, AFTER = 0, 1, 2
-"""Where a child goes: at the end, at the beginning, or after id (place - AFTER)."""
+"""The place of a child: at the end, at the beginning, or after id (place - AFTER)."""
 
 VIEW_OPERATIONS = ("translate", "scale", "rotate", "set", "fit", "follow")
-"""What a program may do to the view of a map."""
+"""Operations of a program on the view of a map."""
 
 TAGS = SVG_TAGS + HTML_TAGS
-"""The tags by their numbers: first those of SVG, then those of HTML."""
+"""The tags in the order of their numbers: first those of SVG, then those of HTML."""
 
 
 class Op(IntEnum):
-    """The first byte of a record; the comment is what comes after it."""
+    """The first byte of a record; the comment lists the bytes after it."""
 
     # About the page.
     DELTA = 1  # v fragment: the element records that follow go to all its mounts
@@ -56,7 +56,7 @@ class Op(IntEnum):
     DETACH = 11  # v instance
     MESSAGE = 12  # v instance, s message (JSON)
     ERROR = 13  # s text
-    PROBLEM = 14  # v number, s text (empty: mended)
+    PROBLEM = 14  # v number, s text (empty: ended)
 
     # About elements; a place is LAST, FIRST or AFTER and the id of a sibling.
     CREATE = 32  # v id, v parent (0: the root), v place, u8 tag
@@ -78,7 +78,7 @@ class Op(IntEnum):
     AGE_LIMIT = 48  # v id, f32 seconds, u8 whether the age is the text
     DATA = 49  # v id of a text, s text
     EVENTS = 50  # v id, u8 count, count times (u8 event, u8 flags)
-    EMPTY = 51  # v id: drop what the page had in a bound element
+    EMPTY = 51  # v id: drop the page's own content of a bound element
     MAP = 52  # v id of svg, v id of world, f32 width, f32 height (0: its container's)
 
 
@@ -93,7 +93,7 @@ TABLES = {
     "BOOLEAN_ATTRIBUTES": sorted(BOOLEAN_ATTRIBUTES),
     "EVENTS": list(EVENTS),
 }
-"""All of it, as the browser gets it."""
+"""All tables, as the browser gets them."""
 
 VERSION = zlib.crc32(repr(TABLES).encode()) & 0xFFFF
-"""Changes with the table, so that a page of another version notices."""
+"""The version of the tables; a page with another one detects the difference."""

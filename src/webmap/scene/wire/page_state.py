@@ -1,4 +1,4 @@
-"""What a session remembers of its page: mounts, maps, and what is to be sent next."""
+"""The state of a page in a session: mounts, maps, and the records to send next."""
 
 import math
 import struct
@@ -30,7 +30,7 @@ class Mount:
         self.listening: dict[tuple[int, str], int] = {}
 
     def record(self) -> bytes:
-        """Return what puts the fragment there, as it is now."""
+        """Return the records that mount the current fragment."""
         out = bytearray([Op.MOUNT])
         out += varint(self.number) + varint(self.fragment.id)
         out += varint(self.within) + varint(self.under) + _ORDER(self.order)
@@ -38,19 +38,19 @@ class Mount:
         return bytes(out) + varint(self.number) + encode_snapshot(self.fragment)
 
     def choices(self) -> bytes:
-        """Return what only this page has: classes and listeners."""
+        """Return the records that only this page has: classes and listeners."""
         return b"".join(
             [self.class_record(name, True) for name in self.classes]
             + [self.listen_record(*key) for key in self.listening]
         )
 
     def class_record(self, name: str, on: bool) -> bytes:
-        """Return what gives or takes a class of the fragment's root."""
+        """Return the record that adds or removes a class of the fragment's root."""
         head = bytes((Op.MOUNT_CLASS, *varint(self.number), on))
         return head + string(name)
 
     def listen_record(self, element: int, event: str) -> bytes:
-        """Return what makes the page listen, or not listen any more."""
+        """Return the record that makes the page listen, or stop listening."""
         flags = self.listening.get((element, event))
         op = Op.UNLISTEN if flags is None else Op.LISTEN
         out = bytearray([op]) + varint(self.number) + varint(element)
@@ -60,7 +60,7 @@ class Mount:
         return bytes(out)
 
     def hears(self, element: int, event: str) -> bool:
-        """Whether anybody here listens to that event of that element now."""
+        """Return whether an event of an element has a listener here now."""
         if (element, event) in self.listening:
             return True
         node = self.fragment.find(element)
@@ -68,7 +68,7 @@ class Mount:
 
 
 def flags(*, prevent: bool, stop: bool) -> int:
-    """Return the flags of an event that is listened to."""
+    """Return the flags of an event with a listener."""
     return PREVENT * prevent | STOP * stop
 
 
@@ -84,7 +84,7 @@ _COUNTS = {
 
 
 class MapView:
-    """One map: its last report, and the operations that are not in it yet."""
+    """One map: its last report, and the operations after that report."""
 
     UNREPORTED_KEPT = 1000
 
@@ -96,7 +96,7 @@ class MapView:
         self._unreported: deque[tuple[int, bytes]] = deque(maxlen=self.UNREPORTED_KEPT)
 
     def state(self, session: int) -> bytes:
-        """Return how the map was last seen, for a page that does not know."""
+        """Return the last reported view of the map, for a new page."""
         report = self.report
         out = bytearray([Op.VIEW_STATE]) + varint(self.svg) + varint(session)
         if report is None:
@@ -111,7 +111,7 @@ class MapView:
         """Return the record of an operation, and keep it until it is reported.
 
         Raises:
-            ValueError: If there is no such operation, or its numbers are wrong.
+            ValueError: If the operation is unknown, or its numbers are wrong.
 
         """
         if len(args) not in _COUNTS.get(operation, ()):
@@ -126,22 +126,22 @@ class MapView:
         return record
 
     def take(self, report: ViewReport) -> None:
-        """Remember how the page shows the map."""
+        """Store the page's report of the map's view."""
         self.report = report
         while self._unreported and self._unreported[0][0] <= report.applied:
             self._unreported.popleft()
 
     @property
     def unreported(self) -> bytes:
-        """The records of the operations that no report has in it."""
+        """The records of the operations that no report contains yet."""
         return b"".join(record for _, record in self._unreported)
 
 
 class PendingRecords:
-    """The records of a page's next frame that no fragment remembers, by kind.
+    """The records of a page's next frame that no fragment stores, by kind.
 
-    All but messages can be made again from what a session keeps. When they grow too
-    long, they are forgotten, and :attr:`send_all` is set.
+    All but messages can be made again from the session. When they grow too long, they
+    are discarded, and :attr:`send_all` is set.
     """
 
     MESSAGES_KEPT: ClassVar = 1000
@@ -151,14 +151,14 @@ class PendingRecords:
 
     def __init__(self) -> None:
         self.send_all = False
-        """Whether the page must get everything, whatever it got before."""
+        """Whether the page must get the whole state, whatever it got before."""
         self.gone = bytearray()
         self.new: list[int] = []
-        """The numbers of mounts that the page has not yet."""
+        """The numbers of mounts that the page does not have yet."""
         self.records = bytearray()
         self.messages: list[bytes] = []
         self.standing: dict[int, bytes] = {}
-        """The record of each problem that is not mended, the newest of too many."""
+        """The record of each current problem; of too many, the newest."""
         self.problems: dict[int, bytes] = {}
         """The record of each problem that changed."""
         self._notices: dict[bytes, None] = {}
@@ -167,19 +167,19 @@ class PendingRecords:
         """Add a record that can be made again."""
         self.records += record
         if len(self.records) > self.BYTES_KEPT:
-            # All of it can be made again from what is kept, and that is less.
+            # All of it can be made again from the stored state, which is shorter.
             self.records.clear()
             self.send_all = True
 
     def message(self, record: bytes) -> None:
         """Add a message, which is sent once; of too many, the newest are kept."""
         if len(self.messages) >= self.MESSAGES_KEPT:
-            # A page that looks away this long wants the newest.
+            # A page that is inactive for this long needs the newest.
             del self.messages[0]
         self.messages.append(record)
 
     def notice(self, text: str) -> None:
-        """Add a notice; the newest are sent again to a page that was loaded again."""
+        """Add a notice; the newest ones are sent again after a reload of the page."""
         record = bytes((Op.ERROR,)) + string(text)
         self._notices.pop(record, None)
         self._notices[record] = None
@@ -188,7 +188,7 @@ class PendingRecords:
         self.message(record)
 
     def problem(self, number: int, text: str) -> None:
-        """Add a problem, or with no text its end; the newest text counts."""
+        """Add a problem, or end it if the text is empty; the newest text counts."""
         record = bytes((Op.PROBLEM, *varint(number))) + string(text)
         self.standing.pop(number, None)
         if text:
@@ -197,16 +197,16 @@ class PendingRecords:
             del self.standing[next(iter(self.standing))]
         self.problems[number] = record
         if len(self.problems) > self.MESSAGES_KEPT:
-            # All of it can be made again from what is kept, and that is less.
+            # All of it can be made again from the stored state, which is shorter.
             self.problems.clear()
             self.send_all = True
 
     def notices_again(self) -> Iterable[bytes]:
-        """Return the newest notices that are not in the next frame anyway."""
+        """Return the newest notices that are not already in the next frame."""
         return [record for record in self._notices if record not in self.messages]
 
     def sent(self) -> None:
-        """Note that the frame with all of it was made."""
+        """Discard the records, as the frame with all of them was made."""
         self.send_all = False
         self.gone, self.records = bytearray(), bytearray()
         self.new, self.messages, self.problems = [], [], {}

@@ -30,12 +30,11 @@ _HEADER = struct.Struct("<HBId").pack
 
 
 class SceneSession:
-    """What one page shows, what it was told of it, and what comes next.
+    """The state of one page: what was sent to it, and what to send next.
 
-    Ask :meth:`frame` for bytes at each tick and send every one of them, in order: a
-    frame builds on those before it. As long as the page has not acknowledged
-    :data:`WINDOW` frames there is no next one, and what changes meanwhile is told
-    by its newest value.
+    Call :meth:`frame` at each tick and send every result in order: a frame builds on
+    those before it. While the page has not acknowledged :data:`WINDOW` frames, there is
+    no next one; changes in the meantime are later sent with their newest values.
     """
 
     WINDOW = 2
@@ -46,7 +45,7 @@ class SceneSession:
         self._mounts: dict[int, Mount] = {}
         self._map_views: dict[int, MapView] = {}
         self._attached: dict[int, tuple[int, bytes]] = {}
-        # The revision of each fragment that the page has; None if not yet.
+        # The revision of each fragment that the page has; None if none yet.
         self._fragments: dict[Fragment, int | None] = {}
         self._numbers = itertools.count(1)
         self._frame = 0
@@ -67,11 +66,12 @@ class SceneSession:
         """Show ``fragment`` on the page; it may be shown at several places.
 
         Args:
-            fragment: What to show.
-            under: Id of the element that takes the fragment's root, or 0 for the
-                document.
-            order: Among the fragments under one element, the higher is further to
-                the front; those below 0 are behind the element's own children.
+            fragment: The fragment to show.
+            under: Id of the element in which the fragment's root is placed, or 0 for
+                the document.
+            order: The drawing order among the fragments under one element: a greater
+                one is drawn above; those below 0 are drawn behind the element's own
+                children.
             within: The mount that ``under`` belongs to, if any.
 
         Returns:
@@ -90,9 +90,9 @@ class SceneSession:
         return number
 
     def unmount(self, mount: int) -> None:
-        """Take a mount off the page, with what is mounted within it.
+        """Remove a mount from the page, with the mounts within it.
 
-        An unknown one is gone already, which is all right.
+        An unknown mount is ignored.
         """
         gone = self._mounts.pop(mount, None)
         if gone is None:
@@ -121,7 +121,7 @@ class SceneSession:
             raise WireError(f"mount {number} is not on the page") from None
 
     def set_class(self, mount: int, name: str, on: bool) -> None:
-        """Give or take a class of a mount's root, on this page only."""
+        """Add or remove a class of a mount's root, on this page only."""
         place = self._mount(mount)
         for word in split_classes(name):
             if on != (word in place.classes):
@@ -140,10 +140,10 @@ class SceneSession:
         prevent: bool = False,
         stop: bool = False,
     ) -> None:
-        """Hear of an event at an element, on this page only.
+        """Listen to an event of an element, on this page only.
 
         Raises:
-            SceneError: If the event is not one that a scene knows.
+            SceneError: If the event is not allowed in a scene.
 
         """
         check_event(event)
@@ -152,7 +152,7 @@ class SceneSession:
         self._pending.record(place.listen_record(element, event))
 
     def unlisten(self, mount: int, element: int, event: str) -> None:
-        """Undo :meth:`listen`; it does nothing if there is nothing to undo."""
+        """Undo :meth:`listen`; does nothing if there is no listener."""
         place = self._mounts.get(mount)
         if place and place.listening.pop((element, event), None) is not None:
             self._pending.record(place.listen_record(element, event))
@@ -163,7 +163,7 @@ class SceneSession:
         return place.fragment if place else None
 
     def element(self, mount: int, element: int) -> Element | None:
-        """Return the element with that id at that mount, or None if it went."""
+        """Return an element of a mount by its id, or None if it was removed."""
         fragment = self.fragment(mount)
         node = fragment.find(element) if fragment else None
         return node if isinstance(node, Element) else None
@@ -191,10 +191,10 @@ class SceneSession:
         Args:
             map_element: Id of the map's ``<svg>``.
             operation: ``translate(x, y)`` in pixels; ``scale(factor[, x, y])`` and
-                ``rotate(degrees[, x, y])``, counter-clockwise as seen, about a
-                point in pixels or else the middle; ``set(a, b, c, d, e, f)``;
+                ``rotate(degrees[, x, y])``, counter-clockwise on the page, about a
+                point in pixels or by default the centre; ``set(a, b, c, d, e, f)``;
                 ``fit(x0, y0, x1, y1)`` in metres; ``follow(element id or 0)``.
-            args: Its numbers.
+            args: The numbers of the operation.
 
         Raises:
             ValueError: If the operation or its numbers are wrong.
@@ -212,14 +212,14 @@ class SceneSession:
         options: dict[str, Any],
         css_url: str | None = None,
     ) -> None:
-        """Let the page load the browser's half of a module and attach it to a map.
+        """Make the page load a module's browser half and attach it to a map.
 
         Args:
             map_element: Id of the map's ``<svg>``.
-            instance: A number of the caller's choice, for messages.
-            module_url: Address of the ES module, relative to the server's root.
-            options: Handed to the module; plain data.
-            css_url: Address of a style sheet, relative to the server's root.
+            instance: A number chosen by the caller, for messages.
+            module_url: URL of the ES module, relative to the server's root.
+            options: Plain data for the module.
+            css_url: URL of a style sheet, relative to the server's root.
 
         """
         self._map_view(map_element)
@@ -230,50 +230,50 @@ class SceneSession:
         self._pending.record(record)
 
     def detach(self, instance: int) -> None:
-        """Take the browser's half of a module away."""
+        """Remove a module's browser half."""
         if self._attached.pop(instance, None) is not None:
             self._pending.record(bytes((Op.DETACH, *varint(instance))))
 
     def send(self, instance: int, message: dict[str, Any]) -> None:
-        """Send a message to the browser's half of a module."""
+        """Send a message to a module's browser half."""
         if instance in self._attached:
             text = msgspec.json.encode(message).decode()
             self._pending.message(bytes((Op.MESSAGE, *varint(instance))) + string(text))
 
     def error(self, text: str) -> None:
-        """Show a notice on the page, and again after it was loaded again."""
+        """Show a notice on the page, and again after a reload."""
         self._pending.notice(text)
 
     def problem(self, number: int, text: str) -> None:
-        """Show what fails until :meth:`mended`; a new text takes its place.
+        """Show a problem until :meth:`mended`; a new text replaces it.
 
         Args:
-            number: Of the caller's choice; one thing's own, on every page.
+            number: Chosen by the caller; the same for one problem on every page.
             text: A sentence for people, not empty.
 
         """
         self._pending.problem(number, text)
 
     def mended(self, number: int) -> None:
-        """Take a problem back; an unknown one is gone already, which is all right."""
+        """Remove a problem; an unknown one is ignored."""
         self._pending.problem(number, "")
 
     # The socket -----------------------------------------------------------------
 
     def restart(self) -> None:
-        """Tell everything again, because the page has a new socket or lost track."""
+        """Send the whole state again, to a new socket or after a missed frame."""
         self._pending.send_all = True
         self._seen = self._frame
 
     def receive(self, text: str | bytes) -> list[PageEvent]:
-        """Take a message from the page.
+        """Process a message from the page.
 
         Returns:
-            What others should hear of; not what concerns an element, a map or a
-            module that has gone meanwhile.
+            The messages for others, without those about an element, a map or a module
+            that was removed meanwhile.
 
         Raises:
-            WireError: If it is no message that a page may send.
+            WireError: If it is not a message that a page may send.
 
         """
         message = read_message(text)
@@ -302,10 +302,10 @@ class SceneSession:
         return True
 
     def frame(self, now: float) -> bytes | None:
-        """Return the next frame, or None if there is nothing to say, or not yet.
+        """Return the next frame, or None if there is nothing to send, or not yet.
 
-        A page that was spoken to is told the time every :data:`HEARTBEAT` seconds at
-        the latest, so that it notices when nobody speaks any more.
+        A page gets the time at least every :data:`HEARTBEAT` seconds, so that it
+        detects when the display stops sending.
 
         Args:
             now: Seconds of :func:`time.monotonic`.
@@ -325,7 +325,7 @@ class SceneSession:
         return head + body
 
     def _changes(self) -> bytes | None:
-        """Return what is new since the last frame; None if it was forgotten."""
+        """Return the changes since the last frame; None if they were discarded."""
         parts: list[bytes | bytearray] = [self._pending.gone]
         fragments = self._fragments
         for fragment, known in fragments.items():
