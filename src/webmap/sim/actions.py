@@ -107,7 +107,7 @@ class ActionlibServer:
         wanted, stamp = publication.message["id"], publication.message["stamp"]
         before = _seconds(stamp)
         for tracked in self._goals:
-            # An empty id with a stamp: all goals up to then. Without a stamp: all goals.
+            # An empty id with a stamp: all goals up to it. No stamp: all goals.
             everything = not wanted and not before
             earlier = before and _seconds(tracked.goal_id["stamp"]) <= before
             if everything or earlier or (wanted and tracked.goal_id["id"] == wanted):
