@@ -10,8 +10,8 @@ Parents = Mapping[str, str]
 BASE = re.compile(
     r"(?P<prefix>(?:.*[/_])?)(?:base_footprint|base_link)\Z|(?P<space>(?:.*/)?)base\Z"
 )
-"""What the frame of a robot's base is called, after a prefix of its own."""
 """Names of the frame of a robot's base, after a prefix of the robot."""
+
 WORLD = re.compile(r"(?:.*[/_])?(?:map|world|earth)\Z")
 MAP = "map"
 """The frame of the map, unless the tree has none of that name (REP 105)."""

@@ -256,7 +256,7 @@ export class Drive {
   }
 
   /**
-   * End a STOP. Moves nothing, and gives nobody control.
+   * End a STOP. Moves nothing, and gives control to no operator.
    *
    * The gate refuses it if STOP was pressed again since then.
    *

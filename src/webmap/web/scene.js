@@ -229,7 +229,7 @@ export class Scene {
    * @param {number} id
    * @param {number | undefined} flags undefined to stop listening.
    * @param {string} kind
-   * @param {number | undefined} flags undefined to hear no more.
+   * @param {number | undefined} flags undefined to stop listening.
    */
   _hear(id, element, kind, flags) {
     const mount = this._mounts.get(id);

@@ -104,13 +104,13 @@ class Observed:
     """Why the bridge does not list its topics, empty if it does."""
 
     told: bool = False
-    """Whether the user gave the topics."""
+    """Whether the list of topics was given by hand."""
 
     shown: tuple[str, ...] = ()
     """Topics that no client needs and that the bridge lists."""
 
     types: Mapping[str, str] = field(default_factory=dict)
-    """Types by topic, from the bridge or the user's list."""
+    """Types by topic, from the bridge or the given list."""
 
     findings: Findings = field(default_factory=Findings)
     """The robots that are measured, with the topics that are in use."""

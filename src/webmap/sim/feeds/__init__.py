@@ -2,7 +2,7 @@
 
 Costmaps, clouds, footprints, particles, covariances, look-ahead points, sonars, fixes,
 markers, diagnostics and logs, under the names of Nav2 and move_base. Each is advertised
-for each robot, and computed only while somebody subscribes. Open ``feed`` first.
+for each robot, and computed only while it has subscribers. Open ``feed`` first.
 """
 
 from webmap.sim.feeds.cloud import Clouds
