@@ -202,7 +202,7 @@ export class MapCanvas {
     return () => this._onSelect.delete(fn);
   }
 
-  /** Suppress the click with which the browser ends a drag; call at the end of a drag. */
+  /** Suppress the click that ends a drag in the browser; call at the end of a drag. */
   suppressNextClick() {
     this._dragEnd.note(performance.now());
   }
